@@ -13,11 +13,11 @@ from forward_cases import clock, medians
 from forward_tables import Promise, cell, promises
 from report import Report
 from tomoskin.core import ModelError
-from tomoskin.inverse import RULES, Evidence, LightTouch, Spectrum, choose
+from tomoskin.imaging import RULES, Evidence, LightTouch, Spectrum, choose
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, prepare
 from tomoskin.pipeline.tune import tune
-from tomoskin.signal import Reference
-from tomoskin.skin import Skin
+from tomoskin.sensing.signal import Reference
 
 CELLS = (660, 3000)
 SECONDS = 2.0

@@ -12,20 +12,13 @@ from pathlib import Path
 import numpy as np
 
 from report import Report
-from tomoskin.calibration import (
-    BENDS,
-    BendExamples,
-    BendModel,
-    Differences,
-    FrameView,
-    JointReference,
-)
 from tomoskin.core import Detection, FloatArray, Frame
-from tomoskin.mesh import Cylinder, Hinge
+from tomoskin.learning import BENDS, BendExamples, BendModel, Differences, FrameView, JointReference
+from tomoskin.model.mesh import Cylinder, Hinge
 from tomoskin.pipeline import FrameResult, Pipeline
 from tomoskin.pipeline.finding import finding, voltage_covariance
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
-from tomoskin.signal import Reference
+from tomoskin.sensing.signal import Reference
 from tomoskin.twin import Bent, Pose, Press
 from touch_fit import HOLD, Lab, drawn
 

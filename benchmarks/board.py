@@ -11,16 +11,16 @@ from pathlib import Path
 import numpy as np
 
 from report import Report
+from tomoskin.board.source import Link, ScanSettings, SerialTransport, Timing
 from tomoskin.core import Frame
-from tomoskin.emulator import (
+from tomoskin.model.pattern import Pattern, Scan
+from tomoskin.twin.emulator import (
     BoardProcess,
     Front,
     SkinMemory,
     build_pico_programs,
     build_programs,
 )
-from tomoskin.pattern import Pattern, Scan
-from tomoskin.source import Link, ScanSettings, SerialTransport, Timing
 
 FRAMES = 100_000
 PICO_FRAMES = 2_000

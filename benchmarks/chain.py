@@ -18,17 +18,17 @@ import numpy as np
 
 from report import Report, progress
 from served import served
+from tomoskin.board.source import SerialTransport
 from tomoskin.core import FloatArray
-from tomoskin.emulator import SkinMemory
-from tomoskin.emulator.program import BUILD, make_firmware
-from tomoskin.emulator.source import front_of
+from tomoskin.files.session import SessionReader
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, prepare
-from tomoskin.recording import SessionReader
 from tomoskin.run import Runner, commands
-from tomoskin.sink import ContactListener, Contacts
-from tomoskin.skin import Skin
-from tomoskin.source import SerialTransport
+from tomoskin.run.sinks import ContactListener, Contacts
 from tomoskin.twin import Press, TwinSettings, TwinSkin
+from tomoskin.twin.emulator import SkinMemory
+from tomoskin.twin.emulator.program import BUILD, make_firmware
+from tomoskin.twin.emulator.source import front_of
 
 SKIN, SEED = "textile-disc-8", 5
 SETTLING = "228 us"

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from report import Report, progress
+from tomoskin.board.source import Link, ScanSettings
 from tomoskin.core import FloatArray, Frame, Touch
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Pipeline, Prepared, prepare
-from tomoskin.skin import Skin
-from tomoskin.source import Link, ScanSettings
 from tomoskin.twin import Press, open_twin
 
 SKINS = ("textile-disc-8", "textile-disc-16", "textile-disc-32")

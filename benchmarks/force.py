@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from report import Report
-from tomoskin.calibration import ForceModel, ForceProcess, WeighedPresses, identify
 from tomoskin.core import Detection, Frame
+from tomoskin.learning import ForceModel, ForceProcess, WeighedPresses, identify
 from tomoskin.twin import Press
 from touch_fit import INSIDE, Lab
 

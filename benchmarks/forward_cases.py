@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tomoskin.core import IntArray
-from tomoskin.mesh import Disc, ElectrodeArc, Mesh, cylinder, triangulate
-from tomoskin.pattern import Pattern
+from tomoskin.model.mesh import Disc, ElectrodeArc, Mesh, cylinder, triangulate
+from tomoskin.model.pattern import Pattern
 
 ELECTRODES = 16
 RADIUS = 0.1

@@ -15,9 +15,9 @@ from forward_cases import PATTERN, Case, medians
 from forward_peak import peaks
 from forward_script import Script
 from tomoskin.core import FloatArray, IntArray
-from tomoskin.forward import ForwardModel, State
-from tomoskin.inverse import OneStep
-from tomoskin.mesh import Mesh
+from tomoskin.imaging import OneStep
+from tomoskin.model.forward import ForwardModel, State
+from tomoskin.model.mesh import Mesh
 
 ALPHA = 1e-3
 AGREE = 1e-9

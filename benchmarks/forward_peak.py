@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from forward_cases import PATTERN, Case
-from tomoskin.forward import ForwardModel
-from tomoskin.mesh import Mesh
+from tomoskin.model.forward import ForwardModel
+from tomoskin.model.mesh import Mesh
 
 _STATUS = Path("/proc/self/status")
 

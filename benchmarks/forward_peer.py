@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from tomoskin.core import FloatArray
-from tomoskin.mesh import Mesh
-from tomoskin.pattern import Pattern
+from tomoskin.model.mesh import Mesh
+from tomoskin.model.pattern import Pattern
 
 INSTALLED = find_spec("pyeit") is not None
 

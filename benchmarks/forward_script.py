@@ -9,8 +9,8 @@ from scipy.sparse import coo_array, csc_array
 from scipy.sparse.linalg import splu
 
 from tomoskin.core import FloatArray
-from tomoskin.mesh import Mesh
-from tomoskin.pattern import Pattern
+from tomoskin.model.mesh import Mesh
+from tomoskin.model.pattern import Pattern
 
 
 class Script:

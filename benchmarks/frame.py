@@ -11,12 +11,12 @@ import numpy as np
 
 from forward_cases import clock
 from report import Report
+from tomoskin.board.source import Link, ScanSettings
+from tomoskin.board.wire import Decoder, encode
 from tomoskin.core import Frame
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Pipeline, Prepared, prepare
-from tomoskin.skin import Skin
-from tomoskin.source import Link, ScanSettings
 from tomoskin.twin import Press, open_twin
-from tomoskin.wire import Decoder, encode
 
 CASES = (
     ("textile-disc-8", 660),

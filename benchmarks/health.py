@@ -13,10 +13,10 @@ from health_real import real_reports
 from health_rig import PROBE, Rig, missed_by, places
 from report import Report
 from tomoskin.core import FloatArray
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Measured, Pipeline, Prepared, prepare
 from tomoskin.pipeline.conditioning import Followed
-from tomoskin.signal import Health, Reference
-from tomoskin.skin import Skin
+from tomoskin.sensing.signal import Health, Reference
 from tomoskin.twin import Faults, Press
 
 SEEDS = (0, 1, 2, 3, 4, 5)

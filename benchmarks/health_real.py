@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from report import Report
 from tomoskin.core import FloatArray
-from tomoskin.pattern import Pattern
-from tomoskin.signal import Baseline, Monitor, NuisanceSubspace, Reference
+from tomoskin.model.pattern import Pattern
+from tomoskin.sensing.signal import Baseline, Monitor, NuisanceSubspace, Reference
 
 IDLE = 20
 """First frames of a recording that make its reference."""

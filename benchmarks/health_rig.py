@@ -7,8 +7,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from tomoskin.core import FloatArray, Frame, Touch
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import FrameResult, Pipeline
-from tomoskin.skin import Skin
 from tomoskin.twin import Faults, Press, TwinSettings, make_electronics
 from twin import table_of
 

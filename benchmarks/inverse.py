@@ -11,8 +11,8 @@ from forward_cases import PATTERN, Case, clock, disc, medians
 from forward_tables import Promise, cell, promises
 from report import Report
 from tomoskin.core import FloatArray
-from tomoskin.forward import ForwardModel
-from tomoskin.inverse import PRIORS, OneStep
+from tomoskin.imaging import PRIORS, OneStep
+from tomoskin.model.forward import ForwardModel
 
 ALPHA = 0.1
 SECONDS = 3.0

@@ -10,11 +10,11 @@ import numpy as np
 
 import force as weighing
 from report import Report, progress
-from tomoskin.calibration import FORCE
+from tomoskin.board.source import Link, ScanSettings, Transport
 from tomoskin.core import Frame, Touch
+from tomoskin.learning import FORCE
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import FrameResult, Pipeline, Prepared, prepare
-from tomoskin.skin import Skin
-from tomoskin.source import Link, ScanSettings, Transport
 from tomoskin.twin import Press, TwinSettings, VirtualClock, make_twin
 
 SEEDS = (11,)

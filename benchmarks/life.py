@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 
 from report import Report, progress
 from tomoskin import Locator, Skin
-from tomoskin.calibration import CalibrationHealth, Watch
+from tomoskin.board.source import ScanSettings
 from tomoskin.core import Frame
-from tomoskin.forward import ForwardModel
-from tomoskin.mesh import triangulate
-from tomoskin.pattern import Scan
-from tomoskin.signal import Readout
-from tomoskin.source import ScanSettings
-from tomoskin.touch import Region
+from tomoskin.learning import CalibrationHealth, Watch
+from tomoskin.model.forward import ForwardModel
+from tomoskin.model.mesh import triangulate
+from tomoskin.model.pattern import Scan
+from tomoskin.sensing.segment import Region
+from tomoskin.sensing.signal import Readout
 from tomoskin.twin import Press, Stretched, TwinElectronics, TwinSettings, TwinSkin, table_of
 
 Floats = NDArray[np.float64]

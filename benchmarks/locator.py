@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from report import Report
 from tomoskin import Locator, Pattern, Skin
-from tomoskin.calibration import SessionAlignment, Watch
-from tomoskin.calibration.locator.process import Process, squared_distances
 from tomoskin.core import DataError
+from tomoskin.learning import SessionAlignment, Watch
+from tomoskin.learning.touch.process import Process, squared_distances
 
 SHARED = Path(__file__).parents[2] / "shared" / "data"
 

@@ -10,8 +10,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from report import Report
-from tomoskin.forward import ForwardModel
-from tomoskin.inverse import (
+from tomoskin.imaging import (
     Greit,
     LinearProblem,
     Merit,
@@ -24,7 +23,8 @@ from tomoskin.inverse import (
     figures,
     noise_figure,
 )
-from tomoskin.skin import Skin
+from tomoskin.model.forward import ForwardModel
+from tomoskin.model.skin import Skin
 
 SKINS = ("textile-disc-8", "textile-disc-16", "textile-square-16", "tank-16")
 FIGURES = (1.0, 1.5)  # below 1.2 no NOSER of the tank has one

@@ -10,11 +10,11 @@ from functools import cache
 import numpy as np
 
 from plant import Finger, Plant, plant_mesh
-from tomoskin.mesh import Mesh
+from tomoskin.board.source import Configuration, ScanSettings
+from tomoskin.model.mesh import Mesh
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import FrameResult, Pipeline, Prepared, prepare
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
-from tomoskin.skin import Skin
-from tomoskin.source import Configuration, ScanSettings
 
 FAST = {8: 4, 16: 2}
 """Conversions to a sample at which a board makes about 40 frames a second, by electrodes."""

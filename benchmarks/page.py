@@ -14,9 +14,9 @@ from threadpoolctl import threadpool_limits
 
 from page_stream import chromium, heap, opened, streaming
 from report import Report
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, colour_limit, prepare
 from tomoskin.server import STATIC
-from tomoskin.skin import Skin
 
 CORES = 2
 """A browser and a server: what every machine that shows a page has."""

@@ -12,8 +12,8 @@ import numpy as np
 import tomoskin.server.page_connection
 from page_stream import chromium, heap, opened, streaming
 from report import Report
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import prepare
-from tomoskin.skin import Skin
 
 CORES = 2
 MINUTES = 10.0

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import Frame
-from tomoskin.forward import ForwardModel
-from tomoskin.mesh import Mesh, laid_on, triangulate
-from tomoskin.pattern import Scan
-from tomoskin.signal import FIGURES, Readout
-from tomoskin.skin import Skin
-from tomoskin.touch.fit import Whitener, row_covariance
+from tomoskin.model.forward import ForwardModel
+from tomoskin.model.mesh import Mesh, laid_on, triangulate
+from tomoskin.model.pattern import Scan
+from tomoskin.model.skin import Skin
+from tomoskin.sensing.fit import Whitener, row_covariance
+from tomoskin.sensing.signal import FIGURES, Readout
 
 CELLS, MESH_SEED = 6600, 4711
 SOFT = 0.3

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from report import Report, progress
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, prepare
-from tomoskin.skin import Skin
 from tomoskin.twin import Press, SteppedSkin, TwinSettings
 
 SEEDS = (21, 22, 23)

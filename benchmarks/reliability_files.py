@@ -9,13 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
-from tomoskin.calibration import TOUCH
 from tomoskin.cli import main
 from tomoskin.core import DataError, Frame
-from tomoskin.formats import read_recording
-from tomoskin.recording import SessionReader, repair
-from tomoskin.signal import Recording
-from tomoskin.skin import Skin
+from tomoskin.files.imports import read_recording
+from tomoskin.files.session import SessionReader, repair
+from tomoskin.learning import TOUCH
+from tomoskin.model.skin import Skin
+from tomoskin.sensing.signal import Recording
 from tomoskin.twin import Script
 from trials import Judge, mutated, remade
 

@@ -18,8 +18,8 @@ from msgspec import inspect
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
+from tomoskin.model.skin import Skin
 from tomoskin.server.requests import Request
-from tomoskin.skin import Skin
 from trials import HANG, MEMORY, Tally, mutated
 
 SKIN = "textile-disc-8"

@@ -15,13 +15,13 @@ from multiprocessing import get_context
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 
+from tomoskin.board.source import open_source
 from tomoskin.core import DataError
+from tomoskin.files.session import SessionReader, repair
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, prepare
-from tomoskin.recording import SessionReader, repair
 from tomoskin.run import Runner, commands
-from tomoskin.sink import make_sink
-from tomoskin.skin import Skin
-from tomoskin.source import open_source
+from tomoskin.run.sinks import make_sink
 from trials import HANG, Judge
 
 SKIN, SOURCE = "textile-disc-8", "twin:fast"

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import scipy
 
-from tomoskin.forward import choose_engine
+from tomoskin.model.forward import choose_engine
 
 
 def machine() -> dict[str, str]:

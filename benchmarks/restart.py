@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from report import Report, progress
+from tomoskin.board.source import ScanSettings
 from tomoskin.core import FloatArray, Frame
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import FrameResult, Pipeline, Prepared, prepare
 from tomoskin.run.board_memory import Trial
-from tomoskin.skin import Skin
-from tomoskin.source import ScanSettings
 from tomoskin.twin import Press, TwinSettings, table_of
 from tomoskin.twin.source import make_electronics
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from from_examples import load_example
 from report import Report, progress
-from tomoskin.skin import Skin
+from tomoskin.model.skin import Skin
 
 SKINS = ("textile-disc-8", "textile-disc-16")
 PRESSES, SEED = 30, 11

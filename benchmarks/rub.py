@@ -14,12 +14,12 @@ from locator import SHARED, Set, held, mean_error, plain
 from report import Report, progress
 from sliding import LEAD, SPEED, START, Way, stage
 from tomoskin import Skin
-from tomoskin.calibration import Rubbing
 from tomoskin.core import DataError
-from tomoskin.recording import SessionReader
+from tomoskin.files.session import SessionReader
+from tomoskin.learning import Rubbing
 from tomoskin.run import simulate
-from tomoskin.signal import Readout
-from tomoskin.touch import Region
+from tomoskin.sensing.segment import Region
+from tomoskin.sensing.signal import Readout
 from tomoskin.twin import Script
 
 SKINS = {

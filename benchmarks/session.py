@@ -13,13 +13,20 @@ from pathlib import Path
 import numpy as np
 
 from report import Report
+from tomoskin.board.wire import encode
 from tomoskin.core import Frame
-from tomoskin.formats import write_parquet
-from tomoskin.pattern import Scan
-from tomoskin.recording import Mark, MarkedFrame, RawRead, Recorder, SessionReader, SessionWriter
-from tomoskin.sink import Capacity, Worker
-from tomoskin.skin import Skin
-from tomoskin.wire import encode
+from tomoskin.files.exports import write_parquet
+from tomoskin.files.session import (
+    Mark,
+    MarkedFrame,
+    RawRead,
+    Recorder,
+    SessionReader,
+    SessionWriter,
+)
+from tomoskin.model.pattern import Scan
+from tomoskin.model.skin import Skin
+from tomoskin.run.sinks import Capacity, Worker
 
 SKIN = "textile-disc-16"
 RATE = 1000.0

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from report import Report
 from session import LONG, RECORDED, SEED, SKIN, frames_of, recorded
-from tomoskin.skin import Skin
+from tomoskin.model.skin import Skin
 
 
 def run(data: Path | None) -> tuple[Report, ...]:

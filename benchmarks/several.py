@@ -13,18 +13,18 @@ from pathlib import Path
 import numpy as np
 
 from report import Report, progress
+from tomoskin.board.source import Configuration, ScanSettings, Transport
+from tomoskin.board.wire import Decoder, encode
 from tomoskin.core import FloatArray, Frame, SourceError
+from tomoskin.files.session.replay_board import ReplayBoard
+from tomoskin.model.robot import Place
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Pipeline, Prepared, prepare
-from tomoskin.recording.replay_board import ReplayBoard
-from tomoskin.robot import Place
 from tomoskin.run import Member, RobotRun
-from tomoskin.sink import ContactListener, Moment, Stream, contacts_of
-from tomoskin.skin import Skin
-from tomoskin.source import Configuration, ScanSettings, Transport
+from tomoskin.run.sinks import ContactListener, Moment, Stream, contacts_of
 from tomoskin.twin import Press, TwinSettings
 from tomoskin.twin.scanning import table_of
 from tomoskin.twin.source import make_electronics
-from tomoskin.wire import Decoder, encode
 
 SKIN, SKINS, SEED = "textile-disc-16", 8, 11
 RATE, PROMISED = 100.0, 5.0

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
 from tomoskin.core import FloatArray
-from tomoskin.forward import ForwardModel
-from tomoskin.mesh import Disc, ElectrodeArc, triangulate
-from tomoskin.pattern import Pattern
+from tomoskin.model.forward import ForwardModel
+from tomoskin.model.mesh import Disc, ElectrodeArc, triangulate
+from tomoskin.model.pattern import Pattern
 
 RADIUS, PIXELS, CELLS = 0.115, 256, 9000
 WIDTHS = (0.0115, 0.0125, 0.0135)

@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from report import Report, progress
+from tomoskin.board.source import Configuration, ScanSettings
 from tomoskin.core import Touch
+from tomoskin.files.session import SessionReader, tick_rate
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Pipeline, Prepared, prepare
-from tomoskin.recording import SessionReader, tick_rate
 from tomoskin.run import simulate
-from tomoskin.skin import Skin
-from tomoskin.source import Configuration, ScanSettings
-from tomoskin.touch import SlideCorrection
+from tomoskin.sensing.track import SlideCorrection
 from tomoskin.twin import Script
 
 SEEDS = (11, 12, 13)

@@ -14,13 +14,14 @@ from pathlib import Path
 
 from report import Report
 from served import served
+from tomoskin.board.source import Configuration, ScanSettings
+from tomoskin.board.wire import Decoder
 from tomoskin.core import Frame, SourceError
-from tomoskin.pattern import Scan
+from tomoskin.files.session import session_info
+from tomoskin.model.pattern import Scan
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import prepare
-from tomoskin.recording import session_info
 from tomoskin.run import Runner, commands
-from tomoskin.skin import Skin
-from tomoskin.source import Configuration, ScanSettings
 from tomoskin.twin import (
     Faults,
     Line,
@@ -31,7 +32,6 @@ from tomoskin.twin import (
     WallClock,
     make_twin,
 )
-from tomoskin.wire import Decoder
 
 SKIN, SEED = "textile-disc-8", 7
 MINUTES = 60.0

@@ -12,15 +12,15 @@ from numpy.typing import NDArray
 
 from report import Report
 from tomoskin import Skin
-from tomoskin.calibration import (
+from tomoskin.core import DataError
+from tomoskin.learning import (
     ChannelMapping,
     Classifier,
     against_rest,
     ring_of,
     solve_channel_mapping,
 )
-from tomoskin.core import DataError
-from tomoskin.pattern import match_rows
+from tomoskin.model.pattern import match_rows
 from tomoskin.twin import COMMON_PRESSES, SetPlan, make_shard
 
 SHARED = Path(__file__).parents[2] / "shared" / "data"

@@ -12,15 +12,16 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from report import Report
-from tomoskin.calibration import Differences, FrameView
+from tomoskin.board.source import ScanSettings
+from tomoskin.board.wire import Drive
 from tomoskin.core import Detection, Frame
+from tomoskin.learning import Differences, FrameView
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import prepare
 from tomoskin.pipeline.finding import Finder, finding
 from tomoskin.pipeline.tune import tuned, tuned_sheet
-from tomoskin.signal import Reference
-from tomoskin.skin import Skin
-from tomoskin.source import ScanSettings
-from tomoskin.touch.fit import Whitener, row_covariance
+from tomoskin.sensing.fit import Whitener, row_covariance
+from tomoskin.sensing.signal import Reference
 from tomoskin.twin import (
     Press,
     SampleTable,
@@ -29,7 +30,6 @@ from tomoskin.twin import (
     make_electronics,
     sample_table,
 )
-from tomoskin.wire import Drive
 
 SEEDS = (11, 12, 13)
 SKINS = ("textile-disc-8", "textile-disc-16")

@@ -8,9 +8,9 @@ import numpy as np
 
 from noisy_board import Floats, Noise, NoisyBoard
 from report import Report, progress
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Pipeline, Prepared, prepare, voltage_covariance
-from tomoskin.skin import Skin
-from tomoskin.touch.fit import Whitener
+from tomoskin.sensing.fit import Whitener
 
 SKINS = ("textile-disc-8", "textile-disc-16")
 SEED = 31

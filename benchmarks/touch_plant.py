@@ -13,16 +13,16 @@ from scipy.optimize import linear_sum_assignment
 
 from plant import Finger, Floats, Plant, plant_mesh
 from report import Report, progress
-from tomoskin.calibration import Differences, FrameView
 from tomoskin.core import Detection
-from tomoskin.mesh import Mesh
+from tomoskin.learning import Differences, FrameView
+from tomoskin.model.mesh import Mesh
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import prepare
 from tomoskin.pipeline.finding import Finder, finding
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.pipeline.tune import tuned, tuned_sheet
-from tomoskin.signal import NuisanceSubspace, Reference
-from tomoskin.signal.health import Roles
-from tomoskin.skin import Skin
+from tomoskin.sensing.signal import NuisanceSubspace, Reference
+from tomoskin.sensing.signal.health import Roles
 
 SEEDS = (11, 12, 13)
 SHEETS, PLACEMENTS = 3, 9

@@ -15,12 +15,12 @@ import numpy as np
 
 from report import Report, progress
 from tomoskin import Locator, Skin
-from tomoskin.calibration import Several
 from tomoskin.core import DataError, Detection
+from tomoskin.files.session import SessionReader, tick_rate
+from tomoskin.learning import Several
 from tomoskin.pipeline import FrameResult, Pipeline, Prepared, prepare
-from tomoskin.recording import SessionReader, tick_rate
 from tomoskin.run import simulate
-from tomoskin.touch import Tracker
+from tomoskin.sensing.track import Tracker
 from tomoskin.twin import Script
 
 SHARED = Path(__file__).parents[2] / "shared" / "data"
@@ -402,7 +402,7 @@ def _events(
 
 
 def _interval(prepared: Prepared) -> float:
-    from tomoskin.source import Configuration, ScanSettings
+    from tomoskin.board.source import Configuration, ScanSettings
 
     return Configuration.of(prepared.scan, ScanSettings.of(prepared.skin)).scan_time
 

@@ -10,11 +10,12 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from report import Report
-from tomoskin.forward import State
-from tomoskin.pattern import Scan
+from tomoskin.board.source import ScanSettings
+from tomoskin.board.wire import Drive
+from tomoskin.model.forward import State
+from tomoskin.model.pattern import Scan
+from tomoskin.model.skin import Skin
 from tomoskin.run import in_processes, in_this_process, make_set
-from tomoskin.skin import Skin
-from tomoskin.source import ScanSettings
 from tomoskin.twin import (
     COMMON_PRESSES,
     Press,
@@ -28,7 +29,6 @@ from tomoskin.twin import (
     sample_table,
 )
 from tomoskin.twin.dent import solved_dent
-from tomoskin.wire import Drive
 
 CASES = (
     ("textile-disc-16", "ideal", 3000),

@@ -14,8 +14,8 @@ import twin
 import wire
 from forward_cases import clock
 from report import Report, cell, named, progress
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import prepare
-from tomoskin.skin import Skin
 from whole_forward import forward_lines
 from whole_line import Line
 from whole_page import page_lines

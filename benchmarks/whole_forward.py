@@ -12,7 +12,7 @@ from forward_measure import ALPHA, measure_touch, set_up
 from forward_peer import INSTALLED, Peer
 from forward_script import Script
 from tomoskin.core import FloatArray
-from tomoskin.forward import ForwardModel
+from tomoskin.model.forward import ForwardModel
 from whole_line import Line
 
 CELLS, SECONDS = 3000, 8.0

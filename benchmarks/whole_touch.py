@@ -13,7 +13,7 @@ from scipy.interpolate import RBFInterpolator
 import frame
 from tomoskin import Locator, Skin
 from tomoskin.core import FloatArray
-from tomoskin.formats import read_recording
+from tomoskin.files.imports import read_recording
 from tomoskin.pipeline import prepare
 from tomoskin.run import in_this_process, make_set
 from tomoskin.twin import COMMON_PRESSES, SetPlan

@@ -8,9 +8,9 @@ import numpy as np
 
 from forward_cases import clock
 from report import Report
+from tomoskin.board.wire import Decoder, PackedFrame, encode
 from tomoskin.core import Frame
-from tomoskin.pattern import Pattern, Scan
-from tomoskin.wire import Decoder, PackedFrame, encode
+from tomoskin.model.pattern import Pattern, Scan
 
 BAUD = 1_000_000
 READ = 4096

@@ -167,7 +167,7 @@ Frame = tuple[
 """Whitened data (c,), the square of their rest, directions (q, c) that are left, an offset (rank,),
 deviations of direction, shape, way and growth, the least and largest depth, and of the touches that
 are expected spots (m, 4), covariances (m, 3, 3) of all columns but the content, and the logarithm
-of the volume of a content's prior: see tomoskin.touch.fit.expectation."""
+of the volume of a content's prior: see tomoskin.sensing.fit.expectation."""
 
 Fitted = tuple[
     list[NDArray[np.float64]],
@@ -177,7 +177,7 @@ Fitted = tuple[
 ]
 """Spots (k, 4), each (k, c), slopes (4k, c), unknown (q, c), normal (4k, 4k); change (rank,),
 predicted (c,), residual (c,), gradient (4k,); misfit, log_size, cost, settled; known (k): see
-tomoskin.touch.fit.refine.Fit."""
+tomoskin.sensing.fit.refine.Fit."""
 
 @final
 class Terminals:
@@ -265,7 +265,7 @@ def lines(
 @final
 class SpotTable:
     """What one spot of four columns (x, y, logarithm of the radius, content) does: see
-    tomoskin.touch.fit.table, which makes it."""
+    tomoskin.sensing.fit.table, which makes it."""
 
     def __new__(
         cls,
@@ -367,7 +367,7 @@ class SeenTable:
 
 @final
 class Reduced:
-    """What stands for the exact model: see tomoskin.touch.fit.certificate."""
+    """What stands for the exact model: see tomoskin.sensing.fit.certificate."""
 
     def __new__(
         cls,

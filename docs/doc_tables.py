@@ -12,8 +12,8 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from tomoskin.robot import SECTIONS as ROBOT_SECTIONS
-from tomoskin.skin import SECTIONS, Key, Section, literal
+from tomoskin.model.robot import SECTIONS as ROBOT_SECTIONS
+from tomoskin.model.skin import SECTIONS, Key, Section, literal
 from tomoskin.twin import (
     PRESETS,
     BendSettings,

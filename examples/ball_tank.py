@@ -30,11 +30,11 @@ import figures
 from figure_file import chosen, parser_of
 from lab import report
 from tomoskin.core import FloatArray, written
-from tomoskin.formats import read_recording
-from tomoskin.forward import ForwardModel
-from tomoskin.inverse import RandomField
-from tomoskin.mesh import Disc, ElectrodeArc, extrude, ring, triangulate
-from tomoskin.pattern import Pattern
+from tomoskin.files.imports import read_recording
+from tomoskin.imaging import RandomField
+from tomoskin.model.forward import ForwardModel
+from tomoskin.model.mesh import Disc, ElectrodeArc, extrude, ring, triangulate
+from tomoskin.model.pattern import Pattern
 
 RECORDINGS = Path(__file__).resolve().parents[2] / "shared" / "data" / "eidors_tanks16"
 PLACED, CARRIED = "ottawa2005_golfball_ph3.npz", "ottawa2005_moving_ball_series.npz"

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import ComplexArray, FloatArray
-from tomoskin.mesh import Disc, FacePatch, Mesh, extrude
+from tomoskin.model.mesh import Disc, FacePatch, Mesh, extrude
 
 HALF_AXES = np.array([75.0, 105.0, 85.0])
 """Of the half ellipsoid that the face is a part of: width, height, depth."""

@@ -17,9 +17,9 @@ import numpy as np
 
 import figures
 from lab import options_of, report
-from tomoskin.forward import ForwardModel
-from tomoskin.mesh import Mesh, quality, triangulate
-from tomoskin.skin import Skin
+from tomoskin.model.forward import ForwardModel
+from tomoskin.model.mesh import Mesh, quality, triangulate
+from tomoskin.model.skin import Skin
 
 TRIANGLES, NODES = 661, 362
 """The thesis's mesh."""

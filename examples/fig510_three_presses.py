@@ -23,7 +23,7 @@ import figures
 from imaging import FRAMES, NOSER, Imager, named_metrics
 from lab import Lab, open_lab, report
 from tomoskin.core import Detection, FloatArray, Image
-from tomoskin.signal import Reference
+from tomoskin.sensing.signal import Reference
 from tomoskin.twin import Circle, Probe
 
 RADIUS, FORCE, FROM_CENTRE = 15e-3, 0.4 * 9.81, 70e-3

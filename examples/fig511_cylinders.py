@@ -25,7 +25,7 @@ from fig58_single_press import elongation
 from imaging import NOSER, Imager
 from lab import Lab, open_lab, report
 from tomoskin.core import Detection, Image
-from tomoskin.mesh import Hinge
+from tomoskin.model.mesh import Hinge
 from tomoskin.twin import Bent, Circle, Pose, Probe
 
 PART, LONGER, ROUND = 0.7, 1.7, 1.5

@@ -24,9 +24,9 @@ import numpy as np
 import figures
 from imaging import NOSER, Imager
 from lab import Lab, open_lab, report
-from tomoskin.calibration import JointReference
 from tomoskin.core import Detection, FloatArray, Image
-from tomoskin.mesh import Cylinder, Hinge, Saddle
+from tomoskin.learning import JointReference
+from tomoskin.model.mesh import Cylinder, Hinge, Saddle
 from tomoskin.twin import Bent, Circle, Pose, Probe
 
 RADIUS, FORCE, PART = 18e-3, 5.0, 0.7

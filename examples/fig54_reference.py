@@ -22,7 +22,7 @@ import numpy as np
 import figures
 from lab import Lab, open_lab, report, source_drive
 from tomoskin.core import FloatArray
-from tomoskin.forward import ForwardModel
+from tomoskin.model.forward import ForwardModel
 
 N = 8
 

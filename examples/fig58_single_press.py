@@ -20,7 +20,7 @@ import figures
 from imaging import NOSER, Imager, named_metrics
 from lab import Lab, open_lab, report
 from tomoskin.core import Detection, Image
-from tomoskin.mesh import Mesh
+from tomoskin.model.mesh import Mesh
 from tomoskin.twin import Circle, Probe
 
 RADIUS, FORCE, FROM_CENTRE, PART = 18e-3, 5.0, 62e-3, 0.7

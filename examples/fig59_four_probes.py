@@ -20,8 +20,8 @@ import figures
 from imaging import FRAMES, NOSER, Imager, named_metrics
 from lab import Lab, open_lab, report
 from tomoskin.core import FloatArray, Image
-from tomoskin.mesh import Mesh
-from tomoskin.signal import Reference
+from tomoskin.model.mesh import Mesh
+from tomoskin.sensing.signal import Reference
 from tomoskin.twin import Circle, Probe, Square
 
 FORCE = 3.0

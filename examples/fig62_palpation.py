@@ -23,15 +23,15 @@ import figures
 from bodies import options_of
 from lab import FRAMES as SOURCE_FRAMES
 from lab import Changes, report
+from tomoskin.board.source import ScanSettings
 from tomoskin.core import Detection, FloatArray, Frame
-from tomoskin.forward import ForwardModel
-from tomoskin.inverse import Matern, OneStep
-from tomoskin.mesh import Mesh
-from tomoskin.pattern import Scan
-from tomoskin.signal import NuisanceSubspace, Readout
-from tomoskin.skin import Skin
-from tomoskin.source import ScanSettings
-from tomoskin.touch import SpotFinder, SpotModel, measured_covariance
+from tomoskin.imaging import Matern, OneStep
+from tomoskin.model.forward import ForwardModel
+from tomoskin.model.mesh import Mesh
+from tomoskin.model.pattern import Scan
+from tomoskin.model.skin import Skin
+from tomoskin.sensing.fit import SpotFinder, SpotModel, measured_covariance
+from tomoskin.sensing.signal import NuisanceSubspace, Readout
 from tomoskin.twin import (
     ContactSettings,
     Inclusion,

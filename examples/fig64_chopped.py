@@ -43,13 +43,13 @@ from fig64_face import (
     whole_runs,
 )  # fmt: skip
 from lab import report
-from tomoskin.calibration import Classifier
+from tomoskin.board.wire import Drive
 from tomoskin.core import FloatArray
-from tomoskin.pattern import Scan
+from tomoskin.learning import Classifier
+from tomoskin.model.pattern import Scan
 from tomoskin.twin import ElectronicsSettings, SampleTable, ScanClock, chopped_table, sample_table
 from tomoskin.twin.electrodes import Electrodes
 from tomoskin.twin.presets import POLARISING
-from tomoskin.wire import Drive
 
 SCAN = Scan.of(PATTERN)
 FREQUENCY, READINGS = 1000.0, 4

@@ -32,11 +32,11 @@ import figures
 from bodies import options_of
 from face import CONTACT, EXPRESSIONS, Bump, Face, face, movement
 from lab import report
-from tomoskin.calibration import Classifier
 from tomoskin.core import ComplexArray, FloatArray
-from tomoskin.forward import ForwardModel, State
-from tomoskin.inverse import LinearProblem, Matern
-from tomoskin.pattern import Pattern
+from tomoskin.imaging import LinearProblem, Matern
+from tomoskin.learning import Classifier
+from tomoskin.model.forward import ForwardModel, State
+from tomoskin.model.pattern import Pattern
 
 PATTERN = Pattern.adjacent(8)
 CURRENT = 1e-3

@@ -12,7 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from tomoskin.core import AMOUNT, CHANGE, Detection, FloatArray, IntArray
-from tomoskin.mesh import Mesh
+from tomoskin.model.mesh import Mesh
 
 BLUE, ORANGE, GREEN, PALE = "#0072B2", "#D55E00", "#009E73", "#56B4E9"
 """Okabe and Ito's colours."""

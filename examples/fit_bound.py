@@ -23,14 +23,14 @@ from matplotlib.figure import Figure
 import figures
 from bodies import options_of
 from lab import report
-from tomoskin.calibration import Differences, FrameView
 from tomoskin.core import FloatArray
+from tomoskin.learning import Differences, FrameView
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, prepare
 from tomoskin.pipeline.finding import finding
 from tomoskin.pipeline.tune import tuned_sheet
-from tomoskin.signal import Reference
-from tomoskin.skin import Skin
-from tomoskin.touch.fit import Whitener, row_covariance
+from tomoskin.sensing.fit import Whitener, row_covariance
+from tomoskin.sensing.signal import Reference
 from tomoskin.twin import Press, TwinSettings, TwinSkin
 
 SKINS = ("textile-disc-8", "textile-disc-16")

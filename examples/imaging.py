@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from tomoskin.core import Detection, FloatArray, Image
-from tomoskin.inverse import ThesisMetrics
+from tomoskin.imaging import ThesisMetrics
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import prepare
-from tomoskin.signal import difference
-from tomoskin.skin import Skin
-from tomoskin.touch import Segmenter
+from tomoskin.sensing.segment import Segmenter
+from tomoskin.sensing.signal import difference
 
 NOSER = {"inverse": {"prior": "noser", "difference": "normalised", "alpha": "auto"}}
 """The thesis's inverse: NOSER's prior, one step, normalised differences; alpha by the noise."""

@@ -29,8 +29,7 @@ from scipy.spatial import cKDTree
 
 from tomoskin import core
 from tomoskin.core import CHANGE, DataError, FloatArray, TomoskinError
-from tomoskin.forward import ForwardModel
-from tomoskin.inverse import (
+from tomoskin.imaging import (
     AbsoluteImaging,
     Matern,
     Observation,
@@ -39,8 +38,9 @@ from tomoskin.inverse import (
     SimilarityWindows,
     homogeneous,
 )
-from tomoskin.mesh import Disc, ElectrodeArc, Mesh, triangulate
-from tomoskin.pattern import Pattern
+from tomoskin.model.forward import ForwardModel
+from tomoskin.model.mesh import Disc, ElectrodeArc, Mesh, triangulate
+from tomoskin.model.pattern import Pattern
 
 Labels = NDArray[np.uint8]
 WATER, RESISTIVE, CONDUCTIVE = 0, 1, 2

@@ -20,12 +20,12 @@ from typing import Any, Protocol
 import numpy as np
 
 from figure_file import FigureFile, chosen, parser_of
+from tomoskin.board.source import Link, ScanSettings, Transport, open_source
 from tomoskin.core import DataError, FloatArray, Frame
-from tomoskin.pattern import Pattern, Scan
-from tomoskin.recording import SessionReader, SessionWriter
-from tomoskin.signal import Readout
-from tomoskin.skin import Skin
-from tomoskin.source import Link, ScanSettings, Transport, open_source
+from tomoskin.files.session import SessionReader, SessionWriter
+from tomoskin.model.pattern import Pattern, Scan
+from tomoskin.model.skin import Skin
+from tomoskin.sensing.signal import Readout
 from tomoskin.twin import Pose, Probe, TwinSettings, TwinTransport, VirtualClock, make_twin
 
 FRAMES = 10

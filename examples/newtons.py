@@ -23,10 +23,10 @@ from matplotlib.figure import Figure
 import figures
 from bodies import options_of
 from lab import report
-from tomoskin.calibration import FORCE, ForceModel, WeighedPresses
 from tomoskin.core import FloatArray
+from tomoskin.learning import FORCE, ForceModel, WeighedPresses
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, prepare
-from tomoskin.skin import Skin
 from tomoskin.twin import Circle, Contact, Press, Probe, SteppedSkin, TwinSettings
 
 SKIN, RADIUS = "textile-disc-16", 12e-3

@@ -22,8 +22,8 @@ import figures
 from imaging import Imager
 from lab import Lab, in_front_of, open_lab, report
 from tomoskin.core import FloatArray
-from tomoskin.inverse import ThesisMetrics
-from tomoskin.pattern import match_rows
+from tomoskin.imaging import ThesisMetrics
+from tomoskin.model.pattern import match_rows
 from tomoskin.twin import Circle, Probe
 
 PATTERNS = ("adjacent", "opposite", "skip:2")

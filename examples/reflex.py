@@ -22,10 +22,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tomoskin.core import FloatArray
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import prepare
 from tomoskin.run import Runner
-from tomoskin.sink import ContactListener, Contacts
-from tomoskin.skin import Skin
+from tomoskin.run.sinks import ContactListener, Contacts
 from tomoskin.twin import Press, TwinSettings, TwinTransport, WallClock, make_twin
 
 LINKS = (0.30, 0.25)

@@ -24,10 +24,10 @@ import figures
 from bodies import options_of
 from lab import report
 from tomoskin.core import FloatArray
-from tomoskin.forward import ForwardModel
-from tomoskin.inverse import Matern, OneStep, Operator
-from tomoskin.mesh import Disc, Mesh, extrude, ring
-from tomoskin.pattern import named
+from tomoskin.imaging import Matern, OneStep, Operator
+from tomoskin.model.forward import ForwardModel
+from tomoskin.model.mesh import Disc, Mesh, extrude, ring
+from tomoskin.model.pattern import named
 
 RADIUS, HEIGHT = 50e-3, 40e-3
 WALL = Disc(RADIUS)

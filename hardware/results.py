@@ -12,7 +12,8 @@ from pathlib import Path
 
 from spice import run
 
-FILE = Path(__file__).resolve().parent.parent / "src" / "tomoskin" / "signal" / "board.toml"
+ROOT = Path(__file__).resolve().parent.parent
+FILE = ROOT / "src" / "tomoskin" / "sensing" / "signal" / "board.toml"
 Figures = dict[str, float]
 
 LSB = 5 / 1024

@@ -8,8 +8,8 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from tomoskin.wire import SCHEMA, Schema
-from tomoskin.wire.schema import FieldSpec
+from tomoskin.board.wire import SCHEMA, Schema
+from tomoskin.board.wire.schema import FieldSpec
 
 HEADER = Path(__file__).resolve().parent.parent / "firmware" / "src" / "protocol.h"
 _SIZES = {"u8": 1, "u16": 2, "u32": 4, "u64": 8}
@@ -18,7 +18,7 @@ _SIZES = {"u8": 1, "u16": 2, "u32": 4, "u64": 8}
 def header(schema: Schema) -> str:
     """Return the header: versions, hash, limits, message types, sizes, offsets, numbers, values."""
     parts = [
-        "/* The wire protocol. Made from src/tomoskin/wire/protocol.toml by\n"
+        "/* The wire protocol. Made from src/tomoskin/board/wire/protocol.toml by\n"
         "   scripts/firmware_header.py: change that file, not this one. */",
         "#ifndef TOMOSKIN_PROTOCOL_H\n#define TOMOSKIN_PROTOCOL_H\n\n#include <stdint.h>",
         "\n".join(

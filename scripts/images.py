@@ -32,7 +32,7 @@ def build(root: Path) -> None:
         When a build fails, or a compiler is missing: the other boards' images are there, stale
         ones are removed.
     """
-    folder, firmware = root / "src" / "tomoskin" / "emulator" / "images", root / "firmware"
+    folder, firmware = root / "src" / "tomoskin" / "twin" / "emulator" / "images", root / "firmware"
     sources = [
         firmware / "Makefile",
         *sorted(firmware.glob("src/*")),

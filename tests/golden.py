@@ -15,9 +15,9 @@ from scipy.io import loadmat
 from scipy.sparse import coo_array
 
 from tomoskin.core import FloatArray
-from tomoskin.forward import ForwardModel
-from tomoskin.mesh import Mesh
-from tomoskin.pattern import Pattern
+from tomoskin.model.forward import ForwardModel
+from tomoskin.model.mesh import Mesh
+from tomoskin.model.pattern import Pattern
 
 SHARED = Path("eidors_golden") / "a_disc8_netgen.mat"
 """The case that is in the data folder."""

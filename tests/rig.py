@@ -7,9 +7,9 @@ from playwright.sync_api import sync_playwright
 
 from run.board import Board, samples_of
 from server.watching import ARGUMENTS, Watched
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import prepare
 from tomoskin.run import Runner
-from tomoskin.skin import Skin
 
 
 @pytest.fixture(scope="session")

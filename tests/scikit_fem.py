@@ -23,7 +23,7 @@ from skfem import (
     MeshTri,
 )
 
-from tomoskin.mesh import Mesh
+from tomoskin.model.mesh import Mesh
 
 ELEMENTS = {
     2: (MeshTri, ElementTriP0, {1: ElementTriP1, 2: ElementTriP2}),

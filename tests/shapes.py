@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, IntArray
-from tomoskin.mesh import Disc, ElectrodeArc, Mesh, triangulate
+from tomoskin.model.mesh import Disc, ElectrodeArc, Mesh, triangulate
 
 
 @cache

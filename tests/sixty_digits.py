@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tomoskin.core import FloatArray
-from tomoskin.mesh import Mesh
-from tomoskin.pattern import Pattern
+from tomoskin.model.mesh import Mesh
+from tomoskin.model.pattern import Pattern
 
 DIGITS = 60
 

@@ -16,7 +16,7 @@ from typer.main import get_command
 
 from tomoskin.cli import main
 from tomoskin.cli.app import app
-from tomoskin.skin import Skin
+from tomoskin.model.skin import Skin
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from tomoskin.core import FloatArray
-from tomoskin.forward import ForwardModel
-from tomoskin.inverse import ShapeImaging
-from tomoskin.pattern import Scan
-from tomoskin.skin import Skin
+from tomoskin.imaging import ShapeImaging
+from tomoskin.model.forward import ForwardModel
+from tomoskin.model.pattern import Scan
+from tomoskin.model.skin import Skin
 from tomoskin.twin import TwinSettings, TwinSkin
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"

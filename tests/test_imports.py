@@ -12,16 +12,30 @@ from pathlib import Path
 
 import pytest
 
-from tomoskin._moved import RENAMED
-
 ROOT = Path(__file__).resolve().parent.parent
-ROOMS = [
-    *("core", "mesh", "pattern", "skin", "robot", "forward", "inverse", "wire", "source", "signal"),
-    *("touch", "calibration", "pipeline", "twin", "emulator", "recording", "formats"),
-    *("sink", "run", "server", "cli"),
+UNITS = {
+    "core": (),
+    "model": ("mesh", "pattern", "skin", "robot", "forward"),
+    "imaging": (),
+    "board": ("wire", "source"),
+    "sensing": ("signal", "track", "segment", "fit"),
+    "learning": (),
+    "pipeline": (),
+    "twin": (".", "emulator"),
+    "files": ("session", "imports", "exports"),
+    "run": ("sinks", "."),
+    "server": (),
+    "cli": (),
+}
+"""The rooms in their order, and in some of them further packages with an order of their own. Others
+import from the package itself, so its ``__all__`` is what it offers; "." are the room's modules."""
+
+ROOMS = list(UNITS)
+ORDER = [
+    room if part == "." else f"{room}.{part}"
+    for room, parts in UNITS.items()
+    for part in parts or (".",)
 ]
-FORMER = {"live", "session", "_moved"}
-"""Not rooms: the names of former ones, which say where they are now."""
 Sources = Mapping[str, str]
 
 
@@ -80,12 +94,16 @@ def _deferred(tree: ast.Module) -> Iterator[ast.AST]:
             yield from (child for child in ast.walk(node) if child is not node)
 
 
-def room_of(module: str) -> str | None:
-    """None for the package itself, and for the program that stands above all rooms."""
+def unit_of(module: str) -> str | None:
+    """The room of a module, or its package in :data:`ORDER`.
+
+    None for the package itself, and for the program that stands above all rooms.
+    """
     parts = module.split(".")
     if parts[0] != "tomoskin" or parts[1:] in ([], ["__main__"]):
         return None
-    return parts[1]
+    inner = ".".join(parts[1:3])
+    return inner if inner in ORDER else parts[1]
 
 
 def violations(sources: Sources) -> list[str]:
@@ -99,14 +117,13 @@ def violations(sources: Sources) -> list[str]:
 
 
 def _wrong(module: str, found: Import, sources: Sources) -> str | None:
-    here = room_of(module)
-    if found.module == "tomoskin" and found.name in ROOMS:
-        found = Import(found.line, f"tomoskin.{found.name}", "", found.runs_at_import)
-    there = room_of(found.module)
-    if here is None or here in FORMER or found.module.split(".")[0] != "tomoskin":
+    here = unit_of(module)
+    if here is None or found.module.split(".")[0] != "tomoskin":
         return None
-    if found.module == "tomoskin._moved":
-        return None
+    full = f"{found.module}.{found.name}"
+    if full in {f"tomoskin.{unit}" for unit in (*ROOMS, *ORDER)}:
+        found = Import(found.line, full, "", found.runs_at_import)
+    there = unit_of(found.module)
     if there is None:
         own = found.name == "__version__"
         return None if own else "a room imports rooms, not the package above them"
@@ -116,25 +133,25 @@ def _wrong(module: str, found: Import, sources: Sources) -> str | None:
 
 
 def _wrong_across(here: str, there: str, found: Import, sources: Sources) -> str | None:
-    unknown = {here, there} - set(ROOMS)
+    unknown = {here, there} - set(ORDER)
     if unknown:
         return f"no such room: {', '.join(sorted(unknown))}"
-    if ROOMS.index(there) > ROOMS.index(here):
+    if ORDER.index(there) > ORDER.index(here):
         return f"{here} stands above {there} and must not import it"
-    if _is_inner(found, sources):
+    if _is_inner(there, found, sources):
         return f"import from tomoskin.{there}, not from its inner modules"
     return None
 
 
 def _wrong_inside(module: str, found: Import, sources: Sources) -> str | None:
-    room = f"tomoskin.{room_of(module)}"
-    if found.module == room and module != room and f"{room}.{found.name}" not in sources:
-        return f"inside {room_of(module)}, import from its modules"
+    unit = f"tomoskin.{unit_of(module)}"
+    if found.module == unit and module != unit and f"{unit}.{found.name}" not in sources:
+        return f"inside {unit_of(module)}, import from its modules"
     return None
 
 
-def _is_inner(found: Import, sources: Sources) -> bool:
-    if found.module.count(".") > 1:
+def _is_inner(there: str, found: Import, sources: Sources) -> bool:
+    if found.module != f"tomoskin.{there}":
         return True
     is_module = f"{found.module}.{found.name}" in sources
     return is_module and found.name not in _offered(sources.get(found.module, ""))
@@ -184,17 +201,9 @@ def test_no_import_cycle() -> None:
     assert cycle(library()) == []
 
 
-def test_no_module_takes_a_name_that_was_renamed() -> None:
-    """The type checker does not see it: a room's ``__getattr__`` answers for every name."""
-    for module, source in library().items():
-        for found in imports_of(module, {module: source}):
-            room = found.module.removeprefix("tomoskin.")
-            assert found.name not in RENAMED.get(room, {}), f"{module}, line {found.line}"
-
-
 def test_every_module_stands_in_a_room() -> None:
-    found = {room_of(module) for module in library()} - {None} - FORMER
-    assert found == set(ROOMS)
+    found = {unit_of(module) for module in library()} - {None}
+    assert found == {*ROOMS, *ORDER}
 
 
 def test_the_documented_order_is_the_order() -> None:
@@ -217,16 +226,16 @@ ROOM = {"tomoskin": "", "tomoskin.core": "__all__ = ['errors']", "tomoskin.core.
         "def later():\n    from tomoskin.server import serve",
         "if TYPE_CHECKING:\n    from tomoskin.server import serve",
         "import importlib\nimportlib.import_module('tomoskin.server')",
-        "from tomoskin.mesh.mesh import Mesh",
-        "from tomoskin.mesh import mesh",
+        "from tomoskin.model.mesh.mesh import Mesh",
+        "from tomoskin.model.mesh import mesh",
         "from tomoskin.nowhere import thing",
         "from tomoskin import Skin",
-        "from tomoskin.skin import Skin",
+        "from tomoskin.model.skin import Skin",
     ],
 )
 def test_a_planted_import_is_found(source: str) -> None:
-    mesh = {"tomoskin.mesh": "__all__ = ['Mesh']", "tomoskin.mesh.mesh": ""}
-    planted = {**ROOM, **mesh, "tomoskin.skin": "", "tomoskin.skin.load": source}
+    mesh = {"tomoskin.model.mesh": "__all__ = ['Mesh']", "tomoskin.model.mesh.mesh": ""}
+    planted = {**ROOM, **mesh, "tomoskin.model.skin": "", "tomoskin.model.skin.load": source}
     assert len(violations(planted)) == 1
 
 
@@ -234,8 +243,8 @@ def test_a_planted_import_is_found(source: str) -> None:
     "source",
     [
         "from tomoskin.core import DataError, errors",
-        "from tomoskin.skin.outline import Disc",
-        "from tomoskin.skin import outline",
+        "from tomoskin.model.skin.outline import Disc",
+        "from tomoskin.model.skin import outline",
         "from .outline import Disc",
         "from tomoskin import __version__",
         "import numpy.linalg",
@@ -243,8 +252,8 @@ def test_a_planted_import_is_found(source: str) -> None:
     ],
 )
 def test_what_is_allowed_passes(source: str) -> None:
-    planted = {**ROOM, "tomoskin.skin": "", "tomoskin.skin.load": source}
-    assert violations({**planted, "tomoskin.skin.outline": ""}) == []
+    planted = {**ROOM, "tomoskin.model.skin": "", "tomoskin.model.skin.load": source}
+    assert violations({**planted, "tomoskin.model.skin.outline": ""}) == []
 
 
 def test_a_planted_cycle_is_found() -> None:

@@ -16,7 +16,8 @@ import numpy as np
 import pytest
 
 import tomoskin
-from tomoskin import core, formats, recording
+from tomoskin import core
+from tomoskin.files import exports, imports, session
 
 
 @pytest.mark.parametrize("name", tomoskin.__all__)
@@ -30,34 +31,6 @@ def test_an_unknown_name_is_an_attribute_error() -> None:
         _ = tomoskin.Nonsense
 
 
-@pytest.mark.parametrize(
-    ("room", "name", "now"),
-    [
-        ("live", "prepare", "pipeline"),
-        ("session", "SessionReader", "recording"),
-        ("touch", "Locator", "calibration"),
-    ],
-)
-def test_a_name_of_a_former_room_says_where_it_is_now(room: str, name: str, now: str) -> None:
-    old, new = import_module(f"tomoskin.{room}"), import_module(f"tomoskin.{now}")
-    with pytest.warns(DeprecationWarning, match=rf"{room}\.{name} is now tomoskin\.{now}\.{name}"):
-        assert getattr(old, name) is getattr(new, name)
-    with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
-        _ = old.nonsense
-
-
-@pytest.mark.parametrize(
-    ("room", "name", "now"),
-    [("source", "Conversation", "ProtocolSession"), ("source", "FrameGate", "SequenceFilter")],
-)
-def test_a_name_that_is_another_now_says_so(room: str, name: str, now: str) -> None:
-    module = import_module(f"tomoskin.{room}")
-    with pytest.warns(DeprecationWarning, match=rf"\.{name} is now tomoskin\.{room}\.{now}"):
-        assert getattr(module, name) is getattr(module, now)
-    with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
-        _ = module.nonsense
-
-
 def test_the_package_alone_imports_nothing_heavy() -> None:
     code = "import sys, tomoskin; sys.exit('numpy' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
@@ -66,7 +39,7 @@ def test_the_package_alone_imports_nothing_heavy() -> None:
 def test_no_room_imports_what_only_some_work_needs() -> None:
     slow = ("scipy.stats", "scipy.signal", "matplotlib", "meshio", "dask")
     code = (
-        "import sys, tomoskin.formats, tomoskin.server, tomoskin.run; "
+        "import sys, tomoskin.files.exports, tomoskin.server, tomoskin.run; "
         f"print([m for m in {slow} if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
@@ -99,15 +72,17 @@ def test_every_entry_point_leads_to_a_function() -> None:
             assert callable(getattr(import_module(module), function)), name
 
 
-ROOMS = (
-    *("core", "mesh", "pattern", "skin", "forward", "inverse", "wire", "source", "signal", "touch"),
-    *("calibration", "pipeline", "twin", "emulator", "recording", "formats", "sink", "run"),
+PACKAGES = (
+    *("core", "model.mesh", "model.pattern", "model.skin", "model.forward"),
+    *("imaging", "board.wire", "board.source", "sensing.signal", "sensing.track"),
+    *("sensing.segment", "sensing.fit", "learning", "pipeline", "twin", "twin.emulator"),
+    *("files.session", "files.imports", "files.exports", "run.sinks", "run"),
 )
 
 
-def functions(room: str) -> Iterator[tuple[str, Callable[..., object]]]:
-    """Public functions of a room, and public methods of its classes other than records."""
-    module = import_module(f"tomoskin.{room}")
+def functions(package: str) -> Iterator[tuple[str, Callable[..., object]]]:
+    """Public functions of a package, and public methods of its classes other than records."""
+    module = import_module(f"tomoskin.{package}")
     for name in module.__all__:
         thing = getattr(module, name)
         if inspect.isfunction(thing):
@@ -120,12 +95,12 @@ def functions(room: str) -> Iterator[tuple[str, Callable[..., object]]]:
                     yield f"{name}.{key}", method
 
 
-@pytest.mark.parametrize("room", ROOMS)
-def test_what_takes_a_path_takes_its_name_too(room: str) -> None:
+@pytest.mark.parametrize("package", PACKAGES)
+def test_what_takes_a_path_takes_its_name_too(package: str) -> None:
     """By the annotations: str is among them wherever Path is."""
     asked = [
         (name, annotation)
-        for name, function in functions(room)
+        for name, function in functions(package)
         for parameter in inspect.signature(function).parameters.values()
         if re.search(r"\bPath\b", annotation := str(parameter.annotation))
     ]
@@ -136,15 +111,15 @@ def test_names_of_files_as_plain_text(tmp_path: Path, monkeypatch: pytest.Monkey
     """Read and written by functions of several rooms."""
     monkeypatch.chdir(tmp_path)
     skin = tomoskin.Skin.load("textile-disc-8")
-    recording.SessionWriter("empty.mcap", skin).close()
-    assert recording.session_info("empty.mcap").frames == 0
+    session.SessionWriter("empty.mcap", skin).close()
+    assert session.session_info("empty.mcap").frames == 0
     assert tomoskin.Session("empty.mcap").skin.identity == skin.identity
-    assert formats.is_session("empty.mcap")
+    assert imports.is_session("empty.mcap")
     core.save_arrays("a.npz", {"a": np.arange(3)})
     assert core.load_arrays("a.npz")["a"].tolist() == [0, 1, 2]
     core.check_outputs([core.Output("b.csv", {".csv": "a table"})], inputs=["a.npz"])
-    assert formats.write_touches("b.csv", []) == 0
-    formats.write_vtu("c.vtu", skin.mesh(), {})
+    assert exports.write_touches("b.csv", []) == 0
+    exports.write_vtu("c.vtu", skin.mesh(), {})
     mesh = skin.mesh()
-    formats.write_picture("d.svg", mesh, [formats.Panel("", np.ones(len(mesh.cells)), ())], "S")
+    exports.write_picture("d.svg", mesh, [exports.Panel("", np.ones(len(mesh.cells)), ())], "S")
     assert sorted(p.suffix for p in tmp_path.iterdir()) == [".csv", ".mcap", ".npz", ".svg", ".vtu"]

@@ -18,7 +18,7 @@ import pytest
 
 from conftest import missing
 from tomoskin import __version__
-from tomoskin.emulator.uf2 import check_boot
+from tomoskin.twin.emulator.uf2 import check_boot
 
 pytestmark = pytest.mark.slow  # make release looks at the same
 
@@ -109,7 +109,7 @@ def test_the_sdist_holds_the_sources_and_no_recordings(sdist: list[str], built) 
     assert wanted - set(sdist) == set()
     assert [n for n in sdist if re.search(r"(^|/)(shared|node_modules|target|\.venv)/", n)] == []
     binaries = {name for name in sdist if name.endswith((".mcap", ".npz", ".elf", ".so"))}
-    assert binaries == {"tests/recording/of_0_1.mcap"}  # that old files are still read
+    assert binaries == {"tests/files/session/of_0_1.mcap"}  # that old files are still read
     assert max(file.stat().st_size for file in built) < 1e6 * MOST_MB
 
 

@@ -129,7 +129,7 @@ def test_lock_files_hold_hashes_and_no_addresses() -> None:
 def test_planted_mistakes_in_python_are_found() -> None:
     assert too_long({"a.py": "x\n" * (MOST_LINES + 1), "b.py": "x\n"}) == ["a.py"]
     bad = ["src/tomoskin/utils.py", "src/tomoskin/mesh/helpers/x.py"]
-    assert catch_alls(dict.fromkeys([*bad, "src/tomoskin/mesh/mesh.py"], "")) == bad
+    assert catch_alls(dict.fromkeys([*bad, "src/tomoskin/model/mesh/mesh.py"], "")) == bad
     loud = "def f():\n    print(1)\n"
     assert printers({"src/a.py": loud, "tests/b.py": loud}) == ["src/a.py:2"]
     assert printers({"src/a.py": "'print(1)'  # print(2)\nself.print(3)\n"}) == []

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.io import savemat
 
-from tomoskin.forward import ForwardModel
-from tomoskin.mesh import Disc, ElectrodeArc, Mesh, triangulate
-from tomoskin.pattern import Pattern
+from tomoskin.model.forward import ForwardModel
+from tomoskin.model.mesh import Disc, ElectrodeArc, Mesh, triangulate
+from tomoskin.model.pattern import Pattern
 
 SIZES = (3000, 12_000)
 REPEATS = 9

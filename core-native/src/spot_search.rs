@@ -1,6 +1,6 @@
 //! How many touches a frame holds: one more as long as the evidence for it grows.
 //!
-//! As `ForwardSelection` in tomoskin/touch/fit/selection.py, of which it does what needs no exact model.
+//! As `ForwardSelection` in tomoskin/sensing/fit/selection.py, of which it does what needs no exact model.
 
 use std::f64::consts::TAU;
 
@@ -9,7 +9,7 @@ use crate::spot_fit::{Fit, Frame, Known};
 use crate::spot_match::{Limits, Signatures, standing, standing_out};
 use crate::spot_table::{PARAMETERS, Spot};
 
-/// How much is tried in a frame; see `Pace` in tomoskin/touch/fit/pace.py.
+/// How much is tried in a frame; see `Pace` in tomoskin/sensing/fit/pace.py.
 #[derive(Clone, Copy, Debug)]
 pub struct Pace {
     /// Steps from the touches of the frame before.

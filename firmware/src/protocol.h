@@ -1,4 +1,4 @@
-/* The wire protocol. Made from src/tomoskin/wire/protocol.toml by
+/* The wire protocol. Made from src/tomoskin/board/wire/protocol.toml by
    scripts/firmware_header.py: change that file, not this one. */
 
 #ifndef TOMOSKIN_PROTOCOL_H

@@ -6,26 +6,26 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from tomoskin.calibration import Locator
-    from tomoskin.formats import plot
-    from tomoskin.forward import ForwardModel
-    from tomoskin.inverse import OneStep
-    from tomoskin.mesh import Mesh
-    from tomoskin.pattern import Pattern
-    from tomoskin.recording import Session
-    from tomoskin.skin import Skin
+    from tomoskin.files.exports import plot
+    from tomoskin.files.session import Session
+    from tomoskin.imaging import OneStep
+    from tomoskin.learning import Locator
+    from tomoskin.model.forward import ForwardModel
+    from tomoskin.model.mesh import Mesh
+    from tomoskin.model.pattern import Pattern
+    from tomoskin.model.skin import Skin
 
 __version__ = "0.1.0"
 
 _HOME = {
-    "ForwardModel": "forward",
-    "Locator": "calibration",
-    "Mesh": "mesh",
-    "OneStep": "inverse",
-    "Pattern": "pattern",
-    "Session": "recording",
-    "Skin": "skin",
-    "plot": "formats",
+    "ForwardModel": "model.forward",
+    "Locator": "learning",
+    "Mesh": "model.mesh",
+    "OneStep": "imaging",
+    "Pattern": "model.pattern",
+    "Session": "files.session",
+    "Skin": "model.skin",
+    "plot": "files.exports",
 }
 """Where each public name lives; it is imported when it is first asked for."""
 

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tomoskin.forward import ForwardModel
-from tomoskin.inverse import RULES
-from tomoskin.mesh import triangulate
-from tomoskin.skin import Skin
+from tomoskin.imaging import RULES
+from tomoskin.model.forward import ForwardModel
+from tomoskin.model.mesh import triangulate
+from tomoskin.model.skin import Skin
 
 SKIN = Skin.load("textile-disc-8")
 IDLE, PRESSES = 5, 6

@@ -7,13 +7,13 @@ import json
 import numpy as np
 import pytest
 
-from tomoskin.calibration import BENDS
 from tomoskin.cli import main
 from tomoskin.core import DataError
-from tomoskin.formats import read_recording
+from tomoskin.files.imports import read_recording
+from tomoskin.files.session import SessionReader
+from tomoskin.learning import BENDS
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Pipeline, prepare
-from tomoskin.recording import SessionReader
-from tomoskin.skin import Skin
 
 SCRIPT = """format = 1
 [script]

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from tomoskin.cli.board import app
 from tomoskin.run import CheckFinding
-from tomoskin.signal import meter_steps
+from tomoskin.sensing.signal import meter_steps
 
 GOOD = [f"{(step.low + step.high) / 2:.3f}" for step in meter_steps(0.1)]
 

@@ -6,8 +6,8 @@ import json
 import numpy as np
 import pytest
 
-from tomoskin.pattern import Pattern
-from tomoskin.skin import Skin
+from tomoskin.model.pattern import Pattern
+from tomoskin.model.skin import Skin
 
 SKIN = "textile-disc-8"
 PATTERN = Pattern.adjacent(8)

@@ -6,8 +6,8 @@ import json
 import numpy as np
 import pytest
 
-from tomoskin.forward import ForwardModel
-from tomoskin.skin import Skin
+from tomoskin.model.forward import ForwardModel
+from tomoskin.model.skin import Skin
 
 SKIN = Skin.load("textile-disc-8").altered({"mesh": {"cells": 400}})
 WEIGHTS = (100.0, 200.0, 400.0, 800.0, 1500.0, 300.0, 600.0, 1000.0, 250.0, 500.0)

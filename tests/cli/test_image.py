@@ -18,10 +18,10 @@ from PIL import Image
 
 from core.seeing import blue_beside_red
 from tomoskin.core import FloatArray
-from tomoskin.formats import circular_average
-from tomoskin.forward import ForwardModel
-from tomoskin.mesh import triangulate
-from tomoskin.skin import Skin
+from tomoskin.files.exports import circular_average
+from tomoskin.model.forward import ForwardModel
+from tomoskin.model.mesh import triangulate
+from tomoskin.model.skin import Skin
 
 PLACE = (0.03, 0.04)
 SKIN = Skin.load("textile-disc-8")

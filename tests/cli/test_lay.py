@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from shapes import disc
-from tomoskin.skin import Skin
+from tomoskin.model.skin import Skin
 
 
 @pytest.fixture

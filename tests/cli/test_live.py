@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 from tomoskin.core import Frame
-from tomoskin.recording import Mark, SessionReader, SessionWriter, session_info
-from tomoskin.skin import Skin
+from tomoskin.files.session import Mark, SessionReader, SessionWriter, session_info
+from tomoskin.model.skin import Skin
 
 COMMAND = [sys.executable, "-c", "from tomoskin.cli import main; main()"]
 PATIENCE = 300

@@ -16,7 +16,7 @@ import pytest
 import typer
 
 from doc_tables import examples
-from recording.runs import write_all
+from files.session.runs import write_all
 from shapes import disc
 from tomoskin.cli import image as image_module
 from tomoskin.cli.app import COMMANDS, Commands
@@ -26,9 +26,9 @@ from tomoskin.cli.session import EXPORTS
 from tomoskin.core import RECORDING as SESSION_ENDINGS
 from tomoskin.core import OutputError
 from tomoskin.core.outputs import MAGIC
-from tomoskin.formats import WRITERS as EXPORT_WRITERS
-from tomoskin.forward import ForwardModel
-from tomoskin.skin import Skin
+from tomoskin.files.exports import WRITERS as EXPORT_WRITERS
+from tomoskin.model.forward import ForwardModel
+from tomoskin.model.skin import Skin
 
 Run = Callable[..., tuple[int, str, str]]
 COARSE = Skin.load("textile-disc-8").altered({"mesh": {"cells": 300}})

@@ -11,10 +11,10 @@ import threading
 import httpx
 import pytest
 
-from robot.test_robot import URDF
+from model.robot.test_robot import URDF
 from tomoskin.cli.robot import chosen_robot
-from tomoskin.recording import split_names
-from tomoskin.robot import Robot
+from tomoskin.files.session import split_names
+from tomoskin.model.robot import Robot
 
 COMMAND = [sys.executable, "-c", "from tomoskin.cli import main; main()"]
 PATIENCE = 300

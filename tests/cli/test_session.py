@@ -10,10 +10,10 @@ import sys
 
 import pytest
 
-from recording.runs import write_all, write_frames
-from tomoskin.formats import read_recording
-from tomoskin.recording import SessionReader
-from tomoskin.skin import Skin
+from files.session.runs import write_all, write_frames
+from tomoskin.files.imports import read_recording
+from tomoskin.files.session import SessionReader
+from tomoskin.model.skin import Skin
 
 
 @pytest.fixture(scope="module")

@@ -11,9 +11,9 @@ import pytest
 import tomoskin.cli.simulate as tomoskin_simulate
 from doc_tables import examples
 from tomoskin.cli.output import Bar
-from tomoskin.formats import read_recording
-from tomoskin.recording import SessionReader
-from tomoskin.skin import Skin
+from tomoskin.files.imports import read_recording
+from tomoskin.files.session import SessionReader
+from tomoskin.model.skin import Skin
 from tomoskin.twin.shards import SHARD_FRAMES
 
 EXAMPLE, PRESSES_EXAMPLE = examples("simulate.md")

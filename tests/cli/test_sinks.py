@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sink.test_mqtt import broker, heard
+from run.sinks.test_mqtt import broker, heard
 
 __all__ = ["broker", "heard"]
 

@@ -2,7 +2,7 @@
 
 import json
 
-from tomoskin.skin import Skin
+from tomoskin.model.skin import Skin
 
 
 def test_list(tomoskin):

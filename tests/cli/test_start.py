@@ -10,7 +10,7 @@ import pytest
 
 from tomoskin.cli.app import COMMANDS
 
-HEAVY = ("numpy", "scipy", "rich", "msgspec", "starlette", "tomoskin.forward")
+HEAVY = ("numpy", "scipy", "rich", "msgspec", "starlette", "tomoskin.model.forward")
 LIGHT = {"app", "named_files"}
 """Modules of the command line that are there before a command is known."""
 

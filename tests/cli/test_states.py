@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from tomoskin.core import FloatArray
-from tomoskin.pattern import Pattern
+from tomoskin.model.pattern import Pattern
 
 PATTERN = Pattern.adjacent(8)
 Run = Callable[..., tuple[int, str, str]]

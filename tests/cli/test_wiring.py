@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tomoskin.calibration import ChannelMapping, ring_of
-from tomoskin.skin import Skin
+from tomoskin.learning import ChannelMapping, ring_of
+from tomoskin.model.skin import Skin
 from tomoskin.twin import COMMON_PRESSES, SetPlan, make_shard
 
 NAME = "textile-disc-8"

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 import tomoskin.core.memory
 from tomoskin.core import DataError
 from tomoskin.core.archive import load_arrays
-from tomoskin.formats import read_recording
+from tomoskin.files.imports import read_recording
 
 ARRAYS = {"voltages": np.arange(80.0).reshape(2, 40), "drive": np.ones((40, 2), dtype=np.int8)}
 

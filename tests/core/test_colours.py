@@ -9,11 +9,11 @@ import pytest
 from PIL import Image as Pillow
 
 from core.seeing import EYES, blue_beside_red, seen
-from recording.runs import TOUCH
+from files.session.runs import TOUCH
 from shapes import disc
 from tomoskin.core import AMOUNT, CHANGE, CHANGE_ON_DARK, DataError
-from tomoskin.formats import FILMS, Panel, rendered, write_picture
-from tomoskin.recording import scene_message
+from tomoskin.files.exports import FILMS, Panel, rendered, write_picture
+from tomoskin.files.session import scene_message
 
 KNOWN = {
     CHANGE: {

@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from recording.runs import SKIN, write_all
-from tomoskin import core, formats
+from files.session.runs import SKIN, write_all
+from tomoskin import core
 from tomoskin.core import DataError, OutputError, write_text, written
-from tomoskin.pattern import Pattern
-from tomoskin.recording import SessionReader
-from tomoskin.signal import Recording
+from tomoskin.files import exports
+from tomoskin.files.session import SessionReader
+from tomoskin.model.pattern import Pattern
+from tomoskin.sensing.signal import Recording
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -124,18 +125,18 @@ def writes(write: Callable[..., Any], *arguments: Any) -> Callable[..., None]:
 WRITERS: dict[str, Callable[..., None]] = {
     "x.toml": writes(core.write_text, "text"),
     "x.npz": writes(core.save_arrays, {"a": np.ones(2)}),
-    "whole.npz": writes(formats.write_whole, {"a": np.ones(2)}),
-    "interchange.npz": writes(formats.write_interchange, recording),
-    "touches.csv": writes(formats.write_touches, ()),
-    "merit.csv": writes(formats.write_merit_table, {}),
-    "curves.png": writes(formats.write_choices, "none", ()),
-    "x.vtu": writes(formats.write_vtu, SKIN.mesh, {}),
-    "x.pvd": writes(formats.write_series, SKIN.mesh, ()),
-    "x.mat": writes(formats.write_matlab, recording, 1.0, 8),
-    "x.gif": lambda path, _, **options: formats.FILMS[".gif"](path, frames(), 10.0, **options),
-    "x.csv": of_session(formats.write_csv),
-    "x.parquet": of_session(formats.write_parquet),
-    "x.h5": of_session(formats.write_hdf5),
+    "whole.npz": writes(exports.write_whole, {"a": np.ones(2)}),
+    "interchange.npz": writes(exports.write_interchange, recording),
+    "touches.csv": writes(exports.write_touches, ()),
+    "merit.csv": writes(exports.write_merit_table, {}),
+    "curves.png": writes(exports.write_choices, "none", ()),
+    "x.vtu": writes(exports.write_vtu, SKIN.mesh, {}),
+    "x.pvd": writes(exports.write_series, SKIN.mesh, ()),
+    "x.mat": writes(exports.write_matlab, recording, 1.0, 8),
+    "x.gif": lambda path, _, **options: exports.FILMS[".gif"](path, frames(), 10.0, **options),
+    "x.csv": of_session(exports.write_csv),
+    "x.parquet": of_session(exports.write_parquet),
+    "x.h5": of_session(exports.write_hdf5),
 }
 
 
@@ -163,17 +164,17 @@ def test_a_series_asks_for_its_parts_too(tmp_path: Path) -> None:
     part.write_text("mine")
     (tmp_path / "xy_000001.vtu").write_text("another's")
     with pytest.raises(OutputError, match=r"x_000002\.vtu: exists already"):
-        formats.write_series(tmp_path / "x.pvd", mesh, iter(moments))
+        exports.write_series(tmp_path / "x.pvd", mesh, iter(moments))
 
     def broken() -> Iterator[tuple[float, np.ndarray]]:
         yield from moments
         raise DataError("half-way")
 
     with pytest.raises(DataError, match="half-way"):
-        formats.write_series(tmp_path / "x.pvd", mesh, broken(), overwrite=True)
+        exports.write_series(tmp_path / "x.pvd", mesh, broken(), overwrite=True)
     assert part.read_text() == "mine"
     assert len(list(tmp_path.iterdir())) == 2
-    assert formats.write_series(tmp_path / "x.pvd", mesh, moments, overwrite=True) == 2
+    assert exports.write_series(tmp_path / "x.pvd", mesh, moments, overwrite=True) == 2
     assert part.read_text().startswith("<?xml")
     assert len(list(tmp_path.iterdir())) == 4
 
@@ -182,10 +183,10 @@ def test_a_series_asks_for_its_parts_too(tmp_path: Path) -> None:
 
 OWN_WAYS = {
     "core/written.py": "the way",
-    "recording/message_log.py": "a session, while it happens, into a file that must be new",
-    "emulator/program.py": "a lock beside what make builds",
-    "emulator/process.py": "in a temporary folder of its own",
-    "emulator/flash.py": "in a temporary folder of its own",
+    "files/session/message_log.py": "a session, while it happens, into a file that must be new",
+    "twin/emulator/program.py": "a lock beside what make builds",
+    "twin/emulator/process.py": "in a temporary folder of its own",
+    "twin/emulator/flash.py": "in a temporary folder of its own",
 }
 OPENERS = {"write_text", "write_bytes", "savefig", "savemat", "ParquetWriter", "mkstemp", "File"}
 

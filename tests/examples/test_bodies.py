@@ -8,7 +8,7 @@ import struct
 import numpy as np
 import pytest
 
-from tomoskin.mesh import simplex_measure
+from tomoskin.model.mesh import simplex_measure
 
 MODELS = [
     *("fig62_palpation", "fig64_chopped", "fig64_face", "fit_bound", "newtons", "soft_volume"),

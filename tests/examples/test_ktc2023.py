@@ -13,8 +13,8 @@ import pytest
 from scipy.io import savemat
 
 from tomoskin.core import DataError, OutputError
-from tomoskin.forward import ForwardModel
-from tomoskin.mesh import Disc, ElectrodeArc, triangulate
+from tomoskin.model.forward import ForwardModel
+from tomoskin.model.mesh import Disc, ElectrodeArc, triangulate
 
 FILE = Path(__file__).resolve().parents[2] / "examples" / "ktc2023.py"
 LEVELS = range(1, 8)
@@ -75,7 +75,7 @@ def tank(water: float = 0.8, leak: float = 0.02) -> tuple[np.ndarray, np.ndarray
 
 
 def _resistances(mesh: Any, contact: np.ndarray) -> ForwardModel:
-    from tomoskin.pattern import Pattern
+    from tomoskin.model.pattern import Pattern
 
     inj, mpat = tables()
     drives = np.column_stack([inj.argmax(axis=0), inj.argmin(axis=0)])

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
-from tomoskin.emulator.program import build_alone
-from tomoskin.pattern import Pattern, Scan
-from tomoskin.source import ScanSettings
-from tomoskin.wire import Decoder, Message, encode
+from tomoskin.board.source import ScanSettings
+from tomoskin.board.wire import Decoder, Message, encode
+from tomoskin.model.pattern import Pattern, Scan
+from tomoskin.twin.emulator.program import build_alone
 
 ROOT = Path(__file__).parents[2]
 FIRMWARE = ROOT / "firmware"

@@ -6,7 +6,7 @@ import re
 import pytest
 
 from firmware.boards import FIRMWARE, ROOT
-from tomoskin.wire import SCHEMA, SCHEMA_HASH
+from tomoskin.board.wire import SCHEMA, SCHEMA_HASH
 
 
 @pytest.fixture(scope="module")

@@ -9,11 +9,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from firmware.boards import PATIENCE, SCAN, SETTINGS, Talk, running, star_counts
-from tomoskin.core import Event, Frame, SourceError
-from tomoskin.source import Link
-from tomoskin.source import serial as port
-from tomoskin.twin import Board, TwinDevice
-from tomoskin.wire import (
+from tomoskin.board.source import Link
+from tomoskin.board.source import serial as port
+from tomoskin.board.wire import (
     Ack,
     BoardLimits,
     Decoder,
@@ -45,6 +43,8 @@ from tomoskin.wire import (
     Stop,
     encode,
 )
+from tomoskin.core import Event, Frame, SourceError
+from tomoskin.twin import Board, TwinDevice
 
 LIMITS = BoardLimits(0, b"Linux process".ljust(24, b"\0"), 10, 5000, 1000, 1000, 0, 813)
 TWIN = Board(16, 10, 0.1, 250e3, 128, 448, unique_id=b"host\0\0\0\0", limits=LIMITS)

@@ -7,7 +7,7 @@ import sys
 import tty
 
 from firmware.boards import PATIENCE, ROOT, star_counts
-from tomoskin.wire import OLDER, Fault, FaultCode, Hello, encode
+from tomoskin.board.wire import OLDER, Fault, FaultCode, Hello, encode
 
 
 def started(program):

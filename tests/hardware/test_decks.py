@@ -5,8 +5,8 @@ import pytest
 import parasitics
 import results
 from spice import DeckError, run
-from tomoskin.skin import Skin
-from tomoskin.source import ScanSettings
+from tomoskin.board.source import ScanSettings
+from tomoskin.model.skin import Skin
 
 pytestmark = pytest.mark.usefixtures("decks")
 OFF, ON, SOUND, BROKEN = 0, 5, "1g", "50m"

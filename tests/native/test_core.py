@@ -13,8 +13,8 @@ from scipy.sparse.linalg import spsolve
 
 import shapes
 from conftest import NO_ENGINE
-from tomoskin.forward import ForwardModel
-from tomoskin.pattern import Pattern
+from tomoskin.model.forward import ForwardModel
+from tomoskin.model.pattern import Pattern
 
 core = pytest.importorskip("tomoskin_core", reason=NO_ENGINE)
 

@@ -13,9 +13,16 @@ import pytest
 import shapes
 from conftest import NO_ENGINE, ROOT
 from tomoskin.core import ModelError
-from tomoskin.forward import ForwardModel, State, Terminals, choose_engine, engine_choice, native
-from tomoskin.mesh import Mesh
-from tomoskin.pattern import Pattern
+from tomoskin.model.forward import (
+    ForwardModel,
+    State,
+    Terminals,
+    choose_engine,
+    engine_choice,
+    native,
+)
+from tomoskin.model.mesh import Mesh
+from tomoskin.model.pattern import Pattern
 
 TOLERANCE = 1e-12
 

@@ -7,9 +7,9 @@ import pytest
 
 from run.board import pressed, samples_of
 from tomoskin.core import Frame, ModelError
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Pipeline, prepare
-from tomoskin.skin import Skin
-from tomoskin.touch import SpotFinder
+from tomoskin.sensing.fit import SpotFinder
 
 NEEDED = 30
 PERIOD = 0.05

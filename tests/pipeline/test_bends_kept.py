@@ -13,19 +13,12 @@ from run.test_replay import Recorded, recorded_touches, same, touches_of
 from run.test_runner import Watch
 from tomoskin import run as room
 from tomoskin import server
-from tomoskin.calibration import (
-    BENDS,
-    TOUCH,
-    BendExamples,
-    BendModel,
-    BendReading,
-    Locator,
-)
 from tomoskin.cli import main
 from tomoskin.core import Frame
+from tomoskin.files.session import Mark, SessionReader, as_recorded, replayed, session_info
+from tomoskin.learning import BENDS, TOUCH, BendExamples, BendModel, BendReading, Locator
 from tomoskin.pipeline import Pipeline, prepare
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
-from tomoskin.recording import Mark, SessionReader, as_recorded, replayed, session_info
 from tomoskin.run.recordings import PreRoll
 
 

@@ -7,10 +7,10 @@ import pytest
 from run.board import Board, samples_of
 from run.test_runner import Watch
 from tomoskin.core import SourceError
+from tomoskin.files.session import session_info
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import prepare
-from tomoskin.recording import session_info
 from tomoskin.run import Runner, commands
-from tomoskin.skin import Skin
 
 
 @pytest.fixture(scope="module")

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from run.board import pressed, samples_of
+from tomoskin.board.wire import Decoder, encode
 from tomoskin.core import Frame
-from tomoskin.forward import choose_engine
-from tomoskin.forward.native import Native
+from tomoskin.model.forward import choose_engine
+from tomoskin.model.forward.native import Native
 from tomoskin.pipeline import Pipeline, prepare
-from tomoskin.wire import Decoder, encode
 
 REFERENCE, WARM, COUNTED = 20, 360, 60
 MOST_CALLS = {"image": 900, "fit": 2500 if isinstance(choose_engine(), Native) else 5000}
@@ -25,7 +25,7 @@ native engine is installed, and numpy's where it is not."""
 MOST_IMAGES = {"image": 15, "fit": 60}
 """Memory that a frame may need, in images of eight bytes a cell."""
 
-NEVER = {"mesh", "skin", "twin", "recording", "formats"}
+NEVER = {"model/mesh", "model/skin", "twin", "files"}
 """Rooms that no frame enters; by image not the exact model either."""
 
 
@@ -81,7 +81,8 @@ def _profiled(one, number):
         if event in ("call", "c_call"):
             calls[event] += 1
         if event == "call" and "/tomoskin/" in frame.f_code.co_filename:
-            rooms.add(frame.f_code.co_filename.rpartition("/tomoskin/")[2].split("/")[0])
+            inside = frame.f_code.co_filename.rpartition("/tomoskin/")[2]
+            rooms.update("/".join(inside.split("/")[:depth]) for depth in (1, 2))
 
     before = sys.getprofile()
     sys.setprofile(seen)
@@ -96,8 +97,8 @@ def test_a_frame_calls_few_functions_and_never_the_model(one, method):
     found = [_profiled(one, REFERENCE + WARM + k) for k in range(COUNTED)]
     assert 100 < median(calls for calls, _ in found) < MOST_CALLS[method]
     rooms = set().union(*(rooms for _, rooms in found))
-    assert rooms >= {"wire", "signal", "inverse", "touch", "pipeline"}
-    assert rooms & (NEVER | ({"forward"} if method == "image" else set())) == set()
+    assert rooms >= {"board/wire", "sensing/signal", "imaging", "sensing/track", "pipeline"}
+    assert rooms & (NEVER | ({"model/forward"} if method == "image" else set())) == set()
 
 
 def test_a_frame_needs_little_memory_and_keeps_none(one, prepared, method):

@@ -10,11 +10,11 @@ import pytest
 from golden import mismatch
 from run.board import AS_TAKEN
 from tomoskin.core import DataError
-from tomoskin.inverse import Evidence, Spectrum, choose
-from tomoskin.pattern import Pattern
+from tomoskin.imaging import Evidence, Spectrum, choose
+from tomoskin.model.pattern import Pattern
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, prepare, reconstruct
-from tomoskin.signal import Recording, Reference
-from tomoskin.skin import Skin
+from tomoskin.sensing.signal import Recording, Reference
 
 SKINS = {
     kind: Skin.load("textile-disc-8").altered(

@@ -9,10 +9,10 @@ import pytest
 
 from run.board import pressed, samples_of
 from tomoskin.core import Frame
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Pipeline, prepare, reconstruct
 from tomoskin.pipeline.finding import InData, InImage, finding
-from tomoskin.signal import Recording, Reference
-from tomoskin.skin import Skin
+from tomoskin.sensing.signal import Recording, Reference
 
 NEEDED = 10
 

@@ -15,14 +15,14 @@ from golden import mismatch
 from run.board import AS_TAKEN, pressed, samples_of
 from run.test_replay import Recorded, recorded_touches, same, touches_of
 from tomoskin.core import FloatArray, Frame
-from tomoskin.inverse import Temporal
+from tomoskin.files.session import SessionReader, replayed
+from tomoskin.imaging import Temporal
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import FrameResult, Pipeline, Prepared, prepare
 from tomoskin.pipeline.following import Following
 from tomoskin.pipeline.imaging import Filtered
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
-from tomoskin.recording import SessionReader, replayed
-from tomoskin.signal import difference
-from tomoskin.skin import Skin
+from tomoskin.sensing.signal import difference
 
 TAU = 0.1
 INTERVAL = 0.02

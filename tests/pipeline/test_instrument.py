@@ -9,11 +9,11 @@ import pytest
 from server.looks import look_in_both
 from server.serving import Site
 from server.watching import Watched, axe_finds
+from tomoskin.board.source import open_source
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import prepare
 from tomoskin.run import Runner
 from tomoskin.server import STATIC, SettingsHandlers, TwinHandlers
-from tomoskin.skin import Skin
-from tomoskin.source import open_source
 
 pytestmark = [pytest.mark.page, pytest.mark.usefixtures("built_page")]
 

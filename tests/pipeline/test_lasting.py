@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import prepare
-from tomoskin.skin import Skin
 from tomoskin.twin import Press, SteppedSkin, TwinSettings
 
 PRESS = Press(0.03, -0.02, force=3.0, radius=0.012)

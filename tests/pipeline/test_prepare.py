@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tomoskin.calibration import FORCE, Calibration, ForceModel, WeighedPresses
 from tomoskin.core import DataError, Detection, ModelError, SkinError
-from tomoskin.forward import ForwardModel
-from tomoskin.inverse import Evidence, Greit, OneStep
-from tomoskin.mesh import Mesh
-from tomoskin.pattern import Pattern
+from tomoskin.imaging import Evidence, Greit, OneStep
+from tomoskin.learning import FORCE, Calibration, ForceModel, WeighedPresses
+from tomoskin.model.forward import ForwardModel
+from tomoskin.model.mesh import Mesh
+from tomoskin.model.pattern import Pattern
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import prepare
 from tomoskin.pipeline.tune import tuned_by_rule
-from tomoskin.skin import Skin
-from tomoskin.touch import Segmenter
+from tomoskin.sensing.segment import Segmenter
 
 PREPARED = prepare(Skin.load("textile-disc-8").altered({"inverse": {"alpha": 0.1}}))
 MOVED = Mesh(1.01 * PREPARED.mesh.points, PREPARED.mesh.cells, PREPARED.mesh.electrodes)

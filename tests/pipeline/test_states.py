@@ -10,14 +10,14 @@ import pytest
 
 from run.board import pressed, samples_of
 from run.test_replay import Recorded, noisy
-from tomoskin.calibration import CLASSES, Classifier, ClassReading, FrameClassifier
 from tomoskin.cli import main
 from tomoskin.core import DataError, Frame
-from tomoskin.formats import read_recording
+from tomoskin.files.imports import read_recording
+from tomoskin.files.session import SessionReader, as_recorded, replayed, tick_rate
+from tomoskin.learning import CLASSES, Classifier, ClassReading, FrameClassifier
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Pipeline, prepare, reconstruct
-from tomoskin.recording import SessionReader, as_recorded, replayed, tick_rate
 from tomoskin.server.page_messages import state as message
-from tomoskin.skin import Skin
 
 NAMES = ("idle", "left", "right")
 EACH = 12

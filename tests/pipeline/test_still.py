@@ -7,9 +7,9 @@ import pytest
 
 from run.board import pressed, samples_of
 from tomoskin.core import Frame
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Pipeline, prepare, reconstruct
-from tomoskin.signal import Recording
-from tomoskin.skin import Skin
+from tomoskin.sensing.signal import Recording
 
 KINDS = [
     {},

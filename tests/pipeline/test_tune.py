@@ -10,11 +10,11 @@ import pytest
 from golden import mismatch
 from run.board import AS_TAKEN, pressed, samples_of
 from tomoskin.core import Frame, ModelError
-from tomoskin.inverse import Evidence
+from tomoskin.imaging import Evidence
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Pipeline, prepare
 from tomoskin.pipeline.tune import tune, tuned, tuned_by_rule
-from tomoskin.signal import Reference
-from tomoskin.skin import Skin
+from tomoskin.sensing.signal import Reference
 
 NEEDED = 20
 LOUD = 5.0
@@ -116,8 +116,8 @@ def test_the_pipeline_goes_on_while_its_operator_changes(auto, idle_samples):
 
 def test_the_deviation_of_a_touch_is_that_of_the_operator_in_use(auto, idle_samples, monkeypatch):
     """What noise adds to it: an image's bias and a sheet's play do not differ between frames."""
-    monkeypatch.setattr("tomoskin.touch.segment._BIAS", 0.0)
-    monkeypatch.setattr("tomoskin.touch.tracking.position._DRAG", 1e-9)
+    monkeypatch.setattr("tomoskin.sensing.segment.segment._BIAS", 0.0)
+    monkeypatch.setattr("tomoskin.sensing.track.position._DRAG", 1e-9)
     pipeline = Pipeline(auto, reference_frames=NEEDED)
     source = frames(auto, idle_samples, LOUD)
     for _ in range(NEEDED):

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from tomoskin.core import DataError, IntArray, ModelError
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, Unresolved, prepare
-from tomoskin.skin import Skin
 
 NONE = np.empty(0, np.int64)
 TRAINED = {"method": "greit", **dict.fromkeys(("prior", "alpha", "exponent", "time_constant"))}

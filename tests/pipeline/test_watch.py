@@ -10,9 +10,9 @@ import pytest
 from golden import mismatch
 from run.board import pressed, samples_of
 from tomoskin.core import Frame
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Pipeline, prepare, reconstruct
-from tomoskin.signal import Recording, nuisance_directions
-from tomoskin.skin import Skin
+from tomoskin.sensing.signal import Recording, nuisance_directions
 
 NEEDED = 20
 PLACE = (0.03, 0.02)

@@ -8,8 +8,7 @@ from itertools import count
 
 import numpy as np
 
-from tomoskin.core import Frame, SourceError
-from tomoskin.wire import (
+from tomoskin.board.wire import (
     OLDER,
     SCHEMA,
     Ack,
@@ -27,6 +26,7 @@ from tomoskin.wire import (
     encode,
     type_byte,
 )
+from tomoskin.core import Frame, SourceError
 
 VERSION, HASH = min(OLDER.items())
 """Of the first protocol: then nothing is read back that it would have to hold."""

@@ -7,12 +7,12 @@ from functools import partial
 
 import pytest
 
-from tomoskin.source import Timing
+from tomoskin.board.source import Timing
 
 
 @pytest.fixture(scope="module", autouse=True)
 def patient_links() -> Iterator[None]:
     """A busy machine may hold up the test's own board: that is no silence of a board."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("tomoskin.source.link.Timing", partial(Timing, silence=300.0))
+        patch.setattr("tomoskin.board.source.link.Timing", partial(Timing, silence=300.0))
         yield

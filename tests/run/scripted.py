@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from tomoskin.model.skin import Skin
 from tomoskin.run import Simulated, simulate
-from tomoskin.skin import Skin
 from tomoskin.twin import Script
 
 SKIN = Skin.load("textile-disc-8")

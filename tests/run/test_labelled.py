@@ -12,16 +12,9 @@ import pytest
 
 import tomoskin.twin.shards
 from tomoskin.core import ScriptError, SourceError
-from tomoskin.run import (
-    in_processes,
-    in_this_process,
-    make_set,
-    on_cluster,
-)
-from tomoskin.run import (
-    labelled_frames as labelled,
-)
-from tomoskin.skin import Skin
+from tomoskin.model.skin import Skin
+from tomoskin.run import in_processes, in_this_process, make_set, on_cluster
+from tomoskin.run import labelled_frames as labelled
 from tomoskin.twin import COMMON_PRESSES, Population, SetPlan
 
 SKIN = Skin.load("textile-disc-8").altered({"mesh": {"cells": 300}}).to_toml()

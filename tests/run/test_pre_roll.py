@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from run.test_replay import Recorded, recorded_touches, touches_of
+from tomoskin.files.session import Mark, SessionReader, as_recorded, replayed
 from tomoskin.pipeline import prepare
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
-from tomoskin.recording import Mark, SessionReader, as_recorded, replayed
 from tomoskin.run import commands
 
 SOON, LATE = (3, 0), (70, 0)

@@ -7,8 +7,8 @@ import pytest
 
 from run.board import Board, pressed, samples_of
 from run.test_runner import PATIENCE, Watch
+from tomoskin.files.session import SessionReader, as_recorded, replayed
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
-from tomoskin.recording import SessionReader, as_recorded, replayed
 from tomoskin.run import BoardMemory, Runner, commands
 
 ENOUGH = 4 * REFERENCE_FRAMES

@@ -11,9 +11,9 @@ from scipy.interpolate import CubicSpline
 
 from tomoskin.cli import main
 from tomoskin.core import FloatArray
-from tomoskin.formats import read_recording
+from tomoskin.files.imports import read_recording
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Reconstruction, prepare, reconstruct
-from tomoskin.skin import Skin
 
 pytestmark = pytest.mark.data
 

@@ -10,15 +10,15 @@ import pytest
 
 from run.board import Board, pressed, samples_of
 from run.test_runner import PATIENCE, Watch
+from tomoskin.board.source import Link, ScanSettings
 from tomoskin.core import DataError, Frame, SourceError
+from tomoskin.files.session import Mark, SessionReader, advance, replayed
+from tomoskin.files.session.replay import ReplayTransport, open_replay, parse_replay
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Pipeline, prepare
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
-from tomoskin.recording import Mark, SessionReader, advance, replayed
-from tomoskin.recording.replay import ReplayTransport, open_replay, parse_replay
 from tomoskin.run import Runner, commands
 from tomoskin.run.backlog import MOST_AT_ONCE
-from tomoskin.skin import Skin
-from tomoskin.source import Link, ScanSettings
 
 
 def noisy(samples, number):
@@ -431,7 +431,7 @@ def test_an_impossible_speed_is_refused(run, prepared, speed):
 
 
 def test_a_session_without_frames_is_refused(tmp_path, prepared):
-    from tomoskin.recording import SessionWriter
+    from tomoskin.files.session import SessionWriter
 
     with SessionWriter(tmp_path / "x.mcap", prepared.skin):
         pass
@@ -443,7 +443,7 @@ def test_frames_alone_are_enough(run, prepared, tmp_path):
     """A session without raw bytes, and of a scan that is set otherwise today."""
     from dataclasses import replace
 
-    from tomoskin.recording import SessionWriter
+    from tomoskin.files.session import SessionWriter
 
     bare = tmp_path / "bare.mcap"
     with SessionReader(run) as session, SessionWriter(bare, prepared.skin) as copy:

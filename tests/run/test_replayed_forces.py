@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from run.test_replay import Recorded, recorded_touches, same, touches_of
-from tomoskin.calibration import FORCE, ForceModel, WeighedPresses
 from tomoskin.core import Detection
+from tomoskin.files.session import SessionReader, as_recorded, replayed
+from tomoskin.learning import FORCE, ForceModel, WeighedPresses
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
-from tomoskin.recording import SessionReader, as_recorded, replayed
 
 
 def test_forces_are_recorded_and_are_the_same_again(prepared, tmp_path):

@@ -11,12 +11,12 @@ from mcap.reader import make_reader
 
 from run.board import Board, samples_of
 from tomoskin.core import DataError, OutputError, SourceError
-from tomoskin.recording import SessionReader, repair, split, split_names
-from tomoskin.robot import Place, Pose
+from tomoskin.files.session import SessionReader, repair, split, split_names
+from tomoskin.model.robot import Place, Pose
 from tomoskin.run import Member, RobotRun
 from tomoskin.run.robot_run import board_problems
+from tomoskin.run.sinks import ContactListener
 from tomoskin.run.turns import Turns
-from tomoskin.sink import ContactListener
 
 PATIENCE = 300
 

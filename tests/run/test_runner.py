@@ -9,18 +9,18 @@ import numpy as np
 import pytest
 
 from run.board import Board
+from tomoskin.board.source import Timing
+from tomoskin.board.wire import Start, Stop
 from tomoskin.core import DataError, SourceError
+from tomoskin.files.session import RawRead, session_info
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import prepare
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES, Pipeline
-from tomoskin.recording import RawRead, session_info
 from tomoskin.run import Runner, commands
 from tomoskin.run.backlog import MOST_AT_ONCE
 from tomoskin.run.publisher import EventLog
 from tomoskin.run.recordings import Recordings
-from tomoskin.skin import Skin
-from tomoskin.source import Timing
 from tomoskin.twin import Press
-from tomoskin.wire import Start, Stop
 
 PATIENCE = 300
 
@@ -181,7 +181,9 @@ class Silent(Board):
 
 
 def test_why_no_board_answers_is_said_once_and_stands_until_one_does(prepared, monkeypatch):
-    monkeypatch.setattr("tomoskin.source.link.Timing", lambda: Timing(0.01, 0.01, 1, goodbye=0.01))
+    monkeypatch.setattr(
+        "tomoskin.board.source.link.Timing", lambda: Timing(0.01, 0.01, 1, goodbye=0.01)
+    )
     board = Silent()
     runner = Runner(prepared, lambda: board)
     runner.start()

@@ -10,9 +10,9 @@ import pytest
 
 from run.scripted import FRAME, PRESS, fault, run
 from tomoskin.core import DataError
+from tomoskin.files.session import Mark, SessionReader, read_session
 from tomoskin.pipeline import Prepared, reconstruct
-from tomoskin.recording import Mark, SessionReader, read_session
-from tomoskin.signal import Recording
+from tomoskin.sensing.signal import Recording
 
 CUT = fault("cut", "{start}", "900 ms", electrode=2)
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from run.scripted import FRAME, SKIN, fault, run
+from tomoskin.board.wire import FrameFlag
 from tomoskin.core import Frame
-from tomoskin.pattern import Scan
-from tomoskin.recording import SessionReader
+from tomoskin.files.session import SessionReader
+from tomoskin.model.pattern import Scan
 from tomoskin.run import Simulated
-from tomoskin.wire import FrameFlag
 
 LEAD_IN, START, END = 0.5, 0.3, 0.7
 SCAN = Scan.of(SKIN.pattern())

@@ -11,13 +11,13 @@ import pytest
 from run.test_runner import PATIENCE, Watch
 from server.serving import Site
 from tomoskin.core import Event, SinkError
+from tomoskin.files.session.replay import open_replay
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import prepare
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
-from tomoskin.recording.replay import open_replay
 from tomoskin.run import Runner
-from tomoskin.sink import Moment, Naming
-from tomoskin.sink.contact import event_content
-from tomoskin.skin import Skin
+from tomoskin.run.sinks import Moment, Naming
+from tomoskin.run.sinks.contact import event_content
 
 FRAMES = 3 * REFERENCE_FRAMES
 
@@ -64,7 +64,7 @@ def sinks(gate):
 
 @pytest.fixture
 def runner(prepared, board, sinks, monkeypatch):
-    monkeypatch.setattr("tomoskin.sink.consumer.GRACE", 0.1)
+    monkeypatch.setattr("tomoskin.run.sinks.consumer.GRACE", 0.1)
     runner = Runner(prepared, lambda: board, sinks=tuple(sinks.values()))
     yield runner
     runner.stop()
@@ -112,7 +112,7 @@ def test_how_they_are_is_said(runner, sinks, gate):
 
 
 def test_a_replay_is_published_with_the_times_of_its_day():
-    old = Path(__file__).parents[1] / "recording" / "of_0_1.mcap"
+    old = Path(__file__).parents[1] / "files" / "session" / "of_0_1.mcap"
     skin, sink = Skin.load("textile-disc-8"), Sink("good")
     with closing(open_replay(f"{old}@max", skin)) as replay:
         runner = Runner(prepare(skin), lambda: replay, sinks=(sink,))

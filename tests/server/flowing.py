@@ -6,9 +6,9 @@ from contextlib import contextmanager
 
 from server.serving import Site
 from server.test_play import Page
+from tomoskin.board.source import open_source
 from tomoskin.run import Runner
 from tomoskin.server import serve_requests
-from tomoskin.source import open_source
 
 
 @contextmanager

@@ -9,10 +9,10 @@ import pytest
 from run.board import AS_TAKEN, Board, pressed, samples_of
 from run.test_runner import Watch
 from server.serving import Site
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import prepare
 from tomoskin.run import Runner
 from tomoskin.server import serve_requests
-from tomoskin.skin import Skin
 
 PANELS = {
     "now": "[data-testid=touch-row]",

@@ -5,12 +5,7 @@ import os
 import pytest
 
 from tomoskin.core import DataError
-from tomoskin.server.access import (
-    AccessPolicy,
-    answer_headers,
-    is_loopback,
-    load_token,
-)
+from tomoskin.server.access import AccessPolicy, answer_headers, is_loopback, load_token
 
 
 @pytest.mark.parametrize(

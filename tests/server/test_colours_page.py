@@ -10,9 +10,9 @@ from run.board import AS_TAKEN, Board, pressed, samples_of
 from run.test_runner import Watch
 from server.serving import Site
 from tomoskin.core import CHANGE, CHANGE_ON_DARK
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import prepare
 from tomoskin.run import Runner
-from tomoskin.skin import Skin
 
 pytestmark = [pytest.mark.page, pytest.mark.usefixtures("built_page")]
 

@@ -11,9 +11,9 @@ import pytest
 
 from run.test_runner import Watch
 from server.flowing import flowing
-from tomoskin.calibration import TOUCH, ChannelMapping
+from tomoskin.board.source import open_source
 from tomoskin.core import DataError
-from tomoskin.recording import (
+from tomoskin.files.session import (
     SessionReader,
     as_recorded,
     end_time,
@@ -21,11 +21,11 @@ from tomoskin.recording import (
     replayed,
     start_time,
 )
+from tomoskin.learning import TOUCH, ChannelMapping
+from tomoskin.model.skin import Skin
 from tomoskin.run import commands
 from tomoskin.server.folder import Folder
 from tomoskin.server.source_handlers import SourceSwitch
-from tomoskin.skin import Skin
-from tomoskin.source import open_source
 from tomoskin.twin import Press
 
 FORCE, RADIUS = 9.0, 0.015

@@ -10,9 +10,9 @@ import pytest
 from server.looks import look_in_both
 from server.serving import Site
 from server.watching import Watched
+from tomoskin.board.source import open_source
 from tomoskin.run import Runner
 from tomoskin.server import load_token, serve_requests
-from tomoskin.source import open_source
 
 pytestmark = [pytest.mark.page, pytest.mark.usefixtures("built_page")]
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tomoskin.calibration import BENDS, BendReading
 from tomoskin.core import Detection, Force, Image, Touch
+from tomoskin.learning import BENDS, BendReading
 from tomoskin.pipeline import FrameResult
 from tomoskin.server.frames import encode_result
 from tomoskin.twin import Finger, Press, Probe

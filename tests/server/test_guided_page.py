@@ -11,11 +11,11 @@ from run.board import Board, pressed, samples_of
 from server.looks import look_in_both
 from server.serving import Site
 from server.watching import Watched
-from tomoskin.calibration import FORCE, TOUCH
+from tomoskin.board.source import open_source
+from tomoskin.learning import FORCE, TOUCH
+from tomoskin.model.skin import Skin
 from tomoskin.run import Runner, commands
 from tomoskin.server import serve_requests
-from tomoskin.skin import Skin
-from tomoskin.source import open_source
 
 pytestmark = [pytest.mark.page, pytest.mark.usefixtures("built_page")]
 

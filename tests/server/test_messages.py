@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from tomoskin.core import Event
-from tomoskin.inverse import AlphaChoice
+from tomoskin.imaging import AlphaChoice
 from tomoskin.pipeline import colour_limit, prepare
 from tomoskin.pipeline.records import ReferenceState
 from tomoskin.run.status import Status
+from tomoskin.sensing.signal import BaselineState, ElectrodeHealth
 from tomoskin.server import page_messages
-from tomoskin.signal import BaselineState, ElectrodeHealth
 
 
 def make_status(**changes):

@@ -7,8 +7,8 @@ import pytest
 from run.test_runner import Watch
 from server.serving import Site
 from server.watching import TO_CLIENT, Watched, distance
+from tomoskin.board.source import open_source
 from tomoskin.run import Runner
-from tomoskin.source import open_source
 
 pytestmark = [pytest.mark.page, pytest.mark.usefixtures("built_page")]
 

@@ -14,8 +14,8 @@ from run.test_replay import run, same, touches_of  # the recorded run
 from run.test_runner import PATIENCE, Watch
 from server.serving import Site
 from tomoskin.core import DataError
-from tomoskin.recording import Mark, SessionReader, end_time, read_timeline, replayed
-from tomoskin.recording.replay import open_replay
+from tomoskin.files.session import Mark, SessionReader, end_time, read_timeline, replayed
+from tomoskin.files.session.replay import open_replay
 from tomoskin.run import Runner, commands
 
 __all__ = ["run"]
@@ -165,7 +165,7 @@ def test_a_note_is_told_and_recorded_at_the_picture_that_was_shown(prepared, idl
 
 
 def test_a_jump_begins_with_the_frames_of_its_reference(run):
-    from tomoskin.recording.info import References
+    from tomoskin.files.session.info import References
 
     found = References(run, {"reference_frames": 2})
     all_frames = frames(run)

@@ -13,9 +13,9 @@ import pytest
 from run.test_robot_run import Watch
 from server.serving import PATIENCE, Site
 from server.watching import Watched
+from tomoskin.files.session import split_names
+from tomoskin.model.robot import Robot
 from tomoskin.pipeline import colour_limit
-from tomoskin.recording import split_names
-from tomoskin.robot import Robot
 from tomoskin.run import Member, RobotRun
 from tomoskin.server import Hub, Overview, Server, listen, robot_application, serve_requests
 from tomoskin.server.access import AccessPolicy

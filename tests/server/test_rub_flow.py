@@ -8,9 +8,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from calibration.test_rubbing import touches
-from tomoskin.calibration import Locator, Rubbing
+from learning.test_rubbing import touches
 from tomoskin.core import DataError, Detection, Touch, WireError
+from tomoskin.learning import Locator, Rubbing
 from tomoskin.server.guided_flow import StoppedError
 from tomoskin.server.requests import AskPoint, LearnFlow, StopLearning, UndoPress
 from tomoskin.server.rub_flow import RubFlow

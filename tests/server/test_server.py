@@ -17,7 +17,7 @@ from run.board import Board, pressed, samples_of
 from run.test_runner import Watch
 from server.serving import PATIENCE, Site
 from server.test_frames import decode
-from tomoskin.recording import session_info
+from tomoskin.files.session import session_info
 from tomoskin.run import Runner
 from tomoskin.server import (
     AccessPolicy,

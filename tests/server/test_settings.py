@@ -14,9 +14,9 @@ from run.board import Board
 from run.test_runner import PATIENCE, Watch
 from tomoskin.core import PatternError, reach
 from tomoskin.core.outputs import MAGIC
-from tomoskin.pattern import named
+from tomoskin.files.session import SessionReader, replayed
+from tomoskin.model.pattern import named
 from tomoskin.pipeline import colour_limit, prepare
-from tomoskin.recording import SessionReader, replayed
 from tomoskin.run import Runner, commands
 from tomoskin.server import Hub, SettingsHandlers
 from tomoskin.server.requests import decode_request

@@ -11,20 +11,13 @@ from run.test_runner import Watch
 from server.looks import look_in_both
 from server.serving import Site
 from server.watching import axe_finds, distance
-from tomoskin.calibration import (
-    BENDS,
-    CLASSES,
-    BendExamples,
-    BendModel,
-    Classifier,
-    FrameClassifier,
-)
-from tomoskin.mesh import Hinge
+from tomoskin.board.source import open_source
+from tomoskin.learning import BENDS, CLASSES, BendExamples, BendModel, Classifier, FrameClassifier
+from tomoskin.model.mesh import Hinge
 from tomoskin.pipeline import voltage_covariance
 from tomoskin.run import Runner
 from tomoskin.run.twin_requests import BendRequest, SetPose
 from tomoskin.server import TwinHandlers
-from tomoskin.source import open_source
 from tomoskin.twin import Bent, Face, TwinSettings, TwinSkin
 
 pytestmark = [pytest.mark.page, pytest.mark.usefixtures("built_page")]

@@ -18,7 +18,7 @@ pytestmark = [pytest.mark.page, pytest.mark.usefixtures("built_page")]
 
 FAMILY = "Source Sans 3"
 MOST = 60_000
-SAYING = ("core", "pipeline", "run", "server", "skin")
+SAYING = ("core", "pipeline", "run", "server", "model/skin")
 """Rooms whose words a page shows: of units, of the server, of a skin's settings."""
 WEIGHTS = (400, 500, 600, 700)
 WIDTHS = """weights => weights.map(weight => {

@@ -8,8 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tomoskin.calibration import FORCE, Weight
 from tomoskin.core import DataError, Detection, Touch, WireError
+from tomoskin.learning import FORCE, Weight
 from tomoskin.server.placements import PlacementTaker
 from tomoskin.server.requests import DeletePress, SetWeight, UndoPress
 from tomoskin.server.weigh_flow import WeighFlow, weighed_presses

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tomoskin.skin import Skin
+from tomoskin.model.skin import Skin
 from tomoskin.twin import TwinSettings, TwinSkin
 
 

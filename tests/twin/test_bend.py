@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from tomoskin.core import GeometryError
-from tomoskin.forward import ForwardModel
-from tomoskin.mesh import Arm, Cap, Cylinder, Hinge, Plane, Saddle
-from tomoskin.pattern import Pattern
-from tomoskin.skin import Skin
+from tomoskin.model.forward import ForwardModel
+from tomoskin.model.mesh import Arm, Cap, Cylinder, Hinge, Plane, Saddle
+from tomoskin.model.pattern import Pattern
+from tomoskin.model.skin import Skin
 from tomoskin.twin import (
     BendSettings,
     Bent,
@@ -204,9 +204,9 @@ def test_a_hinge_of_more_than_a_turn_is_refused():
 
 def test_a_bend_moves_during_a_scan():
     """Each drive sees the sheet as it is in its middle; what stands still costs one solution."""
-    from tomoskin.pattern import Scan
+    from tomoskin.board.wire import Drive
+    from tomoskin.model.pattern import Scan
     from tomoskin.twin import ScanClock, sample_table
-    from tomoskin.wire import Drive
 
     skin = Skin.load("textile-disc-8")
     board = make_electronics(skin, TwinSettings().with_noise(0.0))

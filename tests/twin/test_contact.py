@@ -8,16 +8,7 @@ import pytest
 from scipy.optimize import brentq
 
 from tomoskin.core import GeometryError, ModelError
-from tomoskin.twin import (
-    Circle,
-    ContactSettings,
-    Face,
-    Finger,
-    Grid,
-    Probe,
-    Square,
-    solve_contact,
-)
+from tomoskin.twin import Circle, ContactSettings, Face, Finger, Grid, Probe, Square, solve_contact
 from twin.closed_forms import BallOnSprings, Hertz, even_pressure_depth, flat_punch_stiffness
 
 FOAM = ContactSettings()

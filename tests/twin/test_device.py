@@ -7,9 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tomoskin.core import Frame
-from tomoskin.twin import Board, TwinDevice
-from tomoskin.wire import (
+from tomoskin.board.wire import (
     SCHEMA,
     Ack,
     Decoder,
@@ -31,6 +29,8 @@ from tomoskin.wire import (
     enclose,
     encode,
 )
+from tomoskin.core import Frame
+from tomoskin.twin import Board, TwinDevice
 
 BOARD = Board(channels=8, adc_bits=10, current=0.1, tick_rate=250e3, max_drives=4, max_samples=20)
 SCAN = SetScan(1, 7, 2, 1000, 0, 1, 64, 100_000)

@@ -6,11 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tomoskin.board.source import ScanSettings
+from tomoskin.board.wire import Drive
 from tomoskin.core import Frame
-from tomoskin.pattern import Pattern, Scan
-from tomoskin.signal import Readout
-from tomoskin.skin import Skin
-from tomoskin.source import ScanSettings
+from tomoskin.model.pattern import Pattern, Scan
+from tomoskin.model.skin import Skin
+from tomoskin.sensing.signal import Readout
 from tomoskin.twin import (
     ElectronicsSettings,
     ScanClock,
@@ -22,7 +23,6 @@ from tomoskin.twin import (
 )
 from tomoskin.twin.electrodes import Electrodes
 from tomoskin.twin.presets import POLARISING, PRESETS
-from tomoskin.wire import Drive
 
 CURRENT = 1e-3
 LAYER = replace(ElectronicsSettings(), double_layer=100e-6, leak=100.0)

@@ -6,10 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tomoskin.board.source import ScanSettings
+from tomoskin.board.wire import Drive
 from tomoskin.core import ModelError
-from tomoskin.pattern import Scan
-from tomoskin.skin import ReadoutSettings
-from tomoskin.source import ScanSettings
+from tomoskin.model.pattern import Scan
+from tomoskin.model.skin import ReadoutSettings
 from tomoskin.twin import (
     ElectronicsSettings,
     Faults,
@@ -22,7 +23,6 @@ from tomoskin.twin import (
     sample_table,
 )
 from tomoskin.twin.presets import BOARD
-from tomoskin.wire import Drive
 
 QUIET = ElectronicsSettings(noise=0.0)
 FINE = ReadoutSettings(adc_bits=16, offset=0.5, oversampling=1)

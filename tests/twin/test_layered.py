@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from tomoskin.core import GeometryError, ModelError
-from tomoskin.mesh import Plane
-from tomoskin.skin import Skin
+from tomoskin.model.mesh import Plane
+from tomoskin.model.skin import Skin
 from tomoskin.twin import ContactSettings, Inclusion, Layered, Plate, TwinSettings, TwinSkin
 
 FOAM = ContactSettings(modulus=5e3, thickness=30e-3)

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from tomoskin.board.wire import Decoder, encode
 from tomoskin.core import Frame, ModelError
 from tomoskin.twin import FaultyLine, Line, LineSettings
-from tomoskin.wire import Decoder, encode
 
 SENT = np.random.default_rng(0).integers(0, 256, 20_000).astype(np.uint8).tobytes()
 

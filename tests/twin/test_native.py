@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from conftest import NO_ENGINE
+from tomoskin.board.source import ScanSettings
 from tomoskin.core import FloatArray
-from tomoskin.forward import State, engine_choice
-from tomoskin.pattern import Scan
-from tomoskin.skin import Skin
-from tomoskin.source import ScanSettings
+from tomoskin.model.forward import State, engine_choice
+from tomoskin.model.pattern import Scan
+from tomoskin.model.skin import Skin
 from tomoskin.twin import (
     PRESETS,
     Circle,

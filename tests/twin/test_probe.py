@@ -6,18 +6,8 @@ import numpy as np
 import pytest
 
 from tomoskin.core import GeometryError, ModelError
-from tomoskin.mesh import Disc
-from tomoskin.twin import (
-    FACES,
-    Circle,
-    ContactSettings,
-    Face,
-    Finger,
-    Press,
-    Probe,
-    Square,
-    indent,
-)
+from tomoskin.model.mesh import Disc
+from tomoskin.twin import FACES, Circle, ContactSettings, Face, Finger, Press, Probe, Square, indent
 from tomoskin.twin.probe import check_on_skin
 
 

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tomoskin.board.wire import Drive
 from tomoskin.core import Frame
-from tomoskin.pattern import Scan
-from tomoskin.signal import Readout
-from tomoskin.skin import ReadoutSettings
+from tomoskin.model.pattern import Scan
+from tomoskin.model.skin import ReadoutSettings
+from tomoskin.sensing.signal import Readout
 from tomoskin.twin import ElectronicsSettings, TwinElectronics, convert, sample_table
-from tomoskin.wire import Drive
 
 SETTINGS = ReadoutSettings(offset=0.5)
 LSB = 5.0 / 1024

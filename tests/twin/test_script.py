@@ -7,7 +7,7 @@ import math
 import pytest
 
 from tomoskin.core import ScriptError
-from tomoskin.skin import Skin
+from tomoskin.model.skin import Skin
 from tomoskin.twin.course import pressed
 from tomoskin.twin.script import Script
 from tomoskin.twin.script_check import check_script

@@ -7,8 +7,8 @@ import math
 import pytest
 
 from tomoskin.core import ScriptError
-from tomoskin.mesh import Arm, Hinge
-from tomoskin.skin import Skin
+from tomoskin.model.mesh import Arm, Hinge
+from tomoskin.model.skin import Skin
 from tomoskin.twin import Bent, Script, Stretched, bent, bent_truth, check_script
 
 HEAD = 'format = 1\n[script]\nduration = "10 s"\n'

@@ -7,8 +7,8 @@ import pytest
 
 from oracles import disc_resistance
 from tomoskin.core import GeometryError
-from tomoskin.forward import ForwardModel
-from tomoskin.pattern import Scan
+from tomoskin.model.forward import ForwardModel
+from tomoskin.model.pattern import Scan
 from tomoskin.twin import (
     PRESETS,
     Circle,

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from tomoskin.core import GeometryError
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import prepare
-from tomoskin.skin import Skin
 from tomoskin.twin import Press, SteppedSkin, TwinSettings
 
 PRESS = Press(0.03, -0.02, force=5.0, radius=0.012)

@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tomoskin.board.source import Link, ScanSettings, Transport
 from tomoskin.core import Frame, GeometryError, SkinError, SourceError
-from tomoskin.forward import ForwardModel
-from tomoskin.pattern import Scan
-from tomoskin.signal import Readout
-from tomoskin.source import Link, ScanSettings, Transport
+from tomoskin.model.forward import ForwardModel
+from tomoskin.model.pattern import Scan
+from tomoskin.sensing.signal import Readout
 from tomoskin.twin import (
     PRESETS,
     Faults,

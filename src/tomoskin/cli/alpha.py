@@ -16,7 +16,7 @@ from tomoskin.core import TomoskinError
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from tomoskin.inverse import AlphaChoice, Evidence, Spectrum
+    from tomoskin.imaging import AlphaChoice, Evidence, Spectrum
     from tomoskin.pipeline import Prepared
 
 Outcome = tuple[str, "AlphaChoice | TomoskinError"]
@@ -43,10 +43,10 @@ def alpha(
 ) -> None:
     """Show what each criterion chooses for alpha; with a recording, by its noise, frames and
     labels."""
-    from tomoskin.formats import write_choices
-    from tomoskin.inverse import RULES, AlphaChoice, Spectrum, picard
+    from tomoskin.files.exports import write_choices
+    from tomoskin.imaging import RULES, AlphaChoice, Spectrum, picard
+    from tomoskin.model.skin import Skin
     from tomoskin.pipeline import prepare
-    from tomoskin.skin import Skin
 
     prepared = prepare(Skin.load(skin))
     prepared, evidence = _evidence(prepared, recording, reference, frames)
@@ -78,8 +78,8 @@ def _evidence(
 
     Without a recording: the noise that the read-out predicts.
     """
-    from tomoskin.formats import read_recording
-    from tomoskin.inverse import Evidence
+    from tomoskin.files.imports import read_recording
+    from tomoskin.imaging import Evidence
     from tomoskin.pipeline import recorded_frames
 
     if recording is None:
@@ -91,7 +91,7 @@ def _evidence(
 
 
 def _outcome(spectrum: Spectrum, rule: str, evidence: Evidence) -> AlphaChoice | TomoskinError:
-    from tomoskin.inverse import choose
+    from tomoskin.imaging import choose
 
     try:
         return choose(spectrum, rule, evidence)

@@ -14,8 +14,8 @@ from tomoskin.cli.choices import quantity
 from tomoskin.cli.output import JsonFlag, emit
 
 if TYPE_CHECKING:
+    from tomoskin.board.source import Transport
     from tomoskin.run import CheckFinding
-    from tomoskin.source import Transport
 
 app = group("board")
 _EMULATORS = {"emulator": "mega", "emulator:pico": "pico"}
@@ -64,7 +64,7 @@ def check(
 
 def _findings(source: str, channels: int, current: float, *, meter: bool) -> Iterator[CheckFinding]:
     from tomoskin.run import check_board
-    from tomoskin.signal import LoadRing
+    from tomoskin.sensing.signal import LoadRing
 
     if meter:
         yield from _readings(current)
@@ -76,7 +76,7 @@ def _findings(source: str, channels: int, current: float, *, meter: bool) -> Ite
 def _readings(current: float) -> Iterator[CheckFinding]:
     """Ask for what only a multimeter can tell."""
     from tomoskin.run import CheckFinding
-    from tomoskin.signal import STAGES, meter_steps
+    from tomoskin.sensing.signal import STAGES, meter_steps
 
     stage = ""
     for step in meter_steps(current):
@@ -109,10 +109,10 @@ def _asked(question: str) -> float | None:
 
 @contextlib.contextmanager
 def _opened(source: str, ring: object, current: float) -> Iterator[Transport]:
-    from tomoskin.emulator import emulate_load
-    from tomoskin.signal import LoadRing
-    from tomoskin.skin import Skin
-    from tomoskin.source import open_source
+    from tomoskin.board.source import open_source
+    from tomoskin.model.skin import Skin
+    from tomoskin.sensing.signal import LoadRing
+    from tomoskin.twin.emulator import emulate_load
 
     assert isinstance(ring, LoadRing)
     if source in _EMULATORS:

@@ -20,11 +20,11 @@ from tomoskin.cli.output import Bar, JsonFlag, emit, remark
 from tomoskin.cli.recording import changes, labelled_frames, labels, say_notes
 
 if TYPE_CHECKING:
-    from tomoskin.calibration import Calibration, Locator
     from tomoskin.core import FloatArray
-    from tomoskin.pattern import Pattern
-    from tomoskin.signal import Recording
-    from tomoskin.skin import Skin
+    from tomoskin.learning import Calibration, Locator
+    from tomoskin.model.pattern import Pattern
+    from tomoskin.model.skin import Skin
+    from tomoskin.sensing.signal import Recording
 
     Learn = Callable[[FloatArray, FloatArray], Calibration[Locator]]
 
@@ -71,7 +71,7 @@ def touch(
     import numpy as np
 
     from tomoskin.core import DataError
-    from tomoskin.formats import read_recording
+    from tomoskin.files.imports import read_recording
 
     data = read_recording(recording)
     say_notes(data)
@@ -112,7 +112,7 @@ def touch(
 
 def _from_skin(skin: Skin | None, pattern: Pattern) -> tuple[Learn, Pattern]:
     """What learns from these presses alone."""
-    from tomoskin.calibration import TOUCH, Locator
+    from tomoskin.learning import TOUCH, Locator
 
     def learn(dv: FloatArray, xy: FloatArray) -> Calibration[Locator]:
         with Bar("learning") as bar:
@@ -134,8 +134,8 @@ def _onto(path: Path, name: str | None, recording: Path, *, aligns: bool) -> tup
 
     It ``aligns`` that one to frames of which few have a label, or adds labelled presses to its own.
     """
-    from tomoskin.calibration import TOUCH
     from tomoskin.cli.choices import skin_if_any
+    from tomoskin.learning import TOUCH
 
     old = TOUCH.read(path)
     if (skin := skin_if_any(name, recording)) is not None:
@@ -153,8 +153,8 @@ def _onto(path: Path, name: str | None, recording: Path, *, aligns: bool) -> tup
 
 def _aligned(locator: Locator, dv: FloatArray, xy: FloatArray) -> Locator:
     """The locator for the session of these frames; what has changed is said."""
-    from tomoskin.calibration import SessionAlignment
     from tomoskin.core import DataError
+    from tomoskin.learning import SessionAlignment
 
     alignment = SessionAlignment.of(locator, dv, xy)
     if not alignment.holds:
@@ -168,7 +168,7 @@ def _aligned(locator: Locator, dv: FloatArray, xy: FloatArray) -> Locator:
 def _what_of(name: str | None, path: Path, data: Recording) -> tuple[Skin | None, Pattern]:
     """The skin, where there is one, and the table of rows."""
     from tomoskin.cli.choices import skin_if_any
-    from tomoskin.pattern import Pattern
+    from tomoskin.model.pattern import Pattern
 
     skin = skin_if_any(name, path)
     return skin, skin.pattern() if skin else Pattern.from_tables(data.drive, data.measure)
@@ -177,7 +177,7 @@ def _what_of(name: str | None, path: Path, data: Recording) -> tuple[Skin | None
 def _findings(calibration: Calibration[Locator], frames: list[int]) -> dict[str, Any]:
     import numpy as np
 
-    from tomoskin.calibration import LeftOut
+    from tomoskin.learning import LeftOut
 
     locator, left_out = calibration.model, LeftOut.of(calibration.model)
     older = len(locator.presses) - len(frames)

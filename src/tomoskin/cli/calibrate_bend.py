@@ -16,7 +16,7 @@ from tomoskin.core import DataError
 
 if TYPE_CHECKING:
     from tomoskin.core import FloatArray
-    from tomoskin.signal import Recording
+    from tomoskin.sensing.signal import Recording
 
 _ALONG_Y = 90.0
 
@@ -47,11 +47,11 @@ def calibrate_bend(
     """Learn the bends of a skin: touches are then separated from them, and angles estimated."""
     import numpy as np
 
-    from tomoskin.calibration import BENDS, BendExamples, BendModel
     from tomoskin.cli.choices import skin_for_file
-    from tomoskin.formats import read_recording
+    from tomoskin.files.imports import read_recording
+    from tomoskin.learning import BENDS, BendExamples, BendModel
     from tomoskin.pipeline import prepare, voltage_covariance
-    from tomoskin.signal import Reference
+    from tomoskin.sensing.signal import Reference
 
     chosen = skin_for_file(skin, recording)
     with Bar("preparing"):
@@ -120,8 +120,8 @@ def _from_truth(path: Path, data: Recording) -> tuple[list[int], FloatArray, Flo
     """The same from a session's truth: frames that nothing presses, with one bend or none."""
     import numpy as np
 
-    from tomoskin.formats import is_session
-    from tomoskin.recording import SessionReader
+    from tomoskin.files.imports import is_session
+    from tomoskin.files.session import SessionReader
 
     if not is_session(path):
         raise DataError(

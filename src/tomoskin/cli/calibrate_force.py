@@ -20,8 +20,8 @@ from tomoskin.core import DataError, FloatArray
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from tomoskin.calibration import ForceReport, WeighedPresses
     from tomoskin.core import Detection, Touch
+    from tomoskin.learning import ForceReport, WeighedPresses
     from tomoskin.pipeline import Reconstruction
 
 
@@ -55,9 +55,9 @@ def calibrate_force(
     json: JsonFlag = False,
 ) -> None:
     """Learn the force of touches from presses with known weights, all by the same tip."""
-    from tomoskin.calibration import FORCE, NEWTONS, ForceModel, ForceReport
     from tomoskin.cli.choices import skin_for_file
-    from tomoskin.formats import read_recording
+    from tomoskin.files.imports import read_recording
+    from tomoskin.learning import FORCE, NEWTONS, ForceModel, ForceReport
     from tomoskin.pipeline import prepare, reconstruct
 
     chosen = skin_for_file(skin, recording)
@@ -84,7 +84,7 @@ def calibrate_force(
 def _labels(path: Path, n: int, given: Sequence[str]) -> FloatArray:
     """(n,) force in each frame, in the unit that it is given in; NaN without one."""
     from tomoskin.core import load_arrays, real_numbers
-    from tomoskin.formats import is_session
+    from tomoskin.files.imports import is_session
 
     if given:
         return np.array(
@@ -120,7 +120,7 @@ def _weighed(
     path: Path, result: Reconstruction, newtons: FloatArray, time: FloatArray
 ) -> WeighedPresses:
     """Touches of frames with one touch; a press is what one does at one spot until it is lifted."""
-    from tomoskin.calibration import WeighedPresses
+    from tomoskin.learning import WeighedPresses
 
     rows: list[tuple[Detection, float, int, float]] = []
     without, several, number = 0, 0, 0

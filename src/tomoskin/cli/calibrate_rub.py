@@ -14,10 +14,10 @@ from tomoskin.cli.recording import changes, idle_frames, say_notes
 from tomoskin.core import DataError
 
 if TYPE_CHECKING:
-    from tomoskin.calibration import Rubbing
     from tomoskin.core import FloatArray, IntArray
-    from tomoskin.pattern import Pattern
-    from tomoskin.signal import Recording
+    from tomoskin.learning import Rubbing
+    from tomoskin.model.pattern import Pattern
+    from tomoskin.sensing.signal import Recording
 
 _STANDS_OUT = 4.0
 """Root mean square of a frame's changes, in noise deviations, from which it shows a touch."""
@@ -35,8 +35,8 @@ def calibrate_rub(
 
     The skin file says where the electrodes are. Five frames with a label improve the result.
     """
-    from tomoskin.calibration import TOUCH, Rubbing
-    from tomoskin.formats import read_recording
+    from tomoskin.files.imports import read_recording
+    from tomoskin.learning import TOUCH, Rubbing
 
     data = read_recording(recording)
     say_notes(data)
@@ -64,7 +64,7 @@ def _touched(data: Recording, dv: FloatArray, reference: str | None, pattern: Pa
     """Frames whose changes stand out of the untouched frames' noise; all where none is known."""
     import numpy as np
 
-    from tomoskin.signal import Reference
+    from tomoskin.sensing.signal import Reference
 
     idle = idle_frames(data, reference, pattern)
     if idle is None or isinstance(idle, str):

@@ -16,10 +16,10 @@ from tomoskin.cli.recording import changes, say_notes
 from tomoskin.core import DataError, FloatArray
 
 if TYPE_CHECKING:
-    from tomoskin.calibration import Alignment, Calibration, Codes, Examples, FrameClassifier
     from tomoskin.core import Arrays
-    from tomoskin.pattern import Pattern
-    from tomoskin.skin import Skin
+    from tomoskin.learning import Alignment, Calibration, Codes, Examples, FrameClassifier
+    from tomoskin.model.pattern import Pattern
+    from tomoskin.model.skin import Skin
 
 
 def marked(path: Path, dv: FloatArray, given: list[str], codes: Codes | None) -> Examples:
@@ -30,7 +30,7 @@ def marked(path: Path, dv: FloatArray, given: list[str], codes: Codes | None) ->
     DataError
         When nothing says what the frames show (and ``codes`` are not known), or it is no label.
     """
-    from tomoskin.calibration import Codes, Examples
+    from tomoskin.learning import Codes, Examples
 
     arrays = {} if given else _arrays(path)
     if "flags" in arrays:
@@ -58,7 +58,7 @@ def marked(path: Path, dv: FloatArray, given: list[str], codes: Codes | None) ->
 
 def _arrays(path: Path) -> Arrays:
     from tomoskin.core import load_arrays
-    from tomoskin.formats import is_session
+    from tomoskin.files.imports import is_session
 
     if is_session(path) or path.suffix.lower() != ".npz":
         return {}
@@ -101,10 +101,10 @@ def calibrate_states(
     json: JsonFlag = False,
 ) -> None:
     """Learn the state of a frame, or flags, from a few examples of each."""
-    from tomoskin.calibration import CLASSES
     from tomoskin.cli.calibrate_states import marked
-    from tomoskin.formats import read_recording
-    from tomoskin.pattern import Pattern
+    from tomoskin.files.imports import read_recording
+    from tomoskin.learning import CLASSES
+    from tomoskin.model.pattern import Pattern
 
     data = read_recording(recording)
     say_notes(data)
@@ -143,7 +143,7 @@ def _learnt(
     pattern: Pattern,
     skin: Skin | None,
 ) -> Calibration[FrameClassifier]:
-    from tomoskin.calibration import CLASSES, Classifier, FrameClassifier
+    from tomoskin.learning import CLASSES, Classifier, FrameClassifier
 
     if old is not None:
         fitted = old.model.classifier.in_session(examples.dv, examples.flags)

@@ -15,11 +15,11 @@ from tomoskin.cli.recording import changes, idle_frames, labelled_frames, labels
 from tomoskin.core import DataError
 
 if TYPE_CHECKING:
-    from tomoskin.calibration import MappingAnswer
     from tomoskin.core import FloatArray
-    from tomoskin.pattern import Pattern
-    from tomoskin.signal import Recording
-    from tomoskin.skin import Skin
+    from tomoskin.learning import MappingAnswer
+    from tomoskin.model.pattern import Pattern
+    from tomoskin.model.skin import Skin
+    from tomoskin.sensing.signal import Recording
 
 
 def calibrate_wiring(
@@ -41,9 +41,9 @@ def calibrate_wiring(
     The result is a skin file whose electrodes are where the wires end. Give it as --skin to any
     other command.
     """
-    from tomoskin.calibration import solve_channel_mapping
     from tomoskin.core import write_text
-    from tomoskin.formats import read_recording
+    from tomoskin.files.imports import read_recording
+    from tomoskin.learning import solve_channel_mapping
 
     data = read_recording(recording)
     say_notes(data)
@@ -72,7 +72,7 @@ def _at_rest(
     data: Recording, reference: str | None, pattern: Pattern
 ) -> tuple[FloatArray | None, FloatArray | None]:
     """Mean and noise (n_meas,) V of the untouched skin, as far as they are known."""
-    from tomoskin.signal import Reference
+    from tomoskin.sensing.signal import Reference
 
     idle = idle_frames(data, reference, pattern)
     if idle is None or isinstance(idle, str):
@@ -83,7 +83,7 @@ def _at_rest(
 
 
 def _findings(answer: MappingAnswer, skin: Skin, frames: list[int]) -> dict[str, Any]:
-    from tomoskin.calibration import ring_of
+    from tomoskin.learning import ring_of
 
     ring = ring_of(skin)
     return {

@@ -13,19 +13,19 @@ from tomoskin.cli.output import remark
 from tomoskin.core import DataError
 
 if TYPE_CHECKING:
-    from tomoskin.formats import Display
-    from tomoskin.inverse import AlphaChoice
+    from tomoskin.files.exports import Display
+    from tomoskin.imaging import AlphaChoice
+    from tomoskin.model.skin import Skin
     from tomoskin.pipeline import Prepared
     from tomoskin.run import BoardMemory
-    from tomoskin.signal import Headroom
-    from tomoskin.sink import Sink
-    from tomoskin.skin import Skin
+    from tomoskin.run.sinks import Sink
+    from tomoskin.sensing.signal import Headroom
 
 
 def skin_for_source(skin: str | None, source: str) -> Skin:
     """The skin named, or the one in the session that ``source`` replays, or the default."""
-    from tomoskin.recording import parse_replay
-    from tomoskin.skin import Skin
+    from tomoskin.files.session import parse_replay
+    from tomoskin.model.skin import Skin
 
     name, _, argument = source.partition(":")
     if name == "replay":
@@ -35,16 +35,16 @@ def skin_for_source(skin: str | None, source: str) -> Skin:
 
 def skin_if_any(skin: str | None, path: Path) -> Skin | None:
     """The skin named, or the one in the session ``path``; None where neither says one."""
-    from tomoskin.formats import is_session
+    from tomoskin.files.imports import is_session
 
     return skin_for_file(skin, path) if skin is not None or is_session(path) else None
 
 
 def skin_for_file(skin: str | None, path: Path) -> Skin:
     """The skin named, or the one in the session ``path``, or the default."""
-    from tomoskin.formats import is_session
-    from tomoskin.recording import SessionReader
-    from tomoskin.skin import Skin
+    from tomoskin.files.imports import is_session
+    from tomoskin.files.session import SessionReader
+    from tomoskin.model.skin import Skin
 
     chosen = None if skin is None else Skin.load(skin)
     if not is_session(path):
@@ -72,7 +72,7 @@ def say_headroom(headroom: Headroom) -> None:
 
 def with_alpha(skin: Skin, given: str | None) -> tuple[Skin, str | None]:
     """The skin with the alpha of the option, and the rule that is to choose it, if one is."""
-    from tomoskin.inverse import RULES
+    from tomoskin.imaging import RULES
 
     if given is None or given in RULES:
         return skin, given
@@ -106,7 +106,7 @@ def with_time_constant(skin: Skin, given: str | None) -> Skin:
 
 def display_of(skin: Skin, *, percent: bool, limit: float | None, smooth: str | None) -> Display:
     """How images of ``skin`` are shown. Raises DataError for what cannot be."""
-    from tomoskin.formats import Display
+    from tomoskin.files.exports import Display
 
     return Display(
         conductivity=skin.conductivity if percent else None,
@@ -127,7 +127,7 @@ def quantity(text: str, dimension: str, option: str) -> float:
 
 def chosen_sinks(specs: list[str] | None) -> tuple[Sink, ...]:
     """The sinks that were asked for, not opened; SinkError for one that cannot be meant."""
-    from tomoskin.sink import make_sink
+    from tomoskin.run.sinks import make_sink
 
     return tuple(make_sink(spec) for spec in specs or ())
 
@@ -147,7 +147,7 @@ def with_calibrations(prepared: Prepared, paths: Iterable[Path] | None, skin: Sk
     ``skin`` as its file says, whatever images are made of it. Raises DataError for calibrations of
     another skin, and for two of one kind.
     """
-    from tomoskin.calibration import load_calibration
+    from tomoskin.learning import load_calibration
 
     named: dict[str, Path] = {}
     for path in paths or ():

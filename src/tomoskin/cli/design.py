@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
     from rich.table import Table
 
-    from tomoskin.skin import Skin
-    from tomoskin.touch import Demand
+    from tomoskin.model.skin import Skin
+    from tomoskin.sensing.fit import Demand
 
 _ELECTRODES = "8,16,32"
 _PATTERNS = "adjacent,skip:2,opposite"
@@ -68,9 +68,9 @@ def design(
     The bounds are for the position of a press and for the faintest press, with the skin's own
     read-out. No method can do better without more knowledge (Cramér–Rao).
     """
-    from tomoskin.formats import write_promise
-    from tomoskin.skin import Skin
-    from tomoskin.touch import Demand, resolution_bounds
+    from tomoskin.files.exports import write_promise
+    from tomoskin.model.skin import Skin
+    from tomoskin.sensing.fit import Demand, resolution_bounds
 
     counts = _counts(electrodes)
     chosen = Skin.load(skin)
@@ -128,8 +128,8 @@ def _compared(
     skin: Skin, demand: Demand, counts: list[int], patterns: list[str], bar: Bar
 ) -> list[dict[str, Any]]:
     from tomoskin.core import TomoskinError
-    from tomoskin.pattern import Scan
-    from tomoskin.touch import resolution_bounds, variants
+    from tomoskin.model.pattern import Scan
+    from tomoskin.sensing.fit import resolution_bounds, variants
 
     rows: list[dict[str, Any]] = []
     jobs = 1 + len(counts) * len(patterns)

@@ -45,7 +45,7 @@ def _python() -> Iterator[Finding]:
     import numpy as np
     import scipy
 
-    from tomoskin.forward import choose_engine
+    from tomoskin.model.forward import choose_engine
 
     recent = sys.version_info >= (3, 11)
     yield Finding("python", recent, f"{platform.python_version()} on {platform.platform()}")
@@ -61,7 +61,7 @@ def _page() -> Iterator[Finding]:
 
 
 def _sources() -> Iterator[Finding]:
-    from tomoskin.source import list_ports, source_names
+    from tomoskin.board.source import list_ports, source_names
 
     names = ", ".join(source_names())
     yield Finding("sources", bool(names), names or "none: install tomoskin again (make live)")
@@ -71,7 +71,7 @@ def _sources() -> Iterator[Finding]:
 
 def _sinks() -> Iterator[Finding]:
     """Which could be opened; a package that is not here is no fault."""
-    from tomoskin.sink import make_sink, sink_names
+    from tomoskin.run.sinks import make_sink, sink_names
 
     for name in sink_names():
         spec = _EXAMPLES.get(name, name)
@@ -80,7 +80,7 @@ def _sinks() -> Iterator[Finding]:
 
 
 def _skins() -> Iterator[Finding]:
-    from tomoskin.skin import Skin
+    from tomoskin.model.skin import Skin
 
     for name in Skin.names():
         yield _tried("skin", partial(Skin.load, name), lambda skin: skin.name)

@@ -42,7 +42,7 @@ Board = Annotated[
 
 
 def _check_channels(channels: int, board: str) -> None:
-    from tomoskin.emulator import BOARDS
+    from tomoskin.twin.emulator import BOARDS
 
     kind = BOARDS[board]
     if channels not in kind.channels:
@@ -54,7 +54,7 @@ def _check_channels(channels: int, board: str) -> None:
 @app.command()
 def build(channels: Channels = 8, board: Board = "mega") -> None:
     """Build the firmware of a board: the ELF of an ATmega2560, the UF2 of a Pico."""
-    from tomoskin.emulator import build_elf, build_uf2
+    from tomoskin.twin.emulator import build_elf, build_uf2
 
     _check_channels(channels, board)
     with Bar("building"):
@@ -75,7 +75,7 @@ def flash(
     board: Board = "mega",
 ) -> None:
     """Write the firmware to a board: to a Mega with avrdude, to a Pico's boot drive as UF2."""
-    from tomoskin.emulator import find_boot_drive, pico_image, write_firmware, write_uf2
+    from tomoskin.twin.emulator import find_boot_drive, pico_image, write_firmware, write_uf2
 
     _check_channels(channels, board)
     if board == "mega" and port is None:
@@ -123,14 +123,14 @@ def configure(
 ) -> None:
     """Write a board's current and id into its EEPROM and read them back; without either, show
     them and the board's name. Of a Pico the current alone is written, to its flash."""
-    from tomoskin.emulator import (
+    from tomoskin.model.skin import Skin
+    from tomoskin.twin.emulator import (
         check_current,
         read_identity,
         say_board,
         say_identity,
         write_identity,
     )
-    from tomoskin.skin import Skin
 
     asked = None if current is None else quantity(current, "current", "--current")
     of_skin = Skin.load(skin).current if skin else None
@@ -152,7 +152,7 @@ def configure(
 
 
 def _configure_pico(drive: Path, current: float | None, name: str | None) -> None:
-    from tomoskin.emulator import settings_uf2, write_uf2
+    from tomoskin.twin.emulator import settings_uf2, write_uf2
 
     if name is not None:
         raise typer.BadParameter("the id of a Pico is its flash chip's, and cannot be changed")
@@ -166,7 +166,7 @@ def _configure_pico(drive: Path, current: float | None, name: str | None) -> Non
 
 
 def _say_resistor(current: float) -> None:
-    from tomoskin.emulator import sense_resistor
+    from tomoskin.twin.emulator import sense_resistor
 
     ohms = f"{sense_resistor(current):.4g} Ω"
     typer.echo(
@@ -177,8 +177,8 @@ def _say_resistor(current: float) -> None:
 @app.command()
 def emulate(skin: NamedSkinOption = DEFAULT_SKIN, board: Board = "mega") -> None:
     """Run the firmware on a simulated board until Ctrl-C; its serial port is printed."""
-    from tomoskin.emulator import emulate_board
-    from tomoskin.skin import Skin
+    from tomoskin.model.skin import Skin
+    from tomoskin.twin.emulator import emulate_board
 
     with emulate_board(Skin.load(skin), board) as process:
         typer.echo(process.port)

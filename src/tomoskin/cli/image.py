@@ -40,10 +40,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from tomoskin.core import Touch
-    from tomoskin.formats import Display
-    from tomoskin.pattern import Pattern
+    from tomoskin.files.exports import Display
+    from tomoskin.model.pattern import Pattern
     from tomoskin.pipeline import Prepared, Reconstruction, Unresolved
-    from tomoskin.touch import Span
+    from tomoskin.sensing.track import Span
 
 
 _MOST_FIELDS = 200
@@ -77,10 +77,11 @@ def image(
     json: JsonFlag = False,
 ) -> None:
     """Write the images of a recording and the touches in them, or say what they are."""
-    from tomoskin.calibration import FORCE
-    from tomoskin.formats import read_recording, write_touches
+    from tomoskin.files.exports import write_touches
+    from tomoskin.files.imports import read_recording
+    from tomoskin.learning import FORCE
     from tomoskin.pipeline import prepare, reconstruct
-    from tomoskin.touch import touch_spans
+    from tomoskin.sensing.track import touch_spans
 
     own = skin_for_file(skin, recording)
     chosen, rule = with_alpha(own, alpha)
@@ -129,7 +130,7 @@ def _lines(result: Reconstruction, spans: tuple[Span, ...], prepared: Prepared) 
 
 def _warn(source: Path, result: Reconstruction, pattern: Pattern) -> None:
     """Say on stderr what was left out, and what looks wrong."""
-    from tomoskin.formats import is_session
+    from tomoskin.files.imports import is_session
 
     if len(result.rows_left_out):
         rows = result.rows_left_out.tolist()
@@ -225,7 +226,7 @@ def _png(
     """Draw all frames, or as many as fit, evenly spread over the recording."""
     import numpy as np
 
-    from tomoskin.formats import MOST_PANELS, Panel, write_picture
+    from tomoskin.files.exports import MOST_PANELS, Panel, write_picture
 
     n = len(result.frames)
     chosen = np.unique(np.linspace(0, n - 1, min(n, MOST_PANELS)).round().astype(int))
@@ -264,7 +265,7 @@ def _vtu(
     path: Path, prepared: Prepared, result: Reconstruction, display: Display, *, overwrite: bool
 ) -> None:
     """Write one cell field a frame."""
-    from tomoskin.formats import write_vtu
+    from tomoskin.files.exports import write_vtu
 
     if len(result.frames) > _MOST_FIELDS:
         raise DataError(

@@ -82,9 +82,9 @@ def live(
         return
     named, origin = skin[0] if skin else None, source[0] if source else "twin"
     with ended_by_signals():
+        from tomoskin.board.source import open_source
         from tomoskin.run import Runner
         from tomoskin.server import AccessPolicy, Server, application, check_page, listen
-        from tomoskin.source import open_source
 
         check_page()
         sinks = chosen_sinks(sink)
@@ -113,8 +113,8 @@ def live(
 
 def _prepared(skin: str | None, source: str) -> Prepared:
     """The skin, of a recording with the calibrations that it holds."""
+    from tomoskin.files.session import SessionReader, as_recorded, parse_replay
     from tomoskin.pipeline import prepare
-    from tomoskin.recording import SessionReader, as_recorded, parse_replay
 
     name, _, argument = source.partition(":")
     if skin is None and name == "replay":

@@ -15,9 +15,9 @@ from tomoskin.cli.output import Bar, JsonFlag, emit, remark
 from tomoskin.cli.recording import changes, say_notes
 
 if TYPE_CHECKING:
-    from tomoskin.calibration import Calibration, CalibrationHealth, Locator
     from tomoskin.core import FloatArray, Touch
-    from tomoskin.signal import Recording
+    from tomoskin.learning import Calibration, CalibrationHealth, Locator
+    from tomoskin.sensing.signal import Recording
 
 _BLOCK = 256
 _SHOWN = 20
@@ -40,8 +40,9 @@ def locate(
     """Locate the one touch in every frame by a calibration, or with --several up to two."""
     import numpy as np
 
-    from tomoskin.calibration import TOUCH
-    from tomoskin.formats import read_recording, write_touches
+    from tomoskin.files.exports import write_touches
+    from tomoskin.files.imports import read_recording
+    from tomoskin.learning import TOUCH
 
     with Bar("learning") as bar:
         loaded = TOUCH.read(calibration, bar)
@@ -69,7 +70,7 @@ def locate(
 def _strangeness(locator: Locator, dv: FloatArray) -> CalibrationHealth:
     import numpy as np
 
-    from tomoskin.calibration import CalibrationHealth
+    from tomoskin.learning import CalibrationHealth
 
     strange = float(np.median(locator.strangeness(dv))) if len(dv) else np.nan
     return CalibrationHealth(len(dv), strange)
@@ -89,8 +90,8 @@ def _check_skin(loaded: Calibration[Locator], name: str | None, path: Path) -> N
 
 
 def _several(loaded: Calibration[Locator], dv: FloatArray) -> Iterator[tuple[Touch, ...]]:
-    from tomoskin.calibration import Several
     from tomoskin.core import Touch
+    from tomoskin.learning import Several
 
     both = Several.of(loaded.model)
     with Bar("locating") as bar:
@@ -105,8 +106,8 @@ def _several(loaded: Calibration[Locator], dv: FloatArray) -> Iterator[tuple[Tou
 def _single(loaded: Calibration[Locator], dv: FloatArray) -> Iterator[tuple[Touch, ...]]:
     import numpy as np
 
-    from tomoskin.calibration import Watch
     from tomoskin.core import Detection, Touch
+    from tomoskin.learning import Watch
 
     locator = loaded.model
     watch = Watch(locator)

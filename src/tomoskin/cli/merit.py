@@ -14,8 +14,8 @@ from tomoskin.cli.output import Bar, JsonFlag, tell
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from tomoskin.forward import ForwardModel
-    from tomoskin.inverse import Merit
+    from tomoskin.imaging import Merit
+    from tomoskin.model.forward import ForwardModel
     from tomoskin.pipeline import Prepared
 
 _FINER = 4
@@ -46,9 +46,9 @@ def merit(
     json: JsonFlag = False,
 ) -> None:
     """Show GREIT's figures of merit and the noise figure of a skin's operator."""
-    from tomoskin.formats import write_merit, write_merit_table
+    from tomoskin.files.exports import write_merit, write_merit_table
+    from tomoskin.model.skin import Skin
     from tomoskin.pipeline import prepare
-    from tomoskin.skin import Skin
 
     with Bar("computing the figures of merit"):
         figures = _figures(prepare(Skin.load(skin)), towards, greit)
@@ -65,7 +65,7 @@ def merit(
 
 def _figures(prepared: Prepared, towards: int, figure: float | None) -> dict[str, Merit]:
     """Figures by the name of the operator."""
-    from tomoskin.inverse import Greit, Targets, along, figures
+    from tomoskin.imaging import Greit, Targets, along, figures
 
     skin, operator = prepared.skin, prepared.operator
     if towards > skin.n_electrodes:
@@ -99,7 +99,7 @@ def _figures(prepared: Prepared, towards: int, figure: float | None) -> dict[str
 
 
 def _finer(prepared: Prepared) -> ForwardModel:
-    from tomoskin.forward import ForwardModel
+    from tomoskin.model.forward import ForwardModel
 
     skin = prepared.skin
     mesh = skin.altered({"mesh": {"cells": _FINER * len(prepared.mesh.cells)}}).mesh()

@@ -43,9 +43,9 @@ def record(
     json: JsonFlag = False,
 ) -> None:
     """Run source and pipeline into a session file until there is enough."""
+    from tomoskin.board.source import open_source
     from tomoskin.pipeline import prepare
     from tomoskin.run import Runner
-    from tomoskin.source import open_source
 
     sinks = chosen_sinks(sink)
     if seconds is not None and not 0 < seconds < math.inf:

@@ -16,10 +16,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from tomoskin.core import FloatArray, IntArray
-    from tomoskin.pattern import Pattern
+    from tomoskin.model.pattern import Pattern
     from tomoskin.pipeline import Idle
-    from tomoskin.signal import Recording
-    from tomoskin.touch import Span
+    from tomoskin.sensing.signal import Recording
+    from tomoskin.sensing.track import Span
 
 _SHOWN = 20
 """Touches that are listed."""
@@ -27,7 +27,7 @@ _SHOWN = 20
 
 def idle_frames(recording: Recording, spec: str | None, pattern: Pattern) -> Idle:
     """What the frames are held against; None for a file of differences."""
-    from tomoskin.formats import read_recording
+    from tomoskin.files.imports import read_recording
 
     if recording.is_change:
         if spec is not None:

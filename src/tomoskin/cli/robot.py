@@ -20,8 +20,8 @@ from tomoskin.cli.record import ended_by_signals
 from tomoskin.cli.serving import announce, hub_of
 
 if TYPE_CHECKING:
+    from tomoskin.model.robot import PlacedSkin, Robot
     from tomoskin.pipeline import Prepared
-    from tomoskin.robot import PlacedSkin, Robot
     from tomoskin.run import Member, RobotRun
 
 _NAMED = re.compile(r"[^=./\\]+=.+")
@@ -45,7 +45,7 @@ def chosen_robot(
     file: Path | None, skins: list[str], sources: list[str], calibrations: list[Path]
 ) -> Robot | None:
     """That of a robot file, or of ``--skin NAME=SKIN``; None where one skin runs alone."""
-    from tomoskin.robot import Robot
+    from tomoskin.model.robot import Robot
 
     if file is not None:
         if skins or sources or calibrations:
@@ -99,8 +99,8 @@ def run_robot(robot: Robot, sinks: list[str] | None, served: Served) -> None:
 
 
 def _member(skin: PlacedSkin, sinks: list[str] | None) -> Member:
+    from tomoskin.board.source import open_source
     from tomoskin.run import Member
-    from tomoskin.source import open_source
 
     prepared = _prepared(skin)
     if prepared.headroom.problem is not None:
@@ -186,8 +186,8 @@ def place(
 ) -> None:
     """Lay a skin on a link of a robot: add it to a robot file, for `tomoskin live --robot`."""
     from tomoskin.core import write_text
-    from tomoskin.robot import Robot, Urdf, add_skin
-    from tomoskin.skin import Skin
+    from tomoskin.model.robot import Robot, Urdf, add_skin
+    from tomoskin.model.skin import Skin
 
     found = Urdf.read(urdf)
     found.check_link(link, "LINK")
@@ -229,7 +229,7 @@ def _name_of(link: str) -> str:
 def _pose(urdf: Any, link: str, at: str | None, *, on_mesh: bool) -> dict[str, list[str]]:
     """Keys of the skin's section that say where it lies."""
     from tomoskin.core import SkinError
-    from tomoskin.robot import pose_numbers
+    from tomoskin.model.robot import pose_numbers
 
     if on_mesh:
         if at is not None:

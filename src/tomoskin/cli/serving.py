@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
 def hub_of(runner: Runner, source: str, folder: Path) -> Hub:
     """What serves the page of one skin, whose frames come from ``source``."""
+    from tomoskin.board.source import open_source
     from tomoskin.pipeline import colour_limit
     from tomoskin.server import Hub, serve_requests
-    from tomoskin.source import open_source
 
     hub = Hub(runner, limit=colour_limit(runner.prepared), folder=folder)
     hub.opener = partial(open_source, source)

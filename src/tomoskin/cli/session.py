@@ -16,7 +16,7 @@ from tomoskin.cli.recording import say_notes, span_lines
 
 if TYPE_CHECKING:
     from tomoskin.core import Output
-    from tomoskin.recording import Lost, Repaired, SessionInfo
+    from tomoskin.files.session import Lost, Repaired, SessionInfo
 
 app = group("session")
 
@@ -60,7 +60,7 @@ def _repaired(file: Path, out: Path | None) -> Path:
 def _exported(out: Path | None, _: Given, called: str) -> list[Output]:
     """What an export writes: of a series more than the file that is named."""
     from tomoskin.core import Output
-    from tomoskin.formats import series_files
+    from tomoskin.files.exports import series_files
 
     assert out is not None
     if out.suffix.lower() in (".vtu", ".pvd"):
@@ -71,7 +71,7 @@ def _exported(out: Path | None, _: Given, called: str) -> list[Output]:
 @app.command()
 def info(file: _File, json: JsonFlag = False) -> None:
     """Show what a session holds: duration, rate, gaps, drops, skin, touches."""
-    from tomoskin.recording import session_info
+    from tomoskin.files.session import session_info
 
     with Bar("reading") as bar:
         info = session_info(file, bar)
@@ -96,8 +96,8 @@ def repair(
     json: JsonFlag = False,
 ) -> None:
     """Recover every whole chunk of a damaged session into a new file."""
-    from tomoskin.recording import repair
-    from tomoskin.skin import Skin
+    from tomoskin.files.session import repair
+    from tomoskin.model.skin import Skin
 
     target = _repaired(file, out)
     with Bar("repairing") as bar:
@@ -115,7 +115,7 @@ def split(
     json: JsonFlag = False,
 ) -> None:
     """Split the recording of a robot into a session file for each skin: FILE-NAME.mcap."""
-    from tomoskin.recording import split, split_targets
+    from tomoskin.files.session import split, split_targets
 
     with Bar("splitting") as bar:
         counts = split(file, bar)
@@ -146,9 +146,9 @@ def export(
     force: ForceFlag = False,
 ) -> None:
     """Convert a session to tables, images or the format of another program."""
-    from tomoskin.formats import WRITERS, Export, omitted
-    from tomoskin.recording import SessionReader
-    from tomoskin.sink import write_bag, write_rerun
+    from tomoskin.files.exports import WRITERS, Export, omitted
+    from tomoskin.files.session import SessionReader
+    from tomoskin.run.sinks import write_bag, write_rerun
 
     write = (WRITERS | {".mcap": write_bag, ".rrd": write_rerun})[out.suffix.lower()]
     with SessionReader(file) as session, Bar(f"writing {out}") as bar:
@@ -181,7 +181,7 @@ def import_recording(
     force: ForceFlag = False,
 ) -> None:
     """Convert a recording of another program to the interchange file."""
-    from tomoskin.formats import read_recording, write_interchange
+    from tomoskin.files.imports import read_recording, write_interchange
 
     recording = read_recording(file)
     write_interchange(out, recording, overwrite=force)

@@ -15,8 +15,8 @@ from tomoskin.cli.output import Bar, JsonFlag, remark, tell
 
 if TYPE_CHECKING:
     from tomoskin.core import Output
+    from tomoskin.model.skin import Skin
     from tomoskin.run import Workers
-    from tomoskin.skin import Skin
     from tomoskin.twin import SetPlan
 
 ONE_FILE = {".npz": "labelled frames in one file"}
@@ -79,8 +79,8 @@ def simulate(
     json: JsonFlag = False,
 ) -> None:
     """Check which of the two is asked for, and do it."""
-    from tomoskin.signal import Headroom
-    from tomoskin.skin import Skin
+    from tomoskin.model.skin import Skin
+    from tomoskin.sensing.signal import Headroom
 
     chosen = Skin.load(skin)
     say_headroom(Headroom.of_skin(chosen))
@@ -101,8 +101,8 @@ def simulate(
 
 
 def _timeline(skin: Skin, script: Path, out: Path, seed: int | None, *, json: bool) -> None:
+    from tomoskin.model.skin import read_text
     from tomoskin.run import simulate as run
-    from tomoskin.skin import read_text
     from tomoskin.twin import Script
 
     read = Script.from_toml(read_text(script, "a script"), source=str(script))
@@ -123,7 +123,7 @@ def _timeline(skin: Skin, script: Path, out: Path, seed: int | None, *, json: bo
 
 
 def _plan(skin: Skin, script: Path | None, seed: int, n: int) -> SetPlan:
-    from tomoskin.skin import read_text
+    from tomoskin.model.skin import read_text
     from tomoskin.twin import COMMON_PRESSES, Population, SetPlan, check_settling
 
     population = COMMON_PRESSES

@@ -17,7 +17,7 @@ from tomoskin.cli.robot import place
 
 if TYPE_CHECKING:
     from tomoskin.core import FloatArray
-    from tomoskin.skin import Skin
+    from tomoskin.model.skin import Skin
 
 app = group("skin")
 app.command("alpha")(alpha)
@@ -28,7 +28,7 @@ app.command("place")(place)
 @app.command("list")
 def list_skins(json: JsonFlag = False) -> None:
     """List the built-in skins."""
-    from tomoskin.skin import Skin
+    from tomoskin.model.skin import Skin
 
     skins = [Skin.load(name) for name in Skin.names()]
     lines = (f"{s.name:<18} {s.n_electrodes:>3} electrodes  {s.description}" for s in skins)
@@ -38,7 +38,7 @@ def list_skins(json: JsonFlag = False) -> None:
 @app.command()
 def show(name: SkinArgument, json: JsonFlag = False) -> None:
     """Print the skin file of a skin."""
-    from tomoskin.skin import Skin
+    from tomoskin.model.skin import Skin
 
     skin = Skin.load(name)
     text = skin.to_toml()
@@ -49,9 +49,9 @@ def show(name: SkinArgument, json: JsonFlag = False) -> None:
 def check(file: SkinArgument, json: JsonFlag = False) -> None:
     """Check a skin file, mesh it, and compare the expected voltages with the board's limits."""
     from tomoskin.core import SkinError
-    from tomoskin.mesh import quality
-    from tomoskin.signal import Headroom
-    from tomoskin.skin import Skin
+    from tomoskin.model.mesh import quality
+    from tomoskin.model.skin import Skin
+    from tomoskin.sensing.signal import Headroom
 
     skin = Skin.load(file)
     mesh = quality(skin.mesh())
@@ -94,8 +94,8 @@ def lay(
 ) -> None:
     """Write the skin file of a sheet on a scanned or drawn surface."""
     from tomoskin.core import DIMENSIONS, DataError, write_text
-    from tomoskin.skin import Skin
-    from tomoskin.skin import lay as laid
+    from tomoskin.model.skin import Skin
+    from tomoskin.model.skin import lay as laid
 
     if unit not in ("mm", "cm", "m"):
         raise DataError(f'expected mm, cm or m, got "{unit}"', where="--unit")
@@ -125,7 +125,7 @@ def _positions(path: Path) -> FloatArray:
     import numpy as np
 
     from tomoskin.core import DataError
-    from tomoskin.skin import read_text
+    from tomoskin.model.skin import read_text
 
     rows = []
     for number, line in enumerate(read_text(path, "a table of positions").splitlines(), 1):

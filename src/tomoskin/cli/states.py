@@ -15,8 +15,8 @@ from tomoskin.cli.output import Bar, JsonFlag, emit
 from tomoskin.cli.recording import changes, say_notes
 
 if TYPE_CHECKING:
-    from tomoskin.calibration import Answers
-    from tomoskin.signal import Recording
+    from tomoskin.learning import Answers
+    from tomoskin.sensing.signal import Recording
 
 _SHOWN = 20
 """Changes of state that are said."""
@@ -42,9 +42,9 @@ def states(
     json: JsonFlag = False,
 ) -> None:
     """Tell the state of each frame, or that it is none of those that were learnt."""
-    from tomoskin.calibration import CLASSES
     from tomoskin.cli.choices import skin_if_any
-    from tomoskin.formats import read_recording
+    from tomoskin.files.imports import read_recording
+    from tomoskin.learning import CLASSES
 
     with Bar("learning"):
         loaded = CLASSES.read(calibration)

@@ -3,7 +3,6 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from tomoskin._moved import moved
 from tomoskin.core.errors import (
     EMPTY,
     DataError,
@@ -146,5 +145,5 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     # numpy comes with them; the command line needs errors only until a command runs.
     if name not in __all__:
-        return moved("core", name)
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(f"tomoskin.core.{_HOME.get(name, 'records')}"), name)

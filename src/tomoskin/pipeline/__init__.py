@@ -1,8 +1,5 @@
 """The one frame flow, pure: a reference is collected, then frames are followed to touches."""
 
-from typing import Any
-
-from tomoskin._moved import moved
 from tomoskin.pipeline.finding import voltage_covariance
 from tomoskin.pipeline.model_agreement import DOUBTED, ModelAgreement
 from tomoskin.pipeline.offline import Reconstruction, reconstruct
@@ -34,7 +31,3 @@ __all__ = [
     "tuned_image",
     "voltage_covariance",
 ]
-
-
-def __getattr__(name: str) -> Any:
-    return moved("pipeline", name)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tomoskin.core import FloatArray
 from tomoskin.pipeline.model_agreement import NO_AGREEMENT, ModelAgreement
 from tomoskin.pipeline.records import Measured
-from tomoskin.signal import Reference
+from tomoskin.sensing.signal import Reference
 
 _MOST_EXCLUDED, _MOST_LOST = 0.5, 0.25
 """A frame is lost of which more than the first part is excluded, and the others make a reference if

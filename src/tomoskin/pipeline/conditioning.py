@@ -8,13 +8,13 @@ from typing import NamedTuple, Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.calibration import Differences
 from tomoskin.core import FloatArray, IntArray
-from tomoskin.pattern import Scan
+from tomoskin.learning import Differences
+from tomoskin.model.pattern import Scan
 from tomoskin.pipeline.nuisance import Drift, Nuisance
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.pipeline.records import Measured
-from tomoskin.signal import (
+from tomoskin.sensing.signal import (
     Baseline,
     BaselineState,
     Health,

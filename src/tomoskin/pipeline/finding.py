@@ -8,12 +8,11 @@ from typing import Protocol, Self
 
 import numpy as np
 
-from tomoskin.calibration import FrameView, TouchFit
+from tomoskin.board.source import Configuration, ScanSettings
 from tomoskin.core import Detection, FloatArray, finished
+from tomoskin.learning import FrameView, TouchFit
 from tomoskin.pipeline.prepare import Prepared
-from tomoskin.signal import Reference
-from tomoskin.source import Configuration, ScanSettings
-from tomoskin.touch import (
+from tomoskin.sensing.fit import (
     EXHAUSTIVE,
     Pace,
     SpotFinder,
@@ -21,6 +20,7 @@ from tomoskin.touch import (
     idle_covariance,
     measured_covariance,
 )
+from tomoskin.sensing.signal import Reference
 
 
 class Finder(Protocol):
@@ -154,7 +154,7 @@ class Fitting:
     reference: Reference | None
 
     def touch_fit(self) -> TouchFit | None:
-        """See :class:`tomoskin.calibration.Conditions`."""
+        """See :class:`tomoskin.learning.Conditions`."""
         prepared, reference = self.prepared, self.reference
         if reference is None or prepared.spots is None:
             return None

@@ -7,23 +7,19 @@ from typing import Any
 
 import numpy as np
 
-from tomoskin.calibration import Differences, FrameView
 from tomoskin.core import Detection, Image, ModelError, Touch
-from tomoskin.pattern import Scan
+from tomoskin.learning import Differences, FrameView
+from tomoskin.model.pattern import Scan
 from tomoskin.pipeline.collecting import Rest
-from tomoskin.pipeline.conditioning import (
-    Conditioned,
-    Conditioning,
-    Followed,
-    GivenDifferences,
-)
+from tomoskin.pipeline.conditioning import Conditioned, Conditioning, Followed, GivenDifferences
 from tomoskin.pipeline.finding import Finder, Finding, Fitting, finding
 from tomoskin.pipeline.imaging import Filtered, SingleFrame, imaging
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.pipeline.records import FrameResult, Measured
 from tomoskin.pipeline.tune import Steps, tune, tuned_sheet
-from tomoskin.signal import Reference
-from tomoskin.touch import EXHAUSTIVE, FingerTracker, Pace, Tracker
+from tomoskin.sensing.fit import EXHAUSTIVE, Pace
+from tomoskin.sensing.signal import Reference
+from tomoskin.sensing.track import FingerTracker, Tracker
 
 
 @dataclass(frozen=True, slots=True, eq=False)

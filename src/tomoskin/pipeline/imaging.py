@@ -8,10 +8,10 @@ from functools import cached_property
 import numpy as np
 
 from tomoskin.core import FloatArray, Image
-from tomoskin.inverse import Modes, Temporal
+from tomoskin.imaging import Modes, Temporal
 from tomoskin.pipeline.prepare import Prepared
-from tomoskin.signal import NuisanceSubspace, Reference
-from tomoskin.touch import ImageNoise
+from tomoskin.sensing.segment import ImageNoise
+from tomoskin.sensing.signal import NuisanceSubspace, Reference
 
 ImageAndNoise = tuple[Image, ImageNoise | None]
 """An image, and its noise floor where the noise is known."""

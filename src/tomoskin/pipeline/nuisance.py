@@ -9,7 +9,13 @@ import numpy as np
 
 from tomoskin.core import FloatArray
 from tomoskin.pipeline.prepare import Prepared
-from tomoskin.signal import Baseline, Health, NuisanceSubspace, Reference, nuisance_directions
+from tomoskin.sensing.signal import (
+    Baseline,
+    Health,
+    NuisanceSubspace,
+    Reference,
+    nuisance_directions,
+)
 
 _KEPT = 8
 """Sets of excluded measurements whose subspace is remembered."""

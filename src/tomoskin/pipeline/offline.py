@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from tomoskin.calibration import BENDS, CLASSES, BendReading, ClassReading
 from tomoskin.core import DataError, FloatArray, IntArray, Touch, check_fits
-from tomoskin.inverse import AlphaChoice
+from tomoskin.imaging import AlphaChoice
+from tomoskin.learning import BENDS, CLASSES, BendReading, ClassReading
 from tomoskin.pipeline.collecting import Rest
 from tomoskin.pipeline.following import Following, Setting
 from tomoskin.pipeline.model_agreement import ModelAgreement
@@ -18,8 +18,8 @@ from tomoskin.pipeline.prepare import Prepared
 from tomoskin.pipeline.recorded import Idle, RecordedFrames, recorded_frames
 from tomoskin.pipeline.records import Measured
 from tomoskin.pipeline.tune import tuned, tuned_by_rule
-from tomoskin.signal import Recording
-from tomoskin.touch import STILL, Tracker
+from tomoskin.sensing.signal import Recording
+from tomoskin.sensing.track import STILL, Tracker
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +99,7 @@ def reconstruct(
     idle
         What the frames are held against; see :data:`Idle`.
     rule
-        Chooses alpha from this recording, by a name of :data:`tomoskin.inverse.RULES`; without
+        Chooses alpha from this recording, by a name of :data:`tomoskin.imaging.RULES`; without
         it the skin's alpha holds, "auto" at the noise of the idle frames.
     advance
         Told how many frames of how many are done.

@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from tomoskin.core import Frame
-from tomoskin.inverse import AlphaChoice
+from tomoskin.imaging import AlphaChoice
 from tomoskin.pipeline.collecting import Collecting
 from tomoskin.pipeline.following import Following, Setting
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.pipeline.records import FrameResult, Measured, ReferenceState
-from tomoskin.signal import Reference
-from tomoskin.touch import LIVE, Tracker, TrackSettings
+from tomoskin.sensing.fit import LIVE
+from tomoskin.sensing.signal import Reference
+from tomoskin.sensing.track import Tracker, TrackSettings
 
 REFERENCE_FRAMES = 20
 """Frames of the untouched skin that make a reference."""

@@ -10,10 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from tomoskin.calibration import Calibration, Kind
 from tomoskin.core import FloatArray, Image, IntArray, ModelError, reach
-from tomoskin.forward import ForwardModel
-from tomoskin.inverse import (
+from tomoskin.imaging import (
     AlphaChoice,
     Greit,
     LightTouch,
@@ -24,11 +22,14 @@ from tomoskin.inverse import (
     Spectrum,
     named_prior,
 )
-from tomoskin.mesh import Mesh
-from tomoskin.pattern import Pattern, Scan
-from tomoskin.signal import Headroom, NuisanceSubspace, Readout, Reference, difference_noise
-from tomoskin.skin import Skin
-from tomoskin.touch import ImageNoise, Segmenter, SpotModel
+from tomoskin.learning import Calibration, Kind
+from tomoskin.model.forward import ForwardModel
+from tomoskin.model.mesh import Mesh
+from tomoskin.model.pattern import Pattern, Scan
+from tomoskin.model.skin import Skin
+from tomoskin.sensing.fit import SpotModel
+from tomoskin.sensing.segment import ImageNoise, Segmenter
+from tomoskin.sensing.signal import Headroom, NuisanceSubspace, Readout, Reference, difference_noise
 
 _RADIUS = 0.015
 """m, of the touch that the scale of colours is made for."""

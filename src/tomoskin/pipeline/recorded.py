@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import DataError, FloatArray, Image, IntArray
-from tomoskin.inverse import MOST_EXCLUDED, Evidence
-from tomoskin.pattern import Pattern
+from tomoskin.imaging import MOST_EXCLUDED, Evidence
+from tomoskin.model.pattern import Pattern
 from tomoskin.pipeline.model_agreement import NO_AGREEMENT, REFUSED, ModelAgreement
 from tomoskin.pipeline.prepare import Prepared
-from tomoskin.signal import Consecutive, Recording, Reference, difference, in_phase
+from tomoskin.sensing.signal import Consecutive, Recording, Reference, difference, in_phase
 
 _LISTED = 5
 """Measurements that a message names."""

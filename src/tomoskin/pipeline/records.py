@@ -9,11 +9,11 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.calibration import BENDS, CLASSES, TOUCH, BendReading, CalibrationHealth, ClassReading
 from tomoskin.core import FloatArray, Image, Touch, Voltages
+from tomoskin.learning import BENDS, CLASSES, TOUCH, BendReading, CalibrationHealth, ClassReading
 from tomoskin.pipeline.model_agreement import NO_AGREEMENT, ModelAgreement
-from tomoskin.signal import BaselineState, Health
-from tomoskin.touch import TouchEvent
+from tomoskin.sensing.signal import BaselineState, Health
+from tomoskin.sensing.track import TouchEvent
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import ModelError
-from tomoskin.inverse import Assembly, Evidence, Spectrum, choose
+from tomoskin.imaging import Assembly, Evidence, Spectrum, choose
 from tomoskin.pipeline.prepare import Prepared
-from tomoskin.signal import Reference
+from tomoskin.sensing.signal import Reference
 
 _SAME = 0.05
 """An alpha that differs by less than this part is left as it is: the picture is the same."""

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from tomoskin.core import FloatArray, IntArray, ModelError
-from tomoskin.inverse import unresolved
+from tomoskin.imaging import unresolved
 from tomoskin.pipeline.prepare import Prepared
-from tomoskin.touch import SpotPrior
+from tomoskin.sensing.fit import SpotPrior
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,7 +19,7 @@ class Unresolved:
     Attributes
     ----------
     values
-        (n_cells,) from 0, all is told, to 1, nothing is; see :func:`tomoskin.inverse.unresolved`.
+        (n_cells,) from 0, all is told, to 1, nothing is; see :func:`tomoskin.imaging.unresolved`.
     radius
         Of the disc about each cell, m: that of a usual touch.
     """

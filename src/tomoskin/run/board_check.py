@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tomoskin.board.source import Link, ScanSettings, Timing, Transport
+from tomoskin.board.wire import Info
 from tomoskin.core import FloatArray, Frame, SourceError
-from tomoskin.pattern import Scan
+from tomoskin.model.pattern import Scan
 from tomoskin.run.safe_off import check_safe_off
-from tomoskin.signal import CountScale, LoadRing, diagnose
-from tomoskin.source import Link, ScanSettings, Timing, Transport
-from tomoskin.wire import Info
+from tomoskin.sensing.signal import CountScale, LoadRing, diagnose
 
 GAIN, REFERENCE, BITS = 35.0, 5.0, 10
 """Of the board's amplifiers, and of the Mega's converter, V and bits; a Pico's samples are scaled

@@ -13,11 +13,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from tomoskin.calibration import Calibration
+from tomoskin.board.wire import Info
 from tomoskin.core import Frame, StrPath
+from tomoskin.files.session import SessionReader, SessionWriter, errors_of, recorded_calibrations
+from tomoskin.learning import Calibration
 from tomoskin.pipeline import REFERENCE_FRAMES, FrameResult, Prepared
-from tomoskin.recording import SessionReader, SessionWriter, errors_of, recorded_calibrations
-from tomoskin.wire import Info
 
 _SPACING = 1e-3
 """Seconds between the host times that frames of the last run get in this one."""

@@ -13,10 +13,10 @@ from typing import Annotated
 
 from msgspec import Meta
 
+from tomoskin.board.source import Transport
+from tomoskin.files.session import Log
 from tomoskin.pipeline import Prepared
-from tomoskin.recording import Log
 from tomoskin.run.twin_requests import SetPose, SetTwin, StrictRequest
-from tomoskin.source import Transport
 from tomoskin.twin import Contact
 
 MAX_NOTE = 500

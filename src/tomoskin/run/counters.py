@@ -21,8 +21,8 @@ from typing import Literal, Self
 
 import numpy as np
 
+from tomoskin.board.source import Link
 from tomoskin.core import FloatArray, Frame
-from tomoskin.source import Link
 
 _WINDOW = 512
 """Frames whose times are kept: some seconds of a real board."""

@@ -6,9 +6,11 @@ from collections.abc import Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 
+from tomoskin.board.source import Link, ScanSettings, Transport
+from tomoskin.board.wire import Info
 from tomoskin.core import DataError, Event, Frame
+from tomoskin.files.session import BoardInfo, Mark, MarkedFrame, RawRead, Truth, advance
 from tomoskin.pipeline import FrameResult, Pipeline, Prepared, ReferenceState
-from tomoskin.recording import BoardInfo, Mark, MarkedFrame, RawRead, Truth, advance
 from tomoskin.run.backlog import Backlog
 from tomoskin.run.counters import Latency, Losses
 from tomoskin.run.marker import Marker, replay_status
@@ -16,9 +18,7 @@ from tomoskin.run.publisher import Audience, Publisher
 from tomoskin.run.recall import Recall
 from tomoskin.run.status import Status
 from tomoskin.run.twin_control import TwinControl, described
-from tomoskin.source import Link, ScanSettings, Transport
 from tomoskin.twin import Contact
-from tomoskin.wire import Info
 
 _STANDSTILL = frozenset({"silent", "fault", "reset"})
 """Events after which no frame comes until the board is well again."""

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from tomoskin.core import Output, SourceError, StrPath, check_outputs, install_hint
-from tomoskin.formats import is_done, join_shards, shard_path, write_whole
+from tomoskin.files.exports import is_done, join_shards, shard_path, write_whole
 from tomoskin.twin import SetPlan, make_shard
 
 _PATIENCE = 10.0

@@ -9,13 +9,13 @@ from contextlib import suppress
 
 from threadpoolctl import threadpool_limits
 
+from tomoskin.board.source import Transport
 from tomoskin.core import SourceError, TomoskinError, watch_stages
 from tomoskin.pipeline import Prepared
 from tomoskin.run import commands
 from tomoskin.run.commands import Opener, RunCommands
 from tomoskin.run.flow import Flow
 from tomoskin.run.publisher import Audience
-from tomoskin.source import Transport
 
 _POLL = 0.05
 _WAITING = "waiting for the board to answer"

@@ -6,11 +6,11 @@ import math
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
+from tomoskin.board.source import Transport
 from tomoskin.core import Frame
-from tomoskin.recording import Mark
+from tomoskin.files.session import Mark
 from tomoskin.run.commands import ReplayCommand, Seek, SetLoop, SetSpeed
 from tomoskin.run.status import ReplayStatus
-from tomoskin.source import Transport
 
 
 @runtime_checkable

@@ -10,13 +10,12 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from tomoskin.core import Event
+from tomoskin.files.session import RunMessage
+from tomoskin.model.robot import Place
 from tomoskin.pipeline import FrameResult, Prepared
-from tomoskin.recording import RunMessage
-from tomoskin.robot import Place
 from tomoskin.run.board_memory import BoardMemory
 from tomoskin.run.recordings import Recordings
-from tomoskin.run.turns import Turns
-from tomoskin.sink import (
+from tomoskin.run.sinks import (
     Capacity,
     Consumer,
     Sink,
@@ -28,6 +27,7 @@ from tomoskin.sink import (
     sink_worker,
     stop_workers,
 )
+from tomoskin.run.turns import Turns
 
 MOST_WAITING = 256
 """Results that may wait for a subscriber; the oldest make room."""

@@ -5,12 +5,12 @@ from __future__ import annotations
 import threading
 from typing import TYPE_CHECKING
 
+from tomoskin.board.wire import Info
 from tomoskin.core import TomoskinError
+from tomoskin.files.session import Mark, MarkedFrame, advance
 from tomoskin.pipeline import FrameResult, Prepared
-from tomoskin.recording import Mark, MarkedFrame, advance
 from tomoskin.run.board_memory import BoardMemory, Remembered, Trial
 from tomoskin.run.publisher import Publisher
-from tomoskin.wire import Info
 
 if TYPE_CHECKING:
     from tomoskin.run.flow import Flow

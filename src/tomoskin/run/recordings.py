@@ -9,8 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from tomoskin.core import Frame
-from tomoskin.pipeline import REFERENCE_FRAMES, FrameResult, Prepared
-from tomoskin.recording import (
+from tomoskin.files.session import (
     BoardInfo,
     Log,
     Mark,
@@ -22,7 +21,8 @@ from tomoskin.recording import (
     SessionWriter,
     Truth,
 )
-from tomoskin.sink import Capacity, Worker, epoch, raster
+from tomoskin.pipeline import REFERENCE_FRAMES, FrameResult, Prepared
+from tomoskin.run.sinks import Capacity, Worker, epoch, raster
 
 _KEPT = 3 * REFERENCE_FRAMES
 """Frames that make a reference, and during which the operator follows its noise."""

@@ -11,16 +11,16 @@ from pathlib import Path
 from time import monotonic
 
 from tomoskin.core import SourceError, StrPath, TomoskinError
+from tomoskin.files.session import RobotLog
+from tomoskin.model.robot import Place
 from tomoskin.pipeline import Prepared
-from tomoskin.recording import RobotLog
-from tomoskin.robot import Place
 from tomoskin.run import commands
 from tomoskin.run.board_memory import BoardMemory
 from tomoskin.run.commands import Opener
 from tomoskin.run.runner import Runner
+from tomoskin.run.sinks import Sink, epoch
 from tomoskin.run.status import Status
 from tomoskin.run.turns import Turns
-from tomoskin.sink import Sink, epoch
 
 _OFTEN = 0.25
 """Seconds between two looks at all runs."""

@@ -7,8 +7,9 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 
+from tomoskin.board.source import Transport
+from tomoskin.model.robot import Place
 from tomoskin.pipeline import Prepared
-from tomoskin.robot import Place
 from tomoskin.run.board_memory import BoardMemory
 from tomoskin.run.commands import Command, DirectCommand, Opener
 from tomoskin.run.counters import Latency
@@ -17,12 +18,11 @@ from tomoskin.run.flow import Snapshot
 from tomoskin.run.loop import Loop
 from tomoskin.run.marker import ReplaySource
 from tomoskin.run.publisher import Audience
+from tomoskin.run.sinks import Sink
 from tomoskin.run.status import Status
 from tomoskin.run.turns import Turns
 from tomoskin.run.twin_control import TwinControl
-from tomoskin.signal import Reference
-from tomoskin.sink import Sink
-from tomoskin.source import Transport
+from tomoskin.sensing.signal import Reference
 
 
 class Runner:

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from tomoskin.core import Frame, SourceError
-from tomoskin.pattern import Scan
-from tomoskin.source import Configuration, Exchange, ScanSettings, Transport
-from tomoskin.wire import (
+from tomoskin.board.source import Configuration, Exchange, ScanSettings, Transport
+from tomoskin.board.wire import (
     Ack,
     Command,
     Fault,
@@ -18,6 +16,8 @@ from tomoskin.wire import (
     Start,
     Stop,
 )
+from tomoskin.core import Frame, SourceError
+from tomoskin.model.pattern import Scan
 
 _ANSWER, _TRIES = 0.3, 5
 _HEARTBEAT, _USUAL = 300, 2000

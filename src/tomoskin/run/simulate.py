@@ -8,13 +8,13 @@ from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
+from tomoskin.board.source import Configuration, Link, ScanSettings, Transport
 from tomoskin.core import DataError, Event, Frame, StrPath
-from tomoskin.pattern import Scan
+from tomoskin.files.session import Advance, Mark, SessionWriter, no_report
+from tomoskin.model.pattern import Scan
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import REFERENCE_FRAMES
-from tomoskin.recording import Advance, Mark, SessionWriter, no_report
 from tomoskin.run.twin_control import described
-from tomoskin.skin import Skin
-from tomoskin.source import Configuration, Link, ScanSettings, Transport
 from tomoskin.twin import (
     Contact,
     Disturbance,

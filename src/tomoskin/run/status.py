@@ -6,13 +6,13 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from tomoskin.calibration import BendReading, CalibrationHealth, ClassReading
-from tomoskin.inverse import AlphaChoice
+from tomoskin.board.wire import Info
+from tomoskin.imaging import AlphaChoice
+from tomoskin.learning import BendReading, CalibrationHealth, ClassReading
 from tomoskin.pipeline import ReferenceState
 from tomoskin.run.counters import StageLatency
-from tomoskin.signal import ElectrodeHealth
-from tomoskin.sink import SinkReport
-from tomoskin.wire import Info
+from tomoskin.run.sinks import SinkReport
+from tomoskin.sensing.signal import ElectrodeHealth
 
 
 @dataclass(frozen=True, slots=True)

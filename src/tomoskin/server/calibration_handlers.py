@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from tomoskin.calibration import FORCE, TOUCH, Kind, load_calibration
+from tomoskin.learning import FORCE, TOUCH, Kind, load_calibration
 from tomoskin.run import commands
 from tomoskin.server.folder import Folder
 from tomoskin.server.hub import Hub

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TypeVar
 
 from tomoskin.core import DataError, WireError
-from tomoskin.formats import WRITERS, Export
-from tomoskin.recording import SessionReader
+from tomoskin.files.exports import WRITERS, Export
+from tomoskin.files.session import SessionReader
 from tomoskin.run import Runner
 from tomoskin.server.folder import SESSION, Folder, Listing
 from tomoskin.server.hub import Hub

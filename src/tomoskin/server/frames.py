@@ -26,18 +26,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tomoskin.calibration import BendReading
 from tomoskin.core import Force, Touch
+from tomoskin.learning import BendReading
 from tomoskin.pipeline import FrameResult
 from tomoskin.run import Runner, Snapshot
-from tomoskin.touch import force_values
+from tomoskin.sensing.track import force_values
 from tomoskin.twin import Contact
 
 READY, NO_PICTURE, ROWS_LEFT_OUT, BEND = 1, 2, 4, 8
 """Bits of the header's flags."""
 
 BEND_STATES = ("idle", "bend", "touch", "bend and touch", "unknown")
-"""States of a :class:`~tomoskin.calibration.BendReading`, as they are numbered here."""
+"""States of a :class:`~tomoskin.learning.BendReading`, as they are numbered here."""
 
 _HEADER = np.dtype(
     [

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
-from tomoskin.calibration import FORCE, TOUCH, Kind
 from tomoskin.core import TomoskinError, WireError
+from tomoskin.learning import FORCE, TOUCH, Kind
 from tomoskin.pipeline import FrameResult, Prepared
 from tomoskin.run import Runner
 from tomoskin.server.calibration_handlers import CalibrationHandlers

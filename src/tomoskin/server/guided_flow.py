@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from tomoskin.calibration import Calibration
 from tomoskin.core import FloatArray, TomoskinError, watch_stages
+from tomoskin.learning import Calibration
 from tomoskin.pipeline import FrameResult, Prepared
 from tomoskin.run import Runner, commands
 from tomoskin.server.folder import Folder

@@ -8,11 +8,11 @@ from typing import Literal
 
 import numpy as np
 
-from tomoskin.calibration import LeftOut, Locator, MappingAnswer, ring_of, solve_channel_mapping
 from tomoskin.core import FloatArray
+from tomoskin.learning import LeftOut, Locator, MappingAnswer, ring_of, solve_channel_mapping
 from tomoskin.pipeline import Prepared
+from tomoskin.sensing.segment import Region
 from tomoskin.server.guided_flow import Estimate
-from tomoskin.touch import Region
 
 Effort = Literal["softly", "hard"]
 EFFORTS: tuple[Effort, ...] = ("softly", "hard")

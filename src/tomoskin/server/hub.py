@@ -8,17 +8,17 @@ from collections import deque
 from collections.abc import AsyncIterator, Callable, Sequence
 from pathlib import Path
 
+from tomoskin.board.source import Transport
 from tomoskin.core import DataError, WireError
+from tomoskin.files.session import read_timeline
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, colour_limit
-from tomoskin.recording import read_timeline
 from tomoskin.run import Runner, commands
 from tomoskin.server import page_messages
 from tomoskin.server.frames import NewestFrame
 from tomoskin.server.requests import Request
 from tomoskin.server.run_handlers import run_handlers
 from tomoskin.server.task import Handler, Handlers, Listener, Tasks, beside
-from tomoskin.skin import Skin
-from tomoskin.source import Transport
 
 MAX_PAGES = 16
 """Pages that are served at once."""

@@ -13,13 +13,13 @@ import numpy as np
 
 from tomoskin import __version__
 from tomoskin.core import FloatArray, WireError, encode_json
-from tomoskin.robot import PlacedSkin, Pose, Robot
+from tomoskin.model.robot import PlacedSkin, Pose, Robot
 from tomoskin.run import RobotRun, Runner, Status, commands
+from tomoskin.run.sinks import Moment, Naming, Stream, contacts_of
 from tomoskin.server.page_messages import finite, flat, text_of
 from tomoskin.server.requests import Request, SetRecording
 from tomoskin.server.run_handlers import FILE_NAME
 from tomoskin.server.task import Listener, Tasks, beside
-from tomoskin.sink import Moment, Naming, Stream, contacts_of
 
 PERIOD = 1 / 20
 """Seconds between two looks at the touches."""

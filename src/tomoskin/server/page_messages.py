@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from tomoskin import __version__
-from tomoskin.calibration import BendReading, CalibrationHealth, ClassReading
 from tomoskin.core import Event, FloatArray, IntArray, encode_json
-from tomoskin.mesh import Plane
+from tomoskin.files.session import Timeline
+from tomoskin.learning import BendReading, CalibrationHealth, ClassReading
+from tomoskin.model.mesh import Plane
 from tomoskin.pipeline import Prepared, Unresolved
-from tomoskin.recording import Timeline
 from tomoskin.run import MAX_FORCE, Status
-from tomoskin.signal import BaselineState, ElectrodeHealth
+from tomoskin.sensing.signal import BaselineState, ElectrodeHealth
 
 PROBE_RADIUS = 0.015
 """Radius of a press from the page unless it says otherwise, m: the source's usual probe."""

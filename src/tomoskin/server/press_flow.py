@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from tomoskin.calibration import TOUCH, Locator, MappingAnswer
 from tomoskin.core import FloatArray, WireError, write_text
+from tomoskin.learning import TOUCH, Locator, MappingAnswer
 from tomoskin.pipeline import FrameResult, Prepared, prepare
 from tomoskin.run import Runner, commands
 from tomoskin.server.folder import Folder

@@ -7,16 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from tomoskin.calibration import TOUCH, Locator, Rubbing, quiet_electrodes
 from tomoskin.core import DataError, FloatArray, WireError, reach
+from tomoskin.learning import TOUCH, Locator, Rubbing, quiet_electrodes
 from tomoskin.pipeline import FrameResult, Prepared
 from tomoskin.run import Runner
+from tomoskin.sensing.segment import Region
 from tomoskin.server.folder import Folder
 from tomoskin.server.guided_flow import Estimate, GuidedFlow, keep_calibration
 from tomoskin.server.guided_presses import Dots
 from tomoskin.server.press_taker import OFTEN, PressTaker
 from tomoskin.server.requests import AskPoint, LearnFlow, StopLearning, UndoPress
-from tomoskin.touch import Region
 
 _FEWEST, _GOOD = 150, 400
 """Touches from which it can be learnt, and that are good."""

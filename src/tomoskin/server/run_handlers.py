@@ -11,12 +11,12 @@ from typing import get_args
 import numpy as np
 
 from tomoskin.core import DataError, GeometryError, TomoskinError, WireError
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Unresolved
 from tomoskin.run import Runner, SetPresses, commands
 from tomoskin.server import page_messages
 from tomoskin.server.requests import AskUnresolved, Painted, SetRecording
 from tomoskin.server.task import Handlers, Listener, Tasks
-from tomoskin.skin import Skin
 from tomoskin.twin import Contact
 
 FILE_NAME = "tomoskin-%Y%m%d-%H%M%S.mcap"

@@ -8,9 +8,8 @@ from functools import cache
 from typing import Any
 
 from tomoskin.core import PatternError, SkinError, TomoskinError
-from tomoskin.pattern import named
-from tomoskin.server.page_messages import text_of
-from tomoskin.skin import (
+from tomoskin.model.pattern import named
+from tomoskin.model.skin import (
     SECTIONS,
     Choice,
     Number,
@@ -22,6 +21,7 @@ from tomoskin.skin import (
     ValueKind,
     Whole,
 )
+from tomoskin.server.page_messages import text_of
 
 Changes = Mapping[str, Mapping[str, Any]]
 """Values by section and key, as a skin file writes them; None takes a key out."""

@@ -19,7 +19,8 @@ from tomoskin.core import (
     watch_stages,
     write_text,
 )
-from tomoskin.inverse import LightTouch, LinearProblem, Spectrum
+from tomoskin.imaging import LightTouch, LinearProblem, Spectrum
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, colour_limit, prepare, tuned_image
 from tomoskin.run import Runner, commands
 from tomoskin.server.folder import Folder
@@ -35,7 +36,6 @@ from tomoskin.server.requests import (
 )
 from tomoskin.server.settings_form import altered, refusal, schema, table_of
 from tomoskin.server.task import Listener
-from tomoskin.skin import Skin
 
 STAGES = ("mesh", "model", "image", "touches", "source")
 """What a change of settings comes to, one after the other; many begin later, or end earlier."""

@@ -7,18 +7,18 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from tomoskin.board.source import Transport, list_ports, open_source
+from tomoskin.board.wire import SCHEMA
 from tomoskin.core import SourceError
-from tomoskin.emulator import BOARDS, DEFAULT
+from tomoskin.files.session import ReplayTransport, SessionReader, as_recorded, parse_replay
+from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared
-from tomoskin.recording import ReplayTransport, SessionReader, as_recorded, parse_replay
 from tomoskin.run import commands
 from tomoskin.server.hub import Hub
 from tomoskin.server.page_messages import text_of
 from tomoskin.server.requests import Connect, ListSources
 from tomoskin.server.task import Listener
-from tomoskin.skin import Skin
-from tomoskin.source import Transport, list_ports, open_source
-from tomoskin.wire import SCHEMA
+from tomoskin.twin.emulator import BOARDS, DEFAULT
 
 EMULATED = {
     "emulator"

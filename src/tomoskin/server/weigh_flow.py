@@ -7,15 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from tomoskin.calibration import (
-    FORCE,
-    ForceModel,
-    ForceReport,
-    WeighedPresses,
-    Weight,
-    least_known,
-)
 from tomoskin.core import DataError, WireError
+from tomoskin.learning import FORCE, ForceModel, ForceReport, WeighedPresses, Weight, least_known
 from tomoskin.pipeline import FrameResult, Prepared
 from tomoskin.run import Runner
 from tomoskin.server.folder import Folder

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tomoskin.core import FloatArray, GeometryError
-from tomoskin.mesh import Surface
+from tomoskin.model.mesh import Surface
 from tomoskin.twin.dent import turned
 from tomoskin.twin.parameters import check_numbers, parameter
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from tomoskin.source import PRESCALERS, ScanSettings, chop_limit
-from tomoskin.twin.scanning import LIMITS
-from tomoskin.wire import (
+from tomoskin.board.source import PRESCALERS, ScanSettings, chop_limit
+from tomoskin.board.wire import (
     SCHEMA,
     Ack,
     BoardLimits,
@@ -30,6 +29,7 @@ from tomoskin.wire import (
     SetScan,
     type_byte,
 )
+from tomoskin.twin.scanning import LIMITS
 
 Verdict = tuple[Result, int]
 """Result and detail of an ACK."""

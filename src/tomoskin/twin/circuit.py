@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, IntArray
-from tomoskin.forward import choose_engine
+from tomoskin.model.forward import choose_engine
 from tomoskin.twin.faults import Faults
 from tomoskin.twin.parameters import check_numbers, parameter
 

@@ -10,7 +10,7 @@ from typing import Self
 import numpy as np
 
 from tomoskin.core import FloatArray, GeometryError, ScriptError
-from tomoskin.mesh import Arm, Hinge, Outline
+from tomoskin.model.mesh import Arm, Hinge, Outline
 from tomoskin.twin.bend import Bent, Deformation, Pose, Stretched
 from tomoskin.twin.probe import Probe
 from tomoskin.twin.script_schema import BendSection, StretchSection

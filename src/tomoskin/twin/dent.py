@@ -12,7 +12,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter
 
 from tomoskin.core import FloatArray
-from tomoskin.forward import choose_engine
+from tomoskin.model.forward import choose_engine
 from tomoskin.twin.contact import ContactSettings, Grid, solve_contact
 from tomoskin.twin.probe import Contact, Probe
 from tomoskin.twin.shape import Shape

@@ -4,11 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from tomoskin.core import Frame
-from tomoskin.source import conversion_time
-from tomoskin.twin.board import OK, Board, HeldScanning, Verdict
-from tomoskin.twin.scanning import Analogue, SampleTable, ScanClock, chopped_table, sample_table
-from tomoskin.wire import (
+from tomoskin.board.source import conversion_time
+from tomoskin.board.wire import (
     SCHEMA,
     Ack,
     ChoppedFrame,
@@ -41,6 +38,9 @@ from tomoskin.wire import (
     encode,
     is_command,
 )
+from tomoskin.core import Frame
+from tomoskin.twin.board import OK, Board, HeldScanning, Verdict
+from tomoskin.twin.scanning import Analogue, SampleTable, ScanClock, chopped_table, sample_table
 
 _HELLO_INTERVAL = 0.5
 _HEARTBEAT = 2.0

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, IntArray
-from tomoskin.forward import choose_engine
+from tomoskin.model.forward import choose_engine
 from tomoskin.twin.bend import Pose
 from tomoskin.twin.circuit import ElectronicsSettings, Lines, line_potentials, settling
 from tomoskin.twin.electrodes import Electrodes
@@ -22,7 +22,7 @@ from tomoskin.twin.scanning import SampleTable
 from tomoskin.twin.sheet import TwinSkin
 
 if TYPE_CHECKING:
-    from tomoskin.skin import ReadoutSettings
+    from tomoskin.model.skin import ReadoutSettings
 
 Course = Callable[[float], tuple[Contact, ...]]
 """What presses so many seconds after the start of a scan."""

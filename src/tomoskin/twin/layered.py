@@ -19,7 +19,7 @@ from scipy.ndimage import map_coordinates
 from scipy.optimize import brentq
 
 from tomoskin.core import FloatArray, GeometryError, ModelError
-from tomoskin.mesh import Surface
+from tomoskin.model.mesh import Surface
 from tomoskin.twin.bend import Deformation
 from tomoskin.twin.contact import ContactSettings, Grid
 from tomoskin.twin.strain import bulge_strain

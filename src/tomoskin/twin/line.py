@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tomoskin.board.source import Transport
 from tomoskin.core import ModelError
-from tomoskin.source import Transport
 from tomoskin.twin.parameters import parameter
 
 

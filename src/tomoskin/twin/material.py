@@ -9,8 +9,8 @@ from functools import lru_cache
 import numpy as np
 
 from tomoskin.core import FloatArray
-from tomoskin.forward import choose_engine
-from tomoskin.skin import (
+from tomoskin.model.forward import choose_engine
+from tomoskin.model.skin import (
     MaterialMemory,
     MemoryState,
     Metric,

@@ -7,7 +7,7 @@ from typing import Self
 import numpy as np
 
 from tomoskin.core import FloatArray, ScriptError
-from tomoskin.mesh import Outline
+from tomoskin.model.mesh import Outline
 from tomoskin.twin.probe import Probe
 from tomoskin.twin.script import of_script, tables_of
 from tomoskin.twin.script_schema import PressesSection

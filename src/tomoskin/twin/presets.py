@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import Self
 
 from tomoskin.core import ModelError
-from tomoskin.signal import FIGURES
+from tomoskin.sensing.signal import FIGURES
 from tomoskin.twin.bend import BendSettings
 from tomoskin.twin.circuit import ElectronicsSettings
 from tomoskin.twin.contact import ContactSettings

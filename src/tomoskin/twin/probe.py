@@ -11,7 +11,7 @@ from typing import Self
 import numpy as np
 
 from tomoskin.core import GeometryError, ModelError
-from tomoskin.mesh import Outline
+from tomoskin.model.mesh import Outline
 from tomoskin.twin.shape import Circle, Shape
 
 

@@ -10,10 +10,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from tomoskin.board.source import ScanSettings, choose_periods
+from tomoskin.board.wire import BoardLimits, Drive
 from tomoskin.core import FloatArray, IntArray
-from tomoskin.pattern import Scan
-from tomoskin.source import ScanSettings, choose_periods
-from tomoskin.wire import BoardLimits, Drive
+from tomoskin.model.pattern import Scan
 
 LIMITS = BoardLimits(
     request=0,

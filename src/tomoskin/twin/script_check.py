@@ -7,10 +7,10 @@ from itertools import combinations
 
 import numpy as np
 
+from tomoskin.board.source import Configuration, ScanSettings
 from tomoskin.core import GeometryError, ScriptError
-from tomoskin.pattern import Scan
-from tomoskin.skin import Skin
-from tomoskin.source import Configuration, ScanSettings
+from tomoskin.model.pattern import Scan
+from tomoskin.model.skin import Skin
 from tomoskin.twin.bend import strain_of
 from tomoskin.twin.course import NO_FRAME, ScriptedPress, check_stages
 from tomoskin.twin.presets import TwinSettings

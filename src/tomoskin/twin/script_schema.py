@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from tomoskin.skin import (
+from tomoskin.model.skin import (
     Choice,
     Number,
     OneOrSpan,

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, GeometryError
-from tomoskin.mesh import Polygon
+from tomoskin.model.mesh import Polygon
 
 LEAST_SIZE = 1e-6
 """Of a face and of its curvature, m: far below any mesh, and its square is a number still."""

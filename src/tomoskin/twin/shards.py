@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from tomoskin import __version__
+from tomoskin.board.source import ScanSettings
 from tomoskin.core import FloatArray, Frame, ScriptError
-from tomoskin.pattern import Scan
-from tomoskin.signal import Readout
-from tomoskin.skin import Skin
-from tomoskin.source import ScanSettings
+from tomoskin.model.pattern import Scan
+from tomoskin.model.skin import Skin
+from tomoskin.sensing.signal import Readout
 from tomoskin.twin.electronics import TwinElectronics
 from tomoskin.twin.population import Population
 from tomoskin.twin.presets import TwinSettings

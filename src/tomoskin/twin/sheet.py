@@ -9,9 +9,9 @@ from typing import Self
 import numpy as np
 
 from tomoskin.core import FloatArray
-from tomoskin.forward import ForwardModel, State, Terminals
-from tomoskin.mesh import Outline, Plane, Surface, laid_on, triangulate
-from tomoskin.skin import Skin
+from tomoskin.model.forward import ForwardModel, State, Terminals
+from tomoskin.model.mesh import Outline, Plane, Surface, laid_on, triangulate
+from tomoskin.model.skin import Skin
 from tomoskin.twin import material
 from tomoskin.twin.bend import Pose, depth_of, strain_of
 from tomoskin.twin.dent import Load, indent

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from tomoskin.board.source import read_options
 from tomoskin.core import SourceError
-from tomoskin.source import read_options
 from tomoskin.twin.board import Board
 from tomoskin.twin.device import TwinDevice
 from tomoskin.twin.electronics import TwinElectronics
@@ -16,7 +16,7 @@ from tomoskin.twin.sheet import TwinSkin
 from tomoskin.twin.transport import Clock, TwinTransport, WallClock
 
 if TYPE_CHECKING:
-    from tomoskin.skin import Skin
+    from tomoskin.model.skin import Skin
 
 _BOARDS = (8, 16, 32)
 """Channels that boards come with."""

@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tomoskin.board.source import ScanSettings
 from tomoskin.core import FloatArray, Frame, Touch
 from tomoskin.pipeline import REFERENCE_FRAMES, Pipeline, Prepared
-from tomoskin.source import ScanSettings
 from tomoskin.twin.presets import TwinSettings
 from tomoskin.twin.probe import Contact
 from tomoskin.twin.scanning import table_of

@@ -1,0 +1,1 @@
+"""Boards: bytes and messages, transports, the protocol session."""

@@ -1,0 +1,194 @@
+"""Commands to a board, and frames from it, in order."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+from tomoskin.board.source.configuration import Configuration
+from tomoskin.board.source.settings import Timing
+from tomoskin.board.wire import Command, SetBaud, encode
+from tomoskin.core import Event, Frame, SourceError
+
+_MODULUS = 2**32
+_ANY = -1
+"""The expected number of a frame that may have any."""
+
+
+@dataclass(frozen=True, slots=True)
+class FrameCounters:
+    """Frames since the link was made.
+
+    ``passed`` on; ``lost`` by their sequence numbers; ``foreign``: another configuration or a
+    wrong number of samples; ``stale``: behind the sequence, or before START was answered.
+    """
+
+    passed: int = 0
+    lost: int = 0
+    foreign: int = 0
+    stale: int = 0
+
+
+class SequenceFilter:
+    """Checks each frame against the configuration and the sequence."""
+
+    def __init__(self, configuration: Configuration) -> None:
+        """No frame passes yet."""
+        self._configuration = configuration
+        self._expected: int | None = None
+        self._foreign_run = False
+        self._passed = self._lost = self._foreign = self._stale = 0
+
+    def open(self) -> None:
+        """START has been answered: the sequence begins at 0."""
+        self._expected = 0
+
+    def expect_any(self) -> None:
+        """The next frame may have any number: what it comes from has been set to another place."""
+        if self._expected is not None:
+            self._expected = _ANY
+
+    def close(self) -> None:
+        """No frame passes until START is answered again."""
+        self._expected = None
+
+    @property
+    def counters(self) -> FrameCounters:
+        """Counts so far."""
+        return FrameCounters(self._passed, self._lost, self._foreign, self._stale)
+
+    def take(self, frame: Frame) -> list[Frame | Event]:
+        """The frame, or nothing; and an event if frames are missing or foreign ones begin."""
+        if self._expected is None:
+            self._stale += 1
+            return []
+        fault = self._fault(frame)
+        if fault:
+            self._foreign += 1
+            first, self._foreign_run = not self._foreign_run, True
+            return [Event(frame.host_time, "foreign", fault)] if first else []
+        self._foreign_run = False
+        gap = 0 if self._expected == _ANY else (frame.sequence - self._expected) % _MODULUS
+        if gap >= _MODULUS // 2:
+            self._stale += 1
+            return []
+        self._expected = (frame.sequence + 1) % _MODULUS
+        self._passed += 1
+        if not gap:
+            return [frame]
+        self._lost += gap
+        text = f"{gap} frame{'s' if gap > 1 else ''} lost before frame {frame.sequence}"
+        return [Event(frame.host_time, "lost", text), frame]
+
+    def _fault(self, frame: Frame) -> str:
+        wanted = self._configuration
+        if frame.configuration != wanted.identity:
+            return (
+                f"frames of configuration {frame.configuration:04x} are left out: this scan has "
+                f"configuration {wanted.identity:04x}"
+            )
+        if len(frame.samples) != wanted.n_samples:
+            return (
+                f"frames with {len(frame.samples)} samples are left out: this scan has "
+                f"{wanted.n_samples} samples"
+            )
+        return ""
+
+
+@dataclass
+class _Pending:
+    command: Command
+    sent: float
+    tries: int
+
+
+class CommandQueue:
+    """Commands that wait, the one that is pending, and the bytes to be sent. No I/O.
+
+    Attributes
+    ----------
+    last_sent
+        When anything was sent last, s.
+    """
+
+    def __init__(self, timing: Timing, now: float, where: str) -> None:
+        """Nothing to be sent."""
+        self.last_sent = now
+        self._timing, self._where = timing, where
+        self._waiting: deque[Command] = deque()
+        self._pending: _Pending | None = None
+        self._request = 0
+        self._out = bytearray()
+
+    @property
+    def pending(self) -> Command | None:
+        """The command that an answer is awaited to."""
+        return self._pending.command if self._pending else None
+
+    @property
+    def repeat_time(self) -> float | None:
+        """When the pending command is repeated; None where there is none."""
+        return self._pending.sent + self._timing.answer if self._pending else None
+
+    def restart(self, commands: Iterable[Command], now: float) -> None:
+        """Send these, whatever else was to be sent."""
+        self._waiting = deque(commands)
+        self.send_next(now)
+
+    def add(self, commands: Iterable[Command]) -> None:
+        """Send these after those that wait."""
+        self._waiting.extend(commands)
+
+    def clear(self) -> None:
+        """Await nothing and send nothing more."""
+        self._waiting.clear()
+        self._pending = None
+
+    def send_next(self, now: float) -> bool:
+        """Send the next command, since the pending one is answered; False where none waits."""
+        self._pending = None
+        if not self._waiting:
+            return False
+        command = self._numbered(self._waiting.popleft())
+        self._pending = _Pending(command, now, 1)
+        self._send(command, now)
+        return True
+
+    def send(self, command: Command, now: float) -> int:
+        """Send a command that no answer is awaited to; its request id."""
+        numbered = self._numbered(command)
+        self._send(numbered, now)
+        return numbered.request
+
+    def repeat(self, now: float) -> None:
+        """Send the pending command again, when it is time; SourceError after too many tries."""
+        pending = self._pending
+        if pending is None or now < pending.sent + self._timing.answer:
+            return
+        if pending.tries >= self._timing.tries:
+            raise SourceError(
+                f"no answer to {type(pending.command).__name__} after {pending.tries} tries",
+                where=self._where,
+                hint="check that it is a tomoskin board, that it has power, and that the rate is "
+                "right",
+            )
+        if isinstance(pending.command, SetBaud):  # it may have gone back: do it again
+            pending.command = self._numbered(pending.command)
+        pending.tries += 1
+        pending.sent = now
+        self._send(pending.command, now)
+
+    def take(self) -> bytes:
+        """Bytes to be sent to the board, once."""
+        data = bytes(self._out)
+        self._out.clear()
+        return data
+
+    def _numbered(self, command: Command) -> Command:
+        self._request = self._request % 255 + 1
+        return replace(command, request=self._request)
+
+    def _send(self, command: Command, now: float) -> None:
+        self.last_sent = now
+        self._out += encode(command)

@@ -1,0 +1,183 @@
+"""A board behind a transport: the protocol session with it, and the frames that come of it."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+
+from tomoskin.board.source.agreement import Rated, RateFollower
+from tomoskin.board.source.command_queue import FrameCounters
+from tomoskin.board.source.configuration import Configuration
+from tomoskin.board.source.protocol_session import ProtocolSession, Stage
+from tomoskin.board.source.settings import ScanSettings, Timing
+from tomoskin.board.source.transport import Diagnosable, Fetched, Played, Transport
+from tomoskin.board.wire import Ack, Counters, Decoder, Info
+from tomoskin.core import Event, Frame, SourceError
+from tomoskin.model.pattern import Scan
+
+_HEARD = 256
+"""So many of the first bytes tell what speaks where no board does."""
+
+
+class Link(AbstractContextManager["Link"]):
+    """Sets a board up for a scan and passes its frames on.
+
+    Everything happens in :meth:`poll`; leaving the ``with`` block, or :meth:`close`, stops the
+    board.
+
+    Attributes
+    ----------
+    diagnosis
+        Why no board answers, once it should have; None where it does, or nobody can tell.
+    """
+
+    def __init__(
+        self,
+        transport: Transport,
+        scan: Scan,
+        settings: ScanSettings,
+        *,
+        timing: Timing | None = None,
+        clock: Callable[[], float] = time.monotonic,
+        tap: Callable[[float, bytes], None] | None = None,
+    ) -> None:
+        """A link that has not spoken yet.
+
+        ``clock`` gives monotonic seconds; a transport that plays a recording brings its own.
+        ``tap`` is called with the host time and bytes of every read, before they are decoded.
+        """
+        self.transport = transport
+        self._played = transport if isinstance(transport, Played) else None
+        self._clock = self._played.now if self._played else clock
+        self._tap = tap
+        self._timing = timing or Timing()
+        self._decoder = Decoder()
+        self._fetched = transport if isinstance(transport, Fetched) else None
+        self._rate = RateFollower(transport) if isinstance(transport, Rated) else None
+        self._session = ProtocolSession(scan, settings, self._timing, self._clock(), transport.name)
+        self._closed = False
+        self._heard = b""
+        self.diagnosis: SourceError | None = None
+
+    @property
+    def running(self) -> bool:
+        """Whether the board scans for this link."""
+        return self._session.stage is Stage.RUNNING
+
+    @property
+    def info(self) -> Info | None:
+        """What the board said of itself, once it has."""
+        return self._session.info
+
+    @property
+    def board_name(self) -> str:
+        """What the board calls itself; empty before protocol 1.2."""
+        return self._session.board.text if self._session.board else ""
+
+    @property
+    def configuration(self) -> Configuration:
+        """What this scan asks of the board, fitted to the board once that is known."""
+        return self._session.configuration
+
+    @property
+    def waited(self) -> float:
+        """How long the first byte of the last read had waited on this host, s."""
+        return self._fetched.waited if self._fetched else 0.0
+
+    @property
+    def counters(self) -> Counters:
+        """What the stream has held: messages and dropped bytes."""
+        return self._decoder.counters
+
+    @property
+    def frames(self) -> FrameCounters:
+        """Frames passed, lost, foreign and stale."""
+        return self._session.frames.counters
+
+    def poll(self, timeout: float) -> list[Frame | Event]:
+        """Frames and events, waiting at most ``timeout`` s for bytes.
+
+        Raises
+        ------
+        SourceError
+            The device has gone away, does not answer, or cannot do this scan.
+        WireError
+            The device speaks another protocol.
+        """
+        now = self._clock()
+        try:
+            items = self._session.tick(now)
+        except SourceError as error:
+            raise self.diagnosis or error from None
+        if self.counters.messages:
+            self.diagnosis = None
+        elif self.diagnosis is None and self._session.stage is Stage.SETTING_UP:
+            self.diagnosis = _diagnosis(self.transport, self._heard)
+        self._flush()
+        patience = min(timeout, self._session.deadline() - now)
+        items += self._listen(max(patience, 0.0))
+        return items
+
+    def connect(self) -> Info:
+        """Poll until the board scans; what it said of itself. Raises as :meth:`poll` does."""
+        while not self.running:
+            self.poll(self._timing.answer)
+        assert self.info is not None
+        return self.info
+
+    def close(self) -> None:
+        """Stop the board, as far as it can still be reached, and give the transport back."""
+        if self._closed:
+            return
+        try:
+            self.stop()
+        finally:
+            self._closed = True
+            self.transport.close()
+
+    def stop(self) -> None:
+        """Stop the board, as far as it can still be reached; the transport stays open."""
+        with contextlib.suppress(SourceError):  # gone already: its heartbeat stops it
+            request = self._session.stop(self._clock())
+            self._flush()
+            end = self._clock() + self._timing.goodbye
+            while (now := self._clock()) < end:
+                for message in self._decoder.feed(self.transport.read(end - now), now):
+                    if isinstance(message, Ack) and message.request == request:
+                        return
+
+    def __exit__(self, *_: object) -> None:
+        """Close."""
+        self.close()
+
+    def _listen(self, timeout: float) -> list[Frame | Event]:
+        data = self.transport.read(timeout)
+        now = self._clock()
+        if data and self._tap:
+            self._tap(now, data)
+        if not self.counters.messages:
+            self._heard = (self._heard + data)[:_HEARD]
+        if data and self._played and self._played.after_seek():
+            self._decoder.forget()
+            self._session.frames.expect_any()
+        items = []
+        for message in self._decoder.feed(data, now):
+            items += self._session.receive(message, now)
+        if self._rate:
+            self._rate.follow(self._session.take_rate(), silent=self._session.is_silent)
+            slower = self._rate.slower(self.counters, running=self.running)
+            items += [] if slower is None else [self._session.fall_back(slower, now)]
+        self._flush()
+        return items
+
+    def _flush(self) -> None:
+        data = self._session.commands.take()
+        if data:
+            self.transport.write(data)
+
+
+def _diagnosis(transport: Transport, heard: bytes) -> SourceError | None:
+    """The likeliest cause of nobody's having spoken, where the transport can tell."""
+    return transport.diagnose(heard) if isinstance(transport, Diagnosable) else None

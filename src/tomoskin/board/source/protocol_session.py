@@ -1,0 +1,294 @@
+"""The host's side of the protocol: messages and the time in, bytes and events out. No I/O."""
+
+from __future__ import annotations
+
+from enum import Enum, auto
+
+import numpy as np
+
+from tomoskin.board.source.agreement import BOARDS_SINCE, check_held, check_version, fit_board
+from tomoskin.board.source.chopping import choose_periods
+from tomoskin.board.source.command_queue import CommandQueue, SequenceFilter
+from tomoskin.board.source.configuration import Configuration
+from tomoskin.board.source.settings import ScanSettings, Timing
+from tomoskin.board.wire import (
+    SCHEMA,
+    Ack,
+    BoardLimits,
+    Command,
+    Fault,
+    GetBoard,
+    GetInfo,
+    GetMode,
+    GetPattern,
+    GetScan,
+    HeldMode,
+    HeldPattern,
+    HeldScan,
+    Hello,
+    Info,
+    Message,
+    Ping,
+    Result,
+    SetBaud,
+    Stop,
+    type_byte,
+)
+from tomoskin.core import Event, Frame, SourceError
+from tomoskin.model.pattern import Scan
+
+_ANSWERED: dict[type[Message], type[Command]] = {
+    HeldScan: GetScan,
+    HeldPattern: GetPattern,
+    HeldMode: GetMode,
+}
+"""What each answer of what a board holds was asked by."""
+
+
+class Stage(Enum):
+    """How far the session has come."""
+
+    WAITING = auto()
+    SETTING_UP = auto()
+    RUNNING = auto()
+
+
+class ProtocolSession:
+    """Waits for HELLO, asks for INFO, sets the scan, reads it back, starts it, keeps it alive.
+
+    A board that says HELLO again has been reset or has missed the heartbeat: it is set up again,
+    as is one that answers but has stopped scanning, and one whose line is too fast.
+
+    Attributes
+    ----------
+    configuration
+        What the scan asks of the board, fitted to the board once that is known.
+    commands
+        What is to be sent to the board.
+    frames
+        The frames that pass, and counts of those that do not.
+    stage, info, board
+        How far it has come, and what the board said of itself; ``board`` from protocol 1.2 on.
+    is_silent
+        Whether a board that scans has sent no frame for too long.
+
+    Raises
+    ------
+    WireError
+        From ``receive``: the board speaks another protocol.
+    SourceError
+        From ``receive``: the board cannot do this scan, refuses a command or holds another scan;
+        from ``tick``: it does not answer.
+    """
+
+    def __init__(
+        self, scan: Scan, settings: ScanSettings, timing: Timing, now: float, where: str
+    ) -> None:
+        """A session that has not begun."""
+        self._scan, self._settings, self._timing, self._where = scan, settings, timing, where
+        self.configuration = Configuration.of(scan, settings)
+        self.frames = SequenceFilter(self.configuration)
+        self.commands = CommandQueue(timing, now, where)
+        self.stage = Stage.WAITING
+        self.info: Info | None = None
+        self.board: BoardLimits | None = None
+        self._met: tuple[Info, ScanSettings] | None = None
+        self.is_silent = False
+        self._overdue = False
+        self._silence = max(timing.silence, 4 * self.configuration.scan_time)
+        self._since = self._last_frame = now
+        self._resets = 0
+        self._rate: int | None = None
+
+    def take_rate(self) -> int | None:
+        """The serial rate that the board has just changed to, once."""
+        rate, self._rate = self._rate, None
+        return rate
+
+    def fall_back(self, rate: int, now: float) -> Event:
+        """Set the board up again at a slower ``rate``, Bd: the line damages what it carries."""
+        self._set_up(now, at=rate)
+        return Event(
+            now,
+            "rate",
+            f"messages arrive damaged: the board is set up again at the slower rate of {rate:,} Bd",
+        )
+
+    def receive(self, message: Message, now: float) -> list[Frame | Event]:
+        """Act on a message from the board."""
+        self._overdue = False
+        match message:
+            case Frame():
+                return self._frame(message, now)
+            case Hello():
+                return self._hello(message, now)
+            case Info():
+                self._info(message, now)
+            case BoardLimits():
+                self._limits(message, now)
+            case HeldScan() | HeldPattern() | HeldMode():
+                return self._held(message, now)
+            case Ack():
+                return self._ack(message, now)
+            case Fault():
+                text = SCHEMA.enums["fault"].sentence(message.code)
+                return [Event(now, "fault", f"the board has switched its current off: {text}")]
+        return []
+
+    def tick(self, now: float) -> list[Frame | Event]:
+        """Act on the time: ask again, keep alive, notice silence."""
+        if self.stage is Stage.WAITING and now >= self._since + self._timing.hello:
+            self._set_up(now)
+        self.commands.repeat(now)
+        if self.stage is not Stage.RUNNING:
+            return []
+        if now >= self.commands.last_sent + self._timing.ping:
+            self.commands.send(Ping(0), now)
+        if self.is_silent or now < self._last_frame + self._silence:
+            return []
+        if not self._overdue:  # a busy host may not have read yet what has come
+            self._overdue = True
+            return []
+        self.is_silent = True
+        text = f"no frame for {now - self._last_frame:.1f} s: check the board's power and cable"
+        return [Event(now, "silent", text)]
+
+    def deadline(self) -> float:
+        """Time of the next ``tick`` that matters."""
+        if self.stage is Stage.WAITING:
+            return self._since + self._timing.hello
+        if (repeat_time := self.commands.repeat_time) is not None:
+            return repeat_time
+        ping = self.commands.last_sent + self._timing.ping
+        return ping if self.is_silent else min(ping, self._last_frame + self._silence)
+
+    def stop(self, now: float) -> int:
+        """Send STOP, whatever is going on; returns its request id."""
+        self.frames.close()
+        self.commands.clear()
+        return self.commands.send(Stop(0), now)
+
+    def _set_up(self, now: float, at: int | None = None) -> None:
+        self.stage = Stage.SETTING_UP
+        self.info = self.board = self._met = None
+        self.frames.close()
+        change = () if at is None else (Stop(0), SetBaud(0, at))
+        self.commands.restart((*change, GetInfo(0), Stop(0)), now)
+
+    def _answered(self, now: float) -> list[Frame | Event]:
+        """The pending command has been answered: what follows."""
+        pending = self.commands.pending
+        if isinstance(pending, SetBaud):
+            self._rate = pending.baud
+        if self.commands.send_next(now):
+            return []
+        self.stage, self._last_frame, self.is_silent = Stage.RUNNING, now, False
+        self.frames.open()
+        assert self.info is not None
+        text = _introduction(self.info, self.board, self.configuration)
+        return [Event(now, "connected", text)]
+
+    def _frame(self, frame: Frame, now: float) -> list[Frame | Event]:
+        if self.stage is Stage.WAITING:
+            self._set_up(now)
+        passed = self.frames.take(frame)
+        if not any(isinstance(item, Frame) for item in passed):
+            return passed
+        quiet, was_silent = now - self._last_frame, self.is_silent
+        self._last_frame, self.is_silent = now, False
+        if was_silent:
+            passed.insert(0, Event(now, "resumed", f"frames arrive again after {quiet:.1f} s"))
+        return passed
+
+    def _hello(self, hello: Hello, now: float) -> list[Frame | Event]:
+        check_version(hello, self._where)
+        if self.stage is Stage.SETTING_UP and self.info is None:
+            return []
+        was_running = self.stage is Stage.RUNNING
+        self._resets = 0 if was_running else self._resets + 1
+        if self._resets > self._timing.tries:
+            raise SourceError(
+                "the board resets repeatedly while it is set up",
+                where=self._where,
+                hint="check that its power supply is strong enough",
+            )
+        self._set_up(now)
+        text = "the board was reset or missed the heartbeat: it is set up again"
+        return [Event(now, "reset", text)] if was_running else []
+
+    def _info(self, info: Info, now: float) -> None:
+        pending = self.commands.pending
+        if isinstance(pending, GetInfo) and info.request == pending.request:
+            check_version(info, self._where)
+            fitted = fit_board(info, self._scan, self._settings, self._where)
+            self.configuration = self.configuration.on_board(fitted)
+            if info.minor < BOARDS_SINCE:  # that is all that it says of itself
+                self.info = info
+                self.commands.add(self.configuration.commands(info.minor))
+            else:
+                self._met = info, fitted
+                self.commands.add((GetBoard(0),))
+            self._answered(now)
+
+    def _limits(self, board: BoardLimits, now: float) -> None:
+        pending = self.commands.pending
+        asked = isinstance(pending, GetBoard) and board.request == pending.request
+        if not asked or self._met is None:
+            return
+        info, fitted = self._met
+        channels = int(np.bincount(self._scan.sample_drive).max())
+        periods = choose_periods(board, fitted, channels, info.tick_rate, self._where)
+        self.configuration = self.configuration.with_periods(periods)
+        self.info, self.board = info, board
+        self.commands.add(self.configuration.commands(info.minor))
+        self._answered(now)
+
+    def _held(self, held: HeldScan | HeldPattern | HeldMode, now: float) -> list[Frame | Event]:
+        pending = self.commands.pending
+        if not isinstance(pending, _ANSWERED[type(held)]) or held.request != pending.request:
+            return []
+        check_held(held, self.configuration.behind(pending), self._where)
+        return self._answered(now)
+
+    def _ack(self, ack: Ack, now: float) -> list[Frame | Event]:
+        pending = self.commands.pending
+        if self.is_silent and pending is None:
+            # It hears the heartbeat but does not scan: its HELLO or FAULT was lost.
+            self.is_silent = False
+            self._set_up(now)
+            return [Event(now, "reset", "the board answers but does not scan: it is set up again")]
+        if pending is None or ack.request != pending.request:
+            return []
+        if ack.command != type_byte(type(pending)):
+            return []
+        if ack.result is Result.OK and isinstance(pending, _QUESTIONS):
+            return []  # no answer to a question
+        if ack.result is not Result.OK:
+            raise SourceError(
+                f"the board refused {type(pending).__name__}: {_reason(ack, pending)}",
+                where=self._where,
+            )
+        return self._answered(now)
+
+
+_QUESTIONS = (GetBoard, *_ANSWERED.values())
+
+
+def _reason(ack: Ack, refused: Command) -> str:
+    """Why: the field of a value that is out of range by its name, with what the protocol allows."""
+    number = type_byte(type(refused))
+    message = next(message for message in SCHEMA.messages if message.type == number)
+    if ack.result is not Result.BAD_VALUE or ack.detail >= len(message.fields):
+        return f"{SCHEMA.enums['result'].sentence(ack.result)} ({ack.detail})"
+    field = message.fields[ack.detail]
+    value = f"{getattr(refused, field.name)} {field.unit}".strip()
+    return f"{field.name} of {value} is out of range ({field.text})"
+
+
+def _introduction(info: Info, board: BoardLimits | None, configuration: Configuration) -> str:
+    firmware = ".".join(map(str, info.firmware))
+    name = f"{board.text} " if board else ""
+    return (
+        f"board {name}{info.unique_id.hex()}, firmware {firmware}, "
+        f"{info.channels} channels, scans configuration {configuration.identity:04x}"
+    )

@@ -1,0 +1,222 @@
+"""Serial ports: which there are, and bytes from one."""
+
+from __future__ import annotations
+
+import errno
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from tomoskin.board.source.read_ahead import ReadAhead
+from tomoskin.board.source.registry import read_options
+from tomoskin.board.source.silence import BAUD, PICO, SIGN_ON, SIGN_ON_RATE, Silence, is_bootloader
+from tomoskin.core import SourceError
+
+if TYPE_CHECKING:
+    from serial import Serial
+
+    from tomoskin.model.skin import Skin
+
+
+_MEGA = "Arduino Mega 2560"
+_BOARDS = (_MEGA, PICO)
+_KNOWN = {
+    (0x2341, 0x0010): _MEGA,
+    (0x2341, 0x0042): _MEGA,
+    (0x2341, 0x0242): _MEGA,
+    (0x2A03, 0x0010): _MEGA,
+    (0x2A03, 0x0042): _MEGA,
+    (0x2E8A, 0x000A): PICO,
+    (0x1A86, 0x7523): "CH340, as on many boards",
+    (0x1A86, 0x5523): "CH341, as on many boards",
+    (0x1A86, 0x55D4): "CH9102, as on many boards",
+    (0x0403, 0x6001): "FTDI FT232, as on some boards",
+    (0x0403, 0x6010): "FTDI FT2232, as on some boards",
+    (0x0403, 0x6014): "FTDI FT232H, as on some boards",
+    (0x0403, 0x6015): "FTDI FT231X, as on some boards",
+    (0x10C4, 0xEA60): "CP210x, as on some boards",
+    (0x067B, 0x2303): "PL2303, as on some boards",
+}
+"""What is behind a USB serial port, by vendor and product (the USB ID repository)."""
+
+AUTO = "auto"
+"""Instead of a port: the one that a board could be behind."""
+
+
+@dataclass(frozen=True, slots=True)
+class Port:
+    """A serial port; ``board`` says what is behind it, empty where nobody knows."""
+
+    device: str
+    board: str
+
+    def __str__(self) -> str:
+        """``/dev/ttyACM0 (Arduino Mega 2560)``."""
+        return f"{self.device} ({self.board})" if self.board else self.device
+
+
+def list_ports() -> tuple[Port, ...]:
+    """The ports that are connected, those of known boards first."""
+    from serial.tools.list_ports import comports  # noqa: PLC0415 - only who has a board needs it
+
+    ports = (Port(port.device, _KNOWN.get((port.vid, port.pid), "")) for port in comports())
+    return tuple(
+        sorted(ports, key=lambda port: (port.board not in _BOARDS, not port.board, port.device))
+    )
+
+
+def say_ports() -> str:
+    """The ports in words."""
+    ports = ", ".join(map(str, list_ports()))
+    return f"ports here: {ports}" if ports else "no serial port is connected"
+
+
+def only_board() -> str:
+    """The one port with a Mega 2560 or a Pico, or else the one with a known bridge.
+
+    Raises
+    ------
+    SourceError
+        When there is none, or more than one: opening a port resets what is behind it.
+    """
+    ports = list_ports()
+    candidates = [port for port in ports if port.board in _BOARDS] or [p for p in ports if p.board]
+    if len(candidates) == 1:
+        return candidates[0].device
+    raise SourceError(
+        f"expected one board, found {len(candidates)}",
+        where=f"serial:{AUTO}",
+        hint=f"give the board's port, such as serial:/dev/ttyACM0; {say_ports()}",
+    )
+
+
+_CHECK = "check cable and power"
+_WRITE_TIMEOUT = 1.0
+_CHUNK = 65536
+_FETCH = 0.5
+"""s that the reader's thread waits for bytes, unless it is ended before."""
+
+_ASKED = 0.3
+"""A bootloader answers within so many s."""
+
+
+class SerialTransport:
+    """Bytes through a serial port; opened for this process alone."""
+
+    def __init__(self, port: str, baud: int = BAUD) -> None:
+        """Open ``port``; SourceError says whether it is absent, busy or forbidden."""
+        import serial  # noqa: PLC0415 - only who has a board needs pyserial
+
+        self.name, self._port = f"serial:{port}", port
+        self._closed = False
+        try:
+            self._serial: Serial = serial.Serial(
+                port, baud, timeout=_FETCH, write_timeout=_WRITE_TIMEOUT, exclusive=True
+            )
+        except (OSError, ValueError) as error:
+            raise _refusal(port, error) from None
+        self._ahead = ReadAhead(self._fetch, self._serial.cancel_read)
+
+    def read(self, timeout: float) -> bytes:
+        """What has come, waiting at most ``timeout`` s for the first byte."""
+        if self._closed:
+            raise SourceError("the port is closed", where=self.name, hint=_CHECK)
+        return self._ahead.read(timeout)
+
+    @property
+    def waited(self) -> float:
+        """How long the first byte of the last read had waited here, s."""
+        return self._ahead.waited
+
+    def _fetch(self) -> bytes:
+        try:
+            first: bytes = self._serial.read(1)
+            if not first:
+                return b""
+            waiting = min(self._serial.in_waiting, _CHUNK)
+            return first + self._serial.read(waiting) if waiting else first
+        except (OSError, TypeError) as error:  # TypeError: pyserial, when closed meanwhile
+            raise self._gone(error) from None
+
+    def write(self, data: bytes) -> None:
+        """Send ``data``."""
+        try:
+            self._serial.write(data)
+        except (OSError, TypeError) as error:
+            raise self._gone(error) from None
+
+    @property
+    def rate(self) -> int:
+        """Bd."""
+        return int(self._serial.baudrate)
+
+    def use_rate(self, rate: int) -> None:
+        """Send and read at ``rate`` Bd from now on."""
+        try:
+            self._serial.flush()
+            self._serial.baudrate = rate
+        except (OSError, ValueError, TypeError) as error:
+            raise self._gone(error) from None
+
+    def diagnose(self, heard: bytes) -> SourceError:
+        """Why no board answers: where nothing was ``heard``, a bootloader is asked too."""
+        board = next((port.board for port in list_ports() if port.device == self._port), "")
+        answer = b"" if heard else self._ask_bootloader()
+        return Silence(self._port, board, self.rate, heard, answer, say_ports()).cause
+
+    def _ask_bootloader(self) -> bytes:
+        """What comes when a bootloader is asked who it is."""
+        rate, answer, end = self.rate, b"", time.monotonic() + _ASKED
+        self.use_rate(SIGN_ON_RATE)
+        self.write(SIGN_ON)
+        while (left := end - time.monotonic()) > 0 and not is_bootloader(answer):
+            answer += self.read(left)
+        self.use_rate(rate)
+        return answer
+
+    def close(self) -> None:
+        """Close the port."""
+        if not self._closed:
+            self._closed = True
+            self._ahead.close()
+            self._serial.close()
+
+    def _gone(self, error: Exception) -> SourceError:
+        reason = "the port is closed" if self._closed else "the board has been disconnected"
+        return SourceError(f"{reason}: {error}", where=self.name, hint=_CHECK)
+
+
+def open_serial(argument: str, skin: Skin) -> SerialTransport:  # noqa: ARG001 - a source's signature
+    """The source ``serial:PORT``, ``serial:auto`` or ``serial:PORT,baud=RATE``."""
+    port, _, rest = argument.partition(",")
+    port = only_board() if port == AUTO else port
+    if not port:
+        raise SourceError(
+            "expected a port, such as serial:/dev/ttyACM0, or serial:auto; got none",
+            where="serial",
+            hint=say_ports(),
+        )
+    text = read_options(rest, ("baud",), f"serial:{port}").get("baud", str(BAUD))
+    if not text.isdigit() or not 300 <= int(text) <= 4_000_000:
+        raise SourceError(
+            f'expected a rate from 300 to 4,000,000 Bd, got "{text}"', where=f"serial:{port}"
+        )
+    return SerialTransport(port, int(text))
+
+
+def _refusal(port: str, error: Exception) -> SourceError:
+    where = f"serial:{port}"
+    number = getattr(error, "errno", None)
+    if number in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
+        return SourceError("there is no such port", where=where, hint=say_ports())
+    if number == errno.EACCES:
+        return SourceError(
+            "you have no permission to use the port",
+            where=where,
+            hint="on Linux, add yourself to the group that owns it, often dialout",
+        )
+    if number in (errno.EBUSY, errno.EAGAIN):
+        return SourceError(
+            "another program is using the port", where=where, hint="close the other program first"
+        )
+    return SourceError(f"the port cannot be opened: {error}", where=where)

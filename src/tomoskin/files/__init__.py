@@ -1,0 +1,1 @@
+"""Files: sessions, imports of other formats, exports to them."""

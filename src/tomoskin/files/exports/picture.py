@@ -1,0 +1,182 @@
+"""A sheet of images with their touches, drawn by matplotlib (extra ``plot``)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tomoskin.core import CHANGE, DataError, FloatArray, Image, StrPath, Touch
+from tomoskin.files.exports.display import Display
+from tomoskin.files.exports.figure import new_figure, save_figure
+from tomoskin.model.mesh import Mesh
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+MOST_PANELS = 16
+_MM = 1e3
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """One image: ``values`` (n_cells,), its touches, and what to write above it."""
+
+    title: str
+    values: FloatArray
+    touches: tuple[Touch, ...]
+
+
+def write_picture(
+    path: StrPath,
+    mesh: Mesh,
+    panels: Sequence[Panel],
+    unit: str,
+    limit: float | None = None,
+    *,
+    overwrite: bool = False,
+) -> None:
+    """Draw at most ``MOST_PANELS`` panels on one symmetric colour scale, and save them.
+
+    Parameters
+    ----------
+    unit
+        Of the values; "relative" is drawn in per cent.
+    limit
+        End of the colour scale, in that unit; without it, the greatest value.
+
+    Raises
+    ------
+    DataError
+        When matplotlib is not installed or the mesh is a volume, and as :func:`written` does.
+    """
+    sheet = _Sheet.of(str(path), mesh, panels, unit, limit)
+    save_figure(path, sheet.figure(), overwrite=overwrite)
+
+
+def plot(
+    image: Image,
+    mesh: Mesh,
+    *,
+    touches: Sequence[Touch] = (),
+    title: str = "",
+    display: Display | None = None,
+    ax: Axes | None = None,
+) -> Figure:
+    """Draw ``image`` on its ``mesh`` by matplotlib, with electrodes, touches and a colour bar.
+
+    Parameters
+    ----------
+    touches
+        Marked where they are, in mm.
+    display
+        Filter, unit and end of the colour scale; without it, the image as it is, to its extremes.
+    ax
+        Axes to draw on, such as one of ``pyplot.subplots()``; without them, a figure is made.
+
+    Returns
+    -------
+    Figure
+        The one that was drawn on; ``savefig`` writes it.
+
+    Raises
+    ------
+    DataError
+        When matplotlib is not installed, the image is of another mesh, or the mesh is a volume.
+    """
+    how = Display() if display is None else display
+    shown = how.shown(image, mesh)
+    panel = Panel(title, shown.values, tuple(touches))
+    sheet = _Sheet.of("plot", mesh, [panel], shown.unit, how.limit)
+    if ax is None:
+        return sheet.figure()
+    figure = ax.get_figure(root=True)
+    assert figure is not None, "axes are part of a figure"
+    figure.colorbar(sheet.draw(ax, panel), ax=ax, **sheet.bar)
+    return figure
+
+
+def rendered(path: StrPath, mesh: Mesh, panel: Panel, unit: str, limit: float) -> NDArray[np.uint8]:
+    """One panel as pixels (h, w, 3), for the film ``path``; raises as :func:`write_picture`."""
+    canvas: Any = _Sheet.of(str(path), mesh, [panel], unit, limit).figure().canvas
+    canvas.draw()
+    return np.array(canvas.buffer_rgba())[..., :3]
+
+
+@dataclass(frozen=True, eq=False)
+class _Sheet:
+    """Panels on one colour scale: ``factor`` makes the values those that the scale counts."""
+
+    name: str
+    mesh: Mesh
+    panels: Sequence[Panel]
+    factor: float
+    end: float
+    bar: Mapping[str, Any]
+
+    @classmethod
+    def of(
+        cls, name: str, mesh: Mesh, panels: Sequence[Panel], unit: str, limit: float | None
+    ) -> _Sheet:
+        if mesh.dimension != 2:
+            raise DataError(
+                "a volume cannot be drawn as a sheet",
+                where=name,
+                hint="draw a slice with mesh.pixels(z=…), or write a .vtu file",
+            )
+        factor, label = (100.0, "%") if unit == "relative" else (1.0, unit)
+        greatest = max(float(np.abs(p.values).max()) for p in panels)
+        end = factor * (limit or greatest or 1.0)
+        beyond = factor * greatest > end * (1 + 1e-9)
+        bar = {
+            "label": f"change of conductivity ({label})",
+            "shrink": 0.8,
+            "extend": "both" if beyond else "neither",
+        }
+        return cls(name, mesh, panels, factor, end, bar)
+
+    def figure(self) -> Figure:
+        """All panels, in rows of four."""
+        panels = self.panels
+        columns = min(len(panels), 4)
+        rows = -(-len(panels) // columns)
+        figure = new_figure(self.name, 3.2 * columns + 1.1, 3.3 * rows)
+        axes = np.atleast_1d(figure.subplots(rows, columns)).ravel()
+        for ax, panel in zip(axes, panels, strict=False):
+            drawn = self.draw(ax, panel)
+        for ax in axes[len(panels) :]:
+            ax.set_visible(False)
+        figure.colorbar(drawn, ax=list(axes), **self.bar)
+        return figure
+
+    def draw(self, ax: Axes, panel: Panel) -> Any:
+        """One panel on ``ax``; what a colour bar is made for."""
+        return _draw(ax, self.mesh, replace(panel, values=self.factor * panel.values), self.end)
+
+
+def _draw(ax: Axes, mesh: Mesh, panel: Panel, limit: float) -> Any:
+    x, y = _MM * mesh.points[:, :2].T
+    colours = CHANGE.colormap()
+    drawn = ax.tripcolor(
+        x, y, mesh.cells, facecolors=panel.values, cmap=colours, vmin=-limit, vmax=limit
+    )
+    for number, facets in enumerate(mesh.electrodes, start=1):
+        middle = _MM * mesh.points[np.unique(facets)][:, :2].mean(axis=0)
+        ax.plot(*middle, "s", color="0.25", markersize=2.5)
+        x_label, y_label = 1.09 * middle
+        ax.text(x_label, y_label, f"E{number}", fontsize=6, color="0.3", ha="center", va="center")
+    for touch in panel.touches:
+        place = (_MM * touch.detection.x, _MM * touch.detection.y)
+        ax.plot(*place, "+", color="black", markersize=9, markeredgewidth=1.2)
+        label = f"{place[0]:.0f}, {place[1]:.0f}"
+        ax.annotate(label, place, xytext=(5, 5), textcoords="offset points", fontsize=7)
+    ax.set_title(panel.title, fontsize=9)
+    ax.set_aspect("equal")
+    ax.set_xlabel("mm", fontsize=7)
+    ax.tick_params(labelsize=6)
+    ax.margins(0.09)
+    return drawn

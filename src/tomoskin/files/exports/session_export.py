@@ -1,0 +1,169 @@
+"""Files that a session is exported to, by the ending of their name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tomoskin.core import DataError, StrPath
+from tomoskin.files.exports.hdf5 import write_hdf5
+from tomoskin.files.exports.lerobot import write_lerobot
+from tomoskin.files.exports.matlab_file import write_matlab
+from tomoskin.files.exports.movie import FILMS
+from tomoskin.files.exports.picture import MOST_PANELS, Panel, rendered, write_picture
+from tomoskin.files.exports.session_table import write_csv, write_parquet
+from tomoskin.files.exports.touch_csv import write_touches
+from tomoskin.files.exports.vtu import write_series
+from tomoskin.files.imports import write_interchange
+from tomoskin.files.session import (
+    OWN_FILES,
+    Advance,
+    SessionReader,
+    as_recorded,
+    first_scan,
+    indexed_frames,
+    message_counts,
+    recording_of,
+    replayed,
+    scanned_touches,
+)
+from tomoskin.model.skin import Skin
+from tomoskin.pipeline import Prepared, colour_limit
+from tomoskin.sensing.track import has_forces
+
+if TYPE_CHECKING:
+    from tomoskin.pipeline import FrameResult
+
+
+@dataclass(frozen=True)
+class Export:
+    """A session to be exported.
+
+    ``every`` s between two images; ``advance`` is called with how far it is. Files that are
+    there are written over with ``overwrite`` only.
+    """
+
+    session: SessionReader
+    every: float
+    advance: Advance
+    overwrite: bool = False
+
+    def npz(self, path: StrPath) -> None:
+        """Write the interchange file."""
+        write_interchange(path, recording_of(self.session), overwrite=self.overwrite)
+
+    def csv(self, path: StrPath) -> None:
+        """Write a table of voltages."""
+        write_csv(path, self.session, self.advance, overwrite=self.overwrite)
+
+    def parquet(self, path: StrPath) -> None:
+        """Write a table of voltages for data tools."""
+        write_parquet(path, self.session, self.advance, overwrite=self.overwrite)
+
+    def hdf5(self, path: StrPath) -> None:
+        """Write everything."""
+        write_hdf5(path, self.session, self.advance, overwrite=self.overwrite)
+
+    def lerobot(self, path: StrPath) -> None:
+        """Write a LeRobot dataset, a row every ``every`` s."""
+        write_lerobot(path, self.session, self.every, self.advance)
+
+    def matlab(self, path: StrPath) -> None:
+        """Write EIDORS' structures."""
+        skin = self.session.skin
+        recording = recording_of(self.session)
+        write_matlab(path, recording, skin.current, skin.n_electrodes, overwrite=self.overwrite)
+
+    def series(self, path: StrPath) -> None:
+        """Write a series of meshes with their images."""
+        prepared = as_recorded(self.session)
+        moments = ((r.host_time, r.image.values) for r in self._images(prepared))
+        listing = Path(path).with_suffix(".pvd")
+        write_series(listing, prepared.mesh, moments, overwrite=self.overwrite)
+
+    def film(self, path: StrPath) -> None:
+        """Write a film of the map."""
+        prepared = as_recorded(self.session)
+        unit, limit = prepared.operator.unit, colour_limit(prepared)
+        pictures = (
+            rendered(path, prepared.mesh, panel, unit, limit) for panel in self._panels(prepared)
+        )
+        write = FILMS[Path(path).suffix.lower()]
+        write(path, pictures, 1.0 / self.every, overwrite=self.overwrite)
+
+    def picture(self, path: StrPath) -> None:
+        """Write a sheet of maps, evenly spread over the session."""
+        prepared = as_recorded(self.session)
+        panels = list(self._panels(prepared))
+        chosen = np.linspace(0, len(panels) - 1, min(len(panels), MOST_PANELS)).round()
+        some = [panels[int(number)] for number in np.unique(chosen)]
+        unit, limit = prepared.operator.unit, colour_limit(prepared)
+        write_picture(path, prepared.mesh, some, unit, limit, overwrite=self.overwrite)
+
+    def touches(self, path: StrPath) -> None:
+        """Write a table of the recorded touches."""
+        rows, surface = list(scanned_touches(self.session)), self.session.skin.surface
+        forces = has_forces(rows)
+        begun = first_scan(self.session)
+        write_touches(path, rows, surface, forces=forces, begun=begun, overwrite=self.overwrite)
+
+    def _panels(self, prepared: Prepared) -> Iterator[Panel]:
+        first: float | None = None
+        for result in self._images(prepared):
+            first = result.host_time if first is None else first
+            title = f"{result.host_time - first:.1f} s"
+            yield Panel(title, result.image.values, result.touches)
+
+    def _images(self, prepared: Prepared) -> Iterator[FrameResult]:
+        """A result every so often; those before the reference stands are left out."""
+        total = indexed_frames(self.session)
+        due = float("-inf")
+        shown = False
+        for done, result in enumerate(replayed(prepared, self.session)):
+            self.advance(done, max(done + 1, total))
+            if result.ready and not due - self.every <= result.host_time < due:
+                due = result.host_time + self.every
+                shown = True
+                yield result
+        if not shown:
+            raise DataError(
+                "holds too few frames for a reference, so there are no images",
+                where=str(self.session.path),
+            )
+
+
+WRITERS: dict[str, Callable[[Export, Path], None]] = {
+    ".csv": Export.csv,
+    ".parquet": Export.parquet,
+    ".h5": Export.hdf5,
+    ".lerobot": Export.lerobot,
+    ".npz": Export.npz,
+    ".mat": Export.matlab,
+    ".vtu": Export.series,
+    ".pvd": Export.series,
+    ".png": Export.picture,
+    ".gif": Export.film,
+    ".mp4": Export.film,
+}
+"""What writes a file, by the ending of its name."""
+
+_TABLES = (".csv", ".parquet", ".npz", ".mat")
+"""Files of voltages."""
+
+_BESIDE = {"/touches": "the touches (--touches X.csv)", "/events": "events", "/notes": "notes"}
+"""What only a session or a .h5 holds, by the topic of its messages."""
+
+
+def omitted(session: SessionReader, ending: str) -> tuple[str, ...]:
+    """What of ``session`` a file of that ``ending`` does not hold, in words."""
+    if ending not in _TABLES:
+        return ()
+    name = session.skin.name
+    skin = f"the skin (--skin {name if name in Skin.names() else 'with its file'})"
+    counts = message_counts(session)
+    beside = [words for topic, words in _BESIDE.items() if counts[topic]]
+    return skin, *beside, *(name for name in session.attachments() if name not in OWN_FILES)

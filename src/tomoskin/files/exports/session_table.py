@@ -1,0 +1,110 @@
+"""Voltages of a session as a table, .csv or .parquet, block by block."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from tomoskin.core import DataError, StrPath, install_hint, written
+from tomoskin.files.imports import column_names
+from tomoskin.files.session import (
+    Advance,
+    Block,
+    Rows,
+    SessionReader,
+    all_blocks,
+    idle_count,
+    press_positions,
+)
+
+Column = NDArray[Any]
+
+
+class _Beside:
+    """Columns beside the voltages; ``x_m`` and ``y_m`` where the file holds truth."""
+
+    def __init__(self, session: SessionReader, rows: Rows) -> None:
+        self._idle = idle_count(session, rows.readout.scan)
+        self._positions = press_positions(session)
+        place = ("x_m", "y_m") if self._positions else ()
+        self.names = ("frame", "time_s", "sequence", "ticks", "mark", "idle", *place)
+
+    def __call__(self, block: Block) -> tuple[Column, ...]:
+        """Of one block, in the order of the names."""
+        place = self._positions(block).T if self._positions else ()
+        idle = (block.number < self._idle).astype(np.int64)
+        return block.number, block.time, block.sequence, block.ticks, block.mark, idle, *place
+
+
+def write_csv(
+    path: StrPath, session: SessionReader, advance: Advance, *, overwrite: bool = False
+) -> None:
+    """One line a frame, in the interchange table's columns: ``tomoskin image`` reads it again.
+
+    Raises
+    ------
+    DataError
+        When the session is damaged, and as :func:`written` does.
+    """
+    rows = Rows.of(session)
+    names, beside = column_names(rows.pattern.drive, rows.pattern.measure), _Beside(session, rows)
+    with (
+        written(path, overwrite=overwrite) as part,
+        part.open("w", encoding="utf-8", newline="") as file,
+    ):
+        file.write(",".join([*beside.names, *names]) + "\n")
+        for block in all_blocks(session, rows, advance):
+            columns = [column.tolist() for column in beside(block)]
+            for *first, voltages in zip(*columns, block.voltages.tolist(), strict=True):
+                file.write(",".join(map(_text, [*first, *voltages])) + "\n")
+
+
+def write_parquet(
+    path: StrPath, session: SessionReader, advance: Advance, *, overwrite: bool = False
+) -> None:
+    """One row a frame: the columns beside, and ``voltages`` as a list of floats.
+
+    The tables ``drive`` and ``measure`` are JSON in the schema's metadata, with the skin.
+
+    Raises
+    ------
+    DataError
+        When pyarrow is missing or the session is damaged, and as :func:`written` does.
+    """
+    try:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+    except ImportError as error:
+        raise DataError(
+            "Parquet needs pyarrow", where=str(path), hint=install_hint("parquet")
+        ) from error
+    rows = Rows.of(session)
+    n = rows.pattern.n_meas
+    beside = _Beside(session, rows)
+    kinds = {"time_s": pa.float64(), "ticks": pa.uint64(), "x_m": pa.float64(), "y_m": pa.float64()}
+    fields = [pa.field(name, kinds.get(name, pa.int64())) for name in beside.names]
+    fields.append(pa.field("voltages", pa.list_(pa.float64(), n)))
+    schema = pa.schema(fields, metadata=_about(session, rows))
+    with (
+        written(path, overwrite=overwrite) as part,
+        pq.ParquetWriter(part, schema, compression="zstd") as file,
+    ):
+        for block in all_blocks(session, rows, advance):
+            values = pa.FixedSizeListArray.from_arrays(pa.array(block.voltages.reshape(-1)), n)
+            arrays = [pa.array(column) for column in beside(block)]
+            file.write_batch(pa.record_batch([*arrays, values], schema=schema))
+
+
+def _text(value: float) -> str:
+    return "" if math.isnan(value) else repr(value)
+
+
+def _about(session: SessionReader, rows: Rows) -> dict[str, str]:
+    pattern = rows.pattern
+    tables = {"drive": pattern.drive.tolist(), "measure": pattern.measure.tolist()}
+    written = {name: msgspec.json.encode(table).decode() for name, table in tables.items()}
+    return written | {"skin": session.skin.to_toml(), "epoch_s": repr(session.epoch)}

@@ -1,0 +1,74 @@
+"""The interchange file: a plain .npz that any tool can write.
+
+Keys: ``voltages`` (n_frames, n_meas) V, or ``dv``; ``drive`` (n_meas, 2) source, sink;
+``measure`` (n_meas, 2) plus, minus; optional ``time_s`` (n_frames,), ``reference`` (n_meas,),
+``xy_m`` (n_frames, 2), ``idle`` frames at the beginning that show the untouched skin.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tomoskin.core import (
+    Arrays,
+    DataError,
+    StrPath,
+    electrode_table,
+    numbers,
+    real_numbers,
+    save_arrays,
+    whole_number,
+)
+from tomoskin.sensing.signal import Recording, frame_times
+
+REQUIRED = frozenset({"drive", "measure"})
+
+
+def detects(arrays: Arrays) -> bool:
+    """Whether the keys are those of an interchange file."""
+    return set(arrays) >= REQUIRED and len({"voltages", "dv"} & set(arrays)) > 0
+
+
+def parse(arrays: Arrays, source: str) -> Recording:
+    """Return the recording in the arrays of an interchange file.
+
+    Raises
+    ------
+    DataError
+        When both or neither of voltages and dv are there, a key has the wrong type or shape.
+    """
+    if "voltages" in arrays and "dv" in arrays:
+        raise DataError("holds both voltages and dv", where=source, hint="keep one of them")
+    key = "voltages" if "voltages" in arrays else "dv"
+    voltages = np.atleast_2d(numbers(arrays, key, source))
+    n = len(voltages)
+    return Recording(
+        voltages=voltages,
+        drive=electrode_table(arrays, "drive", source),
+        measure=electrode_table(arrays, "measure", source),
+        time=real_numbers(arrays, "time_s", source) if "time_s" in arrays else frame_times(n),
+        reference=numbers(arrays, "reference", source) if "reference" in arrays else None,
+        labels=real_numbers(arrays, "xy_m", source) if "xy_m" in arrays else None,
+        is_change=key == "dv",
+        source=source,
+        idle=whole_number(arrays, "idle", source) if "idle" in arrays else 1,
+    )
+
+
+def write_interchange(path: StrPath, recording: Recording, *, overwrite: bool = False) -> None:
+    """Write ``recording`` as an interchange file; raises as :func:`written` does."""
+    arrays: dict[str, NDArray[Any]] = {
+        "dv" if recording.is_change else "voltages": recording.voltages,
+        "drive": recording.drive,
+        "measure": recording.measure,
+        "time_s": recording.time,
+        "idle": np.array(recording.idle),
+    }
+    if recording.reference is not None:
+        arrays["reference"] = recording.reference
+    if recording.labels is not None:
+        arrays["xy_m"] = recording.labels
+    save_arrays(path, arrays, overwrite=overwrite)

@@ -1,0 +1,145 @@
+"""Which reader a file needs: what is in it decides, not its name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tomoskin.core import EMPTY, MAGIC, Arrays, DataError, StrPath, load_arrays
+from tomoskin.files.imports import (
+    csv_table,
+    eidors,
+    eit_kit,
+    eskin,
+    interchange,
+    ktc,
+    open_eit,
+    pyeit_arrays,
+    serial_log,
+    sixteen,
+)
+from tomoskin.files.imports.matlab import is_matlab, load_matlab
+from tomoskin.files.imports.text_log import text_lines
+from tomoskin.files.session import read_session
+from tomoskin.sensing.signal import Recording
+
+Detect = Callable[[Arrays], bool]
+Parse = Callable[[Arrays, str], Recording]
+
+FORMATS: tuple[tuple[Detect, Parse], ...] = (
+    (interchange.detects, interchange.parse),
+    (sixteen.detects, sixteen.parse),
+    (eskin.detects, eskin.parse),
+    (ktc.detects, ktc.parse),
+    (pyeit_arrays.detects, pyeit_arrays.parse),
+    (serial_log.detects_arrays, serial_log.parse_arrays),
+)
+"""What recognises a format by its arrays, and what reads it."""
+
+TEXT_FORMATS: tuple[
+    tuple[Callable[[list[str]], bool], Callable[[Iterable[str], str], Recording]], ...
+] = (
+    (csv_table.detects, csv_table.parse),
+    (open_eit.detects, open_eit.parse),
+    (eit_kit.detects, eit_kit.parse),
+    (serial_log.detects, serial_log.parse),
+)
+"""The same for text, by its first lines."""
+
+_HEAD = 128
+_FIRST_LINES = 300
+_ZIP = (b"PK\x03\x04", b"PK\x05\x06")
+_HDF5 = b"\x89HDF"
+_PICKLE = b"\x80"
+
+
+def read_recording(path: StrPath) -> Recording:
+    """Recording in ``path``: a session, an interchange file or a format that can be imported.
+
+    Absurd values are excluded; its notes name them.
+
+    Raises
+    ------
+    DataError
+        When the file cannot be read or is of no known kind; the message lists its keys.
+    """
+    return _read(Path(path)).plausible()
+
+
+def _read(path: Path) -> Recording:
+    head = _beginning(path)
+    if head.startswith(MAGIC):
+        return read_session(path)
+    if is_matlab(head):
+        return _from_matlab(load_matlab(path), path)
+    if head.startswith(_ZIP):
+        return _from_arrays(load_arrays(path), path)
+    return _from_text(head, path)
+
+
+def is_session(path: StrPath) -> bool:
+    """Whether the file begins as a session does; DataError when it cannot be read."""
+    return _beginning(Path(path)).startswith(MAGIC)
+
+
+def _from_arrays(arrays: Arrays, path: Path) -> Recording:
+    for detects, parse in FORMATS:
+        if detects(arrays):
+            return parse(arrays, str(path))
+    raise DataError(
+        f"expected an interchange file (voltages or dv, drive, measure), got the keys "
+        f"{', '.join(sorted(arrays)) or 'of an empty archive'}",
+        where=str(path),
+        hint="docs/interchange.md lists what can be read",
+    )
+
+
+def _from_matlab(variables: dict[str, Any], path: Path) -> Recording:
+    if eidors.detects(variables):
+        return eidors.parse(variables, str(path))
+    arrays = {
+        key: value
+        for key, value in variables.items()
+        if isinstance(value, np.ndarray) and value.dtype.kind in "biufc"
+    }
+    return _from_arrays(arrays, path)
+
+
+def _from_text(head: bytes, path: Path) -> Recording:
+    if head.startswith(_HDF5):
+        raise DataError(
+            "is an HDF5 file, or a MATLAB file of version 7.3",
+            where=str(path),
+            hint="save it with -v7, or as .npz",
+        )
+    if head.startswith(_PICKLE):
+        raise DataError(
+            "looks like a pickle; tomoskin never reads pickles, because they can run any program",
+            where=str(path),
+            hint="save plain arrays as .npz",
+        )
+    first = list(islice(text_lines(path), _FIRST_LINES))
+    for detects, parse in TEXT_FORMATS:
+        if detects(first):
+            return parse(text_lines(path), str(path))
+    raise DataError(
+        "is not a complete .npz archive, a session, a MATLAB file or a known text log",
+        where=str(path),
+        hint="docs/interchange.md lists what can be read",
+    )
+
+
+def _beginning(path: Path) -> bytes:
+    try:
+        with path.open("rb") as file:
+            if head := file.read(_HEAD):
+                return head
+        raise DataError(EMPTY, where=str(path))
+    except FileNotFoundError as error:
+        raise DataError("there is no such file", where=str(path)) from error
+    except OSError as error:
+        raise DataError(f"cannot be read: {error.strerror or error}", where=str(path)) from error

@@ -1,0 +1,125 @@
+"""Tables of drives and measurements as other programs write them → source, sink; plus, minus."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tomoskin.core import DataError, FloatArray, IntArray
+from tomoskin.sensing.signal import Recording, frame_times
+
+
+def voltages_of(
+    source: str,
+    voltages: NDArray[Any],
+    rows: tuple[IntArray, IntArray],
+    *,
+    time: FloatArray | None = None,
+    reference: NDArray[Any] | None = None,
+    notes: Sequence[str] = (),
+) -> Recording:
+    """A recording of voltages (n_frames, n_rows) without labels; ``rows``: drive and measure.
+
+    Where there is no ``time`` (n_frames,), s, the frames are numbered.
+    """
+    drive, measure = rows
+    return Recording(
+        voltages=voltages,
+        drive=drive,
+        measure=measure,
+        time=frame_times(len(voltages)) if time is None else time,
+        reference=reference,
+        labels=None,
+        is_change=False,
+        source=source,
+        notes=tuple(notes),
+    )
+
+
+def pairs_of(patterns: NDArray[Any], what: str, source: str) -> IntArray:
+    """(n, 2) positive and negative electrode of each of (n, n_electrodes) patterns.
+
+    Raises
+    ------
+    DataError
+        When a pattern is not one electrode against one other of equal strength.
+    """
+    signs = np.sign(patterns)
+    balanced = np.abs(patterns.sum(axis=1)) <= 1e-9 * np.abs(patterns).max(initial=0.0)
+    good = ((signs > 0).sum(axis=1) == 1) & ((signs < 0).sum(axis=1) == 1) & balanced
+    if not good.all():
+        row = int(np.argmin(good))
+        used = ", ".join(f"E{e + 1}" for e in np.flatnonzero(patterns[row])) or "none"
+        raise DataError(
+            f"expected one electrode against one other, got a pattern on {used}",
+            where=f"{source}, {what} {row}",
+            hint="tomoskin cannot reconstruct images from such patterns",
+        )
+    return np.column_stack([signs.argmax(axis=1), signs.argmin(axis=1)])
+
+
+def adjacent_scan(n: int, step: int = 1) -> tuple[IntArray, IntArray]:
+    """Drive (n², 2) and measure of a full scan of neighbouring pairs, drive by drive.
+
+    Drive k has one end at k and the other at k + ``step``; the pair read is j, j + 1. The ends
+    are named as in the built-in patterns: sink k, source k + step, plus j, minus j + 1.
+    """
+    k, j = np.divmod(np.arange(n * n), n)
+    drive = np.column_stack([(k + step) % n, k])
+    return drive, np.column_stack([j, (j + 1) % n])
+
+
+def touches_drive(drive: IntArray, measure: IntArray) -> NDArray[np.bool_]:
+    """(n,) whether a row's measuring pair touches its drive."""
+    return np.asarray((drive[:, :, None] == measure[:, None, :]).any(axis=(1, 2)))
+
+
+def without_repeats(recording: Recording) -> Recording:
+    """The recording with each measurement once: the first of those that differ in sign alone.
+
+    Instruments that drive every pair from both ends measure each voltage twice.
+    """
+    rows = np.hstack([np.sort(recording.drive, axis=1), np.sort(recording.measure, axis=1)])
+    first = np.sort(np.unique(rows, axis=0, return_index=True)[1])
+    repeats = len(rows) - len(first)
+    if not repeats:
+        return recording
+    note = f"{repeats} of {len(rows)} rows repeat a measurement and are left out"
+    reference = recording.reference
+    return replace(
+        recording,
+        voltages=recording.voltages[:, first],
+        drive=recording.drive[first],
+        measure=recording.measure[first],
+        reference=None if reference is None else reference[first],
+        notes=(*recording.notes, note),
+    )
+
+
+def for_magnitudes(drive: IntArray, measure: IntArray, n: int) -> IntArray:
+    """``measure`` with each pair so turned that a uniform disc of ``n`` electrodes reads above 0.
+
+    For instruments that tell a voltage's size but not its sign. Potential of point electrodes on
+    the rim of a disc: −ln|z − source| + ln|z − sink| (Gisser, Isaacson, Newell 1990).
+    """
+    place = np.exp(2j * np.pi * np.arange(n) / n)
+    source, sink = place[drive[:, 0]], place[drive[:, 1]]
+
+    def potential(electrode: IntArray) -> NDArray[np.float64]:
+        z = place[electrode]
+        near = 1e-6  # a driven electrode's own potential is large, not infinite
+        return np.asarray(
+            np.log(np.maximum(abs(z - sink), near)) - np.log(np.maximum(abs(z - source), near))
+        )
+
+    falls = potential(measure[:, 0]) < potential(measure[:, 1])
+    return np.where(falls[:, None], measure[:, ::-1], measure)
+
+
+def clockwise(number: IntArray, n: int) -> IntArray:
+    """Electrodes counted counter-clockwise from the top, as the built-in skins count them."""
+    return np.asarray(-number % n)

@@ -1,0 +1,116 @@
+"""The board of a replay: agrees to everything, and says who it was."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from tomoskin.board.wire import (
+    SCHEMA,
+    Ack,
+    BoardLimits,
+    Command,
+    Deframer,
+    GetBoard,
+    GetInfo,
+    GetMode,
+    GetPattern,
+    GetScan,
+    Hello,
+    Message,
+    Result,
+    SetFormat,
+    SetMode,
+    SetPattern,
+    SetScan,
+    Start,
+    Stop,
+    decode_payload,
+    encode,
+    is_command,
+    type_byte,
+)
+from tomoskin.twin import Board, HeldScanning
+
+if TYPE_CHECKING:
+    from tomoskin.model.skin import Skin
+
+_MOST = 2**16 - 1
+
+
+class ReplayBoard:
+    """Answers commands as the board that was recorded would; no I/O.
+
+    ``scanning`` says whether it has been started.
+    """
+
+    def __init__(self, skin: Skin, device: dict[str, Any]) -> None:
+        """``device`` is what the session holds of the board, perhaps nothing."""
+        self._board = _board(skin, device)
+        self._held = HeldScanning(self._board)
+        self._deframer = Deframer(SCHEMA.to_device_bytes)
+        self._out = bytearray(encode(Hello(SCHEMA.major, SCHEMA.minor, SCHEMA.hash)))
+        self.scanning = False
+
+    def obey(self, data: bytes) -> None:
+        """Act on commands."""
+        for payload in self._deframer.feed(data):
+            command = decode_payload(payload, 0.0)
+            if command is not None and is_command(command):
+                self._out += encode(self._answer(command))
+
+    def answer(self) -> bytes:
+        """What it has to say, once."""
+        data = bytes(self._out)
+        self._out.clear()
+        return data
+
+    def _answer(self, command: Command) -> Message:
+        match command:
+            case GetInfo():
+                return self._board.info(command.request)
+            case GetBoard():
+                return replace(self._board.limits, request=command.request)
+            case GetScan() | GetPattern() | GetMode():
+                return self._held.answer(command)
+            case SetScan() | SetPattern() | SetFormat() | SetMode():
+                self._held.set(command)
+            case Start() | Stop():
+                self.scanning = isinstance(command, Start)
+        return Ack(command.request, type_byte(type(command)), Result.OK, 0)
+
+
+def _board(skin: Skin, device: dict[str, Any]) -> Board:
+    """A board that is what was recorded, and has room for any scan.
+
+    It has never fewer channels than the skin has electrodes.
+    """
+    channels = device.get("channels")
+    name = str(device.get("name") or "").encode()[:24]
+    return Board(
+        channels=max(channels if isinstance(channels, int) else 0, skin.n_electrodes),
+        adc_bits=skin.readout.adc_bits,
+        current=skin.current,
+        tick_rate=round(device.get("tick_rate", skin.readout.tick_rate)),
+        max_drives=_MOST,
+        max_samples=_MOST,
+        firmware=_version(device.get("firmware")),
+        unique_id=_identity(device.get("unique_id")),
+        limits=BoardLimits(0, name.ljust(24, b"\0"), 0, _MOST, 0, 0, 0, 0),
+    )
+
+
+def _version(text: Any) -> tuple[int, int, int]:
+    """Three numbers of "1.2.3"; zeros where it says no such."""
+    parts = str(text or "").split(".")
+    is_version = len(parts) == 3 and all(part.isdigit() and int(part) < 256 for part in parts)
+    major, minor, patch = map(int, parts) if is_version else (0, 0, 0)
+    return major, minor, patch
+
+
+def _identity(text: Any) -> bytes:
+    try:
+        identity = bytes.fromhex(str(text or ""))
+    except ValueError:
+        identity = b""
+    return identity if len(identity) == 8 else b"replay\0\0"

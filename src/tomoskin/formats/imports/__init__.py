@@ -1,1 +1,0 @@
-"""Recordings of other programs and instruments, their electrodes and signs brought to ours."""

@@ -1,0 +1,280 @@
+"""Parameter-choice criteria: alpha from the spectrum, and from evidence beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from tomoskin.core import DataError, FloatArray, IntArray, ModelError
+from tomoskin.imaging.choice.alpha_choice import (
+    AlphaChoice,
+    Curve,
+    Evidence,
+    Explanation,
+    Level,
+    Locate,
+    crossing,
+    least,
+)
+from tomoskin.imaging.choice.light_touch import light_touch
+from tomoskin.imaging.linear.spectrum import Spectrum
+from tomoskin.imaging.trained.merit import noise_figure
+
+_LEAST = 0.3
+"""Total turn, in rad, below which a curve has no corner: a straight line or a gentle arc."""
+
+TARGET = 1.0
+"""Noise figure that is aimed at (Adler & Guardo 1996)."""
+
+WIDTH = 0.1
+"""Radius of the contrast in the middle, in parts of the mesh's largest extent."""
+
+FOLDS = 5
+
+_PER_DECADE = 8
+
+_MISSED = 0.25
+"""A press that is not found counts as this part of the mesh's largest extent."""
+
+Criterion = Callable[[Spectrum, Evidence], AlphaChoice]
+
+
+def corner(t: FloatArray, x: FloatArray, y: FloatArray) -> int:
+    """Index of the largest curvature of the curve (x, y) over its parameter t, ascending.
+
+    The curve falls from left to right; only bends towards the origin count, and the ends do
+    not. Hansen & O'Leary 1993, equation 4.
+
+    Raises
+    ------
+    ModelError
+        When the curve does not bend towards the origin anywhere, or hardly.
+    """
+    dx, dy = np.gradient(x, t), np.gradient(y, t)
+    ddx, ddy = np.gradient(dx, t), np.gradient(dy, t)
+    speed = np.maximum(dx**2 + dy**2, np.finfo(float).tiny)
+    # with t ascending x grows and y falls: a bend towards the origin turns left
+    turn = (dx * ddy - dy * ddx) / speed
+    curvature = turn / np.sqrt(speed)
+    inner = np.arange(len(t))[3:-3]
+    peaks = [i for i in inner if curvature[i] == curvature[i - 3 : i + 4].max() and turn[i] > 0]
+    bends = [i for i in peaks if _turned(t, turn, i) >= _LEAST]
+    if not bends:
+        raise ModelError(
+            "the L-curve has no corner",
+            where="rule l-curve",
+            hint="choose another rule, such as gcv or light-touch",
+        )
+    return int(max(bends, key=lambda i: curvature[i]))
+
+
+def _turned(t: FloatArray, turn: FloatArray, at: int) -> float:
+    """Angle, in rad, by which the curve turns to the left around ``at``, as far as it does."""
+    right = np.flatnonzero(turn[at:] <= 0)
+    left = np.flatnonzero(turn[at::-1] <= 0)
+    stop = at + (int(right[0]) if len(right) else len(t) - at)
+    start = at + 1 - (int(left[0]) if len(left) else at + 1)
+    return float(np.trapezoid(turn[start:stop], t[start:stop]))
+
+
+def l_curve(spectrum: Spectrum, evidence: Evidence) -> AlphaChoice:
+    """Corner of (log residual, log seminorm): the point of largest curvature (Hansen 1992).
+
+    Needs frames; their squares are added up. For very smooth images it trusts the data too much
+    (Hanke 1996). Raises ModelError when there is no corner.
+    """
+    frames = evidence.touched(len(spectrum.values))
+    alphas = spectrum.alphas
+    residual = np.array([np.linalg.norm(spectrum.residual(a, frames)) for a in alphas])
+    seminorm = np.array([np.linalg.norm(spectrum.seminorm(a, frames)) for a in alphas])
+    at = corner(np.log(alphas), np.log(residual), np.log(seminorm))
+    curve = Curve(residual, seminorm, "residual ‖Jx − dv‖_W", "seminorm √(xᵀQx)", at)
+    reason = f"the L-curve of {_frames(frames)} bends most here"
+    return AlphaChoice(float(alphas[at]), "l-curve", reason, curve)
+
+
+def gcv(spectrum: Spectrum, evidence: Evidence) -> AlphaChoice:
+    """Least generalised cross-validation error, ‖r‖²_W/(1 − f/m)² (Golub, Heath & Wahba 1979).
+
+    f are the degrees of freedom. Needs frames, not the size of their noise.
+    """
+    frames = evidence.touched(len(spectrum.values))
+    m = len(spectrum.values)
+
+    def error(alpha: float) -> float:
+        unused = 1.0 - spectrum.freedom(alpha) / m
+        return float(np.mean(spectrum.residual(alpha, frames) ** 2)) / (m * unused**2)
+
+    reason = f"{_frames(frames)} predict each row best from the others here"
+    return least(spectrum, error, Explanation("gcv", reason, "mean square error of prediction"))
+
+
+def likelihood(spectrum: Spectrum, evidence: Evidence) -> AlphaChoice:
+    """Most likely alpha, if images come from the prior: N(0, τ²Q⁻¹) under noise N(0, ν²W⁻¹).
+
+    alpha is ν/τ, and the data's coefficients are N(0, τ²(λ + α²)); τ is each frame's own
+    (empirical Bayes; Rasmussen & Williams 2006, section 5.4). Needs frames.
+    """
+    frames = evidence.touched(len(spectrum.values))
+    weighed = np.isfinite(spectrum.values)
+    values, m = spectrum.values[weighed], int(weighed.sum())
+    energy = np.abs(spectrum.coefficients(frames)[:, weighed]) ** 2
+
+    def unlikely(alpha: float) -> float:
+        variance = values + alpha**2
+        own = np.log(np.mean(energy / variance, axis=1))
+        return float(np.mean(own)) + float(np.log(variance).mean())
+
+    reason = f"{_frames(frames)} of {m} coefficients are likeliest here"
+    return least(spectrum, unlikely, Explanation("likelihood", reason, "−2 log likelihood per row"))
+
+
+def discrepancy(spectrum: Spectrum, evidence: Evidence) -> AlphaChoice:
+    """The alpha whose residual is as large as the noise, Σ r²w = Σ noise²w (Morozov 1966).
+
+    Needs frames and noise. Raises ModelError when no alpha gives such a residual.
+    """
+    frames = evidence.touched(len(spectrum.values))
+    noise = evidence.known_noise(len(spectrum.values))
+    level = float(np.sqrt(np.sum(noise**2 * spectrum.problem.weights)))
+
+    def excess(alpha: float) -> float:
+        return float(np.sqrt(np.mean(spectrum.residual(alpha, frames) ** 2))) / level
+
+    hints = (
+        "the model does not explain these frames to within their noise: choose another rule",
+        "these frames hold little more than noise: give frames with touches",
+    )
+    reason = f"the residual of {_frames(frames)} is as large as the noise"
+    explanation = Explanation("discrepancy", reason, "residual / noise")
+    return crossing(spectrum, excess, Level(1.0, "rising", hints), explanation)
+
+
+def _frames(frames: FloatArray) -> str:
+    return "1 frame" if len(frames) == 1 else f"{len(frames)} frames"
+
+
+def by_noise_figure(spectrum: Spectrum, evidence: Evidence, target: float = TARGET) -> AlphaChoice:
+    """The alpha whose noise figure is ``target``, for a contrast in the middle of the mesh.
+
+    The noise's size does not count, only how it is spread over the measurements: evenly where the
+    evidence does not say. The figure falls as alpha grows; at large alphas it may rise again,
+    where the image is no better for being smoother. Raises ModelError when no alpha has that
+    figure before.
+    """
+    n = len(spectrum.values)
+    noise = np.ones(n) if evidence.noise is None else evidence.known_noise(n)
+    volumes = spectrum.problem.model.mesh.volumes
+    change = spectrum.problem.jacobian @ in_the_middle(spectrum)
+
+    def figure(alpha: float) -> float:
+        return noise_figure(spectrum.operator(alpha).matrix, volumes, change, noise)
+
+    reason = f"the noise figure is {target:g} for a contrast in the middle"
+    hints = (
+        "choose a larger noise figure, or another rule",
+        "choose a smaller noise figure, or another rule",
+    )
+    explanation = Explanation("noise-figure", reason, "noise figure")
+    return crossing(spectrum, figure, Level(target, "falling", hints), explanation)
+
+
+def in_the_middle(spectrum: Spectrum) -> FloatArray:
+    """(n_cells,) 1 within :data:`WIDTH` of the mesh's middle (one cell at least), else 0."""
+    mesh = spectrum.problem.model.mesh
+    middle = mesh.volumes @ mesh.centroids / mesh.volumes.sum()
+    distance = np.linalg.norm(mesh.centroids - middle, axis=1)
+    reach = max(WIDTH * float(np.ptp(mesh.points, axis=0).max()), float(distance.min()))
+    return np.asarray(distance <= reach, dtype=np.float64)
+
+
+def labelled(spectrum: Spectrum, evidence: Evidence) -> AlphaChoice:
+    """Least mean distance between presses and the touches found, in log alpha averaged over folds.
+
+    In each of five folds alpha is chosen without the fold's presses, and the error stated is
+    that on them. Needs frames, their positions and a function that finds touches in an image.
+    """
+    frames, positions = evidence.labelled(len(spectrum.values))
+    if evidence.locate is None:
+        raise DataError(
+            "the rule needs the method that finds touches in an image, and none was given",
+            where="rule labelled",
+        )
+    alphas = spectrum.alphas[:: _step(spectrum)]
+    errors = np.array([_errors(spectrum, a, frames, positions, evidence.locate) for a in alphas])
+    chosen, held_out = _folded(errors)
+    alpha = float(np.exp(np.log(alphas[chosen]).mean()))
+    at = int(np.abs(np.log(alphas / alpha)).argmin())
+    reason = (
+        f"{len(frames)} labelled presses are found to {1e3 * held_out:.1f} mm on average, "
+        "each by an alpha chosen without it"
+    )
+    curve = Curve(alphas, 1e3 * errors.mean(axis=1), "alpha", "mean position error, mm", at)
+    return AlphaChoice(alpha, "labelled", reason, curve)
+
+
+def _step(spectrum: Spectrum) -> int:
+    alphas = spectrum.alphas
+    decades = float(np.log10(alphas[-1] / alphas[0]))
+    return max(round(len(alphas) / (decades * _PER_DECADE)), 1)
+
+
+def _errors(
+    spectrum: Spectrum, alpha: float, frames: FloatArray, positions: FloatArray, locate: Locate
+) -> FloatArray:
+    """(n,) m: distance of each press to the nearest touch; more touches than one cost as well."""
+    images = (spectrum.coefficients(frames) * spectrum.gains(alpha)) @ spectrum.modes.T
+    missed = _MISSED * float(np.ptp(spectrum.problem.model.mesh.points, axis=0).max())
+    return np.array(
+        [_error(locate(x), at, missed) for x, at in zip(images, positions, strict=True)]
+    )
+
+
+def _error(touches: FloatArray, position: FloatArray, missed: float) -> float:
+    if not len(touches):
+        return missed
+    nearest = float(np.linalg.norm(touches - position, axis=1).min())
+    return (min(nearest, missed) + missed * (len(touches) - 1)) / len(touches)
+
+
+def _folded(errors: FloatArray) -> tuple[IntArray, float]:
+    """Index chosen in each fold, and the mean error of its held-out presses."""
+    n = errors.shape[1]
+    fold = np.arange(n) % min(FOLDS, n)
+    chosen, held_out = [], np.empty(n)
+    for k in range(int(fold.max()) + 1):
+        best = int(errors[:, fold != k].mean(axis=1).argmin())
+        held_out[fold == k] = errors[best, fold == k]
+        chosen.append(best)
+    return np.array(chosen), float(held_out.mean())
+
+
+RULES: dict[str, Criterion] = {
+    "light-touch": light_touch,
+    "noise-figure": by_noise_figure,
+    "l-curve": l_curve,
+    "gcv": gcv,
+    "likelihood": likelihood,
+    "discrepancy": discrepancy,
+    "labelled": labelled,
+}
+"""Parameter-choice criteria by name.
+
+The first needs nothing but the noise; ``alpha = "auto"`` is decided by it.
+"""
+
+
+def choose(spectrum: Spectrum, rule: str, evidence: Evidence) -> AlphaChoice:
+    """The choice by the criterion that is named ``rule``.
+
+    Raises
+    ------
+    ModelError
+        For an unknown name, or where the criterion finds no alpha.
+    DataError
+        When the evidence lacks what the criterion needs.
+    """
+    if rule not in RULES:
+        raise ModelError(f'expected a rule among {", ".join(RULES)}, got "{rule}"')
+    return RULES[rule](spectrum, evidence)

@@ -1,0 +1,299 @@
+"""Absolute imaging: the conductivity itself, from one set of voltages, by iteration."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tomoskin.core import FloatArray, Image, ModelError
+from tomoskin.imaging.iterative.newton import Descent, Goal, Iteration, descend, table
+from tomoskin.imaging.iterative.observation import Observation, Whitened
+from tomoskin.imaging.iterative.unknowns import (
+    Cells,
+    Contacts,
+    ImageMap,
+    Joint,
+    ModelPoint,
+    Unknowns,
+    others,
+)
+from tomoskin.imaging.priors.named import PriorLike, penalty_of
+from tomoskin.imaging.priors.penalty import Diagonal, Penalty
+from tomoskin.model.forward import ForwardModel
+from tomoskin.model.mesh import Mesh
+
+STEPS = 20
+"""Most iterations."""
+
+REACH = 2.0
+"""No logarithm changes by more in one iteration: beyond, the linearised problem is no guide."""
+
+TOLERANCE = 1e-4
+"""An iteration that lowers the objective by less than this part of it is the last."""
+
+
+@dataclass(frozen=True, eq=False)
+class Absolute:
+    """Conductivity and contacts that explain what was measured, and how they were found.
+
+    Attributes
+    ----------
+    conductivity
+        Per cell, S or S/m.
+    background
+        S or S/m, what the image differs from.
+    contact_impedance
+        (n_electrodes,) Ω·m or Ω·m².
+    voltages
+        (n_meas,) V of the model there.
+    n_values
+        Different values that were measured: a misfit near it explains them to their noise.
+    steps
+        The start and each iteration.
+    reason
+        Why it stopped.
+    converged
+        Whether that is because there was nothing left to gain.
+    """
+
+    conductivity: Image
+    background: float
+    contact_impedance: FloatArray
+    voltages: FloatArray
+    n_values: int
+    steps: tuple[Iteration, ...] = field(repr=False)
+    reason: str
+    converged: bool
+
+    @classmethod
+    def of(cls, point: ModelPoint, descent: Descent) -> Absolute:
+        """What an iteration came to."""
+        mesh = point.of.model.mesh
+        unit = "S" if mesh.dimension == 2 else "S/m"
+        return cls(
+            conductivity=Image(point.conductivity, unit, mesh.identity),
+            background=point.background,
+            contact_impedance=point.contact_impedance,
+            voltages=point.state.voltages,
+            n_values=len(point.of.rows),
+            steps=descent.steps,
+            reason=descent.reason,
+            converged=descent.converged,
+        )
+
+    @property
+    def misfit(self) -> float:
+        """Square sum of the residuals, each over its noise."""
+        return self.steps[-1].misfit
+
+    def __str__(self) -> str:
+        """The iterations, and why they ended."""
+        return (
+            f"{table(self.steps)}\nstopped: {self.reason}; "
+            f"misfit {self.misfit:.4g} of {self.n_values} values"
+        )
+
+
+class AbsoluteImaging:
+    """Iterative Gauss–Newton in the logarithm of the conductivity, so that it stays positive.
+
+    Minimises ‖(v − f(σ, z))/noise‖² + α²·cost(log σ/σ₀) + (log σ₀/start)² + Σ(log z/start)²,
+    with a line search, over the image, its background σ₀ and the contact impedances z.
+
+    Parameters
+    ----------
+    model
+        The forward model; its contact impedances are known, or the start.
+    prior
+        As of :class:`OneStep`, for the logarithm of the conductivity, or a
+        :class:`TotalVariation` or :class:`Sparse`. NOSER takes the Jacobian at the start.
+    alpha
+        Hyper-parameter; it enters squared. Values have unit noise here, so that it is the
+        inverse of the deviation that the prior expects of the logarithm.
+    contacts
+        "fixed", "one" common factor or one for "each" electrode.
+    steps, tolerance
+        It stops after so many steps, or when one gains less than this part of the objective.
+
+    Raises
+    ------
+    ModelError
+        For alpha ≤ 0, a prior that does not fit, or complex contact impedances.
+    """
+
+    def __init__(
+        self,
+        model: ForwardModel,
+        prior: PriorLike = "laplace",
+        *,
+        alpha: float,
+        contacts: Contacts = "fixed",
+        steps: int = STEPS,
+        tolerance: float = TOLERANCE,
+    ) -> None:
+        if not (np.isfinite(alpha) and alpha > 0):
+            raise ModelError(f"expected alpha above 0, got {alpha}")
+        self.model = model
+        self.prior = prior
+        self.alpha = alpha
+        self.contacts = contacts
+        self.steps = steps
+        self.tolerance = tolerance
+
+    def __call__(self, observation: Observation, background: float | None = None) -> Absolute:
+        """Conductivity that explains ``observation``.
+
+        Parameters
+        ----------
+        observation
+            What was measured.
+        background
+            What the medium is expected to have, S or S/m. Without it, the uniform medium that
+            explains most is found first, and its contact impedances if they are looked for.
+
+        Raises
+        ------
+        DataError
+            When the observation is not one of this pattern.
+        """
+        data = observation.whitened(self.model.pattern.n_meas)
+        image = Cells(len(self.model.mesh.cells))
+        unknowns, begin = medium(self.model, data, image, self.contacts, background)
+        descent = descend(
+            Goal(unknowns, self._cost(unknowns), data.target),
+            begin,
+            most=self.steps,
+            tolerance=self.tolerance,
+            reach=REACH,
+        )
+        return Absolute.of(unknowns.at(descent.unknowns), descent)
+
+    def _cost(self, unknowns: Unknowns) -> Quadratic | Sharp:
+        mesh, strength, rest = self.model.mesh, self.alpha**2, others(unknowns.n_contacts)
+        if hasattr(self.prior, "touching"):
+            return Sharp(self.prior, mesh, strength, rest)
+        start = unknowns.at(np.zeros(unknowns.size)).by_contrast
+        return Quadratic(Joint(penalty_of(self.prior, mesh, start), strength, rest))
+
+
+@dataclass(frozen=True, eq=False)
+class Quadratic:
+    """A cost xᵀQx that stays."""
+
+    joint: Penalty
+
+    def penalty(self, unknowns: FloatArray, jacobian: FloatArray) -> Penalty:
+        """Q."""
+        del unknowns, jacobian
+        return self.joint
+
+    def energy(self, unknowns: FloatArray, force: FloatArray) -> float:
+        """xᵀQx, without Q: the force is Qx."""
+        return float(unknowns @ force)
+
+
+@dataclass(frozen=True, eq=False)
+class Sharp:
+    """The cost of a sharp prior, beside that of background and contacts."""
+
+    prior: Any
+    mesh: Mesh
+    strength: float
+    others: Diagonal
+
+    def penalty(self, unknowns: FloatArray, jacobian: FloatArray) -> Penalty:
+        """The quadratic that touches it at ``unknowns``."""
+        del jacobian
+        image = unknowns[: len(self.mesh.cells)]
+        return Joint(self.prior.touching(self.mesh, image), self.strength, self.others)
+
+    def energy(self, unknowns: FloatArray, force: FloatArray) -> float:
+        """The sharp cost itself."""
+        del force
+        n = len(self.mesh.cells)
+        rest = unknowns[n:]
+        return float(
+            self.strength * self.prior.energy(self.mesh, unknowns[:n])
+            + rest @ (self.others.matrix * rest)
+        )
+
+
+def homogeneous(
+    model: ForwardModel,
+    observation: Observation,
+    contacts: Contacts = "fixed",
+    background: float | None = None,
+) -> Absolute:
+    """The uniform conductivity, and contact impedances if wanted, that explain most.
+
+    ``background`` is where the search starts; without it, where the voltages have about the
+    right size. Raises DataError when the observation is not one of this pattern.
+    """
+    return _uniform(model, observation.whitened(model.pattern.n_meas), contacts, background)
+
+
+def _uniform(
+    model: ForwardModel, data: Whitened, contacts: Contacts, background: float | None
+) -> Absolute:
+    if background is None:
+        background = _of_right_size(model, data.target, data.rows)
+    unknowns = Unknowns(model, _Nothing(len(model.mesh.cells)), background, contacts, data.rows)
+    descent = descend(
+        Goal(unknowns, Quadratic(others(unknowns.n_contacts)), data.target),
+        Descent.begin(unknowns.size),
+        most=STEPS,
+        tolerance=TOLERANCE,
+        reach=REACH,
+    )
+    return Absolute.of(unknowns.at(descent.unknowns), descent)
+
+
+def medium(
+    model: ForwardModel,
+    data: Whitened,
+    image: ImageMap,
+    contacts: Contacts,
+    background: float | None,
+) -> tuple[Unknowns, Descent]:
+    """Unknowns of ``image``, and where to begin: no image, on a medium that explains most.
+
+    With a ``background``, on that and with the model's contacts.
+    """
+    if background is not None:
+        unknowns = Unknowns(model, image, background, contacts, data.rows)
+        return unknowns, Descent.begin(unknowns.size)
+    uniform = _uniform(model, data, contacts, None)
+    unknowns = Unknowns(model, image, uniform.background, contacts, data.rows)
+    x = np.zeros(unknowns.size)
+    if contacts != "fixed":
+        ratio = uniform.contact_impedance / model.contact_impedance
+        x[-unknowns.n_contacts :] = np.log(ratio[: unknowns.n_contacts])
+    weight = np.zeros(unknowns.size)
+    weight[image.size :] = others(unknowns.n_contacts).matrix
+    return unknowns, Descent(x, weight * x, (), "not begun", False)
+
+
+def _of_right_size(model: ForwardModel, target: FloatArray, rows: NDArray[Any]) -> float:
+    """Voltages fall as conductivity rises, but for the part of the contacts."""
+    unit = rows @ model.at(1.0).voltages
+    share = float(target @ unit) / float(unit @ unit)
+    return 1.0 / share if share > 0 else 1.0
+
+
+@dataclass(frozen=True)
+class _Nothing:
+    """No image: the contrast is zero everywhere."""
+
+    n_cells: int
+    size: int = 0
+
+    def contrast(self, latent: FloatArray) -> FloatArray:
+        del latent
+        return np.zeros(self.n_cells)
+
+    def chain(self, latent: FloatArray, jacobian: FloatArray) -> FloatArray:
+        del latent
+        return jacobian[:, :0]

@@ -1,0 +1,219 @@
+"""What an iteration looks for: an image, the background that it stands on, contact impedances."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, Protocol
+
+import numpy as np
+
+from tomoskin.core import FloatArray, ModelError
+from tomoskin.imaging.priors.penalty import Carried, Diagonal, Penalty
+from tomoskin.model.forward import ForwardModel, State
+
+Contacts = Literal["fixed", "one", "each"]
+"""Which contact impedances are looked for: none, a common factor, a factor per electrode."""
+
+BACKGROUND_SPREAD = 1.0
+"""Deviation of the logarithm of the background from its start: a factor of e, hardly a wish."""
+
+CONTACT_SPREAD = 1.0
+"""The same of a contact impedance."""
+
+
+class ImageMap(Protocol):
+    """Latent image → logarithm of conductivity over background, cell by cell."""
+
+    @property
+    def size(self) -> int:
+        """Number of latent values."""
+        ...
+
+    def contrast(self, latent: FloatArray) -> FloatArray:
+        """(n_cells,) log of conductivity over background."""
+        ...
+
+    def chain(self, latent: FloatArray, jacobian: FloatArray) -> FloatArray:
+        """(m, size) derivative by the latent image, from (m, n_cells) by the contrast."""
+        ...
+
+
+@dataclass(frozen=True)
+class Cells:
+    """The latent image is the contrast itself, one number a cell."""
+
+    size: int
+
+    def contrast(self, latent: FloatArray) -> FloatArray:
+        """(n_cells,) as it is."""
+        return latent
+
+    def chain(self, latent: FloatArray, jacobian: FloatArray) -> FloatArray:
+        """(m, n_cells) as it is."""
+        del latent
+        return jacobian
+
+
+@dataclass(frozen=True, eq=False)
+class Unknowns:
+    """The vector of unknowns: latent image, log background, log contact impedances.
+
+    The last two count from where they start. Every conductivity and impedance that follows
+    from them is positive.
+
+    Attributes
+    ----------
+    model
+        The forward model; its contact impedances are the start.
+    image
+        How the latent image becomes contrast.
+    background
+        Start of the background, S or S/m.
+    contacts
+        Which contact impedances are looked for.
+    rows
+        (m, n_meas): values of unit noise from voltages.
+    """
+
+    model: ForwardModel
+    image: ImageMap
+    background: float
+    contacts: Contacts
+    rows: FloatArray
+
+    def __post_init__(self) -> None:
+        """Refuse what has no logarithm."""
+        if not (np.isfinite(self.background) and self.background > 0):
+            raise ModelError(f"expected a background above 0, got {self.background}")
+        if np.iscomplexobj(self.model.contact_impedance):
+            raise ModelError("expected real contact impedances, got complex ones")
+        if self.contacts not in ("fixed", "one", "each"):
+            raise ModelError(f'expected contacts "fixed", "one" or "each", got "{self.contacts}"')
+
+    @property
+    def n_contacts(self) -> int:
+        """Number of contact factors."""
+        return {"fixed": 0, "one": 1, "each": self.model.pattern.n_electrodes}[self.contacts]
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return self.image.size + 1 + self.n_contacts
+
+    def at(self, unknowns: FloatArray) -> ModelPoint:
+        """The forward problem at ``unknowns`` (size,)."""
+        return ModelPoint(self, unknowns)
+
+
+@dataclass(frozen=True, eq=False)
+class ModelPoint:
+    """One vector of unknowns, and what follows from it."""
+
+    of: Unknowns
+    unknowns: FloatArray
+
+    @property
+    def latent(self) -> FloatArray:
+        """The latent image."""
+        return self.unknowns[: self.of.image.size]
+
+    @property
+    def background(self) -> float:
+        """S or S/m."""
+        return float(self.of.background * np.exp(self.unknowns[self.of.image.size]))
+
+    @property
+    def contact_impedance(self) -> FloatArray:
+        """(n_electrodes,)."""
+        start = self.of.model.contact_impedance
+        if not self.of.n_contacts:
+            return np.asarray(start)
+        return np.asarray(start * np.exp(self.unknowns[self.of.image.size + 1 :]))
+
+    @cached_property
+    def conductivity(self) -> FloatArray:
+        """(n_cells,) S or S/m."""
+        with np.errstate(over="ignore"):  # the model refuses what is not finite
+            return self.background * np.exp(self.of.image.contrast(self.latent))
+
+    @cached_property
+    def state(self) -> State:
+        """The forward model here."""
+        model = self.of.model
+        if self.of.n_contacts:
+            impedance = self.contact_impedance
+            model = ForwardModel(
+                model.mesh, model.pattern, impedance, model.current, order=model.order
+            )
+        return model.at(self.conductivity)
+
+    @property
+    def predicted(self) -> FloatArray:
+        """(m,) values of unit noise."""
+        return np.asarray(self.of.rows @ self.state.voltages)
+
+    @property
+    def jacobian(self) -> FloatArray:
+        """(m, size)."""
+        rows, by_contrast = self.of.rows, self.by_contrast
+        parts = [self.of.image.chain(self.latent, by_contrast), by_contrast.sum(axis=1)[:, None]]
+        if self.of.n_contacts:
+            by_contact = rows @ (self.state.contact_jacobian * self.contact_impedance)
+            parts.append(
+                by_contact.sum(axis=1)[:, None] if self.of.contacts == "one" else by_contact
+            )
+        return np.hstack(parts)
+
+    @property
+    def by_contrast(self) -> FloatArray:
+        """(m, n_cells) derivative by the logarithm of each cell's conductivity."""
+        return np.asarray(self.of.rows @ (self.state.jacobian * self.conductivity))
+
+
+@dataclass(frozen=True, eq=False)
+class Joint:
+    """Penalty of image, background and contacts: no two of them know of each other.
+
+    Attributes
+    ----------
+    image
+        Penalty of the latent image.
+    strength
+        What it counts: α².
+    others
+        Penalty of all that follows the image.
+    """
+
+    image: Penalty
+    strength: float
+    others: Diagonal
+
+    @property
+    def free(self) -> FloatArray:
+        """The image's free images; nothing else is free."""
+        free = self.image.free
+        return np.vstack([free, np.zeros((len(self.others.matrix), free.shape[1]))])
+
+    @property
+    def matrix(self) -> FloatArray:
+        """Q, dense."""
+        image = self.image.matrix * self.strength
+        n = len(image)
+        both = np.zeros((n + len(self.others.matrix),) * 2)
+        both[:n, :n] = image if image.ndim == 2 else np.diag(image)
+        both[n:, n:] = np.diag(self.others.matrix)
+        return both
+
+    def carry(self, jacobian: FloatArray) -> Carried:
+        """Both parts carry their own columns."""
+        n = jacobian.shape[1] - len(self.others.matrix)
+        spread, gram = self.image.carry(jacobian[:, :n])
+        more, gram_more = self.others.carry(jacobian[:, n:])
+        return np.vstack([spread / self.strength, more]), gram / self.strength + gram_more
+
+
+def others(contacts: int, background_spread: float = BACKGROUND_SPREAD) -> Diagonal:
+    """Penalty of the background and of so many contact impedances."""
+    spread = np.append(background_spread, np.full(contacts, CONTACT_SPREAD))
+    return Diagonal(1.0 / spread**2)

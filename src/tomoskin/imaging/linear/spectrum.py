@@ -1,0 +1,229 @@
+"""The spectrum of a linear problem: every alpha from one decomposition."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eigh, qr, solve_triangular
+
+from tomoskin.core import FloatArray, ModelError
+from tomoskin.imaging.linear.operator import Operator
+from tomoskin.imaging.linear.problem import LinearProblem
+
+_ROUNDING = 1e-14
+"""An eigenvalue below this part of the largest is rounding (a reciprocal row, for one)."""
+
+_UNSEEN = 1e-12
+"""Data of a free image below this part of what they could be at most are rounding."""
+
+_SPAN = (1e-5, 10.0)
+"""Alphas worth looking at, in parts of the largest singular value."""
+
+_PER_DECADE = 40
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """Modes of W^½JQ⁻¹JᴴW^½ = U diag(λ) Uᴴ: data and images that go with each other.
+
+    Data dv have coefficients β = UᴴW^½dv; the image is Σ bᵢ gᵢ βᵢ with gᵢ = 1/(λᵢ + α²). So a
+    new alpha costs one product, and residual, seminorm and noise cost next to nothing. The
+    images that Q does not weigh are modes of their own, with λ = ∞ and g = 1 (the standard form
+    of Eldén 1982); the others are orthogonal to what the data tell of these.
+
+    Attributes
+    ----------
+    problem
+        What was decomposed.
+    values
+        (n_meas,) λ in descending order, ∞ for the images that cost nothing.
+    analysis
+        (n_meas, n_meas) UᴴW^½: difference data → β.
+    modes
+        (n_cells, n_meas) b, the image of each mode.
+    """
+
+    problem: LinearProblem
+    values: FloatArray
+    analysis: NDArray[Any]
+    modes: NDArray[Any]
+
+    @classmethod
+    def of(cls, problem: LinearProblem) -> Self:
+        """Decompose ``problem``.
+
+        Raises
+        ------
+        ModelError
+            When the data do not see an image that the prior leaves free.
+        """
+        root = np.sqrt(problem.weights)
+        spread, gram = problem.carried
+        system = root[:, None] * gram * root
+        free = problem.prior.free
+        k = free.shape[1]
+        if not k:
+            values, u = _eigen(system)
+            return cls(problem, values, u.conj().T * root, (spread * root) @ u)
+        basis, rest, upper = _free_part(root[:, None] * problem.jacobian, free)
+        values, inner = _eigen(rest.conj().T @ system @ rest)
+        u = rest @ inner
+        fitted = solve_triangular(upper, basis.conj().T @ system @ u)
+        cheap = solve_triangular(upper, np.eye(k))
+        return cls(
+            problem,
+            np.concatenate([np.full(k, np.inf), values]),
+            np.hstack([basis, u]).conj().T * root,
+            np.hstack([free @ cheap, (spread * root) @ u - free @ fitted]),
+        )
+
+    @cached_property
+    def singular_values(self) -> FloatArray:
+        """σ = √λ of the modes that the prior weighs, none of mere rounding, in descending order."""
+        values = self.values[np.isfinite(self.values)]
+        return np.asarray(np.sqrt(values[values > _ROUNDING * values.max()]))
+
+    @property
+    def condition(self) -> float:
+        """Largest singular value over the smallest."""
+        return float(self.singular_values[0] / self.singular_values[-1])
+
+    @property
+    def alphas(self) -> FloatArray:
+        """Fine grid of the alphas worth looking at, ascending."""
+        low, high = np.multiply(_SPAN, self.singular_values[0])
+        count = 1 + round(_PER_DECADE * np.log10(high / low))
+        return np.asarray(np.geomspace(low, high, count))
+
+    def gains(self, alpha: float) -> FloatArray:
+        """(n_meas,) g, by which each coefficient enters the image.
+
+        Raises ModelError when alpha is not above 0.
+        """
+        if not (np.isfinite(alpha) and alpha > 0):
+            raise ModelError(f"expected alpha above 0, got {alpha}")
+        weighed = np.isfinite(self.values)
+        return np.where(weighed, 1.0 / (np.where(weighed, self.values, 0.0) + alpha**2), 1.0)
+
+    def filters(self, alpha: float) -> FloatArray:
+        """(n_meas,) filter factors λ/(λ + α²): the part of each coefficient that is believed."""
+        return 1.0 - _complement(self, alpha)
+
+    def freedom(self, alpha: float) -> float:
+        """Effective degrees of freedom: the sum of the filter factors."""
+        return float(self.filters(alpha).sum())
+
+    def operator(self, alpha: float) -> Operator:
+        """The operator of ``alpha``, the same as ``problem.operator(alpha)``, by one product."""
+        return _operator(self, alpha, np.asarray(self.modes @ _filtered(self, alpha)))
+
+    def coefficients(self, dv: NDArray[Any]) -> NDArray[Any]:
+        """(…, n_meas) β of difference data (…, n_meas)."""
+        return np.asarray(dv @ self.analysis.T)
+
+    def residual(self, alpha: float, dv: NDArray[Any]) -> FloatArray:
+        """(…,) ‖dv − Jx‖_W of the images x of data (…, n_meas)."""
+        unexplained = _complement(self, alpha) * self.coefficients(dv)
+        return np.asarray(np.linalg.norm(unexplained, axis=-1))
+
+    def seminorm(self, alpha: float, dv: NDArray[Any]) -> FloatArray:
+        """(…,) √(xᴴQx) of the images x of data (…, n_meas)."""
+        weighed = np.isfinite(self.values)
+        scale = self.gains(alpha)[weighed] * np.sqrt(self.values[weighed])
+        weight = scale * self.coefficients(dv)[..., weighed]
+        return np.asarray(np.linalg.norm(weight, axis=-1))
+
+    def noise_coefficients(self, noise: FloatArray) -> NDArray[Any]:
+        """(n_meas, n_meas) covariance of β for independent ``noise`` (n_meas,) of the data."""
+        spread = self.analysis * noise
+        return np.asarray(spread @ spread.conj().T)
+
+    def image_noise(self, alpha: float, covariance: NDArray[Any]) -> float:
+        """Root mean square over the area of the image's noise.
+
+        ``covariance`` from :meth:`noise_coefficients`.
+        """
+        area = float(self.problem.model.mesh.volumes.sum())
+        return float(np.sqrt(self.energies(np.array([alpha]), covariance)[0] / area))
+
+    def energies(self, alphas: FloatArray, covariance: NDArray[Any]) -> FloatArray:
+        """(k,) expected ∫x² over the sheet, for coefficients of that covariance."""
+        gains = np.array([self.gains(float(a)) for a in alphas])
+        shared = np.real(self.overlap * covariance.T)
+        return np.asarray(np.einsum("am,am->a", gains @ shared, gains))
+
+    @cached_property
+    def overlap(self) -> NDArray[Any]:
+        """(n_meas, n_meas) ∫bᵢ*bⱼ over the sheet."""
+        volumes = self.problem.model.mesh.volumes
+        return np.asarray((self.modes.conj().T * volumes) @ self.modes)
+
+
+def _complement(spectrum: Spectrum, alpha: float) -> FloatArray:
+    """1 − filter factor, without loss of digits."""
+    return np.where(np.isfinite(spectrum.values), alpha**2 * spectrum.gains(alpha), 0.0)
+
+
+def _filtered(spectrum: Spectrum, alpha: float) -> NDArray[Any]:
+    """(n_meas, n_meas) difference data → filtered coefficients; modes times it is R."""
+    return np.asarray(spectrum.gains(alpha)[:, None] * spectrum.analysis)
+
+
+def _operator(spectrum: Spectrum, alpha: float, matrix: NDArray[Any]) -> Operator:
+    """The operator of ``alpha``, given its ``matrix``."""
+    weighed = np.isfinite(spectrum.values)
+    precision = spectrum.analysis[weighed].conj().T @ _filtered(spectrum, alpha)[weighed]
+    p = spectrum.problem
+    return Operator(
+        p.model, matrix, precision=precision, reference=p.reference, difference=p.difference
+    )
+
+
+def _eigen(system: NDArray[Any]) -> tuple[FloatArray, NDArray[Any]]:
+    values, vectors = eigh(system, check_finite=False)
+    return np.maximum(values[::-1], 0.0), vectors[:, ::-1]
+
+
+def _free_part(
+    jacobian: NDArray[Any], free: FloatArray
+) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+    """What the data see of the free images N: JN = QR, with the rest of the data's space."""
+    k = free.shape[1]
+    basis, upper = qr(jacobian @ free)
+    least = np.abs(np.diag(upper)).min()
+    if least <= _UNSEEN * np.linalg.norm(jacobian) * np.linalg.norm(free):
+        raise ModelError(
+            "the data do not determine an image that the prior leaves free",
+            hint="choose another prior, or a pattern that is sensitive to the whole mesh",
+        )
+    return basis[:, :k], basis[:, k:], upper[:k]
+
+
+class Assembly:
+    """The operator of ``alpha`` from a spectrum, some of its rows at a time."""
+
+    def __init__(self, spectrum: Spectrum, alpha: float) -> None:
+        self._spectrum = spectrum
+        self._alpha = alpha
+        self._filtered = _filtered(spectrum, alpha)
+        self._matrix = np.empty_like(spectrum.modes)
+        self._made = 0
+
+    @property
+    def done(self) -> bool:
+        """Whether every row is there."""
+        return self._made == len(self._matrix)
+
+    def advance(self, rows: int) -> None:
+        """Make the next ``rows`` rows, or as many as there are still to make."""
+        piece = slice(self._made, min(self._made + rows, len(self._matrix)))
+        np.matmul(self._spectrum.modes[piece], self._filtered, out=self._matrix[piece])
+        self._made = piece.stop
+
+    def operator(self) -> Operator:
+        """The operator, once it is :attr:`done`."""
+        return _operator(self._spectrum, self._alpha, self._matrix)

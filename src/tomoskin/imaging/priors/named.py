@@ -1,0 +1,241 @@
+"""Priors: what is held to be likely before there are data.
+
+A prior is a small frozen object; on a mesh, with the Jacobian of the difference data, it becomes a
+penalty xᵀQx. A skin file names the priors in ``PRIORS``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array, csr_array, issparse
+
+from tomoskin.core import FloatArray, ModelError
+from tomoskin.imaging.priors.penalty import Diagonal, Penalty, dense_penalty, sparse_penalty
+from tomoskin.imaging.priors.smooth import GaussianHighPass, Laplace, Matern, graph_laplacian
+from tomoskin.model.mesh import Mesh
+
+
+class SharpPrior(Protocol):
+    """A prior whose quadratic follows the image."""
+
+    def penalty(self, mesh: Mesh, jacobian: NDArray[Any]) -> Penalty:
+        """The quadratic at an image of nothing, with which an iteration begins."""
+        ...
+
+    def touching(self, mesh: Mesh, image: FloatArray) -> Penalty:
+        """The quadratic that touches the cost at ``image`` (n_cells,)."""
+        ...
+
+    def energy(self, mesh: Mesh, image: FloatArray) -> float:
+        """The cost of ``image``, in the units of xᵀQx."""
+        ...
+
+
+@dataclass(frozen=True)
+class TotalVariation:
+    """Cost 2 Σ sizeᵢⱼ √((xᵢ − xⱼ)² + β²): twice the jumps times the length of their edges.
+
+    Total variation of an image that is constant on the cells (Borsic et al. 2010), relative to
+    the root of the domain's content, so that alpha does not depend on the unit of length.
+
+    Attributes
+    ----------
+    smoothing
+        β, in the image's unit: differences below it are smoothed, larger ones are edges.
+    """
+
+    smoothing: float = 0.01
+
+    def penalty(self, mesh: Mesh, jacobian: NDArray[Any]) -> Penalty:
+        """The quadratic at an image of nothing."""
+        return self.touching(mesh, np.zeros(jacobian.shape[1]))
+
+    def touching(self, mesh: Mesh, image: FloatArray) -> Penalty:
+        """Weighted graph Laplacian."""
+        step = self._jumps(mesh, image)
+        return sparse_penalty(
+            graph_laplacian(mesh, _edges(mesh) / np.sqrt(step**2 + self._beta**2))
+        )
+
+    def energy(self, mesh: Mesh, image: FloatArray) -> float:
+        """The cost of ``image``; zero for a constant."""
+        beta = self._beta
+        length = np.sqrt(self._jumps(mesh, image) ** 2 + beta**2) - beta
+        return float(2.0 * _edges(mesh) @ length)
+
+    @property
+    def _beta(self) -> float:
+        return _positive(self.smoothing)
+
+    def _jumps(self, mesh: Mesh, image: FloatArray) -> FloatArray:
+        first, second = mesh.neighbours.T
+        return np.asarray(image[first] - image[second])
+
+
+@dataclass(frozen=True)
+class Sparse:
+    """Cost 2 Σ wᵢ √(xᵢ² + β²), L1 of the image: few cells differ from the background.
+
+    wᵢ is the cell's share of the domain, so that a finer mesh holds the same image.
+
+    Attributes
+    ----------
+    smoothing
+        β, in the image's unit.
+    """
+
+    smoothing: float = 0.01
+
+    def penalty(self, mesh: Mesh, jacobian: NDArray[Any]) -> Penalty:
+        """The quadratic at an image of nothing."""
+        return self.touching(mesh, np.zeros(jacobian.shape[1]))
+
+    def touching(self, mesh: Mesh, image: FloatArray) -> Penalty:
+        """Diagonal."""
+        share = mesh.volumes / mesh.volumes.sum()
+        return Diagonal(share / np.sqrt(image**2 + _positive(self.smoothing) ** 2))
+
+    def energy(self, mesh: Mesh, image: FloatArray) -> float:
+        """The cost of ``image``; zero for nothing."""
+        beta = _positive(self.smoothing)
+        share = mesh.volumes / mesh.volumes.sum()
+        return float(2.0 * share @ (np.sqrt(image**2 + beta**2) - beta))
+
+
+def _positive(smoothing: float) -> float:
+    if not (np.isfinite(smoothing) and smoothing > 0):
+        raise ModelError(f"expected a smoothing above 0, got {smoothing}")
+    return smoothing
+
+
+def _edges(mesh: Mesh) -> FloatArray:
+    """(n_pairs,) size of the facet that two neighbours share, over that of the domain."""
+    shared = _shared_facets(mesh)
+    d = mesh.dimension
+    return np.asarray(mesh.facet_sizes(shared) / mesh.volumes.sum() ** ((d - 1) / d))
+
+
+def _shared_facets(mesh: Mesh) -> NDArray[np.int64]:
+    """(n_pairs, k − 1) points that both cells of a pair have."""
+    first, second = (mesh.cells[cells] for cells in mesh.neighbours.T)
+    common = (first[:, :, None] == second[:, None, :]).any(axis=2)
+    return np.asarray(first[common].reshape(len(first), -1))
+
+
+class Prior(Protocol):
+    """Anything that becomes a penalty on a mesh."""
+
+    def penalty(self, mesh: Mesh, jacobian: NDArray[Any]) -> Penalty:
+        """Return Q on ``mesh``; ``jacobian`` (n_meas, n_cells) is that of the difference data."""
+        ...
+
+
+@dataclass(frozen=True)
+class Identity:
+    """Q = I (Tikhonov)."""
+
+    def penalty(self, mesh: Mesh, jacobian: NDArray[Any]) -> Penalty:
+        """Return Q on ``mesh``."""
+        del jacobian
+        return Diagonal(np.ones(len(mesh.cells)))
+
+
+@dataclass(frozen=True)
+class Noser:
+    """Q = diag(Σ_rows |J|²)^exponent (Cheney et al. 1990); 0.5 as in EIDORS.
+
+    An exponent of 0 is the identity; 1 raises the inner cells to the sensitivity of the rim.
+    """
+
+    exponent: float = 0.5
+
+    def penalty(self, mesh: Mesh, jacobian: NDArray[Any]) -> Penalty:
+        """Return Q on ``mesh``."""
+        del mesh
+        power = np.einsum("mc,mc->c", jacobian, jacobian.conj()).real
+        return Diagonal(np.asarray(power**self.exponent))
+
+
+PriorLike = str | Prior | Any
+"""A name, a prior, or a matrix Q of the caller's own: dense, sparse or a diagonal."""
+
+PRIORS: dict[str, Prior] = {
+    "identity": Identity(),
+    "laplace": Laplace(),
+    "gaussian": GaussianHighPass(),
+    "noser": Noser(),
+    "exponential": Matern(smoothness=0.5),
+    "matern": Matern(smoothness=1.5),
+}
+"""Priors by the name that a skin file uses."""
+
+
+def named_prior(
+    name: str, *, exponent: float = 0.5, correlation_length: float | None = None
+) -> Prior:
+    """The prior of that name, with what it takes: NOSER's exponent, a Matérn prior's length, m.
+
+    Raises
+    ------
+    ModelError
+        When the name is not known.
+    """
+    if name not in PRIORS:
+        raise ModelError(f'expected a prior among {", ".join(PRIORS)}, got "{name}"')
+    prior = PRIORS[name]
+    if isinstance(prior, Noser):
+        return replace(prior, exponent=exponent)
+    if isinstance(prior, Matern):
+        return replace(prior, length=correlation_length)
+    return prior
+
+
+def penalty_of(prior: PriorLike, mesh: Mesh, jacobian: NDArray[Any]) -> Penalty:
+    """Penalty of a prior by name, of a prior, or of a matrix of the caller's own, checked.
+
+    Raises
+    ------
+    ModelError
+        When the name is not known, the shape does not fit the mesh, a value is not finite, or
+        Q is not positive semi-definite.
+    """
+    if isinstance(prior, str):
+        prior = named_prior(prior)
+    if hasattr(prior, "penalty"):
+        penalty: Penalty = prior.penalty(mesh, jacobian)
+        return penalty
+    return _of_matrix(prior, len(mesh.cells))
+
+
+def prior_matrix(prior: PriorLike, mesh: Mesh, jacobian: NDArray[Any]) -> FloatArray:
+    """Q: (n_cells,) where it is diagonal, else dense (n_cells, n_cells); see `penalty_of`."""
+    return penalty_of(prior, mesh, jacobian).matrix
+
+
+def _of_matrix(given: Any, n: int) -> Penalty:
+    value: Any = given  # which issparse would narrow to a class without members
+    if issparse(given):
+        table = coo_array(value)
+        _check_shape(table.shape, n)
+        _check_finite(table.data, table.row)
+        return sparse_penalty(csr_array(table).astype(np.float64))
+    matrix = np.asarray(value, dtype=np.float64)
+    _check_shape(matrix.shape, n)
+    _check_finite(matrix, np.arange(n))
+    return Diagonal(matrix) if matrix.ndim == 1 else dense_penalty(matrix)
+
+
+def _check_shape(shape: tuple[int, ...], n: int) -> None:
+    if shape not in ((n,), (n, n)):
+        raise ModelError(f"expected a prior of shape ({n}, {n}), got {shape}")
+
+
+def _check_finite(values: FloatArray, cells: NDArray[Any]) -> None:
+    finite = np.isfinite(values)
+    if not finite.all():
+        cell = int(cells[np.argwhere(~finite)[0, 0]])
+        raise ModelError("expected finite numbers, got others", where=f"prior, cell {cell}")

@@ -1,0 +1,113 @@
+"""What is learnt from examples: touch positions, forces, classes, bends, channel mapping."""
+
+from pathlib import Path
+from typing import Any
+
+from tomoskin.core import DataError, StrPath, load_arrays
+from tomoskin.learning.bend.examples import BendExamples
+from tomoskin.learning.bend.joint import JointReference
+from tomoskin.learning.bend.kind import BENDS
+from tomoskin.learning.bend.model import BendModel
+from tomoskin.learning.bend.reader import BendReader, BendReading
+from tomoskin.learning.classes.alignment import Alignment
+from tomoskin.learning.classes.classifier import Answers, Classifier
+from tomoskin.learning.classes.examples import Codes, Examples, against_rest
+from tomoskin.learning.classes.kind import CLASSES, ClassReading, FrameClassifier
+from tomoskin.learning.force.identify import MaterialFit, identify
+from tomoskin.learning.force.kind import FORCE
+from tomoskin.learning.force.measured import ForceProcess
+from tomoskin.learning.force.model import ForceModel, LabelRemark, PressedSpots
+from tomoskin.learning.force.presses import WeighedPresses
+from tomoskin.learning.force.report import ForceReport, least_known
+from tomoskin.learning.force.weights import NEWTONS, Weight
+from tomoskin.learning.kind import (
+    Applied,
+    Calibration,
+    Conditions,
+    Differences,
+    FrameView,
+    Kind,
+    Progress,
+    TouchFit,
+    silent,
+)
+from tomoskin.learning.mapping.mapping import ChannelMapping, ring_of
+from tomoskin.learning.mapping.solve import MappingAnswer, solve_channel_mapping
+from tomoskin.learning.touch.health import CalibrationHealth
+from tomoskin.learning.touch.kind import TOUCH
+from tomoskin.learning.touch.left_out import LeftOut
+from tomoskin.learning.touch.locator import Locator
+from tomoskin.learning.touch.presses import Presses
+from tomoskin.learning.touch.rubbing import Rubbing, quiet_electrodes
+from tomoskin.learning.touch.session_alignment import SessionAlignment
+from tomoskin.learning.touch.several import Several
+from tomoskin.learning.touch.watch import Watch
+
+KINDS: tuple[Kind[Any], ...] = (TOUCH, FORCE, BENDS, CLASSES)
+"""Every kind whose calibrations are applied to frames, in the order in which they are applied."""
+
+
+def load_calibration(path: StrPath, progress: Progress = silent) -> Calibration[Any]:
+    """Read a file of any of the :data:`KINDS`. Raises DataError where it is of none."""
+    arrays = load_arrays(Path(path))
+    title = str(arrays.get("kind", ""))
+    kind = next((kind for kind in KINDS if kind.title == title), None)
+    if kind is None:
+        raise DataError(
+            "is not a calibration", where=str(path), hint="make one: tomoskin calibrate --help"
+        )
+    return kind.learn(arrays, str(path), progress)
+
+
+__all__ = [
+    "BENDS",
+    "CLASSES",
+    "FORCE",
+    "KINDS",
+    "NEWTONS",
+    "TOUCH",
+    "Alignment",
+    "Answers",
+    "Applied",
+    "BendExamples",
+    "BendModel",
+    "BendReader",
+    "BendReading",
+    "Calibration",
+    "CalibrationHealth",
+    "ChannelMapping",
+    "ClassReading",
+    "Classifier",
+    "Codes",
+    "Conditions",
+    "Differences",
+    "Examples",
+    "ForceModel",
+    "ForceProcess",
+    "ForceReport",
+    "FrameClassifier",
+    "FrameView",
+    "JointReference",
+    "Kind",
+    "LabelRemark",
+    "LeftOut",
+    "Locator",
+    "MappingAnswer",
+    "MaterialFit",
+    "PressedSpots",
+    "Presses",
+    "Rubbing",
+    "SessionAlignment",
+    "Several",
+    "TouchFit",
+    "Watch",
+    "WeighedPresses",
+    "Weight",
+    "against_rest",
+    "identify",
+    "least_known",
+    "load_calibration",
+    "quiet_electrodes",
+    "ring_of",
+    "solve_channel_mapping",
+]

@@ -1,0 +1,191 @@
+"""Newtons from the measurements themselves, for skins without a model: a Gaussian process."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.linalg import cho_factor, cho_solve, eigh
+from scipy.special import ndtri
+
+from tomoskin.core import DataError, FloatArray
+from tomoskin.learning.touch.presses import Features, frames
+from tomoskin.learning.touch.process import Process, squared_distances
+
+_TERMS = (("change", "rest"), ("pressed",), ("rest",))
+_COMPONENTS = {"change": 60, "pressed": 60, "rest": 10}
+"""Principal components of each block that count; chosen by left-out presses of one skin."""
+
+_ROUNDING = 1e-9
+_FEWEST = 20
+_WHERE = "force labels"
+_NINE_IN_TEN = 0.9
+_HALF = float(ndtri(0.5 + _NINE_IN_TEN / 2))
+_RECENT, _LEAST = 8, 30
+"""The last eighth of the presses, or so many, tell whether the skin has changed."""
+
+_CHANCE = 1.15
+"""By which few presses may be missed farther than all without any change."""
+
+
+@dataclass(frozen=True, eq=False)
+class FeatureBlock:
+    """Principal components of what presses read, and how far apart two presses are in them.
+
+    ``middle`` (n_meas,) is taken off where a block is no change by itself; ``mean`` (k,) and
+    ``axes`` (k, c) are of its features; ``inputs`` (n, c) of the presses; ``unit`` their usual
+    squared distance.
+    """
+
+    features: Features
+    middle: FloatArray
+    mean: FloatArray
+    axes: FloatArray
+    inputs: FloatArray
+    unit: float
+
+    @classmethod
+    def of(cls, data: FloatArray, components: int, *, is_change: bool) -> Self:
+        """Of presses ``data`` (n, n_meas); a change has its own zero."""
+        middle = np.zeros(data.shape[1]) if is_change else np.nanmean(data, axis=0)
+        features = Features.of(data - middle)
+        values = features(data - middle)
+        mean = values.mean(axis=0)
+        axes = _principal(values - mean, components)
+        inputs = (values - mean) @ axes
+        square = squared_distances(inputs, inputs)
+        unit = float(np.median(square[square > 0]))
+        return cls(features, middle, mean, axes, inputs, unit)
+
+    def __call__(self, data: FloatArray) -> FloatArray:
+        """(m, c) components of frames (m, n_meas)."""
+        return np.asarray((self.features(data - self.middle) - self.mean) @ self.axes)
+
+    def squares(self, inputs: FloatArray) -> FloatArray:
+        """(m, n) squared distances of ``inputs`` (m, c) from the presses."""
+        return squared_distances(inputs, self.inputs) / self.unit
+
+
+@dataclass(frozen=True, eq=False)
+class ForceProcess:
+    """Forces of single presses, from what they change and from what the skin was like before.
+
+    What a skin reads at rest holds what it remembers of earlier presses; so a force is learnt from
+    what a press changes, from the pressed frame and from the rest before it. The interval is the
+    process's own, widened so that nine in ten of the left-out presses lie in theirs; the last ones
+    count alone where they are missed farther.
+
+    Attributes
+    ----------
+    blocks
+        What is read of each of these, by name.
+    process
+        What tells the force; ``factor`` is the Cholesky factor of its covariance.
+    centre, size
+        N: mean and deviation of the labels.
+    scale
+        By which the process's deviations are widened.
+    left_out
+        (n,) N: force of each press as the others tell it.
+    """
+
+    blocks: Mapping[str, FeatureBlock]
+    process: Process
+    factor: tuple[FloatArray, bool]
+    centre: float
+    size: float
+    scale: float
+    left_out: FloatArray
+
+    @classmethod
+    def fit(cls, before: ArrayLike, during: ArrayLike, force: ArrayLike) -> Self:
+        """Learn from presses in the order of time.
+
+        Parameters
+        ----------
+        before, during
+            (n, n_meas) frames just before and during each press, in any one unit.
+        force
+            (n,) N.
+
+        Raises
+        ------
+        DataError
+            For shapes that do not belong together, fewer than twenty presses, forces that are not
+            finite or all alike, data that never change.
+        """
+        rest, pressed = frames(before), frames(during)
+        newtons = np.asarray(force, dtype=np.float64)
+        if rest.shape != pressed.shape or newtons.shape != (len(rest),) or len(rest) < _FEWEST:
+            raise DataError(
+                f"expected before, during and force of at least {_FEWEST} presses, got shapes "
+                f"{rest.shape}, {pressed.shape}, {newtons.shape}",
+                where=_WHERE,
+            )
+        if not np.isfinite(newtons).all() or np.ptp(newtons) == 0:
+            raise DataError(
+                f"expected finite forces that differ, got {newtons.min():g} to {newtons.max():g} N",
+                where=_WHERE,
+            )
+        blocks = {
+            name: FeatureBlock.of(data, _COMPONENTS[name], is_change=name == "change")
+            for name, data in _named(rest, pressed).items()
+        }
+        squares = {name: block.squares(block.inputs) for name, block in blocks.items()}
+        centre, size = float(newtons.mean()), float(newtons.std())
+        targets = ((newtons - centre) / size)[:, None]
+        process = Process.of(_TERMS, squares, targets)
+        kernel = process.covariance(squares)
+        kernel[np.diag_indices(len(kernel))] += process.noise
+        factor = cho_factor(kernel, lower=True)
+        missed = (process.left_out - targets)[:, 0]
+        own = np.sqrt(1 / np.diag(cho_solve(factor, np.eye(len(kernel)))))
+        left_out = centre + size * process.left_out[:, 0]
+        scale = _scale(np.abs(missed) / own)
+        return cls(blocks, process, factor, centre, size, scale, left_out)
+
+    def predict(
+        self, before: ArrayLike, during: ArrayLike
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Force, 5 % and 95 % point, (n,) N each, of presses as in :meth:`fit`.
+
+        Raises
+        ------
+        DataError
+            For frames of another number of measurements, or without any finite one.
+        """
+        n_meas = len(self.blocks["rest"].middle)
+        data = _named(frames(before, n_meas), frames(during, n_meas))
+        squares = {name: block.squares(block(data[name])) for name, block in self.blocks.items()}
+        cross = self.process.covariance(squares)
+        known = (cross * cho_solve(self.factor, cross.T).T).sum(axis=1)
+        variance = np.maximum(self.process.variance - known, 0.0) + self.process.noise
+        middle = self.centre + self.size * (cross @ self.process.weights)[:, 0]
+        half = _HALF * self.scale * self.size * np.sqrt(variance)
+        return middle, middle - half, middle + half
+
+
+def _principal(values: FloatArray, count: int) -> FloatArray:
+    """(k, c) axes along which ``values`` (n, k) scatter most, from their products (n, n)."""
+    n = len(values)
+    last = max(n - count, 0)
+    variance, rows = eigh(values @ values.T, subset_by_index=[last, n - 1])
+    keep = variance > _ROUNDING * variance[-1]
+    return np.asarray(values.T @ (rows[:, keep] / np.sqrt(variance[keep])))
+
+
+def _named(rest: FloatArray, pressed: FloatArray) -> dict[str, FloatArray]:
+    return {"change": pressed - rest, "pressed": pressed, "rest": rest}
+
+
+def _scale(away: FloatArray) -> float:
+    """Of deviations, by how many of which (n,) each left-out press is missed."""
+    last = away[-max(len(away) // _RECENT, _LEAST) :]
+    return max(_high(away), _high(last) / _CHANCE) / _HALF
+
+
+def _high(away: FloatArray) -> float:
+    return float(np.quantile(away, min(1.0, _NINE_IN_TEN * (1 + 1 / len(away)))))

@@ -1,0 +1,320 @@
+"""Touches under known forces → the force of a touch, with an interval, frame by frame."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+
+from tomoskin.core import DataError, Detection, FloatArray, Force, IntArray
+from tomoskin.learning.force.curve import ForceCurve, basis
+from tomoskin.learning.force.memory import SHALLOW, averaged_memory, without_memory
+from tomoskin.learning.force.presses import WeighedPresses, check_rising
+from tomoskin.model.skin import MaterialMemory, MemoryState, Skin, advanced, load_of
+from tomoskin.sensing.segment import Region
+
+_DEEPEST = 0.999
+"""Part of the conductivity that a touch may take away: all of it has no logarithm."""
+
+_SCALES = (1.0, 1.6)
+"""By which intervals are widened; never narrowed, since the labels of a press go together."""
+
+_LONELY = 0.15
+"""Presses within so many radii of the skin are of one spot."""
+
+_FAR_OFF = 4.0
+"""A label so many half intervals from what the others say contradicts them."""
+
+_MOST_SPOTS = 32
+
+
+@dataclass(frozen=True)
+class LabelRemark:
+    """A ``press`` by its number, or None for all, and what is wrong with it."""
+
+    press: int | None
+    reason: str
+
+
+@dataclass(frozen=True, eq=False)
+class PressedSpots:
+    """What spots of the skin remember: ``xy`` (n, 2) m, ``memory`` of n pieces at ``time`` s."""
+
+    xy: FloatArray
+    time: float
+    memory: MemoryState
+
+    def __len__(self) -> int:
+        """Number of spots."""
+        return len(self.xy)
+
+
+@dataclass(frozen=True, eq=False)
+class ForceModel:
+    """The force of touches on one skin, for the tip that pressed it; made by :meth:`fit`.
+
+    Attributes
+    ----------
+    presses
+        What it was learnt from.
+    conductivity
+        S of the sheet at rest.
+    unit, radius
+        Radius of the skin's region, and usual radius of the labelled touches, m.
+    depth
+        Usual depth of the labelled touches.
+    memory
+        What the sheet remembers, in the unit of a touch's depth.
+    curve
+        Depth and force.
+    scale
+        By which intervals are widened, so that nine in ten of the labels lie in theirs when
+        their press is left out.
+    left_out
+        (n_labelled, 3) force, 5 % and 95 % point of each label, its press left out, N.
+    remarks
+        What is wrong with labels.
+    skin_id, method
+        Identity of the skin; how its touches were found.
+    """
+
+    presses: WeighedPresses
+    conductivity: float
+    unit: float
+    radius: float
+    depth: float
+    memory: MaterialMemory
+    curve: ForceCurve
+    scale: float
+    left_out: FloatArray
+    remarks: tuple[LabelRemark, ...]
+    skin_id: str = ""
+    method: str = "fit"
+
+    @classmethod
+    def fit(cls, presses: WeighedPresses, skin: Skin) -> Self:
+        """Learn from presses on ``skin``; see :meth:`learn`."""
+        unit = Region.of(skin).unit
+        return cls.learn(presses, skin.conductivity, unit, skin.identity, skin.touch.method)
+
+    @classmethod
+    def learn(
+        cls,
+        presses: WeighedPresses,
+        conductivity: float,
+        unit: float,
+        skin_id: str = "",
+        method: str = "fit",
+    ) -> Self:
+        """Learn curve and memory from presses on a sheet of ``conductivity`` S, ``unit`` m.
+
+        The memory is a mean over several plays and creeps, weighted by the labels' evidence.
+
+        Raises
+        ------
+        DataError
+            When the weights contradict, or a labelled touch makes the sheet conduct better.
+        """
+        rows = presses.labelled
+        radius = float(np.exp(np.log(_radius(presses.area[rows])).mean()))
+        depth = depth_of(presses.peak, presses.area, conductivity, radius)
+        if not (depth[rows] > 0).all():
+            row = int(rows[np.argmin(depth[rows])])
+            raise DataError(
+                f"touch {row}, with {presses.force[row]:.3g} N, increases the conductivity "
+                "of the sheet",
+                where="force labels",
+                hint="calibrate with frames in which the press is found as a touch",
+            )
+        check_rising(depth[rows], presses.force[rows])
+        terms = basis(presses.xy, np.log(_radius(presses.area) / radius), unit)
+        usual = float(np.median(depth[rows]))
+        memory = averaged_memory(presses, depth, usual, terms)
+        free = without_memory(memory, depth[:, None], presses.press, presses.time)[:, 0]
+        free = np.maximum(free, SHALLOW * usual)
+        curve = ForceCurve.of(terms[rows], free[rows], presses.force[rows])
+        left_out = _left_out(presses, terms, free)
+        scale = _scale(left_out, presses.force[rows])
+        remarks = _remarks(presses, left_out, unit)
+        return cls(
+            presses, conductivity, unit, radius, usual, memory, curve, scale, left_out, remarks,
+            skin_id, method,
+        )  # fmt: skip
+
+    def read(
+        self, spots: PressedSpots | None, detections: Sequence[Detection], time: float
+    ) -> tuple[list[Force], PressedSpots]:
+        """Forces of a frame's detections, and what the spots remember then.
+
+        ``spots`` is what they remembered after the frame before, None on a skin that nothing has
+        touched; ``time`` is the frame's, s. A spot that is new has been pressed since that frame.
+        """
+        spots = self._untouched if spots is None else spots
+        dt = max(time - spots.time, 0.0) if len(spots) else 0.0
+        if not detections:
+            released = self._released(spots, np.arange(len(spots)), dt)
+            return [], PressedSpots(spots.xy, time, released)
+        xy, area, peak, snr = _columns(detections)
+        least = SHALLOW * self.depth
+        depth = np.maximum(depth_of(peak, area, self.conductivity, self.radius), least)
+        under, rest = _goes_on(spots.xy, xy, 0.5 * self.radius)
+        before = spots.memory
+        if under != list(range(len(spots))):
+            before = before.beside(self._fresh).of_pieces(np.array(under))
+        load, now = load_of(before, self.memory, depth, dt)
+        terms = basis(xy, np.log(_radius(area) / self.radius), self.unit)
+        forces = self._forces(terms, np.maximum(load, least), self._beyond(snr))
+        if rest:
+            others = np.array(rest[: max(_MOST_SPOTS - len(xy), 0)], dtype=np.intp)
+            now = now.beside(self._released(spots, others, dt))
+            xy = np.concatenate([xy, spots.xy[others]])
+        return forces, PressedSpots(xy, time, now)
+
+    def _released(self, spots: PressedSpots, which: IntArray, dt: float) -> MemoryState:
+        """What those of ``spots`` that nothing touches remember ``dt`` s later."""
+        memory = spots.memory.of_pieces(which)
+        return advanced(memory, self.memory, np.zeros((1, len(which))), dt)
+
+    @cached_property
+    def _fresh(self) -> MemoryState:
+        return MemoryState.fresh(self.memory)
+
+    @cached_property
+    def _untouched(self) -> PressedSpots:
+        return PressedSpots(np.zeros((0, 2)), -np.inf, MemoryState.fresh(self.memory, 0))
+
+    @property
+    def errors(self) -> FloatArray:
+        """(n_labelled,) relative errors of the labels, each press left out."""
+        force = self.presses.force[self.presses.labelled]
+        return np.asarray(self.left_out[:, 0] / force - 1)
+
+    @property
+    def most(self) -> float:
+        """The largest force that it was learnt from, N."""
+        return float(np.nanmax(self.presses.force))
+
+    @property
+    def held(self) -> float:
+        """Part of the labels within their own intervals, each press left out."""
+        force = self.presses.force[self.presses.labelled]
+        _, low, high = _widened(np.log(self.left_out), self.scale).T
+        return float(((low <= force) & (force <= high)).mean())
+
+    def _beyond(self, snr: FloatArray) -> FloatArray:
+        """Relative deviation of depths by noise, beyond that of the labelled touches."""
+        own = np.where(snr > 0, 1 / np.square(snr), 0.0)
+        return np.sqrt(np.maximum(own - self._usual_noise, 0.0))
+
+    @cached_property
+    def _usual_noise(self) -> float:
+        """Relative variance of the labelled touches by noise; 0 where it is not known."""
+        known = self.presses.snr[self.presses.labelled]
+        return float(np.nanmedian(1 / known**2)) if np.isfinite(known).any() else 0.0
+
+    def _forces(self, terms: FloatArray, depth: FloatArray, sd: FloatArray) -> list[Force]:
+        points = _widened(self.curve.log_forces(terms, depth, sd), self.scale)
+        return [Force(newtons, low, high) for newtons, low, high in points.tolist()]
+
+
+def depth_of(peak: FloatArray, area: FloatArray, conductivity: float, radius: float) -> FloatArray:
+    """(n,) content of touches over ``radius``²: −log σ/σ₀ of one of that radius, m²/m²."""
+    part = np.maximum(np.asarray(peak) / conductivity, -_DEEPEST)
+    return np.asarray(-np.log1p(part) * np.asarray(area) / (np.pi * radius**2))
+
+
+def _left_out(presses: WeighedPresses, terms: FloatArray, free: FloatArray) -> FloatArray:
+    """(n_labelled, 3) force and interval of each label from the other presses."""
+    rows = presses.labelled
+    out = np.empty((len(rows), 3))
+    for number in np.unique(presses.press[rows]):
+        mine = presses.press[rows] == number
+        others, own = rows[~mine], rows[mine]
+        if not len(others):
+            raise DataError(
+                "expected labelled forces of at least two presses, got one press",
+                where="force labels",
+                hint="lift the tip between two presses, or give the presses their own numbers",
+            )
+        curve = ForceCurve.of(terms[others], free[others], presses.force[others])
+        out[mine] = np.exp(curve.log_forces(terms[own], free[own], np.zeros(len(own))))
+    return out
+
+
+def _scale(left_out: FloatArray, force: FloatArray) -> float:
+    """What nine in ten labels need of their intervals (split-conformal: Vovk et al. 2005)."""
+    needed = _half_intervals(left_out, force)
+    n = len(needed)
+    return float(np.clip(np.quantile(needed, min(1.0, 0.9 * (1 + 1 / n))), *_SCALES))
+
+
+def _half_intervals(left_out: FloatArray, force: FloatArray) -> FloatArray:
+    """(n,) by how many half intervals, on the side where it lies, each force is missed."""
+    middle, low, high = np.log(left_out).T
+    away = np.log(force) - middle
+    return np.asarray(np.abs(away) / np.where(away > 0, high - middle, middle - low))
+
+
+def _widened(log_forces: FloatArray, scale: float) -> FloatArray:
+    """(n, 3) N: forces whose intervals are ``scale`` times as wide as those of ``log_forces``."""
+    middle = log_forces[:, :1]
+    return np.asarray(np.exp(middle + scale * (log_forces - middle)))
+
+
+def _remarks(presses: WeighedPresses, left_out: FloatArray, unit: float) -> tuple[LabelRemark, ...]:
+    rows = presses.labelled
+    force = presses.force[rows]
+    remarks = [
+        LabelRemark(
+            int(presses.press[row]),
+            f"the label {presses.force[row]:.3g} N contradicts the other presses, which give "
+            f"{middle:.2g} N ({low:.2g} to {high:.2g})",
+        )
+        for row, (middle, low, high), away in zip(
+            rows.tolist(), left_out.tolist(), _half_intervals(left_out, force), strict=True
+        )
+        if away > _FAR_OFF
+    ]
+    xy = presses.xy[rows]
+    apart = float(np.linalg.norm(xy - xy.mean(axis=0), axis=1).max())
+    if apart < _LONELY * unit:
+        remarks.append(LabelRemark(
+            None,
+            f"all presses lie within {2e3 * apart:.0f} mm: elsewhere forces are less certain, "
+            "and their intervals are wider; press at other positions too",
+        ))  # fmt: skip
+    if np.ptp(np.log(force)) < np.log(1.5):
+        remarks.append(LabelRemark(
+            None,
+            f"all forces lie from {force.min():.3g} to {force.max():.3g} N: other forces are "
+            "extrapolated; use a lighter and a heavier weight too",
+        ))  # fmt: skip
+    return tuple(remarks)
+
+
+def _goes_on(spots: FloatArray, xy: FloatArray, within: float) -> tuple[list[int], list[int]]:
+    """Number of the spot that each of ``xy`` (k, 2) presses, -1 where it is a new one; numbers of
+    the other ``spots`` (n, 2). The nearest counts, each once."""
+    free, under = dict(enumerate(spots.tolist())), []
+    for here in xy.tolist():
+        apart = {k: math.dist(here, spot) for k, spot in free.items()}
+        nearest = min(apart, key=apart.__getitem__, default=-1)
+        under.append(nearest if nearest >= 0 and apart[nearest] <= within else -1)
+        free.pop(under[-1], None)
+    return under, list(free)
+
+
+def _columns(
+    detections: Sequence[Detection],
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Positions (n, 2), areas, peaks and snr (n,)."""
+    rows = np.array([(d.x, d.y, d.area, d.peak, d.snr) for d in detections])
+    return rows[:, :2], rows[:, 2], rows[:, 3], rows[:, 4]
+
+
+def _radius(area: FloatArray) -> FloatArray:
+    return np.asarray(np.sqrt(np.maximum(area, 1e-12) / np.pi))

@@ -1,0 +1,331 @@
+"""One concept of calibration: what is learnt from examples, kept in a file, and applied to frames.
+
+A kind says how its model is packed, unpacked, checked and applied; files, sessions, the pipeline
+and the command line go through the kinds and know none of them by name. A further kind is one
+module that makes a :class:`Kind` and stands in :data:`tomoskin.learning.KINDS`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import Any, Generic, Protocol, Self, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tomoskin.core import (
+    MOST_ELECTRODES,
+    Arrays,
+    DataError,
+    Detection,
+    FloatArray,
+    Image,
+    IntArray,
+    ModelError,
+    PatternError,
+    StrPath,
+    electrode_table,
+    load_arrays,
+    pack_arrays,
+    save_arrays,
+    unpack_arrays,
+    whole_number,
+)
+from tomoskin.model.pattern import Pattern
+from tomoskin.model.skin import Skin
+from tomoskin.sensing.fit import Response
+from tomoskin.sensing.segment import ImageNoise
+
+BoolArray = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Differences:
+    """What one frame differs by from the untouched skin.
+
+    Attributes
+    ----------
+    dv
+        (n_meas,) difference data without their part in the nuisance subspace.
+    nuisance
+        (n_meas, k) directions of the difference data that carry no information.
+    change
+        (n_meas,) V by which the frame differs from the baseline, with all that is in it.
+    drift
+        (n_meas, k) V: directions of drift and of excluded measurements.
+    from_rest
+        (n_meas,) V by which it differs from the reference as that was taken.
+    excluded
+        (n_meas,) bool: measurements that do not count.
+    """
+
+    dv: FloatArray
+    nuisance: FloatArray
+    change: FloatArray
+    drift: FloatArray
+    from_rest: FloatArray
+    excluded: BoolArray
+
+    @property
+    def since_reference(self) -> FloatArray:
+        """(n_meas,) V by which it differs from that reference, NaN where excluded."""
+        return np.where(self.excluded, np.nan, self.from_rest)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrameView:
+    """What one frame shows: its ``time`` s, its image, the noise of that where it is known, and the
+    differences that it was made of."""
+
+    time: float
+    image: Image
+    image_noise: ImageNoise | None
+    differences: Differences
+
+
+Detect = Callable[[FrameView, list[Detection]], list[Detection]]
+"""Touches fitted to the data of a frame, given those that the skin's own method found."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TouchFit:
+    """Touches on the forward model: its ``response``; the ``gain`` of measured against modelled
+    voltages; ``detect``, which fits them to a frame."""
+
+    response: Response
+    gain: float
+    detect: Detect
+
+
+class Conditions(Protocol):
+    """Under which a calibration is applied, from one reference on."""
+
+    def touch_fit(self) -> TouchFit | None:
+        """The fit of touches beside the calibration; None where no reference is known."""
+        ...
+
+
+class Applied:
+    """What a calibration does with each frame; a kind overrides what it needs.
+
+    ``moved`` V, or (n_meas,) V: what of the newest frame the baseline must not learn.
+    """
+
+    moved: FloatArray | float = 0.0
+
+    def locate(self, view: FrameView, detections: list[Detection]) -> list[Detection]:
+        """Detections with better positions."""
+        del view
+        return detections
+
+    def read(self, view: FrameView, detections: list[Detection], *, touched: bool) -> Any | None:
+        """What the frame says of the calibration's subject.
+
+        ``touched``: whether a touch stands, by one who has tracked the frames before.
+        """
+        del view, detections, touched
+        return None
+
+
+Progress = Callable[[float, float], None]
+"""Called with how much of how much is done."""
+
+M = TypeVar("M")
+
+_PATTERN_KEYS = frozenset({"version", "drive", "measure", "n_electrodes"})
+
+
+def silent(_done: float, _total: float) -> None:
+    """Report no progress."""
+
+
+@dataclass(frozen=True, eq=False)
+class Kind(Generic[M]):
+    """One kind of calibration, whose model is an M.
+
+    Attributes
+    ----------
+    name
+        Its key in :data:`tomoskin.learning.KINDS`.
+    title, version
+        What its file says that it is.
+    subject
+        What it calibrates, for messages.
+    command
+        The sub-command of ``tomoskin calibrate`` that makes one.
+    attachment
+        Name of its file inside a session.
+    keys
+        Arrays that its file must have beside those of the pattern.
+    pack
+        Model → arrays of its file.
+    unpack
+        Arrays of a file, the pattern, the file's name and a progress → model, learnt again.
+        Raises DataError.
+    exclude
+        Model without some measurements; None where it cannot do without.
+    apply
+        Model and conditions → what it does with each frame.
+    skin_id
+        Model → identity of the skin that it was learnt on; "" where none is known.
+    check
+        Raises DataError where a calibration cannot serve a skin of its own scan; None where it
+        always can.
+    check_beside
+        Raises DataError where a calibration cannot serve beside one of that other kind; None where
+        it always can.
+    directions
+        Model → (n_meas, k) V along which what it reads moves the data: images do without them.
+        None where it reads nothing of that sort.
+    locates
+        Whether its positions stand in for those of the image.
+    fits
+        Whether it needs touches fitted to the data of each frame.
+    own_settings
+        Whether it serves only the skin that it was learnt on, with the settings that it had.
+    """
+
+    name: str
+    title: str
+    version: int
+    subject: str
+    command: str
+    attachment: str
+    keys: frozenset[str]
+    pack: Callable[[M], Arrays]
+    unpack: Callable[[Arrays, Pattern, str, Progress], M]
+    exclude: Callable[[M, IntArray], M | None]
+    apply: Callable[[M, Conditions], Applied]
+    skin_id: Callable[[M], str]
+    check: Callable[[Calibration[M], Skin], None] | None = None
+    check_beside: Callable[[Calibration[M], Kind[Any]], None] | None = None
+    directions: Callable[[M], FloatArray] | None = None
+    locates: bool = False
+    fits: bool = False
+    own_settings: bool = False
+
+    def of(self, model: M, pattern: Pattern, skin: Skin | None = None) -> Calibration[M]:
+        """A calibration of this kind, of the measurements of ``pattern``."""
+        return Calibration(self, model, pattern, skin.name if skin else "")
+
+    def read(self, path: StrPath, progress: Progress = silent) -> Calibration[M]:
+        """Read a file of this kind and learn from its examples again.
+
+        Raises
+        ------
+        DataError
+            When it is missing, damaged, or of another kind.
+        """
+        return self.learn(load_arrays(path), str(path), progress)
+
+    def decode(self, data: bytes, where: str) -> Calibration[M]:
+        """:meth:`read` from the file's bytes."""
+        return self.learn(unpack_arrays(data, where), where, silent)
+
+    def learn(self, arrays: Arrays, where: str, progress: Progress) -> Calibration[M]:
+        """:meth:`read` from the arrays of the file."""
+        pattern = self._pattern(arrays, where)
+        model = self.unpack(arrays, pattern, where, progress)
+        return Calibration(self, model, pattern, str(arrays.get("skin_name", "")))
+
+    def _pattern(self, arrays: Arrays, where: str) -> Pattern:
+        title = str(arrays.get("kind", ""))
+        if title != self.title or not set(arrays) >= self.keys | _PATTERN_KEYS:
+            raise DataError(
+                f"is not a calibration of {self.subject}",
+                where=where,
+                hint=f"make one: tomoskin calibrate {self.command}",
+            )
+        if whole_number(arrays, "version", where) != self.version:
+            raise DataError(
+                f"expected version {self.version}, got {arrays['version']}", where=where
+            )
+        drive, measure = (electrode_table(arrays, key, where) for key in ("drive", "measure"))
+        with located(where):
+            n_electrodes = whole_number(arrays, "n_electrodes", where, MOST_ELECTRODES)
+            return Pattern.from_tables(drive, measure, n_electrodes)
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration(Generic[M]):
+    """A ``model`` of one ``kind``, the pattern of its measurements and the name of its skin.
+
+    ``skin_name`` is "" where there is no skin.
+    """
+
+    kind: Kind[M]
+    model: M
+    pattern: Pattern
+    skin_name: str = ""
+
+    def write(self, path: StrPath, *, overwrite: bool = False) -> None:
+        """Write the file; raises as :func:`tomoskin.core.written` does."""
+        save_arrays(path, self._arrays(), overwrite=overwrite)
+
+    def encode(self) -> bytes:
+        """The same file's bytes, for a session that holds it."""
+        return pack_arrays(self._arrays())
+
+    def check(self, skin: Skin, beside: Iterable[Kind[Any]] = ()) -> None:
+        """Raise DataError where it cannot serve ``skin``: of another scan, or as its kind says.
+
+        ``beside``: kinds of the other calibrations in use.
+        """
+        if skin.pattern().identity != self.pattern.identity:
+            raise self.mismatch("scan", skin)
+        if self.kind.check is not None:
+            self.kind.check(self, skin)
+        if self.kind.check_beside is not None:
+            for other in beside:
+                self.kind.check_beside(self, other)
+
+    def check_skin(self, skin: Skin) -> None:
+        """Raise DataError where it was learnt on another skin, or on other settings of it."""
+        learnt_on = self.kind.skin_id(self.model)
+        if learnt_on and learnt_on != skin.identity:
+            raise self.mismatch("skin", skin)
+
+    def mismatch(self, what: str, skin: Skin) -> DataError:
+        """That it was learnt on another ``what`` than that of ``skin``, by their names."""
+        mine = f'"{self.skin_name}"' if self.skin_name else "a skin without a name"
+        other = f'"{skin.name}"' + (", with other settings" if skin.name == self.skin_name else "")
+        return DataError(
+            f"the calibration of {self.kind.subject} belongs to another {what}: it was learnt on "
+            f"{mine} and is used on {other}",
+            hint=f"calibrate this skin: tomoskin calibrate {self.kind.command}",
+        )
+
+    def with_model(self, model: M) -> Self:
+        """The same with another model."""
+        return replace(self, model=model)
+
+    def without(self, measurements: IntArray) -> Self | None:
+        """The same without some measurements; None where it cannot do without."""
+        model = self.kind.exclude(self.model, measurements)
+        return None if model is None else self.with_model(model)
+
+    def apply(self, conditions: Conditions) -> Applied:
+        """What it does with each frame under ``conditions``."""
+        return self.kind.apply(self.model, conditions)
+
+    def _arrays(self) -> Arrays:
+        return {
+            "kind": np.array(self.kind.title),
+            "version": np.array(self.kind.version),
+            "drive": self.pattern.drive,
+            "measure": self.pattern.measure,
+            "n_electrodes": np.array(self.pattern.n_electrodes),
+            "skin_name": np.array(self.skin_name),
+            **self.kind.pack(self.model),
+        }
+
+
+@contextmanager
+def located(where: str) -> Iterator[None]:
+    """Name the file in errors of what is made from its arrays, as DataError."""
+    try:
+        yield
+    except (DataError, ModelError, PatternError) as error:
+        raise DataError(error.message, where=f"{where}, {error.where}".rstrip(", ")) from error

@@ -1,0 +1,259 @@
+"""Posterior of a position, and estimates of presses that were held out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache, cached_property
+from itertools import product
+from typing import Self, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tomoskin.core import FloatArray
+from tomoskin.learning.touch.maps import ResponseMaps, principal
+from tomoskin.learning.touch.per_channel import ChannelLikelihood, ChannelMaps
+from tomoskin.learning.touch.process import LENGTHS, Likeness, squared_distances
+from tomoskin.learning.touch.rotations import Rotations
+
+BoolArray = NDArray[np.bool_]
+
+POWERS = 1 / np.array([1, 1.5, 2, 3, 4, 6, 9, 14, 20, 30, 45, 70])
+"""To which a likelihood may be raised: rows err together in ways that maps do not know."""
+
+_LEAST = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class GridLikelihood:
+    """Maps read at the positions of a grid, ready for frames.
+
+    A feature vector of k values has a Student density of k degrees of freedom about each place's
+    answer: the covariances were learnt from few presses, and a frame far from every map must
+    not be called certain.
+    """
+
+    maps: ResponseMaps
+    precision: FloatArray
+    answer: FloatArray
+    offset: FloatArray
+    volume: FloatArray
+
+    @classmethod
+    def of(cls, maps: ResponseMaps, positions: FloatArray) -> Self:
+        """For the grid ``positions`` (g, 2)."""
+        mean, variance = maps.at(positions)
+        answer = mean / variance
+        offset = (mean * answer).sum(axis=1)
+        volume = np.log(variance).sum(axis=1)
+        return cls(
+            maps, np.ascontiguousarray(1 / variance.T), answer.T.copy(), offset, 0.5 * volume
+        )
+
+    def misfit(self, features: FloatArray) -> FloatArray:
+        """(n, g) mean square of what frames (n, k) differ by from each place's answer, in units
+        of the noise."""
+        f = self.maps.whitened(features)
+        total = (f * f) @ self.precision - 2 * (f @ self.answer) + self.offset
+        return np.asarray(np.maximum(total, 0.0) / f.shape[1])
+
+    def of_misfit(self, misfit: FloatArray) -> FloatArray:
+        """(n, g) log-likelihood of each place, up to a constant of the frame."""
+        return np.asarray(-len(self.precision) * np.log1p(misfit) - self.volume)
+
+    def __call__(self, features: FloatArray) -> FloatArray:
+        """The same of frames (n, k)."""
+        return self.of_misfit(self.misfit(features))
+
+
+def pooled(log_likelihoods: Sequence[FloatArray], powers: FloatArray) -> FloatArray:
+    """(n, g) probabilities of the grid's positions: the product of powers of each likelihood.
+
+    A logarithmic opinion pool (Genest & Zidek 1986); a single one is tempered by its power.
+    """
+    scaled = powers[0] * log_likelihoods[0]
+    for power, part in zip(powers[1:], log_likelihoods[1:], strict=False):
+        scaled += power * part
+    weight = np.exp(scaled - scaled.max(axis=1, keepdims=True))
+    return np.asarray(weight / weight.sum(axis=1, keepdims=True))
+
+
+def powers_of(
+    log_likelihoods: Sequence[FloatArray], grid: FloatArray, xy: FloatArray
+) -> FloatArray:
+    """The power of each likelihood at which held-out presses at ``xy`` are likeliest.
+
+    ``log_likelihoods`` (n, g) each, of presses that the maps have not seen.
+    """
+    nearest = squared_distances(xy, grid).argmin(axis=1)
+    rows = np.arange(len(xy))
+    tried = POWERS if len(log_likelihoods) == 1 else np.append(0.0, POWERS)
+    choices = [np.array(powers) for powers in product(tried, repeat=len(log_likelihoods))]
+    score = [
+        np.log(pooled(log_likelihoods, powers)[rows, nearest] + _LEAST).sum() for powers in choices
+    ]
+    return choices[int(np.argmax(score))]
+
+
+def moments(probability: FloatArray, grid: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Mean (n, 2) and covariance (n, 2, 2) of ``probability`` (n, g) on ``grid`` (g, 2)."""
+    mean = probability @ grid
+    pairs = (grid[:, :, None] * grid[:, None, :]).reshape(-1, 4)
+    second = (probability @ pairs).reshape(-1, 2, 2)
+    return mean, second - mean[:, :, None] * mean[:, None, :]
+
+
+FEW = 80
+"""So few presses are asked row by row too; with more, all rows together know better."""
+
+_SCARCE = 20
+_FOLDS = (8, 5)
+"""In which presses are left out, when they are scarce and when they are not."""
+
+_NEAR = 0.5
+"""Mean squared step, in parts of that between any two presses, below which they are in an order."""
+
+Likelihood = Callable[[FloatArray], FloatArray]
+"""Features (n, k) → log-likelihood (n, g) of the grid's positions."""
+
+L = TypeVar("L", bound=Likelihood)
+
+_WIDENS = 1.5
+"""Power of a frame's strangeness by which its covariance grows: chosen on the two sessions of
+eskin_hydrogel_round, learnt from 200 presses of one and asked on the other."""
+
+
+@dataclass(frozen=True, eq=False)
+class Estimates:
+    """Posterior mean and covariance of a place.
+
+    ``powers`` weigh the log-likelihoods of ``likelihood``, and of ``per_channel`` where that
+    stands. ``usual`` is the least misfit over the grid that half of the left-out presses have.
+    ``left_out`` (n, 2) and ``left_out_spread`` (n, 2, 2) are those of the presses themselves,
+    each from maps learnt without it and some others.
+    """
+
+    grid: FloatArray
+    likelihood: GridLikelihood
+    per_channel: ChannelLikelihood | None
+    powers: FloatArray
+    usual: float
+    left_out: FloatArray
+    left_out_spread: FloatArray
+
+    @classmethod
+    def of(
+        cls,
+        features: FloatArray,
+        positions: FloatArray,
+        grid: FloatArray,
+        rotations: Rotations,
+    ) -> Self:
+        """Learn the maps; length scales by evidence, powers by left-out presses."""
+        directions = principal(features)
+        maps = _likeliest(positions, features, directions)
+        together = maps.basis.likeness
+
+        def joint(some: FloatArray, theirs: FloatArray) -> GridLikelihood:
+            learnt = ResponseMaps.of(together, some, theirs, directions)
+            return GridLikelihood.of(learnt, grid)
+
+        folds = _folds(positions)
+        of_others = _without(joint, folds, positions, features)
+        misfit = _read(folds, [part.misfit(x) for part, x in of_others])
+        parts = [of_others[0][0].of_misfit(misfit)]
+        alone = None
+        if len(positions) < FEW:
+            alone = channels = ChannelMaps.of(positions, features, rotations)
+
+            def single(some: FloatArray, theirs: FloatArray) -> ChannelLikelihood:
+                return ChannelLikelihood.of(channels.again(some, theirs), grid)
+
+            alone_of_others = _without(single, folds, positions, features)
+            parts.append(_read(folds, [part(x) for part, x in alone_of_others]))
+        powers = powers_of(parts, grid, positions)
+        left_out = moments(pooled(parts, powers), grid)
+        per_channel = ChannelLikelihood.of(alone, grid) if alone and powers[1] else None
+        usual = float(np.median(misfit.min(axis=1)))
+        return cls(grid, GridLikelihood.of(maps, grid), per_channel, powers, usual, *left_out)
+
+    def __call__(self, features: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Mean (n, 2), covariance (n, 2, 2) and strangeness (n,) of frames (n, k).
+
+        A frame is strange by its least misfit over the grid, in parts of the usual one.
+        """
+        misfit = self.likelihood.misfit(features)
+        parts = [self.likelihood.of_misfit(misfit)]
+        if self.per_channel is not None:
+            parts.append(self.per_channel(features))
+        mean, covariance = moments(pooled(parts, self.powers), self.grid)
+        return mean, covariance, misfit.min(axis=1) / self.usual
+
+    @cached_property
+    def least_known(self) -> FloatArray:
+        """(2,) place of the grid at which a press would change the maps most.
+
+        Its answers have the largest prior variance over the noise: the expected information
+        ½ Σ log(1 + signal / noise) (MacKay 1992).
+        """
+        return np.asarray(self.grid[int(self.likelihood.volume.argmax())])
+
+
+def widening(strangeness: FloatArray) -> FloatArray:
+    """(n,) by which the covariances of frames grow that fit the maps worse than left-out presses.
+
+    Such frames are of a skin that has changed, or of no single touch.
+    """
+    return np.asarray(np.maximum(strangeness, 1.0) ** _WIDENS)
+
+
+def _likeliest(positions: FloatArray, features: FloatArray, directions: FloatArray) -> ResponseMaps:
+    """Maps of the length scale of the largest evidence, climbed to from the middle one."""
+
+    @cache
+    def of(number: int) -> ResponseMaps:
+        return ResponseMaps.of(Likeness(LENGTHS[number]), positions, features, directions)
+
+    best = len(LENGTHS) // 2
+    while True:
+        near = range(max(best - 1, 0), min(best + 2, len(LENGTHS)))
+        higher = max(near, key=lambda number: of(number).evidence)
+        if higher == best:
+            return of(best)
+        best = higher
+
+
+def _folds(positions: FloatArray) -> list[BoolArray]:
+    """(n,) which presses are left out together.
+
+    Folds are stretches of time, so that they are as strange to each other as presses to come; but
+    where presses follow each other over the skin, a stretch of time is a part of the skin.
+    """
+    n = len(positions)
+    folds = min(_FOLDS[n >= _SCARCE], n)
+    order = np.arange(n)
+    fold = order * folds // n if _in_any_order(positions) else order % folds
+    return [fold == k for k in range(folds)]
+
+
+def _without(
+    learn: Callable[[FloatArray, FloatArray], L],
+    folds: Sequence[BoolArray],
+    positions: FloatArray,
+    features: FloatArray,
+) -> list[tuple[L, FloatArray]]:
+    """What was learnt without each fold, and the features of that fold."""
+    return [(learn(positions[~out], features[~out]), features[out]) for out in folds]
+
+
+def _read(folds: Sequence[BoolArray], values: Sequence[FloatArray]) -> FloatArray:
+    """(n, g) values of each fold, in the order of the presses."""
+    order = np.argsort(np.concatenate([np.flatnonzero(out) for out in folds]))
+    return np.asarray(np.concatenate(values)[order])
+
+
+def _in_any_order(positions: FloatArray) -> bool:
+    """Whether presses that follow each other are about as far apart as any two."""
+    step = float((np.diff(positions, axis=0) ** 2).sum(axis=1).mean())
+    return step > _NEAR * 2 * float(positions.var(axis=0).sum())

@@ -1,0 +1,1 @@
+"""What is there and what it reads: mesh, pattern, skin, robot, forward model."""

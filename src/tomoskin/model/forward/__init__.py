@@ -1,0 +1,9 @@
+"""The complete electrode model: from conductivity to voltages and their derivatives."""
+
+from tomoskin.model.forward.engine import Engine
+from tomoskin.model.forward.engine_choice import choose_engine
+from tomoskin.model.forward.model import ForwardModel, State
+from tomoskin.model.forward.solution import Solution
+from tomoskin.model.forward.terminals import Terminals
+
+__all__ = ["Engine", "ForwardModel", "Solution", "State", "Terminals", "choose_engine"]

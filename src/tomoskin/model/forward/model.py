@@ -1,0 +1,159 @@
+"""The forward model, and its states: one conductivity each, factorised once, asked many things."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tomoskin.model.forward import derivatives
+from tomoskin.model.forward.conductivity import checked_conductivity
+from tomoskin.model.forward.engine import Compressed, Factor
+from tomoskin.model.forward.solution import (
+    Solution,
+    checked_voltages,
+    error_of_drives,
+    solve_checked,
+)
+from tomoskin.model.forward.system import System
+from tomoskin.model.forward.update import LocalUpdate
+
+
+class ForwardModel(System):
+    """Complete electrode model (Somersalo, Cheney & Isaacson 1992) by finite elements.
+
+    Parameters
+    ----------
+    mesh
+        The domain, with one facet array per electrode.
+    pattern
+        Drives and measurements on those electrodes.
+    contact_impedance
+        Scalar or (n_electrodes,): Ω·m on a sheet, Ω·m² on a volume; may be complex.
+    current
+        Scalar or (n_drive,) A.
+    order
+        Order of the elements: 1, linear; 2, quadratic.
+
+    Raises
+    ------
+    ModelError
+        When mesh and pattern have different electrodes, or z or the current is impossible.
+    """
+
+    def at(self, conductivity: ArrayLike) -> State:
+        """Return the model at a conductivity, S or S/m.
+
+        One number for all cells, (n_cells,), or a symmetric tensor per cell (n_cells, d, d) in
+        the mesh's coordinates. Ask the state for ``solution``, ``jacobian`` and more: the
+        factorisation is shared between them.
+        """
+        return State(self, checked_conductivity(conductivity, self.mesh))
+
+    def solve(self, conductivity: ArrayLike) -> Solution:
+        """Voltages and potentials; see :meth:`at`."""
+        return self.at(conductivity).solution
+
+    def jacobian(self, conductivity: ArrayLike) -> NDArray[Any]:
+        """(n_meas, n_cells) dV/dσ, V/S; see :meth:`at`."""
+        return self.at(conductivity).jacobian
+
+    def transfer_resistance(self, conductivity: ArrayLike) -> NDArray[Any]:
+        """(n_electrodes, n_electrodes) Ω; see :class:`State`."""
+        return self.at(conductivity).transfer_resistance
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """A forward model at a conductivity, (n_cells,) or a tensor per cell (n_cells, d, d).
+
+    Everything follows from one basis: the fields of 1 A into each electrode and out at the last.
+    """
+
+    model: ForwardModel
+    conductivity: NDArray[Any]
+
+    @cached_property
+    def factor(self) -> Factor:
+        """The factorised system."""
+        return self.model.factorise(self._matrix.values)
+
+    @cached_property
+    def _matrix(self) -> Compressed:
+        return self.model.assembly.matrix(self.conductivity, self.model.contacts)
+
+    @cached_property
+    def solution(self) -> Solution:
+        """Voltages and potentials for every drive of the pattern."""
+        model, matrix, assembly = self.model, self._matrix, self.model.assembly
+        electrodes = np.arange(assembly.n_points, assembly.n_unknowns)
+        basis, lost, largest = solve_checked(self.factor, matrix.values, electrodes)
+        voltages = checked_voltages(
+            model,
+            basis[assembly.n_points :],
+            lost,
+            sharper=lambda: error_of_drives(model, matrix.matrix, basis),
+        )
+        return Solution(model, self.conductivity, basis, voltages, largest)
+
+    @property
+    def basis(self) -> NDArray[Any]:
+        """(n_unknowns, n_electrodes − 1) V/A: the last electrode is at zero."""
+        return self.solution.basis
+
+    @property
+    def voltages(self) -> NDArray[Any]:
+        """(n_meas,) V of the pattern."""
+        return self.solution.voltages
+
+    @property
+    def transfer_resistance(self) -> NDArray[Any]:
+        """(n_electrodes, n_electrodes) Ω; see :attr:`Solution.transfer_resistance`."""
+        return self.solution.transfer_resistance
+
+    @property
+    def gradient(self) -> NDArray[Any]:
+        """(n_electrodes, d·q, n_cells): scaled gradient of each basis field, see Element."""
+        return self.solution.gradient
+
+    @property
+    def power(self) -> NDArray[Any]:
+        """(n_drive, n_cells) W: power turned to heat in each cell, its real part."""
+        return self.solution.power
+
+    @cached_property
+    def jacobian(self) -> NDArray[Any]:
+        """(n_meas, n_cells) V/S; for a tensor (n_meas, n_cells, d, d), by each component.
+
+        −I ∫ ∇u_drive · ∇u_measure over each cell (Polydorides & Lionheart 2002): the fields of
+        1 A through the driven and the measured pair.
+        """
+        return derivatives.by_conductivity(self.solution)
+
+    @cached_property
+    def contact_jacobian(self) -> NDArray[Any]:
+        """(n_meas, n_electrodes): derivative by each contact impedance, V per Ω·m (or Ω·m²)."""
+        return derivatives.by_contact_impedance(self.solution)
+
+    @cached_property
+    def movement_jacobian(self) -> NDArray[Any]:
+        """(n_meas, n_electrodes, n_coordinates) V/m: derivative by each electrode's position.
+
+        The electrode's points move with it, also those that it shares with another electrode,
+        and all others stay (Soleimani, Gómez-Laberge & Adler 2006); only for scalar
+        conductivity and elements of order 1.
+        """
+        return derivatives.by_movement(self.solution)
+
+    @cached_property
+    def local(self) -> LocalUpdate:
+        """Exact voltages when few cells change, without a new factorisation."""
+        model = self.model
+        return LocalUpdate(
+            self.solution,
+            columns=self.factor.columns,
+            factorise=lambda changed: State(model, changed).basis,
+        )

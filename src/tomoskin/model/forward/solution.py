@@ -1,0 +1,222 @@
+"""What a solve gives: the fields of one conductivity, and all that is a product of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tomoskin.core import FloatArray, IntArray
+from tomoskin.model.forward.engine import Factor, singular
+from tomoskin.model.forward.system import System
+
+MOST_RESIDUAL = 1e-6
+"""A relative residual above this means that the matrix was singular to working precision."""
+
+_FLOOR = 1e-12
+"""Voltages that are zero by symmetry are right to this part of √(R_drive · R_measure)."""
+
+
+def solve_checked(
+    factor: Factor, values: NDArray[Any], rows: IntArray
+) -> tuple[NDArray[Any], NDArray[Any], float]:
+    """Columns X (n_unknowns, n_rows) of the inverse of the matrix A with these values.
+
+    And what the residual costs, Xᵀ (E − A X) with E the columns of the identity; and its largest
+    entry.
+
+    Raises
+    ------
+    ModelError
+        When the residual shows that the matrix is singular to working precision.
+    """
+    columns, lost, largest = factor.checked_columns(values, rows)
+    if not largest < MOST_RESIDUAL:
+        raise singular()
+    return columns, lost, largest
+
+
+def checked_voltages(
+    model: System,
+    grounded: NDArray[Any],
+    lost: NDArray[Any],
+    sharper: Callable[[], NDArray[Any]] | None = None,
+) -> NDArray[Any]:
+    """(…, n_meas) V, of which the residual leaves six digits of the largest of each drive.
+
+    Parameters
+    ----------
+    grounded
+        (…, k, k) Ω transfer resistance against the ground electrode.
+    lost
+        (…, k, k) Ω, fields of 1 A into each electrode times their residuals, Σ over nodes: how
+        far ``grounded`` may be off.
+    sharper
+        A dearer estimate of the voltages' errors (n_meas,) V, asked for where that is too large.
+
+    Raises
+    ------
+    ModelError
+        When more than that is lost.
+    """
+    resistance = padded(grounded)
+    voltages = model.voltages(resistance)
+    order, starts = model.by_drive
+    largest = np.maximum.reduceat(np.abs(voltages[..., order]), starts, axis=-1)
+    least = MOST_RESIDUAL * largest.min(axis=-1)
+    most = 4.0 * model.most_current * np.abs(lost).max(axis=(-2, -1), initial=0.0)
+    if not (most <= least).all():
+        for index in np.argwhere(~(most <= least)):
+            at = tuple(index)
+            _confirm(model, resistance[at], voltages[at], lost[at], sharper)
+    return voltages
+
+
+def _confirm(
+    model: System,
+    resistance: NDArray[Any],
+    voltages: NDArray[Any],
+    lost: NDArray[Any],
+    sharper: Callable[[], NDArray[Any]] | None,
+) -> None:
+    """Refuse voltages (n_meas,) that the residual may have spoilt, one by one."""
+    pattern = model.pattern
+    largest = np.zeros(pattern.n_drive)
+    np.maximum.at(largest, pattern.drive_index, np.abs(voltages))
+    inner = _inner(model, resistance, pattern.drive) * _inner(model, resistance, pattern.measure)
+    floor = _FLOOR * np.abs(model.current[pattern.drive_index]) * np.sqrt(inner)
+    allowed = np.maximum(MOST_RESIDUAL * largest[pattern.drive_index], floor)
+    if (np.abs(model.voltages(padded(lost))) <= allowed).all():
+        return
+    if sharper is None or not (np.abs(sharper()) <= allowed).all():
+        raise singular()
+
+
+def _inner(model: System, resistance: NDArray[Any], pairs: IntArray) -> FloatArray:
+    """(n_pairs,) Ω between the electrodes of each pair, without what the contacts have at least."""
+    (a, b), r = pairs.T, resistance
+    sizes = np.array([size.sum() for size in model.assembly.element.facet_sizes])
+    contact = np.abs(model.contact_impedance) / sizes
+    between = np.abs(r[a, a] - r[a, b] - r[b, a] + r[b, b])
+    return np.asarray(np.maximum(between - contact[a] - contact[b], 0.0))
+
+
+def error_of_drives(model: System, matrix: Any, basis: NDArray[Any]) -> NDArray[Any]:
+    """(n_meas,) V that the residual of each drive's own field may cost.
+
+    Sharper, and dearer, where all fields of the basis share the large potential of a bad ground
+    electrode: that of a drive between others has none of it, and loses no digits to it.
+    """
+    pattern, n_points = model.pattern, model.assembly.n_points
+    fields = np.zeros((len(basis), basis.shape[1] + 1), basis.dtype)
+    fields[:, :-1] = basis
+    error = np.empty(pattern.n_meas, basis.dtype)
+    for drive, (source, sink) in enumerate(pattern.drives):
+        residual = -(matrix @ (fields[:, source] - fields[:, sink]))
+        for electrode, current in ((source, 1.0), (sink, -1.0)):
+            if electrode < basis.shape[1]:
+                residual[n_points + electrode] += current
+        rows = np.flatnonzero(pattern.drive_index == drive)
+        plus, minus = pattern.measure[rows].T
+        error[rows] = (fields[:, plus] - fields[:, minus]).T @ residual * model.current[drive]
+    return error
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Potentials and voltages for one conductivity; complex where σ or z is.
+
+    What is more than the voltages is computed when it is asked for, once.
+
+    Attributes
+    ----------
+    model
+        What was solved.
+    conductivity
+        (n_cells,), or a tensor per cell (n_cells, d, d), S or S/m.
+    basis
+        (n_unknowns, n_electrodes − 1) V/A: fields of 1 A into each electrode and out at the last,
+        which is at zero.
+    voltages
+        (n_meas,) V, in the pattern's order.
+    residual
+        Largest relative residual of the linear solves.
+    """
+
+    model: System
+    conductivity: NDArray[Any]
+    basis: NDArray[Any]
+    voltages: NDArray[Any]
+    residual: float
+
+    @cached_property
+    def transfer_resistance(self) -> NDArray[Any]:
+        """(n_electrodes, n_electrodes) Ω: potentials = R @ currents, for currents that sum to 0.
+
+        Symmetric (reciprocity, Geselowitz 1971); rows and columns sum to zero.
+        """
+        return centred(self.basis[self.model.assembly.n_points :])
+
+    @cached_property
+    def electrode_potentials(self) -> NDArray[Any]:
+        """(n_drive, n_electrodes) V; each row sums to zero, which fixes the free constant."""
+        return self._of_drives(self.transfer_resistance)
+
+    @cached_property
+    def potentials(self) -> NDArray[Any]:
+        """(n_drive, n_points) V at the mesh's points."""
+        model = self.model
+        fields = np.zeros((model.assembly.n_electrodes, len(model.mesh.points)), self.basis.dtype)
+        fields[:-1] = self.basis[: fields.shape[1]].T
+        return np.asarray(self._of_drives(fields) + self.electrode_potentials[:, -1:])
+
+    @cached_property
+    def gradient(self) -> NDArray[Any]:
+        """(n_electrodes, d·q, n_cells): scaled gradient of each basis field, see Element."""
+        n, operator = self.model.assembly.n_electrodes, self.model.gradient
+        fields = self.basis[: self.model.assembly.n_points]
+        gradient = np.empty((n, operator.shape[0]), dtype=fields.dtype)
+        gradient[-1] = 0.0
+        self.model.engine.fields(operator, fields, gradient[:-1])
+        return gradient.reshape(n, -1, len(self.conductivity))
+
+    @cached_property
+    def power(self) -> NDArray[Any]:
+        """(n_drive, n_cells) W: power turned to heat in each cell, its real part."""
+        model, gradient = self.model, self.gradient
+        source, sink = model.pattern.drives.T
+        field = model.current[:, None, None] * (gradient[source] - gradient[sink])
+        if self.conductivity.ndim == 1:
+            return np.asarray(np.sum(np.abs(field) ** 2, axis=1) * self.conductivity.real)
+        n_cells, d, _ = self.conductivity.shape
+        field = field.reshape(len(field), d, -1, n_cells)
+        flow = np.einsum("cab,kbqc->kaqc", self.conductivity, field)
+        return np.asarray(np.einsum("kaqc,kaqc->kc", field.conj(), flow).real)
+
+    def _of_drives(self, fields: NDArray[Any]) -> NDArray[Any]:
+        """(n_drive, …): fields (n_electrodes, …) of 1 A → those of each drive's current."""
+        source, sink = self.model.pattern.drives.T
+        return np.asarray(self.model.current[:, None] * (fields[source] - fields[sink]))
+
+
+def centred(grounded: NDArray[Any]) -> NDArray[Any]:
+    """Transfer resistance against the ground electrode → rows and columns that sum to zero."""
+    full = padded(grounded)
+    rows = full - full.mean(axis=-2, keepdims=True)
+    return np.asarray(rows - rows.mean(axis=-1, keepdims=True))
+
+
+def padded(grounded: NDArray[Any]) -> NDArray[Any]:
+    """Transfer resistance against the ground electrode, with its row and column of zeros.
+
+    Voltages are taken from this one: the means that centring subtracts would carry the digits
+    lost to one bad contact into all electrodes.
+    """
+    n = grounded.shape[-1] + 1
+    full = np.zeros((*grounded.shape[:-2], n, n), dtype=grounded.dtype)
+    full[..., :-1, :-1] = grounded
+    return full

@@ -1,0 +1,229 @@
+"""The mesh: points, simplices, and the boundary facets that are electrodes."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, fields
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from tomoskin.core import FloatArray, GeometryError, IntArray, PixelMap
+from tomoskin.model.mesh.check import check_mesh, checked_metric
+from tomoskin.model.mesh.choose import Electrodes, choose
+from tomoskin.model.mesh.files import (
+    at_source,
+    cells_of,
+    check_repeats,
+    groups_of,
+    parsed,
+    points_of,
+    renumbered,
+)
+from tomoskin.model.mesh.pixels import pixel_map, step_for
+from tomoskin.model.mesh.triangles import boundary_facets, neighbour_pairs, owners, simplex_measure
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Simplices with electrodes on their boundary.
+
+    Attributes
+    ----------
+    points
+        (n_points, d) m; one more coordinate than the cells' dimension is a curved sheet.
+    cells
+        (n_cells, k) point indices: 3 a triangle, 4 a tetrahedron; orientation is free.
+    electrodes
+        One (n_facets, k − 1) array of point indices per electrode.
+    metric
+        (n_cells, 2, 2) of a flat sheet that is laid on a surface or stretched: a step dx in the
+        points' plane is sqrt(dx·G·dx) m long on the sheet. None: as long as it looks.
+
+    Raises
+    ------
+    GeometryError
+        For tables that are no numbers, indices that do not exist, a degenerate cell, a facet in
+        more than two cells, an electrode without a facet, an electrode's facet that is not on
+        the boundary or belongs to another one too, a mesh in pieces, or a metric that is none.
+    """
+
+    points: FloatArray
+    cells: IntArray
+    electrodes: tuple[IntArray, ...]
+    metric: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays and check them."""
+        object.__setattr__(self, "points", _frozen(self.points, np.float64, "points"))
+        object.__setattr__(self, "cells", _frozen(self.cells, np.int64, "cells"))
+        facets = tuple(_frozen(e, np.int64, f"E{i}") for i, e in enumerate(self.electrodes, 1))
+        object.__setattr__(self, "electrodes", facets)
+        check_mesh(self.points, self.cells, self.electrodes)
+        if self.metric is not None:
+            object.__setattr__(self, "metric", checked_metric(self.metric, self.points, self.cells))
+
+    def with_metric(self, metric: FloatArray) -> Mesh:
+        """The same mesh measured otherwise, (n_cells, d, d): nothing else is checked again."""
+        made = object.__new__(Mesh)
+        for field in fields(self):
+            object.__setattr__(made, field.name, getattr(self, field.name))
+        object.__setattr__(made, "metric", checked_metric(metric, self.points, self.cells))
+        return made
+
+    @classmethod
+    def read(cls, path: str | Path, electrodes: Electrodes = None, *, scale: float = 1.0) -> Mesh:
+        """Read a .msh, .vtu, .stl or .obj file; see :func:`read_mesh`. Raises GeometryError."""
+        return read_mesh(path, electrodes, scale=scale)
+
+    @property
+    def dimension(self) -> int:
+        """Dimension of the cells: 2 for triangles, 3 for tetrahedra."""
+        return int(self.cells.shape[1]) - 1
+
+    @cached_property
+    def volumes(self) -> FloatArray:
+        """(n_cells,) area of each triangle, m², or volume of each tetrahedron, m³."""
+        flat = simplex_measure(self.points, self.cells)
+        return flat if self.metric is None else flat * np.sqrt(np.linalg.det(self.metric))
+
+    @cached_property
+    def corners(self) -> FloatArray:
+        """(n_cells, k, d) m: each cell's corners with its true lengths and angles.
+
+        With a metric, in a frame of the cell's own, whose first axis is the direction of x.
+        """
+        corner = self.points[self.cells]
+        if self.metric is None:
+            return np.asarray(corner)
+        return np.asarray((corner - corner[:, :1]) @ np.linalg.cholesky(self.metric))
+
+    def facet_sizes(self, facets: IntArray) -> FloatArray:
+        """(n,) length, m, or area, m², of facets (n, k − 1) on the boundary."""
+        if self.metric is None:
+            return simplex_measure(self.points, facets)
+        along = self.points[facets[:, 1]] - self.points[facets[:, 0]]
+        squared = np.einsum("ni,nij,nj->n", along, self.metric[owners(self.cells, facets)], along)
+        return np.asarray(np.sqrt(squared))
+
+    @cached_property
+    def centroids(self) -> FloatArray:
+        """(n_cells, d) m."""
+        return np.asarray(self.points[self.cells].mean(axis=1))
+
+    @cached_property
+    def neighbours(self) -> IntArray:
+        """(n_pairs, 2) cells that share a facet, each pair once."""
+        return neighbour_pairs(self.cells)
+
+    @cached_property
+    def boundary(self) -> IntArray:
+        """(n_facets, k − 1) facets that belong to one cell only."""
+        return boundary_facets(self.cells)
+
+    @cached_property
+    def identity(self) -> str:
+        """Short hash of points, cells and electrodes: images and operators are matched by it."""
+        digest = hashlib.sha256()
+        stretched = () if self.metric is None else (self.metric,)
+        for array in (self.points, self.cells, *self.electrodes, *stretched):
+            digest.update(str(array.shape).encode())
+            digest.update(np.ascontiguousarray(array).tobytes())
+        return digest.hexdigest()[:16]
+
+    def pixels(
+        self, count: int = 64, *, step: float | None = None, z: float | None = None
+    ) -> PixelMap:
+        """Raster of square pixels: ``count`` along the longer side, or of side ``step`` m.
+
+        Of tetrahedra it is the slice at height ``z`` m. Raises GeometryError for a curved sheet,
+        or a size or height that is impossible.
+        """
+        side = step_for(self.points, self.cells, count) if step is None else step
+        return pixel_map(self.points, self.cells, self.identity, step=side, height=z)
+
+
+@dataclass(frozen=True, eq=False)
+class MeshFile:
+    """What a mesh file holds.
+
+    Triangles all in one plane z = const lose that coordinate. Points that belong to no cell are
+    dropped when the mesh is made.
+
+    Attributes
+    ----------
+    points
+        (n, d) m.
+    cells
+        (n_cells, k) triangles or tetrahedra.
+    groups
+        Name → (n, k − 1) facets: gmsh's physical groups, cell sets, and numbers in cell data
+        named "electrode".
+    source
+        The path, for messages.
+    """
+
+    points: FloatArray
+    cells: IntArray
+    groups: dict[str, IntArray]
+    source: str
+
+    @classmethod
+    def read(cls, path: str | Path, *, scale: float = 1.0) -> Self:
+        """Read ``path``; its coordinates times ``scale`` are m. Raises GeometryError."""
+        file = Path(path)
+        raw = parsed(file)
+        try:
+            cells = cells_of(raw)
+            points = points_of(raw, cells, scale)
+            groups = groups_of(raw, cells.shape[1] - 1)
+        except GeometryError as error:
+            raise at_source(error, str(file)) from error
+        return cls(points, cells, groups, str(file))
+
+    def mesh(self, electrodes: Electrodes = None) -> Mesh:
+        """Return the mesh with those electrodes. Raises GeometryError."""
+        try:
+            check_repeats(self.cells)
+            facets = choose(self.points, self.cells, self.groups, electrodes)
+            used, compact = np.unique(self.cells, return_inverse=True)
+            number = np.full(len(self.points), -1)
+            number[used] = np.arange(len(used))
+            tables = [renumbered(number, f, f"E{i}") for i, f in enumerate(facets, 1)]
+            return Mesh(self.points[used], compact.reshape(self.cells.shape), tuple(tables))
+        except GeometryError as error:
+            raise at_source(error, self.source) from error
+
+
+def read_mesh(path: str | Path, electrodes: Electrodes = None, *, scale: float = 1.0) -> Mesh:
+    """Read a mesh; see :class:`MeshFile` for what is read and :data:`Electrodes` for the choice.
+
+    Raises
+    ------
+    GeometryError
+        When meshio is not installed, the file cannot be read or holds no usable cells, it seems
+        to be in millimetres, a cell repeats another one, or an electrode has no facet.
+    """
+    return MeshFile.read(path, scale=scale).mesh(electrodes)
+
+
+def _frozen(value: object, dtype: DTypeLike, where: str) -> NDArray[Any]:
+    try:
+        raw = np.array(value)
+    except ValueError as error:
+        raise GeometryError(
+            "expected rows of equal length, got different lengths", where=where
+        ) from error
+    if raw.ndim != 2:
+        raise GeometryError(f"expected a table with two axes, got shape {raw.shape}", where=where)
+    if raw.dtype.kind not in "iuf":
+        raise GeometryError(f"expected real numbers, got {raw.dtype}", where=where)
+    with np.errstate(invalid="ignore"):
+        array = raw.astype(dtype)
+    if array.dtype.kind == "i" and not np.array_equal(array, raw):
+        raise GeometryError("expected whole numbers, got fractions", where=where)
+    array.flags.writeable = False
+    return array

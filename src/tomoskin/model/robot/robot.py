@@ -1,0 +1,223 @@
+"""The robot file: its skins by name, each with its board and its place on a link; strict."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+
+from tomoskin.core import SkinError
+from tomoskin.model.robot.pose import Place, Pose
+from tomoskin.model.robot.urdf import Urdf
+from tomoskin.model.skin import (
+    OneOrMore,
+    Quantity,
+    Row,
+    Section,
+    Text,
+    check_names,
+    key,
+    literal,
+    read_text,
+    show,
+)
+from tomoskin.model.skin import toml_tables as tables_of
+
+FORMAT = 1
+"""Version of the file that this code reads, the top-level key ``format``."""
+
+MOST_SKINS = 64
+
+_NAME = re.compile(r"[a-z][a-z0-9_]{0,31}")
+_BOARD = re.compile(r"([0-9a-f]{2}){1,16}")
+_LENGTH = Quantity("length", "mm", -100_000, 100_000)
+_ANGLE = Quantity("angle", "deg", -360, 360)
+_XYZ = Row({"x": _LENGTH, "y": _LENGTH, "z": _LENGTH})
+_RPY = Row({"roll": _ANGLE, "pitch": _ANGLE, "yaw": _ANGLE})
+_FILE = Text(1000)
+_OLDER = "The same as `calibration`, for older files."
+
+
+class RobotSection(Section, section="robot"):
+    """The robot itself."""
+
+    name: str = key(Text(64), "A title of one line, for people.", default="robot")
+    urdf: str | None = key(
+        _FILE, "The URDF with its links. The path is relative to this file.", default=None
+    )
+
+
+class SkinSection(Section, section="skin", many=True):
+    """A skin, its board, and its position on a link. Paths are relative to this file."""
+
+    name: str = key(Text(32), "Small letters, digits and `_`. Its topics begin with this name.")
+    skin: str = key(_FILE, "The skin: a built-in name, or the path of a skin file.")
+    source: str = key(_FILE, "The source of its frames, as for `--source`.", default="twin")
+    board: str | None = key(
+        Text(32),
+        "Unique id of its board, as the page's set-up shows it. Another board is reported.",
+        default=None,
+    )
+    link: str | None = key(Text(200), "Link of the URDF that the skin lies on.", default=None)
+    position: tuple[float, ...] | None = key(
+        _XYZ, "Position of the skin's frame in the link's frame.", default=None, needs="link"
+    )
+    angles: tuple[float, ...] | None = key(
+        _RPY, "Angles about the link's fixed x, y and z, as in a URDF.", default=None, needs="link"
+    )
+    calibration: tuple[str, ...] = key(
+        OneOrMore(_FILE), "Files from `tomoskin calibrate`, one of each kind.", default=None
+    )
+    force: tuple[str, ...] = key(OneOrMore(_FILE), _OLDER, default=None)
+    bend: tuple[str, ...] = key(OneOrMore(_FILE), _OLDER, default=None)
+    states: tuple[str, ...] = key(OneOrMore(_FILE), _OLDER, default=None)
+
+
+SECTIONS = {section.section: section for section in (RobotSection, SkinSection)}
+
+
+@dataclass(frozen=True, slots=True)
+class PlacedSkin:
+    """One skin of a robot.
+
+    Attributes
+    ----------
+    place
+        Its name, and where it lies.
+    skin
+        Built-in name or path.
+    source
+        What its frames come from.
+    board
+        Unique id of its board, hexadecimal, or None: any.
+    calibrations
+        Paths, at most one of each kind.
+    """
+
+    place: Place
+    skin: str
+    source: str = "twin"
+    board: str | None = None
+    calibrations: tuple[Path, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Of the skin on the robot."""
+        return self.place.name
+
+
+@dataclass(frozen=True, slots=True)
+class Robot:
+    """A robot's skins; ``urdf`` None: where its links are is not known."""
+
+    source: str
+    name: str
+    skins: tuple[PlacedSkin, ...]
+    urdf: Urdf | None = None
+
+    @classmethod
+    def load(cls, path: Path) -> Self:
+        """From a file.
+
+        Raises
+        ------
+        SkinError
+            For a value that cannot be meant, two skins of one name, board or source, or a link
+            that the URDF does not have; the message says where.
+        """
+        tables = tables_of(read_text(path, "a robot file"), str(path), FORMAT)
+        return cls.of(tables, str(path), path.parent)
+
+    @classmethod
+    def of(cls, tables: Mapping[str, Any], source: str, folder: Path) -> Self:
+        """From the tables of a file: ``source`` for errors, ``folder`` of its paths; SkinError."""
+        check_names(tables, list(SECTIONS), "section", source)
+        robot = RobotSection.read(tables.get("robot", {}), f"{source}: [robot]")
+        urdf = None if robot.urdf is None else Urdf.read(folder / robot.urdf)
+        skins = tuple(_placed(given, where, folder, urdf) for given, where in _each(tables, source))
+        if not 0 < len(skins) <= MOST_SKINS:
+            raise SkinError(
+                f"expected 1 to {MOST_SKINS} sections [[skin]], got {len(skins)}", where=source
+            )
+        _check_different(skins, source)
+        return cls(source, robot.name, skins, urdf)
+
+    def link_pose(self, place: Place) -> Pose:
+        """Of the frame that a skin's touches are told in, in that of the robot's root."""
+        return self.urdf.pose(place.link) if self.urdf and place.link else Pose()
+
+
+def add_skin(path: Path, given: Mapping[str, Any], urdf: str | None = None) -> str:
+    """Text of the robot file at ``path`` with one more skin; of a new one where there is none.
+
+    ``given``: keys of its section as written; ``urdf``: path from the file. Raises SkinError.
+    """
+    if path.exists():
+        text = read_text(path, "a robot file").rstrip("\n")
+        tables = tables_of(text, str(path), FORMAT)
+        known = tables.get("robot", {}).get("urdf")
+        if urdf is not None and known != urdf:
+            raise SkinError(f"belongs to the URDF {known}, not to {urdf}", where=str(path))
+    else:
+        lines = [f"format = {FORMAT}", "", "[robot]"]
+        text = "\n".join(lines + ([] if urdf is None else [f"urdf = {literal(urdf)}"]))
+    SkinSection.complete(given, f"{path}: new [[skin]]")
+    entry = [f"{name} = {literal(value)}" for name, value in given.items()]
+    return "\n".join([text, "", "[[skin]]", *entry]) + "\n"
+
+
+def _each(tables: Mapping[str, Any], source: str) -> list[tuple[SkinSection, str]]:
+    given = tables.get("skin", [])
+    if not isinstance(given, list):
+        raise SkinError(
+            f"expected a list of tables, got {show(given)}", where=source, hint="write [[skin]]"
+        )
+    found = []
+    for number, table in enumerate(given, 1):
+        title = table.get("name") if isinstance(table, Mapping) else None
+        where = f"{source}: skin {number}" + (f' "{title}"' if title else "")
+        found.append((SkinSection.read(table, where), where))
+    return found
+
+
+def _placed(given: SkinSection, where: str, folder: Path, urdf: Urdf | None) -> PlacedSkin:
+    for text, form, what in (
+        (given.name, _NAME, "name of small letters, digits and _ that begins with a letter"),
+        (given.board or "00", _BOARD, "unique id of hexadecimal digits, two a byte"),
+    ):
+        if not form.fullmatch(text):
+            raise SkinError(f'expected a {what}, got "{text}"', where=where)
+    if given.link is not None and urdf is not None:
+        urdf.check_link(given.link, where)
+    calibrations = (given.calibration, given.force, given.bend, given.states)
+    zero = np.zeros(3)
+    pose = Pose.of(given.position or zero, given.angles or zero)
+    return PlacedSkin(
+        place=Place(given.name, given.link or "", pose),
+        skin=str(folder / given.skin) if given.skin.endswith(".toml") else given.skin,
+        source=_from(folder, given.source),
+        board=given.board,
+        calibrations=tuple(folder / path for some in calibrations for path in some or ()),
+    )
+
+
+def _from(folder: Path, source: str) -> str:
+    """A source, a replay's file from the robot file's folder."""
+    name, _, argument = source.partition(":")
+    return f"replay:{folder / argument}" if name == "replay" else source
+
+
+def _check_different(skins: tuple[PlacedSkin, ...], source: str) -> None:
+    """Two of one name, board or port would be taken for each other."""
+    for what, values in (
+        ("name", [skin.name for skin in skins]),
+        ("board", [skin.board for skin in skins if skin.board]),
+        ("source", [skin.source for skin in skins if skin.source.startswith("serial:")]),
+    ):
+        twice = sorted({value for value in values if values.count(value) > 1})
+        if twice:
+            raise SkinError(f"two skins have the same {what} {twice[0]}", where=source)

@@ -1,0 +1,224 @@
+"""Sections of a skin file → outline, surface, electrodes and pattern that go together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Self, get_type_hints
+
+import numpy as np
+
+from tomoskin.core import DIMENSIONS, FloatArray, GeometryError, PatternError, SkinError
+from tomoskin.model.mesh import (
+    Arm,
+    Cap,
+    Cylinder,
+    Disc,
+    Draped,
+    ElectrodeArc,
+    Ellipse,
+    Mesh,
+    Outline,
+    Plane,
+    Polygon,
+    Rectangle,
+    Saddle,
+    Surface,
+    check_arcs,
+    triangulate,
+)
+from tomoskin.model.pattern import Pattern, named
+from tomoskin.model.skin.body import (
+    DriveSection,
+    ElectrodesSection,
+    MaterialSection,
+    NameSection,
+    OutlineSection,
+    ReadoutSettings,
+    SurfaceSection,
+)
+from tomoskin.model.skin.kept_mesh import kept_mesh
+from tomoskin.model.skin.processing import (
+    InverseSettings,
+    MeshSettings,
+    SignalSettings,
+    TouchSettings,
+    TwinChoice,
+)
+from tomoskin.model.skin.section import Section
+
+FORMAT = 1
+"""Version of the file that this code reads, the top-level key ``format``."""
+
+OFF_RIM = 0.01
+"""A position may miss the rim by half an electrode, and by this part of the rim's length."""
+
+_RIM_POINTS = 240
+
+_SAMPLE_BITS = 16
+"""A frame carries each sample, the sum over the oversampling, in so many bits."""
+
+
+@dataclass(frozen=True)
+class SkinSections:
+    """The sections of a skin file, in the order in which they are written."""
+
+    skin: NameSection
+    outline: OutlineSection
+    surface: SurfaceSection
+    electrodes: ElectrodesSection
+    material: MaterialSection
+    drive: DriveSection
+    readout: ReadoutSettings
+    mesh: MeshSettings
+    inverse: InverseSettings
+    signal: SignalSettings
+    touch: TouchSettings
+    twin: TwinChoice
+
+
+SECTIONS: dict[str, type[Section]] = get_type_hints(SkinSections)
+"""Every section by its name, in that order."""
+
+BODY = frozenset({"outline", "surface", "electrodes", "drive"})
+"""Sections that a :class:`SkinBody` is made of."""
+
+
+@dataclass(frozen=True, eq=False)
+class SkinBody:
+    """What is made of the sections :data:`BODY`.
+
+    ``contact_impedance`` is (n,) per electrode, Ω·m.
+    """
+
+    outline: Outline
+    surface: Surface
+    arcs: tuple[ElectrodeArc, ...]
+    contact_impedance: FloatArray
+    pattern: Pattern
+
+    @classmethod
+    def of(cls, sections: SkinSections, source: str) -> Self:
+        """Raises SkinError that names ``source`` and section where parts do not go together."""
+        with located(f"{source}: [outline]"):
+            outline = _outline(sections.outline)
+        with located(f"{source}: [electrodes]"):
+            arcs = _arcs(outline, sections.electrodes)
+            check_arcs(outline, arcs)
+        with located(f"{source}: [surface]"):
+            surface = _surface(sections.surface, Path(source).parent)
+            surface.check(outline.polyline(outline.length / _RIM_POINTS))
+        impedance = _impedances(sections.electrodes, len(arcs), source)
+        with located(f"{source}: [drive]"):
+            pattern = _pattern(sections.drive, len(arcs))
+        return cls(outline, surface, arcs, impedance, pattern)
+
+
+@contextmanager
+def located(place: str) -> Iterator[None]:
+    """Turn errors of the rooms above into errors of the skin file, at ``place``."""
+    try:
+        yield
+    except (GeometryError, PatternError) as error:
+        where = f"{place}, {error.where}" if error.where else place
+        raise SkinError(error.message, where=where, hint=error.hint) from error
+
+
+def check_readout(readout: ReadoutSettings, source: str) -> None:
+    """Raise SkinError for sums that do not fit into a frame's samples."""
+    most = (2**_SAMPLE_BITS - 1) // (2**readout.adc_bits - 1)
+    if readout.oversampling > most:
+        raise SkinError(
+            f"expected at most {most} at {readout.adc_bits} bits, got {readout.oversampling}",
+            where=f"{source}: [readout] oversampling",
+            hint=f"a sample is the sum of its readings and must fit in {_SAMPLE_BITS} bits",
+        )
+
+
+@lru_cache(maxsize=16)
+def flat_mesh(outline: OutlineSection, electrodes: ElectrodesSection, mesh: MeshSettings) -> Mesh:
+    """The sheet of these sections, laid flat; equal skins of a process share it, and it is kept on
+    disk.
+
+    Raises GeometryError when the electrodes cannot be resolved with so few cells.
+    """
+    rim = _outline(outline)
+    arcs = _arcs(rim, electrodes)
+    wanted = f"{outline!r} {electrodes!r} {mesh.cells}"
+    return kept_mesh(wanted, lambda: triangulate(rim, arcs, mesh.cells))
+
+
+def _outline(given: OutlineSection) -> Outline:
+    match given:
+        case OutlineSection(diameter=float(diameter)):
+            return Disc(diameter / 2)
+        case OutlineSection(shape="ellipse", width=float(width), height=float(height)):
+            return Ellipse(width / 2, height / 2)
+        case OutlineSection(width=float(width), height=float(height)):
+            return Rectangle(width, height)
+        case _:
+            return Polygon(np.array(given.vertices))
+
+
+def _surface(given: SurfaceSection, folder: Path) -> Surface:
+    match given:
+        case SurfaceSection(shape="cylinder", radius=float(radius)):
+            return Cylinder(radius, given.axis)
+        case SurfaceSection(shape="cap", radius=float(radius)):
+            return Cap(radius)
+        case SurfaceSection(radius_x=float(x), radius_y=float(y)):
+            return Saddle(x, y)
+        case SurfaceSection(radius=float(radius), joint=float(joint)):
+            return Arm(radius, given.bend, joint)
+        case SurfaceSection(file=str(file)):
+            return Draped.read(folder / file, scale=DIMENSIONS["length"][given.unit])
+        case _:
+            return Plane()
+
+
+def _arcs(outline: Outline, given: ElectrodesSection) -> tuple[ElectrodeArc, ...]:
+    """Electrodes, E1 first. Raises GeometryError that names the one that is off the rim."""
+    if given.count is None:
+        centres = _on_rim(outline, np.array(given.positions), given.width)
+    else:
+        step = outline.length / given.count
+        turn = -1 if given.order == "clockwise" else 1
+        centres = np.float64(outline.toward(given.first)) + turn * step * np.arange(given.count)
+    return tuple(ElectrodeArc.around(float(s) % outline.length, given.width) for s in centres)
+
+
+def _on_rim(outline: Outline, positions: FloatArray, width: float) -> FloatArray:
+    s = outline.nearest(positions)
+    gap = np.linalg.norm(outline.point(s) - positions, axis=1)
+    allowed = min(width / 2, OFF_RIM * outline.length)
+    if (gap > allowed).any():
+        number = int(np.argmax(gap > allowed))
+        x, y = positions[number] * 1e3
+        raise GeometryError(
+            f"expected a position on the rim within {allowed * 1e3:.3g} mm, "
+            f"got ({x:.4g}, {y:.4g}) mm, {gap[number] * 1e3:.3g} mm off",
+            where=f"E{number + 1}",
+        )
+    return s
+
+
+def _impedances(given: ElectrodesSection, n_electrodes: int, source: str) -> FloatArray:
+    values = given.contact_impedance
+    if len(values) not in (1, n_electrodes):
+        raise SkinError(
+            f"expected one value or {n_electrodes}, one per electrode, got {len(values)}",
+            where=f"{source}: [electrodes] contact_impedance",
+        )
+    result = np.array(np.broadcast_to(values, n_electrodes), dtype=float)
+    result.flags.writeable = False
+    return result
+
+
+def _pattern(given: DriveSection, n_electrodes: int) -> Pattern:
+    """The file's own tables, or the named pattern."""
+    if given.drive is not None and given.measure is not None:
+        return Pattern.from_tables(given.drive, given.measure, n_electrodes)
+    return named(given.pattern, n_electrodes)

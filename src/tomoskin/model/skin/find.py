@@ -1,0 +1,73 @@
+"""Where a skin's text comes from: the built-in skins, or a file."""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from importlib.resources import files
+from os import PathLike, fspath
+from pathlib import Path
+
+from tomoskin.core import EMPTY, SkinError, StrPath
+
+BUILT_IN = "built-in"
+"""Source of the skins that come with tomoskin."""
+
+_LARGEST = 1_000_000
+"""A skin file has at most so many bytes."""
+
+
+def built_in_names() -> tuple[str, ...]:
+    """Names of the built-in skins, sorted."""
+    folder = files("tomoskin.model.skin") / "builtin"
+    names = [entry.name.removesuffix(".toml") for entry in folder.iterdir()]
+    return tuple(sorted(name for name in names if not name.startswith("_")))
+
+
+def skin_text(skin: str | PathLike[str]) -> tuple[str, str]:
+    """Text and source of the built-in skin or file.
+
+    Raises SkinError when there is neither, or the file cannot be read as text.
+    """
+    if isinstance(skin, str) and skin in built_in_names():
+        entry = files("tomoskin.model.skin") / "builtin" / f"{skin}.toml"
+        return entry.read_text(encoding="utf-8"), BUILT_IN
+    path = Path(fspath(skin))
+    try:
+        return read_text(path, "a skin file", _LARGEST), str(path)
+    except SkinError as error:
+        raise _missing(path) if isinstance(error.__cause__, FileNotFoundError) else error from None
+
+
+def _missing(path: Path) -> SkinError:
+    names = built_in_names()
+    close = get_close_matches(str(path), names, n=1)
+    guess = f'did you mean "{close[0]}"? ' if close else ""
+    return SkinError(
+        "there is no such file, and no built-in skin of that name",
+        where=str(path),
+        hint=f"{guess}built-in skins: {', '.join(names)}",
+    )
+
+
+def read_text(path: StrPath, what: str, most: int = 10_000_000) -> str:
+    """Text of ``what`` a person has written, of at most so many bytes.
+
+    Raises SkinError for what is no such file, and what cannot be read as text.
+    """
+    path = Path(path)
+    where = str(path)
+    try:
+        if path.exists() and not path.is_file():
+            raise SkinError(f"is a folder or device, not {what}", where=where)
+        if path.stat().st_size > most:
+            raise SkinError(f"is too large for {what} (over {most / 1e6:g} MB)", where=where)
+        if not (text := path.read_bytes().decode("utf-8-sig")).strip():
+            raise SkinError(EMPTY, where=where)
+        return text
+    except UnicodeDecodeError as error:
+        raise SkinError(
+            f"is not a text file (byte {error.start} is not UTF-8)", where=where
+        ) from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise SkinError(f"cannot be read: {reason}", where=where[:80]) from error

@@ -1,0 +1,160 @@
+"""The skin file: what the host makes of the voltages; a page may change most of it live."""
+
+from __future__ import annotations
+
+from tomoskin.model.skin.kinds import Choice, Number, NumberOrWord, Quantity, Whole
+from tomoskin.model.skin.section import Section, key
+
+_ONE_STEP = "one-step"
+_IN_IMAGE = ("method", ("image",))
+
+
+class MeshSettings(Section, section="mesh"):
+    """The triangles that the image is made of."""
+
+    cells: int = key(
+        Whole(50, 100_000),
+        "Wanted number of triangles; the mesh has this number within 10 %.",
+        default=1500,
+    )
+
+
+class InverseSettings(Section, section="inverse"):
+    """How voltages become an image."""
+
+    method: str = key(
+        Choice((_ONE_STEP, "greit")),
+        "one-step: the most likely image under a prior. greit: an operator trained to "
+        "show small targets as a stated response; truer positions, not sharper.",
+        default=_ONE_STEP,
+    )
+    prior: str = key(
+        Choice(("identity", "laplace", "gaussian", "noser", "exponential", "matern")),
+        "Prior: the changes of conductivity that are assumed to be likely.",
+        default="noser",
+        method=_ONE_STEP,
+    )
+    exponent: float = key(
+        Number(0, 2),
+        "For noser: the power of a cell's sensitivity by which its change is penalised.",
+        default=0.5,
+        effective=("prior", ("noser",)),
+        method=_ONE_STEP,
+    )
+    correlation_length: float | None = key(
+        Quantity("length", "mm", 0.1, 5000),
+        "For exponential and matern: the distance over which changes are similar. Default: a "
+        "tenth of the sheet's extent.",
+        default=None,
+        effective=("prior", ("exponential", "matern")),
+        method=_ONE_STEP,
+    )
+    alpha: float | str = key(
+        NumberOrWord(Number(1e-9, 1e9), Choice(("auto",))),
+        "Weight of the prior; it enters squared. auto: chosen by the noise, for a light touch.",
+        default="auto",
+        method=_ONE_STEP,
+    )
+    noise_figure: float = key(
+        Number(0.1, 100),
+        "Ratio of the signal-to-noise ratio of the voltages to that of the image.",
+        default=1.0,
+        method="greit",
+    )
+    difference: str = key(
+        Choice(("plain", "normalised")), "v − v_ref, or (v − v_ref)/|v_ref|.", default="plain"
+    )
+    time_constant: float = key(
+        Quantity("time", "s", 0, 3600),
+        "Time constant of the filter over frames (Kalman filter): a longer one has less noise "
+        "and more delay. 0 s: each image uses its own frame alone.",
+        default="0 s",
+        method=_ONE_STEP,
+    )
+
+
+class SignalSettings(Section, section="signal"):
+    """What becomes of the reference while time goes by."""
+
+    baseline: str = key(
+        Choice(("follow", "hold")),
+        "follow: the reference follows the skin's drift while nothing touches, and stays fixed "
+        "under a touch. hold: it stays the same until the next one is taken.",
+        default="follow",
+    )
+    common_modes: str = key(
+        Choice(("projected", "kept")),
+        "projected: proportional changes of all voltages, as from temperature, and directions of "
+        "drift learnt while idle do not show in the image. kept: they show.",
+        default="projected",
+    )
+
+
+class TouchSettings(Section, section="touch"):
+    """How data become touches."""
+
+    method: str = key(
+        Choice(("fit", "image")),
+        "fit: position, size and strength of up to five touches, fitted to the voltages, with "
+        "standard deviations. image: the thesis's regions of the image, set by gamma1 to "
+        "position.",
+        default="fit",
+    )
+    gamma1: float = key(
+        Number(0.1, 0.99),
+        "First threshold, as a fraction of the extreme value; 0.6 to 0.7 is usual.",
+        default=0.65,
+        effective=_IN_IMAGE,
+    )
+    gamma2: float = key(
+        Number(0.1, 1),
+        "Second threshold, after smoothing, as a fraction of the first.",
+        default=0.9,
+        effective=_IN_IMAGE,
+    )
+    smoothing: float = key(
+        Quantity("length", "mm", 0, 1000),
+        "Standard deviation of the Gaussian between the two thresholds.",
+        default="5 mm",
+        effective=_IN_IMAGE,
+    )
+    sign: str = key(
+        Choice(("decrease", "increase", "both")),
+        "Change of conductivity that counts as a touch.",
+        default="decrease",
+    )
+    snr: float = key(
+        Number(0, 1000),
+        "Extreme value that a touch needs, in standard deviations of the noise.",
+        default=5,
+    )
+    position: str = key(
+        Choice(("centroid", "peak")),
+        "One touch a region, at its weighted centroid; or one at each local extreme.",
+        default="centroid",
+        effective=_IN_IMAGE,
+    )
+    max_touches: int = key(Whole(1, 50), "Largest number of touches reported at once.", default=8)
+    slide_lag: float = key(
+        Quantity("length", "mm", 0, 100),
+        "Distance by which the sheet's response lags behind a sliding finger, because friction "
+        "drags the sheet along. Sliding touches are reported ahead by this distance.",
+        default="0 mm",
+    )
+
+
+class TwinChoice(Section, section="twin"):
+    """The simulated skin that stands in for this one; a real skin does not read it."""
+
+    preset: str = key(
+        Choice(("ideal", "textile", "hydrogel", "tank")),
+        "Material and board: ideal has no errors and no memory; the others have measured or "
+        "assumed ones.",
+        default="ideal",
+    )
+    electrodes: str | None = key(
+        Choice(("ideal", "polarising")),
+        "polarising: they charge under current, as on a gel, and their contacts warm and cool; "
+        "an alternating drive does not see it.",
+        default=None,
+    )

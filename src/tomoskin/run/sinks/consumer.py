@@ -1,0 +1,203 @@
+"""Sinks by name, and what of a run goes to one."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import logging
+from collections.abc import Iterable
+from dataclasses import dataclass
+from importlib.metadata import entry_points
+from typing import Any
+
+from tomoskin.core import Event, SinkError, TomoskinError, install_hint
+from tomoskin.pipeline import FrameResult
+from tomoskin.run.sinks.sink import Item, Moment, Sink, Stream
+from tomoskin.run.sinks.worker import Capacity, Consumer, Say, Worker
+
+GROUP = "tomoskin.sinks"
+"""Entry-point group: each entry is a function ``argument -> Sink`` that does no I/O."""
+
+
+def sink_names() -> tuple[str, ...]:
+    """Names of the installed sinks."""
+    return tuple(sorted(entry_points(group=GROUP).names))
+
+
+def make_sink(spec: str) -> Sink:
+    """Sink of ``name`` or ``name:argument``, not opened: ``lsl``, ``mqtt://host/topic``.
+
+    Raises
+    ------
+    SinkError
+        When there is no sink of that name, its argument is none, or its package is missing.
+    """
+    name, _, argument = spec.partition(":")
+    entries = tuple(entry_points(group=GROUP, name=name))
+    if not entries:
+        raise SinkError(
+            f'there is no sink "{name}"', hint=f"sinks: {', '.join(sink_names()) or 'none'}"
+        )
+    sink: Sink = entries[0].load()(argument)
+    return sink
+
+
+def needed(module: str, extra: str) -> Any:
+    """A module that a sink cannot do without.
+
+    Raises
+    ------
+    SinkError
+        When it is not installed, or cannot be loaded; names the extra that brings it.
+    """
+    try:
+        return importlib.import_module(module)
+    except (ImportError, OSError, RuntimeError) as error:
+        raise SinkError(
+            f"needs the package {module.partition('.')[0]}: {error}",
+            where=f"sink {extra}",
+            hint=install_hint(extra),
+        ) from error
+
+
+def port_of(text: str, where: str) -> int:
+    """A port number; SinkError where ``text`` is none."""
+    if text.isascii() and text.isdigit() and 0 < int(text) < 65536:
+        return int(text)
+    raise SinkError(f'expected a port from 1 to 65535, got "{text}"', where=where)
+
+
+def options_of(words: Iterable[str], known: tuple[str, ...], where: str) -> dict[str, str]:
+    """``a=1`` and ``b=2`` by name; SinkError for what is not known."""
+    options = {}
+    for word in words:
+        key, _, value = word.partition("=")
+        if key not in known or not value:
+            form = ", ".join(f"{name}=…" for name in known)
+            raise SinkError(f'expected {form}, got "{word}"', where=where)
+        options[key] = value
+    return options
+
+
+MOST_WAITING = 256
+"""Results and events that may wait for one sink; the oldest make room, and are counted."""
+
+IMAGE_PERIOD = 0.1
+"""Seconds between two images, by host time."""
+
+GRACE = 2.0
+"""Seconds in which a sink must send what waits when it is stopped."""
+
+_FIRST_DELAY, _LONGEST_DELAY = 0.5, 10.0
+_LONG = 2.0
+"""Seconds in one call after which a sink is said not to answer."""
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class SinkReport:
+    """How a sink is doing: ``well`` or not, in words, and what it sent and what was left out."""
+
+    name: str
+    well: bool
+    text: str
+    sent: int
+    left_out: int
+
+
+class SinkConsumer(Consumer):
+    """Gives a sink results and events; opens it again whenever it has failed.
+
+    Of results that wait only the newest keeps its image, ten a second at most. Those that came
+    while the sink was away are no news any more; events are.
+
+    Attributes
+    ----------
+    trouble
+        Why nothing is sent, or "".
+    """
+
+    kind = "sink"
+    slow, ready = "is too slow, and results are left out", "takes results"
+
+    def __init__(self, sink: Sink, stream: Stream, say: Say) -> None:
+        self.name = sink.name
+        self.trouble = "connecting"
+        self._sink, self._stream, self._say = sink, stream, say
+        self._newest: FrameResult | None = None
+        self._last_image = float("-inf")
+        self._delay = _FIRST_DELAY
+
+    def admit(self, message: Any) -> FrameResult | Event | None:
+        """Results and events, and nothing else of a run."""
+        if isinstance(message, FrameResult):
+            self._newest = message
+            return message
+        return message if isinstance(message, Event) else None
+
+    def durable(self, item: FrameResult | Event) -> bool:
+        """Events are news however late."""
+        return isinstance(item, Event)
+
+    def open(self) -> None:
+        """Open the sink."""
+        self._sink.open(self._stream)
+        self.trouble = ""
+
+    def take(self, item: FrameResult | Event) -> None:
+        """Send it."""
+        self._sink.publish(self._item(item))
+        self._delay = _FIRST_DELAY
+
+    def close(self) -> None:
+        """Close the sink, which may be what has failed."""
+        with contextlib.suppress(Exception):
+            self._sink.close()
+
+    def handle_failure(self, error: Exception) -> float:
+        """Say so once; it is opened again after a pause that doubles."""
+        before, self.trouble = self.trouble, f"is not reachable: {_why(error)}"
+        if self.trouble != before:
+            text = f"{self.name} {self.trouble}"
+            _log.warning("%s", text)
+            self._say("sink-away", text)
+        delay = self._delay
+        self._delay = min(2 * delay, _LONGEST_DELAY)
+        return delay
+
+    def _item(self, item: FrameResult | Event) -> Item:
+        if isinstance(item, Event):
+            return item
+        due = item is self._newest and not 0 <= item.host_time - self._last_image < IMAGE_PERIOD
+        due = due and item.ready and item.has_image
+        if due:
+            self._last_image = item.host_time
+        return Moment.of(item, with_image=due)
+
+
+def sink_worker(sink: Sink, stream: Stream, say: Say) -> Worker[SinkConsumer]:
+    """A worker before ``sink``, not started."""
+    consumer = SinkConsumer(sink, stream, say)
+    return Worker(consumer, Capacity(MOST_WAITING, "newest", GRACE), say)
+
+
+def sink_report(worker: Worker[SinkConsumer]) -> SinkReport:
+    """How a sink is doing now."""
+    consumer = worker.consumer
+    text = consumer.trouble or f"{worker.taken} sent"
+    if (silent := worker.silent) > _LONG:
+        text = f"has not answered for {silent:.0f} s, {text}"
+    if worker.left_out:
+        text += f", {worker.left_out} left out"
+    well = not consumer.trouble and silent <= _LONG
+    return SinkReport(consumer.name, well, text, worker.taken, worker.left_out)
+
+
+def _why(error: Exception) -> str:
+    """In words; the sink's name stands before them already."""
+    if isinstance(error, TomoskinError):
+        return f"{error.message} ({error.hint})" if error.hint else error.message
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror
+    return f"{type(error).__name__}: {error}"

@@ -1,0 +1,134 @@
+"""The sink ``foxglove``: a live server for Foxglove, in the schemas of our own session files."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from tomoskin.core import Event, SinkError, encode_json
+from tomoskin.files.session import (
+    grid_message,
+    log_message,
+    scene_message,
+    schema_of,
+    touches_message,
+)
+from tomoskin.run.sinks.consumer import needed, port_of
+from tomoskin.run.sinks.sink import Item, Moment, Stream, TouchPace
+
+DEFAULT_PORT = 8766
+"""Foxglove's own default is the port of our page."""
+
+_TOPICS = ("/touches", "/scene", "/image", "/events")
+
+
+@dataclass
+class _Server:
+    """A server, the context of its channels, and how many sinks use it."""
+
+    context: Any
+    server: Any
+    users: int = 1
+
+
+_robots: dict[tuple[str, int], _Server] = {}
+_robots_lock = threading.Lock()
+"""Foxglove shows one connection at a time: all skins of a robot are behind one port."""
+
+
+class FoxgloveSink:
+    """Serves ``ws://host:port`` by Foxglove's SDK; what nobody has subscribed to is not made."""
+
+    def __init__(self, host: str, port: int) -> None:
+        self.name = f"foxglove at ws://{host}:{port}"
+        self._address = host, port
+        self._sdk = needed("foxglove", "foxglove")
+        self._server: _Server | None = None
+        self._channels: dict[str, Any] = {}
+
+    def open(self, stream: Stream) -> None:
+        """Begin to serve."""
+        sdk, prefix = self._sdk, "" if stream.place is None else f"/{stream.place.name}"
+        self._stream, self._pace = stream, TouchPace()
+        self._server = self._joined(stream)
+        for topic in _TOPICS:
+            found = schema_of(topic)
+            schema = sdk.Schema(name=found.name, encoding=found.encoding, data=found.data)
+            self._channels[topic] = sdk.Channel(
+                prefix + topic,
+                schema=schema,
+                message_encoding="json",
+                context=self._server.context,
+            )
+
+    def publish(self, item: Item) -> None:
+        """Send the messages of ``item``."""
+        now = self._stream.log_time(item.host_time)
+        for event in (item,) if isinstance(item, Event) else item.messages:
+            self._send("/events", log_message(event, now), now)
+        if isinstance(item, Event):
+            return
+        if self._pace.is_due(item):
+            content = touches_message(item.host_time, item.sequence, item.touches)
+            self._send("/touches", content, now)
+        self._show(item, now)
+
+    def _show(self, item: Moment, now: int) -> None:
+        pixels = self._stream.pixels
+        if item.image is None:
+            return
+        self._send("/scene", scene_message(item.touches, now, self._stream.surface), now)
+        if pixels is not None and self._channels["/image"].has_sinks():
+            self._send("/image", grid_message(item.image, pixels, item.host_time, now), now)
+
+    def close(self) -> None:
+        """Serve no longer."""
+        server, self._server = self._server, None
+        for channel in self._channels.values():
+            channel.close()
+        self._channels = {}
+        if server is None:
+            return
+        with _robots_lock:
+            server.users -= 1
+            if server.users:
+                return
+            if _robots.get(self._address) is server:
+                del _robots[self._address]
+        server.server.stop()
+
+    def _joined(self, stream: Stream) -> _Server:
+        """The server of the robot, or one of its own."""
+        if stream.place is None:
+            return self._begun(f"tomoskin, {stream.source}")
+        with _robots_lock:
+            server = _robots.get(self._address)
+            if server is None:
+                server = _robots[self._address] = self._begun("tomoskin, a robot's skins")
+            else:
+                server.users += 1
+        return server
+
+    def _begun(self, name: str) -> _Server:
+        host, port = self._address
+        # the SDK lets go of the channels too with the last reference to their context
+        context = self._sdk.Context()
+        try:
+            server = self._sdk.start_server(name=name, context=context, host=host, port=port)
+        except RuntimeError as error:
+            raise SinkError(str(error), where=self.name, hint="choose another port") from error
+        return _Server(context, server)
+
+    def _send(self, topic: str, content: Mapping[str, Any], now: int) -> None:
+        channel = self._channels[topic]
+        if channel.has_sinks():
+            channel.log(encode_json(content), log_time=now)
+
+
+def open_foxglove(argument: str) -> FoxgloveSink:
+    """``foxglove``, ``foxglove:8766``, ``foxglove:ADDRESS:8766``."""
+    host, _, port = argument.rpartition(":")
+    number = port_of(port, "sink foxglove") if port else DEFAULT_PORT
+    return FoxgloveSink(host or "127.0.0.1", number)

@@ -1,0 +1,115 @@
+"""The sink ``lsl``: outlets of the lab streaming layer."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from tomoskin.core import Event, FloatArray, SinkError, clock_ahead, encode_json
+from tomoskin.model.pattern import Pattern
+from tomoskin.run.sinks.consumer import needed
+from tomoskin.run.sinks.sink import Item, Moment, Stream, TouchPace
+
+MOST_TOUCHES = 5
+"""Touches that a sample has room for, the strongest first."""
+
+_FIELDS = (("id", ""), ("x", "m"), ("y", "m"), ("peak", "image"))
+_IRREGULAR = 0.0
+
+
+class LslSink:
+    """Streams ``NAME-voltages``, ``-dv``, ``-touches`` and ``-events``, on LSL's own clock."""
+
+    def __init__(self, prefix: str) -> None:
+        self.name = f"lsl {prefix}"
+        self._root = prefix
+        self._lsl = needed("pylsl", "lsl")
+        self._outlets: dict[str, Any] = {}
+
+    def open(self, stream: Stream) -> None:
+        """Announce the streams."""
+        place = stream.place
+        self._prefix = self._root if place is None else f"{self._root}-{place.name}"
+        # both are the machine's monotonic clock, but LSL may count from elsewhere
+        self._offset = clock_ahead(self._lsl.local_clock)
+        self._pace = TouchPace()
+        rows = [(label, "V") for label in _row_labels(stream.pattern)]
+        touches = [
+            (f"{name} {number}", unit)
+            for number in range(1, MOST_TOUCHES + 1)
+            for name, unit in _FIELDS
+        ]
+        touches += [(f"force {number}", "N") for number in range(1, MOST_TOUCHES + 1)]
+        double, string = self._lsl.cf_double64, self._lsl.cf_string
+        self._announce(stream, "voltages", "EIT", rows, double)
+        self._announce(stream, "dv", "EIT", rows, double)
+        self._announce(stream, "touches", "Touch", touches, double)
+        self._announce(stream, "events", "Markers", [("event", "")], string)
+
+    def publish(self, item: Item) -> None:
+        """Push the samples of ``item``."""
+        for event in (item,) if isinstance(item, Event) else item.messages:
+            text = encode_json({"kind": event.kind, "text": event.text}).decode()
+            self._push("events", [text], item)
+        if isinstance(item, Event):
+            return
+        self._push("voltages", item.voltages, item)
+        if item.ready:
+            self._push("dv", item.voltages - item.reference, item)
+        if self._pace.is_due(item):
+            self._push("touches", _touch_row(item), item)
+
+    def close(self) -> None:
+        """Withdraw the streams."""
+        self._outlets = {}
+
+    def _push(self, name: str, sample: FloatArray | list[str], item: Item) -> None:
+        self._outlets[name].push_sample(sample, item.host_time + self._offset)
+
+    def _announce(
+        self,
+        stream: Stream,
+        name: str,
+        kind: str,
+        channels: Sequence[tuple[str, str]],
+        number_format: int,
+    ) -> None:
+        full = f"{self._prefix}-{name}"
+        # one identity for a stream of a skin: receivers find it again after a restart
+        identity = f"{full}-{stream.skin}"
+        info = self._lsl.StreamInfo(full, kind, len(channels), _IRREGULAR, number_format, identity)
+        described = info.desc().append_child("channels")
+        for label, unit in channels:
+            channel = described.append_child("channel")
+            channel.append_child_value("label", label)
+            channel.append_child_value("unit", unit)
+        info.desc().append_child_value("skin", stream.skin)
+        self._outlets[name] = self._lsl.StreamOutlet(info)
+
+
+def open_lsl(argument: str) -> LslSink:
+    """``lsl``, or ``lsl:NAME`` for streams called ``NAME-voltages`` and so on."""
+    if any(not (c.isalnum() or c in "-_.") for c in argument):
+        raise SinkError(
+            f'expected a name of letters and digits, got "{argument}"', where="sink lsl"
+        )
+    return LslSink(argument or "tomoskin")
+
+
+def _row_labels(pattern: Pattern) -> list[str]:
+    """``E2-E1 E4-E5``: source and sink, plus and minus."""
+    tables = np.hstack((pattern.drive, pattern.measure)) + 1
+    return [f"E{a}-E{b} E{c}-E{d}" for a, b, c, d in tables.tolist()]
+
+
+def _touch_row(moment: Moment) -> FloatArray:
+    strongest = sorted(moment.touches, key=lambda t: -abs(t.detection.peak))[:MOST_TOUCHES]
+    row = np.full((MOST_TOUCHES, len(_FIELDS)), np.nan)
+    forces = np.full(MOST_TOUCHES, np.nan)
+    for number, touch in enumerate(strongest):
+        detection = touch.detection
+        row[number] = touch.id, detection.x, detection.y, detection.peak
+        forces[number] = np.nan if detection.force is None else detection.force.newtons
+    return np.concatenate((row.ravel(), forces))

@@ -1,0 +1,142 @@
+"""The sink ``ros2``: a DDS participant that ROS 2 nodes hear, with no ROS 2 on this machine."""
+
+from __future__ import annotations
+
+import functools
+import os
+from collections.abc import Mapping
+from typing import Any
+
+from tomoskin.core import SinkError
+from tomoskin.run.sinks.cdr import encode_cdr
+from tomoskin.run.sinks.consumer import needed, options_of
+from tomoskin.run.sinks.naming import NAMES, Naming
+from tomoskin.run.sinks.ros import KEPT, TOPICS, RosView
+from tomoskin.run.sinks.ros_types import TYPES, Field, dds_name, type_hash
+from tomoskin.run.sinks.sink import Item, Stream
+
+_WHERE = "sink ros2"
+_DEPTH = 10
+"""Messages that a publisher keeps for slow subscribers, as ROS 2's own do."""
+
+_BLOCKING = 100_000_000
+"""Ns that a write may wait for a slow subscriber."""
+
+_MOST_DOMAINS = 232
+
+
+class Ros2Sink:
+    """Publishes messages of :data:`~tomoskin.run.sinks.ros.TOPICS` by CycloneDDS.
+
+    Topics, types and their hashes are as ROS 2 has them, in user data as its own middlewares put
+    them there.
+
+    Parameters
+    ----------
+    domain
+        ROS domain, 0 to 232.
+    naming
+        Of topics and frame.
+    """
+
+    def __init__(self, domain: int, naming: Naming) -> None:
+        self.name = f"ros2 /{naming.namespace}, domain {domain}"
+        self._domain, self._naming = domain, naming
+        self._dds = {
+            name: needed(f"cyclonedds.{name}", "ros2")
+            for name in ("core", "domain", "pub", "topic", "idl")
+        }
+        self._writers: dict[str, Any] = {}
+
+    def open(self, stream: Stream) -> None:
+        """Join the domain; SinkError when there is no network for it."""
+        core = self._dds["core"]
+        try:
+            participant = self._dds["domain"].DomainParticipant(
+                self._domain, qos=core.Qos(core.Policy.Userdata(b"enclave=/;"))
+            )
+            naming = self._naming.of_skin(stream)
+            self._writers = {topic: self._writer(participant, naming, topic) for topic in TOPICS}
+        except core.DDSException as error:
+            raise SinkError(
+                f"cannot join domain {self._domain}: {error}",
+                where=self.name,
+                hint="set CYCLONEDDS_URI to choose the network interface",
+            ) from error
+        self._view = RosView(stream, naming)
+
+    def publish(self, item: Item) -> None:
+        """Write the messages of ``item``; the source time is that of the measurement."""
+        for message in self._view.of(item):
+            writer = self._writers[message.topic]
+            if message.topic not in KEPT and not writer.get_matched_subscriptions():
+                continue  # bytes are the dear part, and nobody listens
+            data = encode_cdr(TOPICS[message.topic], message.value)
+            writer.write(_encoded(writer.data_type)(data), message.stamp)
+
+    def close(self) -> None:
+        """Leave: with the last reference to a writer its participant goes too."""
+        self._writers = {}
+
+    def _writer(self, participant: Any, naming: Naming, topic: str) -> Any:
+        core, kind = self._dds["core"], TOPICS[topic]
+        policy = core.Policy
+        kept = topic in KEPT
+        qos = core.Qos(
+            policy.Reliability.Reliable(_BLOCKING),
+            policy.History.KeepLast(1 if kept else _DEPTH),
+            policy.Durability.TransientLocal if kept else policy.Durability.Volatile,
+            policy.DataRepresentation(use_cdrv0_representation=True),
+            policy.Userdata(f"typehash={type_hash(kind)};".encode()),
+        )
+        name = f"rt/{naming.topic(topic)}"
+        return self._dds["pub"].DataWriter(
+            participant, self._dds["topic"].Topic(participant, name, struct_of(kind)), qos=qos
+        )
+
+
+def open_ros2(argument: str) -> Ros2Sink:
+    """``ros2``, ``ros2:domain=N,namespace=NAME,frame=NAME,parent=NAME,at=X/Y/Z``; SinkError.
+
+    Without ``domain`` it is the environment's ROS_DOMAIN_ID, as for ROS 2 itself.
+    """
+    options = options_of(filter(None, argument.split(",")), ("domain", *NAMES), _WHERE)
+    text = options.get("domain", os.environ.get("ROS_DOMAIN_ID") or "0")
+    if not (text.isascii() and text.isdigit() and int(text) <= _MOST_DOMAINS):
+        raise SinkError(f'expected a domain from 0 to {_MOST_DOMAINS}, got "{text}"', where=_WHERE)
+    return Ros2Sink(int(text), Naming.of(options, _WHERE))
+
+
+@functools.cache
+def struct_of(kind: str) -> Any:
+    """CycloneDDS' class of a message by its name (:data:`~tomoskin.run.sinks.ros_types.TYPES`)."""
+    idl = needed("cyclonedds.idl", "ros2")
+    fields = {name: _type_of(Field.of(text)) for name, text in TYPES[kind].items()}
+    name = dds_name(kind)
+    return idl.make_idl_struct(name.rpartition(":")[2], name.replace("::", "."), fields)
+
+
+def _type_of(field: Field) -> Any:
+    types = needed("cyclonedds.idl.types", "ros2")
+    plain: Mapping[str, Any] = {"string": str, "bool": bool}
+    if field.kind in TYPES:
+        kind = struct_of(field.kind)
+    else:
+        kind = plain.get(field.kind) or getattr(types, field.kind)
+    if field.length is None:
+        return kind
+    return types.array[kind, field.length] if field.length else types.sequence[kind]
+
+
+@functools.cache
+def _encoded(struct: Any) -> Any:
+    """A message that has been encoded already: CycloneDDS asks a sample for its bytes."""
+
+    class Encoded(struct):  # type: ignore[misc]
+        def __init__(self, encoded: bytes) -> None:
+            self.encoded = encoded
+
+        def serialize(self, **_: Any) -> bytes:
+            return self.encoded
+
+    return Encoded

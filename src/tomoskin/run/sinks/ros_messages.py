@@ -1,0 +1,198 @@
+"""What a frame says, as the fields of ROS 2 messages."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from tomoskin.core import FloatArray, Image, PixelMap
+from tomoskin.files.session import touch_colour, touch_width
+from tomoskin.model.robot import Place
+from tomoskin.run.sinks.contact import Contact, Contacts
+from tomoskin.run.sinks.space import UNKNOWN
+
+Value = dict[str, Any]
+
+_SPHERE, _TEXT, _DELETE_ALL = 2, 9, 3
+_LABEL = 8e-3
+"""Height of a touch's number, m."""
+_GREY = {"r": 0.5, "g": 0.5, "b": 0.5, "a": 1.0}
+_OK, _WARN, _ERROR = 0, 1, 2
+_FLOAT32 = 7
+
+
+def header(stamp: int, frame: str) -> Value:
+    """``std_msgs/Header`` of ``stamp`` ns since 1970."""
+    sec, nanosec = divmod(stamp, 1_000_000_000)
+    return {"stamp": {"sec": sec, "nanosec": nanosec}, "frame_id": frame}
+
+
+def pose(contact: Contact) -> Value:
+    """``geometry_msgs/PoseWithCovariance``: on the surface, z along the normal."""
+    covariance = contact.pose.covariance(contact.touch.detection)
+    return {"pose": _pose(contact), "covariance": covariance.ravel()}
+
+
+def track(head: Value, contact: Contact) -> Value:
+    """``nav_msgs/Odometry``: a pose with the touch's identity; velocities are not measured."""
+    name = _name(head, contact)
+    return {"header": head, "child_frame_id": name, "pose": pose(contact), "twist": _AT_REST}
+
+
+def contacts(head: Value, found: Contacts) -> Value:
+    """``tactile_msgs/TactileContacts``; the wrench is NaN where force is not measured."""
+    return {
+        "contacts": [
+            {
+                "header": head,
+                "name": _name(head, contact),
+                "position": _named("xyz", contact.position),
+                "normal": _named("xyz", contact.normal),
+                "wrench": _wrench(_force(contact), np.zeros(3)),
+            }
+            for contact in found.touches
+        ]
+    }
+
+
+def wrench(head: Value, found: Contacts) -> Value:
+    """``geometry_msgs/WrenchStamped``: of all touches, about the frame's origin."""
+    force, torque = np.zeros(3), np.zeros(3)
+    for contact in found.touches:
+        force += _force(contact)
+        torque += np.cross(contact.position, _force(contact))
+    return {"header": head, "wrench": _wrench(force, torque)}
+
+
+def markers(head: Value, found: Contacts) -> Value:
+    """``visualization_msgs/MarkerArray`` that shows these touches, and no others."""
+    shown = [_NO_MARKER | {"header": head, "action": _DELETE_ALL}]
+    for contact in found.touches:
+        width, place = touch_width(contact.touch), _pose(contact)
+        about = {"header": head, "id": contact.touch.id, "pose": place}
+        sphere = {"ns": "touch", "type": _SPHERE, "color": touch_colour(contact.touch)}
+        scale = _named("xyz", (width, width, 0.2 * width))
+        shown.append(_NO_MARKER | about | sphere | {"scale": scale})
+        label = {"ns": "label", "type": _TEXT, "color": _GREY, "text": str(contact.touch.id)}
+        shown.append(_NO_MARKER | about | label | {"scale": _named("xyz", (0.0, 0.0, _LABEL))})
+    return {"markers": shown}
+
+
+def diagnostics(head: Value, found: Contacts, name: str) -> Value:
+    """``diagnostic_msgs/DiagnosticArray``: error where touches are not valid."""
+    level = _ERROR if not found.valid else _WARN if found.problem else _OK
+    values = {
+        "sequence": found.sequence,
+        "latency_s": found.latency,
+        "touches": len(found.touches),
+        "valid": found.valid,
+    }
+    status = {
+        "level": level,
+        "name": f"{name}: skin",
+        "message": found.problem or "OK",
+        "hardware_id": found.skin,
+        "values": [{"key": key, "value": str(value)} for key, value in values.items()],
+    }
+    return {"header": head, "status": [status]}
+
+
+def transform(stamp: int, frame: str, mount: Place) -> Value:
+    """``tf2_msgs/TFMessage``: where the skin is on the robot."""
+    place = {
+        "translation": _named("xyz", mount.pose.position.tolist()),
+        "rotation": _named("xyzw", mount.pose.quaternion()),
+    }
+    head = header(stamp, mount.link)
+    return {"transforms": [{"header": head, "child_frame_id": frame, "transform": place}]}
+
+
+def image(head: Value, change: Image, pixels: PixelMap) -> Value:
+    """``sensor_msgs/Image``: 32-bit floats, the top row first, NaN outside the sheet."""
+    values = change.on_pixels(pixels).astype("<f4")
+    height, width = values.shape
+    return {
+        "header": head,
+        "height": height,
+        "width": width,
+        "encoding": "32FC1",
+        "is_bigendian": 0,
+        "step": 4 * width,
+        "data": values.tobytes(),
+    }
+
+
+def points(head: Value, change: Image, places: FloatArray) -> Value:
+    """``sensor_msgs/PointCloud2``: the change at the middle of each cell, in space."""
+    data = np.column_stack([places, change.values]).astype("<f4")
+    names = ("x", "y", "z", "change")
+    return {
+        "header": head,
+        "height": 1,
+        "width": len(data),
+        "fields": [
+            {"name": name, "offset": 4 * number, "datatype": _FLOAT32, "count": 1}
+            for number, name in enumerate(names)
+        ],
+        "is_bigendian": False,
+        "point_step": 4 * len(names),
+        "row_step": data.nbytes,
+        "data": data.tobytes(),
+        "is_dense": True,
+    }
+
+
+def _pose(contact: Contact) -> Value:
+    return {
+        "position": _named("xyz", contact.position),
+        "orientation": _named("xyzw", contact.pose.quaternion()),
+    }
+
+
+def _name(head: Value, contact: Contact) -> str:
+    return f"{head['frame_id']}/touch_{contact.touch.id}"
+
+
+def _force(contact: Contact) -> FloatArray:
+    """(3,) N, into the body; NaN where it is not measured."""
+    strength = np.nan if contact.force is None else contact.force
+    return -strength * np.array(contact.normal)
+
+
+def _wrench(force: FloatArray, torque: FloatArray) -> Value:
+    return {"force": _named("xyz", force.tolist()), "torque": _named("xyz", torque.tolist())}
+
+
+def _named(names: str, values: Sequence[float]) -> Value:
+    return dict(zip(names, values, strict=True))
+
+
+_ZERO = _named("xyz", (0.0, 0.0, 0.0))
+_AT_REST = {
+    "twist": {"linear": _ZERO, "angular": _ZERO},
+    "covariance": (UNKNOWN * np.eye(6)).ravel(),
+}
+_NO_TIME = {"sec": 0, "nanosec": 0}
+_NO_MARKER: Value = {
+    "ns": "",
+    "id": 0,
+    "type": 0,
+    "action": 0,
+    "pose": {"position": _ZERO, "orientation": _named("xyzw", (0.0, 0.0, 0.0, 1.0))},
+    "scale": _ZERO,
+    "color": _GREY,
+    "lifetime": _NO_TIME,
+    "frame_locked": True,
+    "points": (),
+    "colors": (),
+    "texture_resource": "",
+    "texture": {"header": header(0, ""), "format": "", "data": b""},
+    "uv_coordinates": (),
+    "text": "",
+    "mesh_resource": "",
+    "mesh_file": {"filename": "", "data": b""},
+    "mesh_use_embedded_materials": False,
+}
+"""A marker without a header, and nothing in it."""

@@ -1,0 +1,1 @@
+"""From counts to touches with an identity: signal, fit, segment, track."""

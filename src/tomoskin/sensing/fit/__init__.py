@@ -1,0 +1,47 @@
+"""Touches fitted to voltages by their parameters, with the exact forward model."""
+
+from tomoskin.sensing.fit.bound import (
+    detection_bound,
+    fisher_information,
+    least_content,
+    position_bound,
+)
+from tomoskin.sensing.fit.bounds import (
+    Demand,
+    ResolutionBounds,
+    Variant,
+    resolution_bounds,
+    variants,
+)
+from tomoskin.sensing.fit.covariance import idle_covariance
+from tomoskin.sensing.fit.finder import SpotFinder, SpotModel
+from tomoskin.sensing.fit.noise import Whitener, measured_covariance, row_covariance
+from tomoskin.sensing.fit.pace import EXHAUSTIVE, LIVE, Pace
+from tomoskin.sensing.fit.prior import SpotPrior
+from tomoskin.sensing.fit.spot import Response, Spots, depth_of, spots_of
+
+__all__ = [
+    "EXHAUSTIVE",
+    "LIVE",
+    "Demand",
+    "Pace",
+    "ResolutionBounds",
+    "Response",
+    "SpotFinder",
+    "SpotModel",
+    "SpotPrior",
+    "Spots",
+    "Variant",
+    "Whitener",
+    "depth_of",
+    "detection_bound",
+    "fisher_information",
+    "idle_covariance",
+    "least_content",
+    "measured_covariance",
+    "position_bound",
+    "resolution_bounds",
+    "row_covariance",
+    "spots_of",
+    "variants",
+]

@@ -1,0 +1,113 @@
+"""What is held to be likely of a touch before the data speak."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from tomoskin.core import FloatArray
+from tomoskin.model.mesh import Mesh
+from tomoskin.sensing.fit.expectation import Expectation, Known
+from tomoskin.sensing.fit.spot import CONTENT, FILLING, LOG_RADIUS
+
+_RADIUS = 0.11
+"""Median radius, in parts of the breadth of a square as large as the sheet."""
+
+_SPREAD = 0.45
+"""Standard deviation of the radius's logarithm: a factor of 1.6 either way."""
+
+_DEPTH = 0.5
+"""Standard deviation of log(σ/σ₀) at the centre of a spot of median radius, about none."""
+
+_MOST_DEPTH = 3.0
+"""A spot that is deeper (a conductivity of 5 %) differs from this one by less than its noise."""
+
+
+@dataclass(frozen=True)
+class SpotPrior:
+    """Each spot alone: its position even over the sheet, radius log-normal, content normal.
+
+    Attributes
+    ----------
+    area
+        Of the sheet, m².
+    radius
+        Median, m.
+    spread
+        Standard deviation of the radius's logarithm.
+    content
+        Standard deviation of the content about none, m².
+    """
+
+    area: float
+    radius: float
+    spread: float
+    content: float
+
+    @classmethod
+    def of(cls, mesh: Mesh) -> Self:
+        """For the fingers of somebody who made a sheet of this size."""
+        area = float(mesh.volumes.sum())
+        radius = _RADIUS * math.sqrt(area)
+        return cls(area, radius, _SPREAD, _DEPTH * FILLING * radius**2)
+
+    def away(self, spots: FloatArray) -> FloatArray:
+        """(k, 4) deviations of spots (k, 4) from the prior's middle; positions have none."""
+        deviations = np.zeros_like(spots)
+        deviations[:, LOG_RADIUS] = (spots[:, LOG_RADIUS] - math.log(self.radius)) / self.spread
+        deviations[:, CONTENT] = spots[:, CONTENT] / self.content
+        return deviations
+
+    @property
+    def middle(self) -> FloatArray:
+        """(4,) of each column; positions have none."""
+        return np.array([0.0, 0.0, math.log(self.radius), 0.0])
+
+    @property
+    def weights(self) -> FloatArray:
+        """(4,) 1/deviation of each column; a position is on the sheet."""
+        wide = 1 / math.sqrt(self.area)
+        return np.array([wide, wide, 1 / self.spread, 1 / self.content])
+
+    def log_most(self, known: Known, expected: Expectation) -> float:
+        """Logarithm of the density of spots at their most likely; newcomers are in no order."""
+        old = [number for number in known if number is not None]
+        new = len(known) - len(old)
+        going_on = len(old) * self.log_content + float(expected.log_volumes[old].sum())
+        return math.lgamma(new + 1) - new * self.log_volume - going_on
+
+    @property
+    def log_content(self) -> float:
+        """What the content has of :attr:`log_volume`."""
+        return math.log(self.content) + math.log(2 * math.pi) / 2
+
+    @property
+    def log_volume(self) -> float:
+        """Logarithm of one over the density of one spot at its most likely."""
+        return math.log(self.area * self.spread * self.content) + math.log(2 * math.pi)
+
+    def held(self, spots: FloatArray, sign: str) -> FloatArray:
+        """``spots`` (k, 4) with radius and content where they may be."""
+        kept = spots.copy()
+        kept[:, LOG_RADIUS] = np.clip(kept[:, LOG_RADIUS], *self.log_radii)
+        low, high = self.depths(sign)
+        filling = FILLING * np.exp(2 * kept[:, LOG_RADIUS])
+        kept[:, CONTENT] = np.clip(kept[:, CONTENT], low * filling, high * filling)
+        return kept
+
+    @property
+    def log_radii(self) -> tuple[float, float]:
+        """Least and largest logarithm of a radius in m."""
+        middle, margin = math.log(self.radius), 2 * self.spread
+        return middle - margin, middle + margin
+
+    @staticmethod
+    def depths(sign: str) -> tuple[float, float]:
+        """Least and largest log(σ/σ₀) at the centre: ``sign`` as in a skin's ``[touch]``."""
+        return (
+            0.0 if sign == "increase" else -_MOST_DEPTH,
+            0.0 if sign == "decrease" else _MOST_DEPTH,
+        )

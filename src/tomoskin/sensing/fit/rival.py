@@ -1,0 +1,110 @@
+"""One touch more than was found: what frames say for it is summed until it is clear.
+
+A frame alone often leaves it open whether two fingers press or three. Each frame is an independent
+test between the two, once it is known where either has the touches (Wald 1945).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from tomoskin.sensing.fit.expectation import Expectation, newcomers
+from tomoskin.sensing.fit.openings import HELD, misshapen
+from tomoskin.sensing.fit.refine import Fit
+from tomoskin.sensing.fit.search import SpotDetections, judged
+from tomoskin.sensing.fit.selection import ForwardSelection
+
+_BORN = -4.0
+"""Logarithm of the odds that one frame must give a rival, beginning apart."""
+
+_DROPPED = -12.0
+"""Logarithm of the odds below which it is given up."""
+
+_ASTRAY = 9.0
+"""Squared deviations from where it is expected, beyond which a touch may have left its place to
+explain another one that has begun."""
+
+GoingOn = Callable[[SpotDetections], Expectation]
+"""What is expected of the touches of one frame in the next."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rival:
+    """Touches that may explain the last frames, one more than were found in them.
+
+    Attributes
+    ----------
+    detected
+        In the newest frame.
+    odds
+        Logarithm of those for them against what was found.
+    """
+
+    detected: SpotDetections
+    odds: float
+
+
+def challenged(
+    selection: ForwardSelection, found: SpotDetections, rival: Rival | None, going_on: GoingOn
+) -> tuple[SpotDetections, Rival | None]:
+    """What explains a frame, if not what was ``found`` in it; and the rival in the next one.
+
+    A rival wins as soon as the frames speak for it, where each of its touches stands out as one
+    that stays does. A wrong profile says the same in every frame, so it is no evidence.
+    """
+    if rival is not None and _is_beside(rival, found.fit):
+        fit, gain = _followed(selection, found.fit, rival, going_on)
+        odds = rival.odds + gain
+    else:
+        proposed, gain = _proposed(selection, found.fit)
+        if proposed is None or gain < _BORN:
+            return found, None
+        fit, odds = proposed, gain - selection.pace.rare
+    if odds < _DROPPED:
+        return found, None
+    fit = replace(fit, known=newcomers(len(fit.spots)))  # of what was found
+    stays = math.hypot(HELD * selection.least, misshapen(found.fit))
+    detected = judged(selection, fit)
+    if odds > 0 and selection.ratios(fit).min() >= stays:
+        return detected, None
+    return found, Rival(detected, odds)
+
+
+def _is_beside(rival: Rival, found: Fit) -> bool:
+    """Whether what was found goes on, so that the rival does too."""
+    return None not in found.known and len(rival.detected.fit.spots) == len(found.spots) + 1
+
+
+def _followed(
+    selection: ForwardSelection, found: Fit, rival: Rival, going_on: GoingOn
+) -> tuple[Fit, float]:
+    """The rival in a further frame, and the logarithm of the odds that this gives."""
+    pace, before = selection.pace, rival.detected.fit
+    problem = replace(selection.problem, expected=going_on(rival.detected))
+    known = tuple(range(len(problem.expected.spots)))
+    fit = problem.refined(before.spots, before.deficit, pace.warm, known)
+    fit = problem.corrected(fit, pace.closing, pace.near, pace.tolerance)
+    return fit, problem.evidence(fit) - selection.problem.evidence(found)
+
+
+def _proposed(selection: ForwardSelection, found: Fit) -> tuple[Fit | None, float]:
+    """The best that has one spot more than was found, and what it is worth."""
+    best, most = None, -math.inf
+    for fit in (selection.proposed(found), _beside_expected(selection, found)):
+        evidence = -math.inf if fit is None else selection.problem.evidence(fit)
+        if evidence > most:
+            best, most = fit, evidence
+    return best, most - selection.problem.evidence(found) if best else most
+
+
+def _beside_expected(selection: ForwardSelection, found: Fit) -> Fit | None:
+    """One spot beside those that are expected, where these may have left their places in vain."""
+    expected = selection.problem.expected
+    if len(found.spots) != len(expected.spots) or expected.away(found.spots, found.known) < _ASTRAY:
+        return None
+    known = tuple(range(len(expected.spots)))
+    return selection.proposed(
+        selection.problem.refined(expected.spots, selection.deficit, 0, known)
+    )

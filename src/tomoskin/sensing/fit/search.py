@@ -1,0 +1,129 @@
+"""The touches of a frame: found, confirmed by the exact model, and how sure each one is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tomoskin.core import FloatArray
+from tomoskin.sensing.fit.refine import Fit
+from tomoskin.sensing.fit.selection import ForwardSelection
+from tomoskin.sensing.fit.spot import CONTENT, LOG_RADIUS, N_PARAMETERS
+
+_DOUBTFUL = 0.8
+"""Part of the ratio at which a touch begins; above it, another touch beside one is possible."""
+
+_UNEVEN = 0.08
+"""Part by which each row answers a touch otherwise than the model's, at the least: a sheet is
+uneven, contacts and gains differ. A standard deviation, chosen on the twin's seeds 1 to 3."""
+
+
+@dataclass(frozen=True, eq=False)
+class SpotDetections:
+    """What explains a frame, and how sure each touch is.
+
+    Attributes
+    ----------
+    fit
+        The most likely spots.
+    ratio
+        (k,) deviations by which each stands out of the noise, the others given.
+    covariance
+        (4k, 4k), noise and a wrong profile together.
+    close
+        (k,) bool: another touch so near cannot be ruled out.
+    """
+
+    fit: Fit
+    ratio: FloatArray
+    covariance: FloatArray
+    close: NDArray[np.bool_]
+
+
+def search(selection: ForwardSelection, before: FloatArray) -> SpotDetections:
+    """Touches of the frame of ``selection``; ``before`` (k, 4) are those of the last one."""
+    answer = selection.problem.solver.searched(selection.question, before)
+    fit = selection.found(before) if answer is None else answer.fit
+    if answer and answer.others:
+        selection.openings.beside.remember(fit, answer.others)
+    if answer and answer.turned_down:
+        selection.turn_down(fit, answer.turned_down)
+    return judged(selection, _confirmed(selection, fit, before))
+
+
+def _confirmed(selection: ForwardSelection, fit: Fit, before: FloatArray) -> Fit:
+    """A fit by the exact model. Where touches begin beside others: with or without these, since
+    a further one may be what the table lacks of those."""
+    pace, problem = selection.pace, selection.problem
+    exact = problem.corrected(fit, pace.closing, pace.near, pace.tolerance)
+    if not pace.closing or len(fit.spots) < 2 or len(fit.spots) <= len(before):
+        return exact
+    fewer = selection.again(before)
+    other = problem.corrected(fewer, pace.closing, pace.near, pace.tolerance)
+    worth = selection.ratios(exact).min() >= selection.openings.threshold(other, 1.0)
+    gain = problem.evidence(exact) - problem.evidence(other)
+    return exact if worth and gain > pace.rare else other
+
+
+def judged(selection: ForwardSelection, fit: Fit) -> SpotDetections:
+    """How sure each touch of a fit is."""
+    if not len(fit.spots):
+        none = np.zeros(0)
+        return SpotDetections(fit, none, np.zeros((0, 0)), none.astype(bool))
+    problem = selection.problem
+    squares, covariance = problem.solver.judged(problem, fit, _UNEVEN)
+    return SpotDetections(fit, np.sqrt(squares), covariance, _close(selection, fit))
+
+
+def _close(selection: ForwardSelection, fit: Fit) -> NDArray[np.bool_]:
+    """Where a candidate within a radius of a spot stands out nearly enough."""
+    ratio, _ = selection.openings.beside.ratios(fit)
+    doubtful = selection.matched.spots[ratio > selection.openings.threshold(fit, _DOUBTFUL), :2]
+    if not len(doubtful):
+        return np.zeros(len(fit.spots), dtype=bool)
+    apart = np.linalg.norm(fit.spots[:, None, :2] - doubtful, axis=2).min(axis=1)
+    return np.asarray(apart < 2 * np.exp(fit.spots[:, LOG_RADIUS]))
+
+
+def joined(detected: SpotDetections) -> SpotDetections:
+    """The same with each two touches as one whose positions are not distinct (2 deviations)."""
+    places = detected.fit.spots[:, :2].tolist()
+    variance = detected.covariance.diagonal().tolist()
+    for i in range(len(places)):
+        for j in range(i + 1, len(places)):
+            x, y = (one - other for one, other in zip(places[i], places[j], strict=True))
+            both = sum(variance[4 * k] + variance[4 * k + 1] for k in (i, j))
+            if x * x + y * y > 8 * both:  # no direction has more than all
+                continue
+            away = np.array([x, y])
+            pick = [4 * i, 4 * i + 1, 4 * j, 4 * j + 1]
+            block = detected.covariance[np.ix_(pick, pick)]
+            turn = np.concatenate([away, -away])
+            if (away @ away) ** 2 < 4 * (turn @ block @ turn):
+                return joined(_merged(detected, i, j))
+    return detected
+
+
+def _merged(detected: SpotDetections, i: int, j: int) -> SpotDetections:
+    """Touches i and j as one, at the middle of their contents."""
+    fit, keep = detected.fit, np.delete(np.arange(len(detected.fit.spots)), j)
+    share = np.abs(fit.spots[[i, j], CONTENT])
+    share = share / share.sum()
+    one = fit.spots[i].copy()
+    one[:2] = share @ fit.spots[[i, j], :2]
+    one[LOG_RADIUS] = share @ fit.spots[[i, j], LOG_RADIUS]
+    one[CONTENT] = fit.spots[[i, j], CONTENT].sum()
+    spots = fit.spots.copy()
+    spots[i] = one
+    mix = np.eye(4 * len(fit.spots))
+    for column, part in ((i, share[0]), (j, share[1])):
+        mix[4 * i : 4 * i + 2, 4 * column : 4 * column + 2] = part * np.eye(2)
+    rows = (4 * keep[:, None] + np.arange(N_PARAMETERS)).ravel()
+    covariance = (mix @ detected.covariance @ mix.T)[np.ix_(rows, rows)]
+    ratio = detected.ratio.copy()
+    ratio[i] = np.hypot(*detected.ratio[[i, j]])
+    close = detected.close.copy()
+    close[i] = True
+    return SpotDetections(replace(fit, spots=spots[keep]), ratio[keep], covariance, close[keep])

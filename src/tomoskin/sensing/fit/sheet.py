@@ -1,0 +1,216 @@
+"""A sheet as its reference tells of it: uneven, and conducting otherwise along than across.
+
+The logarithm of the conductivity is a Gaussian random field. How uneven it is, over which lengths,
+and how well rows follow the model is what makes the reference likeliest (evidence: MacKay 2003,
+chapter 28); the field itself is the most likely one then. Both are found anew about the last sheet
+(Gauss–Newton).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import LinAlgError, cho_factor, cho_solve, cholesky, solve_triangular
+
+from tomoskin.core import FloatArray, finished, reach
+from tomoskin.model.forward import ForwardModel, State
+from tomoskin.model.mesh import Mesh
+from tomoskin.sensing.fit.anisotropy import anisotropy_slopes, directed
+from tomoskin.sensing.fit.channels import channel_errors
+from tomoskin.sensing.fit.random_field import field_modes
+
+_UNEVEN = (0.01, 0.03, 0.06, 0.12, 0.24)
+"""Standard deviations of log σ over a sheet that are compared."""
+
+_LENGTHS = (0.15, 0.3)
+"""Correlation lengths that are compared, in parts of √area."""
+
+_ERRORS = (0.003, 0.01, 0.03, 0.1, 0.3)
+"""Standard deviations of rows about the model, in parts of them, that are compared: meshes,
+positions of electrodes, wires."""
+
+_DIRECTED = 0.2
+"""Standard deviation of the two numbers of an anisotropy."""
+
+_LEAST = 0.03
+"""Size of an anisotropy below which an even sheet counts as isotropic."""
+
+_STEPS = 4
+
+
+@dataclass(frozen=True, eq=False)
+class _Measured:
+    """A reference (n_meas,) V, its standard deviation (n_meas,) V, and (n,) rows that count."""
+
+    values: FloatArray
+    deviation: FloatArray
+    rows: NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class _Linear:
+    """The rows that count, linear about a sheet.
+
+    ``residual`` (n,) V less the model's; ``by_cell`` (n, n_cells) V by log σ; ``along`` (n, 2) V,
+    what one deviation of an anisotropy does; ``common`` (n, n) V², covariance of what the channels
+    and a common factor do, and of the noise; ``size`` (n,) V of the model.
+    """
+
+    residual: FloatArray
+    by_cell: FloatArray
+    along: FloatArray
+    common: FloatArray
+    size: FloatArray
+
+    @classmethod
+    def about(cls, now: State, measured: _Measured) -> Generator[None, None, Self]:
+        """About a sheet, a piece between two yields."""
+        rows = measured.rows
+        size, values = now.voltages[rows], measured.values[rows]
+        factor = float(values @ size) / float(size @ size)
+        yield
+        by_cell = (now.jacobian * now.conductivity)[rows]
+        yield
+        channels = channel_errors(now)[rows]
+        yield
+        noise = np.diag((measured.deviation[rows] / factor) ** 2)
+        return cls(
+            residual=values / factor - size,
+            by_cell=by_cell,
+            along=_DIRECTED * anisotropy_slopes(now)[rows],
+            common=channels @ channels.T + np.outer(size, size) + noise,
+            size=size,
+        )
+
+    def covariance(self, error: float) -> FloatArray:
+        """(n, n) V² where rows are off by ``error``, in parts of them."""
+        return np.asarray(self.common + np.diag((error * self.size) ** 2))
+
+    def explained(
+        self, data: FloatArray, field: FloatArray, error: float
+    ) -> Generator[None, None, tuple[FloatArray, FloatArray]]:
+        """(n_cells,) change of log σ and (2,) anisotropy, in deviations, that explain ``data`` (n,)
+        V best where ``field`` (n_cells, k) is random; a piece between two yields."""
+        yield
+        columns = np.hstack([self.by_cell @ field, self.along])
+        yield
+        solved = cho_solve(cho_factor(self.covariance(error)), columns)
+        normal = columns.T @ solved + np.eye(columns.shape[1])
+        amplitudes = np.asarray(np.linalg.solve(normal, solved.T @ data), np.float64)
+        return np.asarray(field @ amplitudes[:-2]), amplitudes[-2:]
+
+    def whitened(self, columns: FloatArray, error: float) -> tuple[FloatArray, float]:
+        """``columns`` (n, k) V where channels, an anisotropy and an ``error`` of rows are noise of
+        variance one; and half the logarithm of that noise's determinant.
+
+        Raises
+        ------
+        LinAlgError
+            When a row has no noise.
+        """
+        root = cholesky(self.covariance(error) + self.along @ self.along.T, lower=True)
+        white = solve_triangular(root, columns, lower=True, check_finite=False)
+        return white, float(np.log(np.diag(root)).sum())
+
+
+@lru_cache(maxsize=4)
+def fields_of(mesh: Mesh) -> list[FloatArray]:
+    """(n_cells, k) modes of a field of each length: some ten milliseconds of work for a mesh."""
+    breadth = math.sqrt(float(mesh.volumes.sum()))
+    return [field_modes(mesh, part * breadth) for part in _LENGTHS]
+
+
+def fitted_sheet(state: State, reference: FloatArray, deviation: FloatArray | float) -> State:
+    """As :func:`fitting_sheet`, at once."""
+    return finished(fitting_sheet(state, reference, deviation))
+
+
+def fitting_sheet(
+    state: State, reference: FloatArray, deviation: FloatArray | float
+) -> Generator[None, None, State]:
+    """The sheet that explains a ``reference`` (n_meas,) V of this standard deviation, V, best; a
+    piece between each two yields.
+
+    ``state`` itself where nothing speaks against it. Rows that are not finite do not count,
+    and a factor that all voltages have in common means nothing.
+    """
+    finite = np.flatnonzero(np.isfinite(reference))
+    if len(finite) < len(reference) / 2:
+        return state
+    mesh = state.model.mesh
+    fields = fields_of(mesh)
+    measured = _Measured(reference, np.broadcast_to(deviation, reference.shape), finite)
+    uneven, anisotropy, now = np.zeros(len(mesh.cells)), np.zeros(2), state
+    for _ in range(_STEPS):
+        linear = yield from _Linear.about(now, measured)
+        yield
+        data = linear.residual + linear.by_cell @ uneven + linear.along @ anisotropy
+        likeliest = yield from _likeliest(fields, linear, data)
+        uneven, anisotropy = yield from linear.explained(data, *likeliest)
+        yield
+        now = yield from _sheet(state, uneven, _DIRECTED * anisotropy)
+        yield
+    even = not uneven.any() and _DIRECTED * math.hypot(*anisotropy) < _LEAST
+    return state if even else now
+
+
+def _likeliest(
+    fields: Sequence[FloatArray], linear: _Linear, data: FloatArray
+) -> Generator[None, None, tuple[FloatArray, float]]:
+    """(n_cells, k) modes of the random field that makes ``data`` (n,) V likeliest, zero for an even
+    sheet; and how far rows are off."""
+    best = (-math.inf, fields[0][:, :0], 0.0)
+    seen = []
+    for modes in fields:
+        yield
+        seen.append(linear.by_cell @ modes)
+    columns = np.column_stack([*seen, data])
+    ends = np.cumsum([modes.shape[1] for modes in fields])
+    for error in _ERRORS:
+        reach()
+        yield
+        try:
+            white, log_size = linear.whitened(columns, error)
+        except LinAlgError:
+            continue
+        *white_modes, (own,) = (part.T for part in np.split(white, ends, axis=1))
+        for modes, rows in zip(fields, white_modes, strict=True):
+            square = np.vstack([rows, own]) @ np.vstack([rows, own]).T
+            for size in (0.0, *_UNEVEN):
+                log_evidence = _log_evidence(square, size) - log_size
+                if log_evidence > best[0]:
+                    best = log_evidence, size * modes, error
+    return best[1:]
+
+
+def _log_evidence(square: FloatArray, size: float) -> float:
+    """Of white data, where the modes of a field have random amplitudes of that ``size``.
+
+    ``square`` (k + 1, k + 1): products of what the k modes do to the data, and the data. Of a root
+    of these, the modes' diagonal is the determinant's, and what is left of the data the misfit's.
+    """
+    scale = np.append(np.full(len(square) - 1, size), 1.0)
+    noise = np.append(np.ones(len(square) - 1), 0.0)
+    try:
+        root = np.diag(np.linalg.cholesky(square * scale[:, None] * scale + np.diag(noise)))
+    except LinAlgError:
+        return -math.inf
+    return float(-(root[-1] ** 2) / 2 - np.log(root[:-1]).sum())
+
+
+def _sheet(
+    state: State, uneven: FloatArray, anisotropy: FloatArray
+) -> Generator[None, None, State]:
+    """The sheet with that change (n_cells,) of log σ and that anisotropy."""
+    model = state.model
+    mesh = directed(model.mesh, anisotropy)
+    yield
+    own = ForwardModel(mesh, model.pattern, model.contact_impedance, model.current)
+    yield
+    return own.at(state.conductivity * np.exp(uneven))

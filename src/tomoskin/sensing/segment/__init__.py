@@ -1,0 +1,10 @@
+"""Regions of an image."""
+
+from tomoskin.sensing.segment.region import Region
+from tomoskin.sensing.segment.segment import ImageNoise, Segmenter
+
+__all__ = [
+    "ImageNoise",
+    "Region",
+    "Segmenter",
+]

@@ -1,0 +1,236 @@
+"""The reference while time goes by: it follows the untouched skin, and holds under a touch."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from tomoskin.core import FloatArray
+from tomoskin.sensing.signal.health import Mask
+from tomoskin.sensing.signal.idle import Idle
+from tomoskin.sensing.signal.reference import Reference
+
+SLOWEST = 60.0
+"""Time constant with which the baseline follows where no drift has been seen, s."""
+
+_LINGER = 10
+"""Frames after a touch for which the baseline still holds."""
+
+_FADING = 10.0
+"""Seconds after a release in which the residual response fades into the baseline."""
+
+_FADE = 1.0
+"""Time constant of that, s."""
+
+_CUT = 4.0
+"""An innovation counts for at most so many of its deviations (Huber 1964)."""
+
+_DOUBT = 3.0
+"""Deviations of a frame's noise that a held baseline may have drifted before it is called stale."""
+
+_DELAY = 3
+"""Frames after which a frame is learnt: a touch is noticed only when it has stood for some."""
+
+_LONGEST_STEP = 60.0
+_ROUNDING = 1e-9
+
+_TREND = 30.0
+"""Seconds that the skin must have been followed before a trend is estimated."""
+
+
+@dataclass(frozen=True, eq=False)
+class BaselineState:
+    """How the baseline is; what nobody asks for is not computed.
+
+    Attributes
+    ----------
+    start, mean
+        (n_meas,) V, the untouched skin when the reference was taken, and now.
+    deviation
+        (n_meas,) V, of one frame.
+    variance
+        (n_meas,) V² of the mean.
+    n_frames
+        Of that reference.
+    held, followed
+        Seconds for which it has been held under a touch, 0 where it follows; and for which it has
+        followed.
+    """
+
+    start: FloatArray
+    mean: FloatArray
+    deviation: FloatArray
+    variance: FloatArray
+    n_frames: int
+    held: float
+    followed: float
+
+    @cached_property
+    def drift(self) -> float:
+        """By how much it has moved since the reference, as a part of its size (rms of all rows)."""
+        size = _rms(self.start)
+        return _rms(self.mean - self.start) / size if size else 0.0
+
+    @cached_property
+    def noise(self) -> float:
+        """V, rms of the rows."""
+        return _rms(self.deviation)
+
+    @cached_property
+    def doubt(self) -> float:
+        """What a held baseline may be off by, in deviations of one frame's noise; median row.
+
+        As a random walk, and as much as the skin has gone one way until now, which a random walk
+        does not foresee.
+        """
+        if not self.held:
+            return 0.0
+        walked = self.variance / self.deviation**2
+        middle = float(np.median(walked))
+        if self.followed < _TREND:
+            return math.sqrt(middle)
+        moved = np.mean(((self.mean - self.start) / self.deviation) ** 2) - 1.0 / self.n_frames
+        trend = math.sqrt(max(float(moved - walked.mean()), 0.0)) * self.held / self.followed
+        return math.hypot(math.sqrt(middle), trend)
+
+    @property
+    def stale(self) -> str | None:
+        """What someone should see to, or None."""
+        if self.doubt < _DOUBT:
+            return None
+        return (
+            f"a touch has held the reference for {self.held:.0f} s, and it may have drifted by "
+            f"{self.doubt:.0f} times the noise: lift the touch, or take a new reference"
+        )
+
+
+class Baseline:
+    """Scalar Kalman filters of a random walk, one a row (Kalman 1960), fed while nothing touches.
+
+    While a touch stands nothing is learnt, and the variance grows by what the skin drifts as a
+    rule, so that afterwards the baseline comes back the faster the longer it was held.
+
+    Parameters
+    ----------
+    reference
+        Where it begins.
+    follows
+        False: it stays there; noise is estimated all the same.
+
+    Attributes
+    ----------
+    start
+        (n_meas,) V, mean of that reference.
+    mean
+        (n_meas,) V, what the untouched skin reads now.
+    """
+
+    def __init__(self, reference: Reference, *, follows: bool = True) -> None:
+        self.start = reference.mean
+        # frames that are all the same have no noise but for rounding
+        least = _ROUNDING * _rms(reference.mean)
+        self._known = reference.noise_is_known and bool((reference.noise > least).all())
+        noise = reference.noise if self._known else np.full_like(reference.mean, np.nan)
+        self._follows = follows and self._known
+        self.mean = reference.mean
+        self._n_frames = reference.n_frames
+        self.idle = Idle(noise, reference.n_frames, SLOWEST, reference.least)
+        self._least = reference.least
+        self._variance = noise**2 / reference.n_frames
+        self._time: float | None = None
+        self._held = 0.0
+        self._linger = 0
+        self._fading = 0.0
+        self._followed = 0.0
+        self._waiting: deque[tuple[FloatArray, Mask, float, float, bool]] = deque()
+        self._scatter = reference.scatter
+        self._deviations: list[FloatArray] = []
+
+    def push(
+        self, values: FloatArray, lost: Mask, time: float, *, touched: bool, noise: bool = True
+    ) -> bool:
+        """Take a frame, (n_meas,) V at ``time`` s; True where it ended a block of idle frames.
+
+        ``lost`` rows, (n_meas,) bool, say nothing; ``touched``: whether something touches;
+        ``noise``: whether what it shows beside the reference may be learnt as noise.
+        """
+        step = 0.0 if self._time is None else min(max(time - self._time, 0.0), _LONGEST_STEP)
+        self._time = time
+        if not self._known:
+            return False
+        self._variance = self._variance + self.idle.drift * step
+        if touched:
+            self._held += step
+            self._linger, self._fading = _LINGER, _FADING
+            return self._interrupted()
+        if self._linger:
+            self._linger -= 1
+            return self._interrupted()
+        self._held = 0.0
+        self._followed += step
+        self._waiting.append((values, lost, time, step, noise))
+        if len(self._waiting) <= _DELAY:
+            return False
+        return self._learn(*self._waiting.popleft())
+
+    def _learn(self, values: FloatArray, lost: Mask, time: float, step: float, noise: bool) -> bool:
+        deviation = values - self.mean
+        if self._follows:
+            self._follow(values, lost, step)
+        if self._fading > 0:
+            self._fading -= step
+            self.idle.interrupt()
+            return False
+        ended = self.idle.push(values, time, lost)
+        if noise:
+            self._deviations.append(deviation)
+        if ended and self._scatter is not None and self._deviations:
+            self._scatter = self._scatter.after(np.array(self._deviations), lost)
+            self._deviations.clear()
+        return ended
+
+    def _follow(self, values: FloatArray, lost: Mask, step: float) -> None:
+        noise = self.idle.noise**2
+        if self._fading > 0:
+            gain = 1.0 - np.exp(-step / _FADE)
+            self._variance = np.maximum(self._variance, noise * gain / (1.0 - gain + 1e-12))
+        gain = self._variance / (self._variance + noise)
+        gain[lost] = 0.0
+        most = _CUT * np.sqrt(self._variance + noise)
+        self.mean = self.mean + gain * np.clip(values - self.mean, -most, most)
+        self._variance = (1.0 - gain) * self._variance
+
+    def _interrupted(self) -> bool:
+        self._waiting.clear()
+        self._deviations.clear()
+        self.idle.interrupt()
+        return False
+
+    @property
+    def reference(self) -> Reference:
+        """The reference as it is now: the noise is a frame's together with the baseline's own."""
+        if not self._known:
+            return Reference(self.mean, self.idle.noise, self._n_frames, self._least)
+        noise, frames = np.sqrt(self.idle.noise**2 + self._variance), max(self._n_frames, 2)
+        return Reference(self.mean, noise, frames, self._least, self._scatter)
+
+    @property
+    def state(self) -> BaselineState:
+        """How it is now."""
+        return BaselineState(
+            self.start,
+            self.mean,
+            self.idle.noise,
+            self._variance,
+            self._n_frames,
+            self._held,
+            self._followed,
+        )
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2)))

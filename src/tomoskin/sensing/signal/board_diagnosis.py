@@ -1,0 +1,204 @@
+"""From the readings of a board on its ring of resistors to what is wrong with it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from tomoskin.core import DataError, FloatArray, IntArray
+from tomoskin.sensing.signal.board_faults import BoardFault, single_faults
+from tomoskin.sensing.signal.load_ring import LoadRing, potentials
+from tomoskin.sensing.signal.readout import FIGURES
+
+_TOLERANCE = 0.015
+"""RMS deviation over the largest reading that resistors of 1 % and sound channels stay below."""
+
+_FEW = 1.5
+"""The same for small readings, counts."""
+
+_LARGEST = 4.0
+"""Times that RMS: no single reading may be further off."""
+
+_AS_GOOD = 1.3
+"""Faults whose deviation is within this of the best one's cannot be told apart."""
+
+_CURRENT = 0.03
+"""Relative error of the current that board and resistors may have."""
+
+_SCALE = (0.85, 1.15)
+"""Of the current, while a fault is looked for."""
+
+_AFFINE_GAIN = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class CountScale:
+    """code = volts · ``per_volt``, from 0 to ``top``."""
+
+    per_volt: float
+    top: float
+
+    @classmethod
+    def of(cls, gain: float, reference: float, bits: int) -> Self:
+        """Of an amplifier and a converter of ``bits`` with ``reference`` V."""
+        return cls(gain * (1 << bits) / reference, (1 << bits) - 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """What the readings say.
+
+    Attributes
+    ----------
+    scale
+        Current times resistance over its nominal value.
+    sink_ohms
+        Mean resistance from a sink's electrode to ground, Ω: transistor, tracks, joints.
+    deviation, largest
+        RMS and largest of what the best explanation leaves, counts.
+    faults
+        Sentences, of which one holds; empty: the board is sound.
+    """
+
+    scale: float
+    sink_ohms: float
+    deviation: float
+    largest: float
+    faults: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    text: str
+    scale: float
+    sink_drop: float
+    deviation: float
+    largest: float
+
+
+def diagnose(
+    counts: FloatArray, ring: LoadRing, drives: IntArray, current: float, scale: CountScale
+) -> Diagnosis:
+    """Compare readings with a sound board and with each single fault.
+
+    Parameters
+    ----------
+    counts
+        (n_drives, n) mean of a conversion of each channel under each drive.
+    drives
+        (n_drives, 2) source, sink.
+    current
+        A, nominal.
+
+    Raises DataError for another shape.
+    """
+    counts = np.asarray(counts, dtype=float)
+    if counts.shape != (len(drives), len(ring.ohms)):
+        raise DataError(
+            f"expected readings of {len(drives)} drives by {len(ring.ohms)} channels, "
+            f"got {counts.shape}"
+        )
+    volts = potentials(ring, drives, current)
+    nominal = BoardFault("", volts, np.zeros(volts.shape, bool))
+    sound = _fit(counts, nominal, scale, (0.02, 1.4))
+    limit = max(_TOLERANCE * float(volts.max()) * scale.per_volt, _FEW)
+    sink_ohms = FIGURES.switch_resistance + sound.sink_drop / scale.per_volt / current
+    figures = (sound.scale, sink_ohms, sound.deviation, sound.largest)
+    if sound.deviation <= limit * min(sound.scale, 1) and sound.largest <= _LARGEST * limit:
+        off = abs(sound.scale - 1) > _CURRENT
+        said = (_wrong_current(sound.scale, current),) if off else ()
+        return Diagnosis(*figures, said)
+    fits = [_fit(counts, one, scale, _SCALE) for one in single_faults(ring, drives, current)]
+    fits += _amplifiers(counts, nominal, scale)
+    best = min(fits, key=lambda fit: fit.deviation)
+    if best.deviation > 2 * limit:
+        return Diagnosis(*figures, tuple(_unexplained(counts, nominal, sound, scale, drives)))
+    close = [fit for fit in fits if fit.deviation <= _AS_GOOD * best.deviation + _FEW / 4]
+    close.sort(key=lambda fit: fit.deviation)
+    return Diagnosis(*figures[:2], best.deviation, best.largest, tuple(f.text for f in close[:4]))
+
+
+def _fit(
+    counts: FloatArray,
+    fault: BoardFault,
+    scale: CountScale,
+    bounds: tuple[float, float],
+    left_out: int | None = None,
+) -> _Fit:
+    """Least squares of the current's scale and the sinks' drop, on readings within the rails."""
+    ideal = fault.volts * scale.per_volt
+    judged = ~fault.unknown
+    if left_out is not None:
+        judged[:, left_out] = False
+    inside = judged & (ideal < scale.top) & (counts < scale.top) & (counts > 0)
+    times, drop = _line(ideal[inside], counts[inside])
+    times = float(np.clip(times, *bounds))
+    model = np.clip(times * ideal + np.where(ideal > 0, drop, 0.0), 0, scale.top)
+    left = (counts - model)[judged]
+    rms, largest = float(np.sqrt(np.mean(left**2))), float(np.abs(left).max())
+    return _Fit(fault.text, times, drop, rms, largest)
+
+
+def _line(x: FloatArray, y: FloatArray) -> tuple[float, float]:
+    """Slope and intercept of y over x; 1 and 0 where there is nothing to fit."""
+    if len(x) < 3 or np.ptp(x) < 1:
+        return 1.0, 0.0
+    here, there = x - x.mean(), y - y.mean()
+    slope = float(here @ there / (here @ here))
+    return slope, float(y.mean() - slope * x.mean())
+
+
+def _amplifiers(counts: FloatArray, nominal: BoardFault, scale: CountScale) -> Iterator[_Fit]:
+    """Channels of which one reads wrongly, all others rightly."""
+    for e in range(counts.shape[1]):
+        rest = _fit(counts, nominal, scale, _SCALE, left_out=e)
+        ideal = rest.scale * nominal.volts[:, e] * scale.per_volt + rest.sink_drop
+        gain, offset = _line(ideal, counts[:, e])
+        model = np.clip(gain * ideal + offset, 0, scale.top)
+        if np.ptp(counts[:, e]) < 1:
+            gain, model = 0.0, np.full(len(ideal), counts[:, e].mean())
+        left = counts[:, e] - model
+        n = counts.shape[1]
+        rms = float(np.sqrt((rest.deviation**2 * (n - 1) + np.mean(left**2)) / n))
+        largest = max(rest.largest, float(np.abs(left).max()))
+        text = _of_an_amplifier(e, gain, offset, float(counts[:, e].mean()) / scale.top)
+        yield _Fit(text, rest.scale, rest.sink_drop, rms, largest)
+
+
+def _of_an_amplifier(e: int, gain: float, offset: float, level: float) -> str:
+    name, part = f"E{e + 1}", 100 * (e + 1)
+    if abs(gain) < _AFFINE_GAIN:
+        return (
+            f"the reading of {name} stays at {level:.0%} of its range: U{part + 1}, U{part + 2}, "
+            "its header's pin"
+        )
+    if abs(gain - 1) < _AFFINE_GAIN:
+        return f"the reading of {name} is {offset:+.0f} counts off: U{part + 1}, D{part + 2}"
+    return f"the reading of {name} is {gain:.2g} times what it should be: R{part + 8}, U{part + 1}"
+
+
+def _wrong_current(times: float, current: float) -> str:
+    return (
+        f"the current, or all resistors, are {times:.3g} times what they should be "
+        f"({times * current * 1e3:.4g} mA): R23, R24, U21"
+    )
+
+
+def _unexplained(
+    counts: FloatArray, nominal: BoardFault, sound: _Fit, scale: CountScale, drives: IntArray
+) -> Iterator[str]:
+    """The largest deviations, where no single fault explains them."""
+    model = sound.scale * nominal.volts * scale.per_volt + sound.sink_drop
+    model = np.clip(model, 0, scale.top)
+    off = np.abs(counts - model)
+    yield "no single fault explains the readings; the largest deviations follow"
+    for flat in np.argsort(off, axis=None)[::-1][:4]:
+        drive, e = np.unravel_index(flat, off.shape)
+        source, sink = drives[drive]
+        yield (
+            f"E{e + 1}, driven E{source + 1} to E{sink + 1}: {counts[drive, e]:.0f} counts, "
+            f"expected {model[drive, e]:.0f}"
+        )

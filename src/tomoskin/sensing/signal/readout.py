@@ -1,0 +1,167 @@
+"""Raw counts of a frame → volts in the pattern's order; figures of the simulated board."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from functools import cached_property
+from importlib.resources import files
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tomoskin.core import DataError, FloatArray, Frame, Voltages
+from tomoskin.model.pattern import Scan
+from tomoskin.model.skin import ReadoutSettings
+from tomoskin.sensing.signal.own_voltage import OwnVoltage
+
+
+@dataclass(frozen=True, slots=True)
+class BoardFigures:
+    """The board as simulated.
+
+    Attributes
+    ----------
+    noise
+        Standard deviation of one conversion before it is rounded, LSB.
+    input_noise, amplifier_noise
+        The same at the amplifier's input, V; that of amplifier and current alone, V.
+    compliance
+        Most that the current source drives its load with, V.
+    output_resistance, switch_resistance
+        Across the current source; of a switch, the mean of high and low side, Ω.
+    low_rail, high_rail
+        Least and largest output of the amplifier, V.
+    time_constant, settling
+        Of a channel after a switch of the drive; until it is within half an LSB, s.
+    current_error
+        Largest relative error into 0.5 to 20 Ω.
+    peak
+        Largest current into the skin at a switch over the nominal one.
+    """
+
+    noise: float
+    input_noise: float
+    amplifier_noise: float
+    compliance: float
+    output_resistance: float
+    switch_resistance: float
+    low_rail: float
+    high_rail: float
+    time_constant: float
+    settling: float
+    current_error: float
+    peak: float
+
+
+FIGURES = BoardFigures(
+    **tomllib.loads(
+        files("tomoskin.sensing.signal").joinpath("board.toml").read_text(encoding="utf-8")
+    )["board"]
+)
+
+
+CONVERSION_NOISE = FIGURES.noise
+"""Standard deviation of one conversion before it is rounded, in LSB, of the simulated board;
+rounding adds 1/√12 LSB, and a row is the difference of two samples."""
+
+
+@dataclass(frozen=True, eq=False)
+class Readout:
+    """The converter and amplifier chain, inverted.
+
+    Attributes
+    ----------
+    scan
+        Which sample is which electrode under which drive.
+    volts_per_count
+        Skin voltage per count of the summed readings, V.
+    low, high
+        A sample at or beyond these summed counts stood at a rail; of an alternating drive, half of
+        them in either direction.
+    noise
+        Standard deviation of a row that the converter alone causes, V.
+    rounding
+        The part of it that rounding alone causes, V: 1/√12 of a step a reading.
+    """
+
+    scan: Scan
+    volts_per_count: float
+    low: int
+    high: int
+    noise: float
+    rounding: float
+
+    @classmethod
+    def of(cls, scan: Scan, settings: ReadoutSettings) -> Self:
+        """Read-out of a skin; one count of each summed reading is kept as margin at the rails."""
+        levels = 1 << settings.adc_bits
+        n = settings.oversampling
+        volts = settings.reference_voltage / (levels * settings.gain * n)
+        noise, rounding = (
+            volts * float(np.sqrt(2 * n * (sd**2 + 1 / 12))) for sd in (CONVERSION_NOISE, 0.0)
+        )
+        return cls(scan, volts, low=n, high=(levels - 2) * n, noise=noise, rounding=rounding)
+
+    def __call__(self, frame: Frame) -> Voltages:
+        """Voltages of one frame.
+
+        The amplifier's offset is common to both samples of a row and leaves with the difference.
+
+        Raises
+        ------
+        DataError
+            When the frame has another number of samples than the scan.
+        """
+        if len(frame.samples) != self.scan.n_samples:
+            raise DataError(
+                f"expected {self.scan.n_samples} samples, got {len(frame.samples)}",
+                where=f"frame {frame.sequence}",
+            )
+        values, railed = self.rows(frame.samples, frame.sums)
+        return Voltages(
+            values=values,
+            railed=railed,
+            sequence=frame.sequence,
+            ticks=frame.ticks,
+            host_time=frame.host_time,
+            own=None if frame.sums is None else self.own_voltage(frame.sums),
+        )
+
+    @cached_property
+    def own_voltage(self) -> OwnVoltage:
+        """What electrodes show that does not turn with the current."""
+        return OwnVoltage.of(self.scan, self.volts_per_count, self.high)
+
+    def rows(
+        self, samples: NDArray[np.uint16], sums: NDArray[np.uint16] | None = None
+    ) -> tuple[FloatArray, NDArray[np.bool_]]:
+        """(..., n_meas) V, and whether a sample of it stood at a rail, of (..., n_samples) counts.
+
+        With ``sums``, of an alternating drive.
+        """
+        counts = samples.astype(np.float64)
+        plus, minus = self.scan.plus, self.scan.minus
+        at_rail = (
+            self._at_rail(counts, 1)
+            if sums is None
+            else np.any([self._at_rail(part, 2) for part in directions(samples, sums)], axis=0)
+        )
+        volts = (counts.take(plus, -1) - counts.take(minus, -1)) * self.volts_per_count
+        return np.asarray(volts), np.asarray(at_rail.take(plus, -1) | at_rail.take(minus, -1))
+
+    def _at_rail(self, counts: FloatArray, parts: int) -> NDArray[np.bool_]:
+        return np.asarray((parts * counts <= self.low) | (parts * counts >= self.high))
+
+
+def directions(
+    samples: NDArray[np.uint16], sums: NDArray[np.uint16]
+) -> tuple[FloatArray, FloatArray]:
+    """Counts with the current from source to sink, and from sink to source; shapes as given."""
+    difference = samples.astype(np.float64) - _NO_DIFFERENCE
+    return (sums + difference) / 2, (sums - difference) / 2
+
+
+_NO_DIFFERENCE = 0x8000
+"""What stands for no difference between the directions of an alternating drive."""

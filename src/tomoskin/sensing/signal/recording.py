@@ -1,0 +1,179 @@
+"""A recording in memory: frames of voltages with their own table of rows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tomoskin.core import DataError, FloatArray, IntArray, PatternError
+from tomoskin.model.pattern import Pattern, match_rows
+
+_MOST = 1e12
+"""No instrument has a unit in which a voltage is a larger number."""
+
+_MOST_OF_MEDIAN = 1e4
+"""Voltages beyond so many times the largest of the median frame are absurd: 3 in real recordings,
+and an input at its rail is some hundred. Differences have no such scale, as idle ones are zero."""
+
+_MOST_TIME = 1e18
+"""s; what counts nanoseconds since 1970 as seconds is below."""
+
+_LISTED = 5
+"""Frames that a note names."""
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """Frames with the drive and measurement of each row, in the file's own order.
+
+    Attributes
+    ----------
+    voltages
+        (n_frames, n_rows) V or instrument units, real or complex; differences when ``is_change``.
+    drive, measure
+        (n_rows, 2) source, sink; plus, minus.
+    time
+        (n_frames,) s.
+    reference
+        (n_rows,) the file's own reference, or None.
+    labels
+        (n_frames, 2) m, positions of a single touch, or None.
+    is_change
+        True when the file holds differences (``dv``) rather than voltages.
+    source
+        Where it came from, for messages.
+    notes
+        What of the file was omitted, in sentences.
+    idle
+        Frames at the beginning that show the untouched skin; 1 where that is assumed.
+    """
+
+    voltages: NDArray[Any]
+    drive: IntArray
+    measure: IntArray
+    time: FloatArray
+    reference: NDArray[Any] | None
+    labels: FloatArray | None
+    is_change: bool
+    source: str
+    notes: tuple[str, ...] = ()
+    idle: int = 1
+
+    def __post_init__(self) -> None:
+        """Check that the shapes belong together and that there is a frame."""
+        if self.voltages.ndim != 2 or not self.voltages.size:
+            empty = "" if self.voltages.size else ": the recording is empty"
+            raise DataError(
+                f"expected voltages (n_frames, n_rows), got shape {self.voltages.shape}{empty}",
+                where=self.source,
+            )
+        n_frames, n_rows = self.voltages.shape
+        if not 1 <= self.idle <= n_frames:
+            raise DataError(
+                f"expected idle from 1 to {n_frames}, got {self.idle}", where=self.source
+            )
+        _check(self.drive.shape, (n_rows, 2), "drive", self.source)
+        _check(self.measure.shape, (n_rows, 2), "measure", self.source)
+        _check(self.time.shape, (n_frames,), "time_s", self.source)
+        if self.reference is not None:
+            _check(self.reference.shape, (n_rows,), "reference", self.source)
+        if self.labels is not None:
+            _check(self.labels.shape, (n_frames, 2), "xy_m", self.source)
+
+    def __len__(self) -> int:
+        """Number of frames."""
+        return len(self.voltages)
+
+    def part(self, start: int, stop: int) -> Recording:
+        """Frames ``start`` to ``stop`` − 1."""
+        chosen = slice(start, stop)
+        labels = None if self.labels is None else self.labels[chosen]
+        return replace(
+            self,
+            voltages=self.voltages[chosen],
+            time=self.time[chosen],
+            labels=labels,
+            idle=max(1, min(self.idle, stop) - start),
+        )
+
+    def plausible(self) -> Recording:
+        """The recording without absurd values: NaN stands for them, and notes name them."""
+        most = self._most()
+        limits = {"voltages": most, "reference": most, "time": _MOST_TIME}
+        changes: dict[str, Any] = {}
+        notes = []
+        for key, limit in limits.items():
+            values = getattr(self, key)
+            if values is None or not (absurd := _beyond(values, limit)).any():
+                continue
+            changes[key] = np.where(absurd, np.nan, values)
+            notes.append(_absurd(key, absurd, limit))
+        return replace(self, **changes, notes=(*self.notes, *notes)) if changes else self
+
+    def _most(self) -> float:
+        """The largest number that can be a voltage of this recording."""
+        size = np.abs(self.voltages)
+        tops = np.where(size <= _MOST, size, 0.0).max(axis=1)
+        if self.is_change or not tops.any():
+            return _MOST
+        median = float(np.quantile(tops[tops > 0], 0.5, method="lower"))
+        return min(_MOST, _MOST_OF_MEDIAN * median)
+
+    def in_order_of(self, pattern: Pattern) -> Recording:
+        """Return the recording with exactly the pattern's rows, in its order and signs.
+
+        Raises
+        ------
+        DataError
+            When the recording has another number of electrodes.
+        PatternError
+            When rows are missing or impossible; the message lists them.
+        """
+        electrodes = 1 + int(max(self.drive.max(), self.measure.max()))
+        if electrodes > pattern.n_electrodes:
+            raise DataError(
+                f"the recording uses electrodes E1 to E{electrodes}, "
+                f"the skin has {pattern.n_electrodes}",
+                where=self.source,
+                hint="choose the skin that it was recorded with: --skin",
+            )
+        try:
+            match = match_rows(pattern, self.drive, self.measure)
+        except PatternError as error:
+            where = f"{self.source}, {error.where}" if error.where else self.source
+            raise PatternError(error.message, where=where, hint=error.hint) from error
+        return replace(
+            self,
+            voltages=match.apply(self.voltages),
+            drive=pattern.drive,
+            measure=pattern.measure,
+            reference=None if self.reference is None else match.apply(self.reference),
+        )
+
+
+def _beyond(values: NDArray[Any], most: float) -> NDArray[np.bool_]:
+    """Infinite values are excluded as what is not finite."""
+    return np.asarray(np.isfinite(values) & (np.abs(values) > most))
+
+
+def _absurd(key: str, absurd: NDArray[np.bool_], most: float) -> str:
+    count = np.count_nonzero(absurd)
+    where = ""
+    if key != "reference":
+        frames = np.flatnonzero(absurd.reshape(len(absurd), -1).any(axis=1)).tolist()
+        listed = ", ".join(map(str, frames[:_LISTED]))
+        where = f" (frames {listed}{', …' if len(frames) > _LISTED else ''})"
+    return f"{count} values of {key}{where} are beyond {most:.2g} and were excluded"
+
+
+def _check(got: tuple[int, ...], expected: tuple[int, ...], key: str, source: str) -> None:
+    if got != expected:
+        raise DataError(f"expected {key} of shape {expected}, got {got}", where=source)
+
+
+def frame_times(n_frames: int, rate: float = 1.0) -> FloatArray:
+    """(n_frames,) s: frames at a constant rate, for files that hold no times."""
+    return np.arange(n_frames) / rate

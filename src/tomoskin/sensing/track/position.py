@@ -1,0 +1,137 @@
+"""Where a touch is held to be: its detections, each as far as its strength bears it out."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Self
+
+from tomoskin.core import Detection
+from tomoskin.sensing.track.motion import region_radius
+
+# Chosen on the twin's seeds 101 to 103 (docs/theory/tracking.md).
+
+_RECOVERY = 1.0
+"""Seconds in which a sheet recovers: for so long it responds to what no longer presses."""
+
+_DIFFUSION = 5e-4
+"""Variance along each axis by which a touch may move in a second that tells nothing of it, m²."""
+
+_ELSEWHERE = 200.0
+"""Places on a sheet where noise and drift may look like a touch."""
+
+_DRAG = 0.012
+"""How far behind a sliding press the sheet responds at the most, m: play (Prandtl 1928), which
+does not depend on the speed, and stays when the press stops."""
+
+
+@dataclass(frozen=True, slots=True)
+class Position:
+    """A position and its covariance.
+
+    Attributes
+    ----------
+    x, y, xx, yy, xy
+        m and m²: mean of the detections that it rests on, and of their covariances.
+    unseen
+        Variance along each axis by which the touch may have moved meanwhile, m².
+    bias
+        Deviation along each axis of what is off all the time, m.
+    strength
+        As the sheet remembers it.
+    behind
+        Where the sheet responds to a press that has slid, at the worst, m.
+    time
+        Device time of the newest detection, s.
+    """
+
+    x: float
+    y: float
+    xx: float
+    yy: float
+    xy: float
+    unseen: float
+    bias: float
+    strength: float
+    behind: tuple[float, float]
+    time: float
+
+    @classmethod
+    def of(cls, detection: Detection, size: float, time: float) -> Self:
+        """Of one detection, ``size`` strong."""
+        x, y, xx, yy = detection.x, detection.y, detection.sd_x**2, detection.sd_y**2
+        return cls(x, y, xx, yy, detection.cov_xy, 0.0, detection.bias, size, (x, y), time)
+
+    def after(self, detection: Detection, size: float, time: float) -> Self:
+        """With a further detection, ``size`` strong.
+
+        Where it is as strong as before, it is the position. What is missing of the strength may be
+        the press, and what is left the sheet's residual response: then it lies anywhere in its
+        region, and moves the position as far as a Kalman filter (1960) lets it.
+        """
+        since = max(time - self.time, 0.0)
+        strength = max(size, self.strength * math.exp(-since / _RECOVERY))
+        unseen, region = self.unseen + _DIFFUSION * since, region_radius(detection) ** 2
+        astray = region * (strength / size - 1.0) ** 2 if size > 0 else math.inf
+        trust = unseen / (unseen + astray) if astray > 0 else 1.0
+        trust *= 1.0 - self._chance(detection, unseen, region)
+        x, y = self.x + trust * (detection.x - self.x), self.y + trust * (detection.y - self.y)
+        return type(self)(
+            x,
+            y,
+            self.xx + trust * (detection.sd_x**2 - self.xx),
+            self.yy + trust * (detection.sd_y**2 - self.yy),
+            self.xy + trust * (detection.cov_xy - self.xy),
+            (1.0 - trust) * unseen,
+            detection.bias,
+            strength,
+            _dragged(self.behind, x, y),
+            time,
+        )
+
+    def _chance(self, detection: Detection, unseen: float, region: float) -> float:
+        """Probability that this is noise elsewhere (data association: Bar-Shalom & Tse 1975).
+
+        Noise is larger than the touch with a probability of ½ erfc(snr / 2), in each place of the
+        size of its ``region`` m²; near by it cannot be told from the touch.
+        """
+        spread = unseen + 0.5 * (self.xx + self.yy + detection.sd_x**2 + detection.sd_y**2)
+        if not (spread > 0 and region > 0 and math.isfinite(detection.snr)):
+            return 0.0
+        square = (detection.x - self.x) ** 2 + (detection.y - self.y) ** 2
+        noise = _ELSEWHERE * 0.5 * math.erfc(detection.snr / 2.0) * spread / region
+        return noise / (noise + math.exp(max(-0.5 * square / spread, -700.0)))
+
+    @property
+    def wavers(self) -> float:
+        """Deviation in the plane of what differs from frame to frame, m."""
+        return math.sqrt(self.xx + self.yy + 2.0 * self.unseen)
+
+    def of_detection(self, detection: Detection) -> Detection:
+        """The ``detection`` at this position, with all that may be off."""
+        along_x, along_y = self.x - self.behind[0], self.y - self.behind[1]
+        more = self.unseen + self.bias**2
+        return Detection(  # of all fields: dataclasses.replace takes several times as long
+            x=self.x,
+            y=self.y,
+            sd_x=math.sqrt(self.xx + more + along_x**2),
+            sd_y=math.sqrt(self.yy + more + along_y**2),
+            area=detection.area,
+            peak=detection.peak,
+            cells=detection.cells,
+            cov_xy=self.xy + along_x * along_y,
+            snr=detection.snr,
+            close=detection.close,
+            weak=detection.weak,
+            bias=0.0,
+            force=detection.force,
+        )
+
+
+def _dragged(behind: tuple[float, float], x: float, y: float) -> tuple[float, float]:
+    """What hangs ``behind``, once the touch is at ``x``, ``y``."""
+    away = math.hypot(x - behind[0], y - behind[1])
+    if away <= _DRAG:
+        return behind
+    part = _DRAG / away
+    return x - part * (x - behind[0]), y - part * (y - behind[1])

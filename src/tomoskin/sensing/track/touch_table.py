@@ -1,0 +1,104 @@
+"""Touches as a table: one row a touch, SI units."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tomoskin.core import Force, Touch
+from tomoskin.model.mesh import Plane, Surface
+
+COLUMNS = (
+    *("frame", "time_s", "id", "x_m", "y_m", "sd_x_m", "sd_y_m"),
+    *("area_m2", "peak", "kind"),
+)
+
+FORCE = ("force_n", "force_low_n", "force_high_n", "force_state")
+"""Further columns where a calibration measures forces: median, interval that nine in ten lie in,
+and "calibrated" or "uncalibrated"."""
+
+IN_SPACE = ("space_x_m", "space_y_m", "space_z_m")
+"""Further columns where the sheet lies on a surface; x_m and y_m are the sheet's own (u, v)."""
+
+ELAPSED = "elapsed_s"
+"""The last column where it is known when a recording began: s since its first frame."""
+
+TouchedFrame = tuple[int | None, float, tuple[Touch, ...]]
+"""Index of a frame in the recording (None where that does not hold it), its time, its touches."""
+
+Value = int | float | str | None
+
+
+def columns_of(
+    surface: Surface | None = None, *, forces: bool = False, begun: float | None = None
+) -> tuple[str, ...]:
+    """Names of the columns, with those of forces, of a ``surface`` that is not flat, and of the
+    time since the recording has ``begun``."""
+    in_space = IN_SPACE if _curved(surface) else ()
+    return COLUMNS + (FORCE if forces else ()) + in_space + (() if begun is None else (ELAPSED,))
+
+
+def touch_rows(
+    frames: Iterable[TouchedFrame],
+    surface: Surface | None = None,
+    *,
+    forces: bool = False,
+    begun: float | None = None,
+) -> Iterator[tuple[Value, ...]]:
+    """One row a touch, in the order of :func:`columns_of`; NaN for what is not known."""
+    on = _curved(surface)
+    for frame, time, touches in frames:
+        for touch in touches:
+            more = force_values(touch.detection.force) if forces else ()
+            last = () if begun is None else (time - begun,)
+            yield _row(frame, time, touch) + more + _in_space(touch, on) + last
+
+
+def touch_columns(
+    frames: Iterable[TouchedFrame], surface: Surface | None = None, *, forces: bool = False
+) -> dict[str, NDArray[np.generic]]:
+    """Columns by their name, (n,) each, as ``pandas.DataFrame`` takes them.
+
+    ``frame`` is −1 where the recording does not hold the frame; what is not known is NaN.
+    """
+    names = columns_of(surface, forces=forces)
+    rows = list(touch_rows(frames, surface, forces=forces))
+    columns = dict(zip(names, zip(*rows, strict=True), strict=True)) if rows else {}
+    return {name: np.array(columns.get(name, ()), _kind(name)) for name in names}
+
+
+def _kind(name: str) -> type:
+    if name in ("frame", "id"):
+        return np.int64
+    return np.str_ if name in ("kind", "force_state") else np.float64
+
+
+def _curved(surface: Surface | None) -> Surface | None:
+    return None if isinstance(surface, Plane) else surface
+
+
+def _row(frame: int | None, time: float, touch: Touch) -> tuple[Value, ...]:
+    d = touch.detection
+    number = -1 if frame is None else frame
+    return (number, time, touch.id, d.x, d.y, d.sd_x, d.sd_y, d.area, d.peak, touch.said)
+
+
+def has_forces(frames: Iterable[TouchedFrame]) -> bool:
+    """Whether a touch of any frame has a force."""
+    return any(t.detection.force is not None for *_, touches in frames for t in touches)
+
+
+def force_values(force: Force | None) -> tuple[float, float, float, str]:
+    """As in the columns :data:`FORCE`; NaN and "" where nothing tells it."""
+    if force is None:
+        return (math.nan, math.nan, math.nan, "")
+    return (force.newtons, force.low, force.high, force.state)
+
+
+def _in_space(touch: Touch, surface: Surface | None) -> tuple[Value, ...]:
+    if surface is None:
+        return ()
+    return tuple(surface.point([[touch.detection.x, touch.detection.y]])[0].tolist())

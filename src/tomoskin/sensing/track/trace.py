@@ -1,0 +1,169 @@
+"""One spot in the tracker's memory, from its first detection to its release."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from tomoskin.core import Detection
+from tomoskin.sensing.track.merging import Alone, MergedFinger
+from tomoskin.sensing.track.motion import TrackState, region_radius
+from tomoskin.sensing.track.position import Position
+from tomoskin.sensing.track.strength import TouchStrength, content_of
+
+_STEP = 0.012
+"""A touch that slides leaves a footprint every so many metres."""
+
+_MOST_FOOTPRINTS = 40
+_STRONG = 0.5
+_FRESH = 1.0
+"""Seconds for which the strength of a touch that has come out of a merged one tells who it is."""
+
+
+@dataclass(slots=True)
+class Footprint:
+    """Where a touch was, m, and how large at most."""
+
+    x: float
+    y: float
+    top: float
+
+
+@dataclass(eq=False)
+class Trace:
+    """One spot, or what may become one, as the tracker remembers it.
+
+    Attributes
+    ----------
+    detection, state, strength
+        Newest detection; position and velocity; how strong it is.
+    since, host_since
+        Device and host time of its first frame, s.
+    odds
+        Logarithm of those that it is there.
+    members
+        The fingers that it stands for.
+    reported
+        Whether anyone has heard of it.
+    missing
+        Device time of the first frame without a detection since the last one, or None.
+    beside, met
+        The other spots as they were before this one came, or went missing, and what frames since
+        then say for its having met them.
+    parted, fresh
+        Device time at which it came out of a merged one, and its strength shortly after that.
+    strong, low, least
+        Device times at which it was last strong for its position, and since which it has been
+        so weak that it may be a residual response, or None; least size of its peak since then.
+    footprints, top
+        Where it has been, the newest last; and how large it has been where its detection is now,
+        for a press that slid leaves a residual response anywhere along its way.
+    held
+        Where it is held to be.
+    """
+
+    detection: Detection
+    state: TrackState
+    since: float
+    host_since: float
+    odds: float
+    members: list[MergedFinger]
+    reported: bool = False
+    missing: float | None = None
+    beside: dict[int, Alone] = field(default_factory=dict)
+    met: dict[int, float] = field(default_factory=dict)
+    parted: float = -math.inf
+    strong: float = 0.0
+    low: float | None = None
+    least: float = 0.0
+    footprints: list[Footprint] = field(default_factory=list)
+    top: float = 0.0
+    strength: TouchStrength = field(init=False)
+    fresh: TouchStrength = field(init=False)
+    held: Position = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Leave the first footprint."""
+        self.strong = self.since
+        self.strength = self.fresh = TouchStrength.of(self.detection)
+        self.held = Position.of(self.detection, content_of(self.detection), self.since)
+        self._step()
+
+    @property
+    def key(self) -> int:
+        """Of the first of its members."""
+        return self.members[0].key
+
+    @property
+    def kind(self) -> str:
+        """Whether it lowers the conductivity or raises it."""
+        return "decrease" if self.sign < 0 else "increase"
+
+    @property
+    def sign(self) -> float:
+        """Of its peak."""
+        return sign_of(self.detection)
+
+    @property
+    def shown(self) -> Detection:
+        """Its newest detection, where it is held to be."""
+        return self.held.of_detection(self.detection)
+
+    def alone(self, time: float) -> Alone:
+        """As it is now."""
+        return Alone(self.state, self.strength, time)
+
+    def see(self, detection: Detection, time: float, seconds: float, *, still: bool) -> None:
+        """Take the detection of this frame, ``seconds`` after the frame before; ``still``: the last
+        ones say nothing of it."""
+        self.detection = detection
+        held = Position.of if still else self.held.after
+        self.held = held(detection, content_of(detection), time)
+        self.strength = self.strength.after(detection, seconds)
+        if time - self.parted < _FRESH:
+            self.fresh = self.fresh.after(detection, seconds)
+        self.missing = None
+        self._step()
+        if size_of(detection) >= _STRONG * self.top:
+            self.strong = time
+
+    def change(self, time: float) -> None:
+        """It stands for other fingers from now on: what it was says nothing of them."""
+        self.parted = time
+        self.strength = self.fresh = TouchStrength.of(self.detection)
+        self.held = Position.of(self.detection, content_of(self.detection), time)
+
+    def become(self, other: Trace) -> None:
+        """Go on from where ``other`` is."""
+        self.detection, self.state, self.strong = other.detection, other.state, other.strong
+        self.held, self.strength, self.odds = other.held, other.strength, other.odds
+        self.missing, self.low = other.missing, None
+        self._step()
+
+    def absorb(self, other: Trace) -> None:
+        """Stand for ``other`` too."""
+        self.members += other.members
+        self.footprints = [*other.footprints, *self.footprints][-_MOST_FOOTPRINTS:]
+
+    def _step(self) -> None:
+        x, y, size = self.detection.x, self.detection.y, size_of(self.detection)
+        feet = self.footprints
+        if not feet or (x - feet[-1].x) ** 2 + (y - feet[-1].y) ** 2 >= _STEP**2:
+            feet.append(Footprint(x, y, size))
+            del feet[:-_MOST_FOOTPRINTS]
+        elif size > feet[-1].top:
+            feet[-1].top = size
+        reach = max(region_radius(self.detection), _STEP) ** 2
+        near = [foot.top for foot in feet if (foot.x - x) ** 2 + (foot.y - y) ** 2 <= reach]
+        self.top = max(near, default=feet[-1].top)
+
+
+def size_of(detection: Detection) -> float:
+    """By how many deviations it stands out, or its peak where the noise is unknown: a fit knows
+    the depth of a faint touch badly, but well what it does to the voltages."""
+    return detection.snr if 0 < detection.snr < math.inf else abs(detection.peak)
+
+
+def sign_of(detection: Detection) -> float:
+    """1 or −1."""
+    return -1.0 if detection.peak < 0 else 1.0

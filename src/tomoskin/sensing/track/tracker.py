@@ -1,0 +1,205 @@
+"""Detections of successive frames → touches that keep their identity, and what happens to them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from tomoskin.core import Detection, Touch
+from tomoskin.sensing.track import existence
+from tomoskin.sensing.track.clock import TrackClock
+from tomoskin.sensing.track.event import Happening, TouchEvent
+from tomoskin.sensing.track.ledger import IdentityLedger
+from tomoskin.sensing.track.meetings import (
+    divide,
+    merge,
+    met_by,
+    origin_of,
+    sibling_of,
+    weigh_meetings,
+)
+from tomoskin.sensing.track.merging import Alone, MergedFinger
+from tomoskin.sensing.track.motion import TrackSettings, begin
+from tomoskin.sensing.track.pairing import FrameOfTouches, expected, miss, pairs_of, see
+from tomoskin.sensing.track.residual import ResidualResponses, is_residual
+from tomoskin.sensing.track.trace import Trace
+
+
+class Tracker:
+    """Joins detections to touches; remembers what can come back.
+
+    Attributes
+    ----------
+    events
+        What happened in the newest frame.
+    """
+
+    def __init__(self, settings: TrackSettings | None = None) -> None:
+        self.settings = settings or TrackSettings()
+        self.events: tuple[TouchEvent, ...] = ()
+        self._residuals = ResidualResponses(self.settings.least_snr)
+        self._clock = TrackClock()
+        self._happened: list[TouchEvent] = []
+        self._keys = 0
+        self._traces: list[Trace] = []
+        self._ledger = IdentityLedger()
+
+    @property
+    def numbered(self) -> int:
+        """The last identity that was given."""
+        return self._ledger.numbered
+
+    @numbered.setter
+    def numbered(self, last: int) -> None:
+        self._ledger.numbered = last
+
+    def update(
+        self, detections: Sequence[Detection], time: float, host_time: float
+    ) -> tuple[Touch, ...]:
+        """Touches of this frame, in order of their identity.
+
+        ``time`` is the device's, s; where it does not go on, as when a board starts again, the
+        host's counts. ``host_time`` is what touches and events carry.
+        """
+        self._clock = self._clock.at(time, host_time)
+        if self.settings.still:  # what stood there before says nothing of this frame
+            detections = [detection for detection in detections if not detection.weak]
+            self._residuals.forget()
+        if detections or self._traces:
+            self._follow(FrameOfTouches.of(detections, self._clock, self.settings))
+        self._residuals.note(self._clock.now, quiet=not detections)
+        touches = self._touches()
+        self.events, self._happened = tuple(self._happened), []
+        return touches
+
+    def reset(self) -> None:
+        """Release every touch and forget all else; identities go on counting.
+
+        The next frame tells that they were released. Time starts again at zero: what follows is
+        to the bit what a new tracker would make of it.
+        """
+        for trace in [trace for trace in self._traces if trace.reported]:
+            self._end(trace)
+        self._traces = []
+        self._ledger.forget()
+        self._residuals.forget()
+        self.events = ()
+        self._clock = TrackClock()
+
+    def _follow(self, frame: FrameOfTouches) -> None:
+        """One frame: who is where, who has begun, ended, met and parted."""
+        traces, now = list(self._traces), self._clock.now
+        states = expected(traces, frame)
+        found = pairs_of(traces, states, frame)
+        fresh = len(found.pairs) < len(frame.detections)
+        beside = {m.key: t.alone(now) for t in traces if fresh and t.reported for m in t.members}
+        miss(traces, states, found, frame)
+        see(traces, states, found, frame)
+        weigh_meetings(traces)
+        for index, detection in enumerate(frame.detections):
+            if index in found.pairs or detection.weak or detection.snr < self.settings.snr:
+                continue
+            if not self._residuals.explain(detection, now, self._traces):
+                self._begin(index, frame, beside)
+        for i, k, odds in found.exchanges:  # while both were seen
+            one, other = traces[i], traces[k]
+            if one.reported and other.reported and not self.settings.still:
+                for trace in (one, other):
+                    if self._ledger.sure:
+                        trace.change(now)
+                self._ledger.exchange(one.key, other.key, odds)
+        self._settle()
+        self._ledger.judge(self._traces)
+
+    def _begin(self, index: int, frame: FrameOfTouches, beside: dict[int, Alone]) -> None:
+        self._keys += 1
+        detection = frame.detections[index]
+        others = any(trace.reported and trace.missing is None for trace in self._traces)
+        odds = existence.first(detection, self.settings.snr, frame.strongest if others else 0.0)
+        state = begin(frame.seen[index].position, self.settings)
+        clock = self._clock
+        trace = Trace(detection, state, clock.now, clock.host, odds, [MergedFinger(self._keys)])
+        trace.beside = beside
+        sibling = sibling_of(trace, self._traces)
+        if sibling is not None:  # its strength has not faded: some of it was the newcomer's
+            sibling.change(clock.now)
+        self._traces.append(trace)
+
+    def _settle(self) -> None:
+        """Report what is there, end what is gone."""
+        for trace in [t for t in self._traces if not t.reported]:
+            self._consider(trace)
+        for trace in [t for t in self._traces if t.reported]:
+            if trace.missing is not None:
+                self._lose(trace)
+            elif is_residual(trace, self._clock.now):
+                self._end(trace)
+
+    def _consider(self, trace: Trace) -> None:
+        """Report a newcomer that is sure to be there, forget one that is not."""
+        if self.settings.still and trace.missing is None:
+            self._report_onset(trace)
+            return
+        if trace.missing is not None or trace.detection.snr < self.settings.snr:
+            self._traces.remove(trace)
+            return
+        seconds = self._clock.now - trace.since
+        if trace.odds < existence.BEGUN or not existence.placed(trace.detection, seconds):
+            return
+        if self._residuals.explain(trace.detection, self._clock.now, self._traces):
+            self._traces.remove(trace)
+            return
+        origin = origin_of(trace, self._traces)
+        if origin is None:
+            self._report_onset(trace)
+        elif origin.missing is not None:  # its region is gone, and this is one of those it was
+            self._traces.remove(trace)
+            origin.become(trace)
+        else:
+            self._split(origin, trace)
+
+    def _report_onset(self, trace: Trace) -> None:
+        trace.reported = True
+        self._ledger.begin(trace.key, trace.host_since)
+        self._report("onset", trace)
+
+    def _split(self, carrier: Trace, branch: Trace) -> None:
+        """Divide the fingers of ``carrier``."""
+        for one, other, odds in divide(carrier, branch, self._clock.now):
+            self._ledger.exchange(one, other, odds)
+        branch.reported = True
+        for trace in (carrier, branch):
+            trace.change(self._clock.now)
+        for trace in sorted((carrier, branch), key=lambda t: self._ledger.name(t.key)):
+            self._report("split", trace)
+
+    def _lose(self, trace: Trace) -> None:
+        """Of one that is missing: it has met another, or has been lifted, or is waited for."""
+        odds, carrier = met_by(trace, self._traces)
+        over = self.settings.still or trace.odds < existence.ENDED
+        if carrier is not None and (odds > existence.MET or (over and odds > 0)):
+            self._traces.remove(trace)
+            merge(carrier, trace, self._clock.now)
+            self._report("merge", carrier)
+        elif over:
+            self._end(trace)
+
+    def _end(self, trace: Trace) -> None:
+        self._traces.remove(trace)
+        self._residuals.leave(trace, self._clock.now)
+        for touch in self._ledger.end(trace):
+            self._happened.append(TouchEvent("release", touch, self._clock.host))
+
+    def _touches(self) -> tuple[Touch, ...]:
+        shown = [trace for trace in self._traces if trace.reported]
+        touches = self._ledger.touches(shown, self._traces)
+        pairs = sorted(zip(touches, shown, strict=True), key=lambda pair: pair[0].id)
+        for touch, trace in pairs:
+            if self._ledger.moved(touch, trace.held.wavers):
+                self._happened.append(TouchEvent("move", touch, self._clock.host))
+                self._ledger.place(touch)
+        return tuple([touch for touch, _ in pairs])
+
+    def _report(self, kind: Happening, trace: Trace) -> None:
+        (touch,) = self._ledger.touches([trace], self._traces)
+        self._ledger.place(touch)
+        self._happened.append(TouchEvent(kind, touch, self._clock.host))

@@ -1,0 +1,199 @@
+"""A simulated processor: its process and the memory that the sheet shares with it."""
+
+from __future__ import annotations
+
+import mmap
+import struct
+import subprocess
+import tempfile
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import astuple, dataclass, field
+from pathlib import Path
+from typing import IO, Protocol
+
+import numpy as np
+
+from tomoskin.core import FloatArray, SourceError, StrPath
+from tomoskin.twin.emulator.flash import BoardIdentity
+
+MOST_ELECTRODES = 32
+_MAGIC = 0x31306E696B736F74
+_HEAD = struct.Struct("<QII7d")
+_SEQUENCE = struct.Struct("<I")
+_SEQUENCE_AT = 8
+_FAULTS_AT = _HEAD.size + 8 * MOST_ELECTRODES**2
+_FAULTS = struct.Struct(f"<4I{MOST_ELECTRODES}s{MOST_ELECTRODES}s{MOST_ELECTRODES}s")
+_POTENTIALS_AT = _FAULTS_AT + _FAULTS.size
+_OFFSETS_AT = _POTENTIALS_AT + 8 * MOST_ELECTRODES
+_LAYER = struct.Struct("<2d")
+_LAYER_AT = _OFFSETS_AT + 8 * MOST_ELECTRODES
+_SIZE = _LAYER_AT + _LAYER.size
+
+
+@dataclass(frozen=True, slots=True)
+class Front:
+    """What stands between sheet and code: code = (gain V + offset) levels / reference.
+
+    ``current`` A; ``compliance`` V across the driven pair at most; ``offset`` and ``reference`` V;
+    ``noise`` LSB, standard deviation of one conversion.
+    """
+
+    current: float
+    compliance: float
+    gain: float
+    offset: float
+    reference: float
+    levels: float
+    noise: float
+
+
+@dataclass(frozen=True, slots=True)
+class BoardFaults:
+    """What is wrong with an emulated board; the Pico's emulator knows ``reading`` alone.
+
+    ``high_open``, ``low_open``: channels whose switch never connects them to the current, or to
+    ground; ``high_stuck``, ``low_stuck``: always; of the stuck ones the lowest counts, on one side.
+    ``source``, ``sink``, ``reading``: the channel that is connected, or read, instead of another.
+    """
+
+    high_open: Collection[int] = ()
+    low_open: Collection[int] = ()
+    high_stuck: Collection[int] = ()
+    low_stuck: Collection[int] = ()
+    source: Mapping[int, int] = field(default_factory=dict)
+    sink: Mapping[int, int] = field(default_factory=dict)
+    reading: Mapping[int, int] = field(default_factory=dict)
+
+    def pack(self) -> bytes:
+        """As ``firmware/host/skin.h`` has it."""
+        masks = (self.high_open, self.low_open, self.high_stuck, self.low_stuck)
+        maps = (self.source, self.sink, self.reading)
+        return _FAULTS.pack(
+            *(sum(1 << channel for channel in mask) for mask in masks),
+            *(bytes(1 + one[e] if e in one else 0 for e in range(MOST_ELECTRODES)) for one in maps),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class OwnVoltages:
+    """What is read though it does not come from the sheet.
+
+    ``potentials`` (n,) V that each electrode has by itself, such as a thermoelectric voltage;
+    ``offsets`` (n,) V of each channel's amplifier, at its input; ``double_layer`` F of an electrode
+    that polarises, or 0, and ``leak`` Ω across it.
+    """
+
+    potentials: FloatArray = field(default_factory=lambda: np.zeros(0))
+    offsets: FloatArray = field(default_factory=lambda: np.zeros(0))
+    double_layer: float = 0.0
+    leak: float = 0.0
+
+
+class SkinMemory:
+    """A file, mapped by this process and by the emulator's; a seqlock, so nobody waits."""
+
+    def __init__(
+        self,
+        path: StrPath,
+        front: Front,
+        resistance: FloatArray,
+        faults: BoardFaults | None = None,
+        own: OwnVoltages | None = None,
+    ) -> None:
+        """Make the file; ``resistance`` as in :meth:`write`. Without ``faults``, ``own``: none."""
+        self.path = Path(path)
+        self._n = len(resistance)
+        if self._n > MOST_ELECTRODES:
+            raise SourceError(
+                f"expected at most {MOST_ELECTRODES} electrodes, got {self._n}", where="emulator"
+            )
+        with self.path.open("w+b") as file:
+            file.truncate(_SIZE)
+            self._map = mmap.mmap(file.fileno(), _SIZE)
+        self._sequence = 0
+        _HEAD.pack_into(self._map, 0, _MAGIC, 0, self._n, *astuple(front))
+        self._map[_FAULTS_AT:_POTENTIALS_AT] = (faults or BoardFaults()).pack()
+        own = own or OwnVoltages()
+        _LAYER.pack_into(self._map, _LAYER_AT, own.double_layer, own.leak)
+        self._put(_OFFSETS_AT, own.offsets)
+        self.write_potentials(own.potentials)
+        self.write(resistance)
+
+    def write(self, resistance: FloatArray) -> None:
+        """(n, n) Ω transfer resistance from now on."""
+        self._put(_HEAD.size, resistance)
+
+    def write_potentials(self, potentials: FloatArray) -> None:
+        """(n,) V that each electrode has by itself from now on."""
+        self._put(_POTENTIALS_AT, potentials)
+
+    def _put(self, at: int, numbers: FloatArray) -> None:
+        data = numbers.astype("<f8").tobytes()
+        self._count()
+        self._map[at : at + len(data)] = data
+        self._count()
+
+    def _count(self) -> None:
+        """Odd while it is written; the interpreter keeps the order, and so does the processor."""
+        self._sequence = (self._sequence + 1) % 2**32
+        _SEQUENCE.pack_into(self._map, _SEQUENCE_AT, self._sequence)
+
+    def close(self) -> None:
+        """Give the memory back."""
+        self._map.close()
+
+
+class BoardPrograms(Protocol):
+    """The firmware of a board, and the emulator that runs it."""
+
+    def power_on(
+        self, options: Sequence[str | Path], said: IO[bytes]
+    ) -> tuple[subprocess.Popen[bytes], str]:
+        """The emulator's process, whose stderr goes to ``said``, and the board's serial port.
+
+        The port is empty when it does not start.
+        """
+
+
+class BoardProcess:
+    """An emulated board; ``port`` is its serial port."""
+
+    def __init__(
+        self, programs: BoardPrograms, memory: StrPath, current: float, *options: str | Path
+    ) -> None:
+        """Power on. ``memory``: of the skin; ``current`` A: what its limiter is set to.
+
+        ``options``: further ones of the emulator.
+        """
+        memory = Path(memory)
+        eeprom = memory.with_name("eeprom")
+        eeprom.write_bytes(BoardIdentity(current, b"emulated").pack())
+        self._said = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as the process
+        own = ("-d", "-s", memory, "-e", eeprom)
+        self._process, self.port = programs.power_on((*own, *options), self._said)
+        if not self.port:
+            self.close()
+            raise SourceError(f"the emulator does not start: {self.last_words}", where="emulator")
+
+    @property
+    def alive(self) -> bool:
+        """Whether it runs."""
+        return self._process.poll() is None
+
+    @property
+    def complaints(self) -> str:
+        """What the emulator has said of switches that were misused; empty when none were."""
+        self._said.seek(0)
+        return self._said.read().decode(errors="replace")
+
+    def close(self) -> None:
+        """Power off."""
+        if self._said.closed:
+            return
+        self._process.kill()
+        self._process.wait()
+        for pipe in (self._process.stdin, self._process.stdout):
+            assert pipe is not None
+            pipe.close()
+        self.last_words = self.complaints.strip()
+        self._said.close()

@@ -1,0 +1,72 @@
+"""The device's clock by frames that come late, in batches, and now and then very late."""
+
+import numpy as np
+import pytest
+
+from tomoskin.files.session.clock import ClockFitter
+
+RATE, FAST, OFFSET = 250e3, 37e-6, 1234.5
+PERIOD = 5e-3
+
+
+def arrivals(seconds, *, batch, stalls, seed=3):
+    """Ticks and host times: a USB bridge hands over every ``batch`` s, and the host is busy."""
+    random = np.random.default_rng(seed)
+    true = np.arange(0, seconds, PERIOD)
+    late = 1e-4 + random.exponential(5e-4, len(true))
+    late[random.random(len(true)) < stalls] += 0.2
+    came = np.ceil((true + late) / batch) * batch if batch else true + late
+    ticks = np.round(true * RATE * (1 + FAST)).astype(int) + 7_000_000
+    return zip(ticks.tolist(), (OFFSET + np.maximum.accumulate(came)).tolist(), strict=True)
+
+
+def fitted(frames):
+    fitter = ClockFitter()
+    for ticks, host_time in frames:
+        fitter.add(ticks, host_time)
+    return fitter
+
+
+@pytest.mark.parametrize(("batch", "stalls"), [(0, 0), (0.016, 0), (0.016, 0.05), (0, 0.08)])
+def test_drift_and_offset(batch, stalls):
+    fit = fitted(arrivals(120, batch=batch, stalls=stalls)).fit
+    assert fit.drift(RATE) == pytest.approx(FAST, abs=3e-6)
+    tick_0 = OFFSET - 7_000_000 / (RATE * (1 + FAST))
+    assert fit.offset == pytest.approx(tick_0, abs=1.5e-3)
+    assert fit.frames == 24_000
+
+
+def test_stalls_on_one_side_do_not_bend_it():
+    """As when the machine grows busier: least squares would take it for a slow clock."""
+    frames = list(arrivals(60, batch=0, stalls=0))
+    late = [(t, h + (0.3 if n > 9_000 and n % 3 else 0)) for n, (t, h) in enumerate(frames)]
+    assert fitted(late).fit.drift(RATE) == pytest.approx(FAST, abs=4e-6)
+
+
+def test_the_residual_is_how_late_frames_are():
+    exact = [(round(k * PERIOD * RATE), OFFSET + k * PERIOD) for k in range(1000)]
+    assert fitted(exact).fit.residual == pytest.approx(0, abs=1e-5)
+    late = [(t, h + (0.02 if n % 2 else 0)) for n, (t, h) in enumerate(exact)]
+    assert fitted(late).fit.residual == pytest.approx(0.02 / np.sqrt(2), rel=0.01)
+
+
+def test_a_device_that_starts_anew_is_fitted_anew():
+    fitter = fitted(arrivals(60, batch=0, stalls=0))
+    for k in range(19):
+        fitter.add(k * 1250, 5000 + k * PERIOD)
+    assert fitter.fit is None
+    fitter.add(19 * 1250, 5000 + 19 * PERIOD)
+    assert fitter.fit.frames == 20
+    assert fitter.fit.offset == pytest.approx(5000)
+
+
+def test_memory_is_bounded():
+    fitter = ClockFitter()
+    for k in range(20_000):  # ever slower: each frame is a corner of the hull
+        fitter.add(1250 * k, k * PERIOD + 1e-9 * k**2)
+    assert len(fitter._run.corners) <= 257
+    assert fitter.fit.frames == 20_000
+
+
+def test_frames_of_one_tick_are_no_clock():
+    assert fitted([(5, 1.0)] * 50).fit is None

@@ -1,0 +1,109 @@
+"""What a robot's links look like: sizes, places, files, and what cannot be drawn."""
+
+from __future__ import annotations
+
+import struct
+
+import numpy as np
+import pytest
+
+from tomoskin.core import SkinError
+from tomoskin.model.robot import Urdf
+from tomoskin.model.robot.link_shapes import Ball, Box, Rod, thinned
+
+LINKS = """<link name="a">
+  <visual><origin xyz="0 0 1"/><geometry><box size="0.2 0.4 0.6"/></geometry></visual>
+  <visual><geometry><sphere radius="0.1"/></geometry></visual>
+  <collision><geometry><cylinder radius="9" length="9"/></geometry></collision></link>
+<link name="b"><collision><origin rpy="0 1.5707963267948966 0"/>
+  <geometry><cylinder radius="0.1" length="0.5"/></geometry></collision></link>
+<link name="c"><visual><geometry>
+  <mesh filename="package://arm/meshes/c.stl" scale="0.001 0.001 -0.002"/>
+  </geometry></visual></link>
+<link name="d"/>"""
+CORNERS = np.array([[[0, 0, 0], [100, 0, 0], [0, 50, 10]]], dtype=np.float64)
+
+
+def write_stl(path, triangles):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    rows = (struct.pack("<12fH", 0, 0, 0, *t.ravel(), 0) for t in triangles)
+    path.write_bytes(bytes(80) + struct.pack("<I", len(triangles)) + b"".join(rows))
+
+
+def solids_of(folder, links):
+    path = folder / "arm" / "urdf" / "arm.urdf"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(f'<robot name="arm">{links}</robot>')
+    return {solid.link: solid for solid in Urdf.read(path).solids()}
+
+
+def area(triangles):
+    a, b, c = np.moveaxis(triangles, 1, 0)
+    return np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
+
+
+@pytest.mark.parametrize(
+    ("shape", "whole"),
+    [
+        (Box(np.array([1.0, 2.0, 3.0])), 22.0),
+        (Rod(0.5, 2.0), 2 * np.pi * 0.25 + 2 * np.pi * 0.5 * 2),
+        (Ball(0.5), np.pi),
+    ],
+)
+def test_a_shape_is_closed_and_has_its_size(shape, whole):
+    triangles = shape.triangles()
+    assert area(triangles) == pytest.approx(whole, rel=0.02)
+    edges = np.concatenate([np.roll(triangles, k, axis=1)[:, :2] for k in range(3)]).round(9) + 0.0
+    counts = {}
+    for edge in edges:
+        ends = frozenset(map(tuple, edge))
+        counts[ends] = counts.get(ends, 0) + 1
+    assert set(counts.values()) == {2}
+
+
+def test_links_are_drawn_by_what_is_seen_else_by_what_may_collide(tmp_path):
+    write_stl(tmp_path / "arm" / "meshes" / "c.stl", CORNERS)
+    solids = solids_of(tmp_path, LINKS)
+    assert [*solids] == ["a", "b", "c"]
+    assert all(not solid.problems for solid in solids.values())
+    low, high = (
+        getattr(solids["a"].triangles.reshape(-1, 3), end)(axis=0) for end in ("min", "max")
+    )
+    assert low == pytest.approx([-0.1, -0.2, -0.1], abs=1e-9)
+    assert high == pytest.approx([0.1, 0.2, 1.3], abs=1e-9)
+    assert np.abs(solids["b"].triangles).reshape(-1, 3).max(axis=0) == pytest.approx(
+        [0.25, 0.1, 0.1]
+    )
+    expected = [[[0, 0, 0], [0.1, 0, 0], [0, 0.05, -0.02]]]
+    assert solids["c"].triangles == pytest.approx(np.array(expected))
+
+
+def test_what_cannot_be_drawn_is_said_without_a_folder(tmp_path):
+    (solid,) = solids_of(tmp_path, LINKS[LINKS.index('<link name="c"') :]).values()
+    (problem,) = solid.problems
+    assert problem.startswith("package://arm/meshes/c.stl: cannot be read")
+    assert str(tmp_path) not in problem
+    assert solid.triangles.shape == (0, 3, 3)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("0.2 0.4 0.6", "0.2 0.4", "three numbers in <box> size"),
+        ('radius="0.1"/>', 'radius="big"/>', "a number in <sphere> radius"),
+        (' length="0.5"', "", "a number in <cylinder> length"),
+        ("0.001 0.001 -0.002", "0.001", "three numbers in <mesh> scale"),
+    ],
+)
+def test_numbers_that_cannot_be_meant(tmp_path, old, new, said):
+    assert old in LINKS
+    with pytest.raises(SkinError, match=f'link "[abc]": expected {said}'):
+        solids_of(tmp_path, LINKS.replace(old, new))
+
+
+def test_a_fine_mesh_is_drawn_coarsely():
+    fine = np.concatenate([Ball(radius).triangles() for radius in np.linspace(0.96, 1.0, 5)])
+    coarse = thinned(fine, 1000)
+    assert 250 < len(coarse) <= 1000 < len(fine)
+    assert np.abs(coarse).max() == pytest.approx(1.0, abs=0.1)
+    assert np.array_equal(thinned(fine, len(fine)), fine)

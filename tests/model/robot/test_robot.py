@@ -1,0 +1,161 @@
+"""The robot file and its URDF: poses, and what cannot be meant."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from tomoskin.core import SkinError
+from tomoskin.model.mesh import Cylinder, Plane
+from tomoskin.model.robot import Place, Pose, Robot, Urdf, add_skin
+
+URDF = """<robot name="arm">
+  <link name="base"/>
+  <link name="upper"><visual><origin xyz="0 0 0.1"/><geometry><mesh filename="u.stl"/></geometry>
+  </visual></link>
+  <link name="fore"/>
+  <joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/>
+    <origin xyz="0 0 0.2" rpy="0 0 1.5707963267948966"/></joint>
+  <joint name="elbow" type="revolute"><parent link="upper"/><child link="fore"/>
+    <origin xyz="0.3 0 0"/></joint>
+</robot>
+"""
+ROBOT = """format = 1
+[robot]
+name = "an arm"
+urdf = "arm.urdf"
+
+[[skin]]
+name = "left"
+skin = "textile-disc-8"
+source = "twin:seed=1"
+link = "fore"
+position = ["10 mm", "0 mm", "30 mm"]
+angles = ["0 deg", "90 deg", "0 deg"]
+calibration = ["touch.npz", "bend.npz"]
+
+[[skin]]
+name = "right"
+skin = "own.toml"
+source = "replay:run.mcap@2"
+board = "0102"
+force = "force.npz"
+"""
+
+
+@pytest.fixture
+def files(tmp_path):
+    (tmp_path / "arm.urdf").write_text(URDF)
+    (tmp_path / "robot.toml").write_text(ROBOT)
+    return tmp_path
+
+
+def test_a_robot_is_read_with_its_files_beside_it(files):
+    robot = Robot.load(files / "robot.toml")
+    left, right = robot.skins
+    assert (left.name, left.skin, left.place.link) == ("left", "textile-disc-8", "fore")
+    assert left.place.pose.position.tolist() == [0.01, 0, 0.03]
+    assert right.skin == str(files / "own.toml")
+    assert right.source == f"replay:{files / 'run.mcap@2'}"
+    assert left.calibrations == (files / "touch.npz", files / "bend.npz")
+    assert right.calibrations == (files / "force.npz",)
+    assert robot.link_pose(left.place).position == pytest.approx([0, 0.3, 0.2])
+    assert robot.link_pose(right.place).position.tolist() == [0, 0, 0]
+    assert robot.urdf.bones() == pytest.approx(
+        np.array([[[0, 0, 0], [0, 0, 0.2]], [[0, 0, 0.2], [0, 0.3, 0.2]]])
+    )
+
+
+@pytest.mark.parametrize("angles", [(0.1, 0, 0), (0, 0.5, -2), (3, -1, 0.2)])
+def test_angles_are_a_urdfs(angles):
+    pose = Pose.of((0.1, 0.2, 0.3), angles)
+    assert pose.rotation == pytest.approx(Rotation.from_euler("xyz", angles).as_matrix())
+    inner = Pose.of((0, 0, 1), (0.3, 0, 0))
+    point = np.array([[1.0, 2.0, 3.0]])
+    assert (pose @ inner)(point) == pytest.approx(pose(inner(point)))
+
+
+def test_a_rotation_is_a_quaternion():
+    for angles in ((0.3, -0.4, 1.2), (np.pi, 0, 0), (0, np.pi, 0.1), (0, 0, 3.1)):
+        found = Rotation.from_quat(Pose.of((0, 0, 0), angles).quaternion())
+        assert (found.inv() * Rotation.from_euler("xyz", angles)).magnitude() < 1e-7
+
+
+def test_a_moved_surface_is_the_surface_moved():
+    pose = Pose.of((0.1, 0.2, 0.3), (0.4, 0.5, 0.6))
+    cylinder = Cylinder(0.05)
+    moved = Place("left", "fore", pose).moved(cylinder)
+    uv = np.array([[0.01, 0.02], [-0.02, 0.0]])
+    assert moved.point(uv) == pytest.approx(pose(cylinder.point(uv)))
+    assert moved.normal(uv) == pytest.approx(cylinder.normal(uv) @ pose.rotation.T)
+    assert moved.metric(uv) == pytest.approx(cylinder.metric(uv))
+    step = 1e-6
+    aside = np.array([step, 0.0])
+    slope = (moved.point(uv + aside) - moved.point(uv - aside)) / (2 * step)
+    assert moved.jacobian(uv)[:, :, 0] == pytest.approx(slope, abs=1e-6)
+    plane = Plane()
+    assert Place("left", "", pose).moved(plane) is plane
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('name = "right"', 'name = "left"', "two skins have the same name left"),
+        ('name = "right"', 'name = "Right arm"', "small letters"),
+        ('source = "twin:seed=1"', 'source = "twin:seed=1"\nboard = "0102"', "the same board 0102"),
+        ('link = "fore"', 'link = "four"', 'no link "four".*did you mean "fore"'),
+        ('link = "fore"', "", "needs the key link"),
+        ('"arm.urdf"', '"leg.urdf"', "no such file|cannot be read"),
+        ('board = "0102"', 'board = "x1"', "hexadecimal"),
+        ('board = "0102"', 'bord = "0102"', 'did you mean "board"'),
+        ('["10 mm", "0 mm", "30 mm"]', "[1, 2, 3]", "without a unit"),
+        ('"bend.npz"', "3", 'skin 1 "left" calibration: entry 1: expected text'),
+    ],
+)
+def test_what_cannot_be_meant_is_said(files, old, new, said):
+    assert old in ROBOT
+    (files / "robot.toml").write_text(ROBOT.replace(old, new))
+    with pytest.raises(SkinError, match=said):
+        Robot.load(files / "robot.toml")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("<robot", "<robots", "expected <robot>|not valid XML"),
+        ('<link name="fore"/>', "", 'no link "fore"'),
+        ('<link name="fore"/>', '<link name="fore"/><link name="fore"/>', "twice"),
+        ('parent link="base"', 'parent link="fore"', "ring"),
+        ('xyz="0.3 0 0"', 'xyz="0.3 0"', "three numbers"),
+        ('xyz="0.3 0 0"', 'xyz="nan 0 0"', "three numbers"),
+        ("</robot>", "", "not valid XML"),
+    ],
+)
+def test_a_bad_urdf_is_refused(files, old, new, said):
+    assert old in URDF
+    (files / "arm.urdf").write_text(URDF.replace(old, new))
+    with pytest.raises(SkinError, match=said):
+        Urdf.read(files / "arm.urdf")
+
+
+def test_a_mesh_lies_on_its_link(files):
+    urdf = Urdf.read(files / "arm.urdf")
+    assert [*urdf.meshes] == ["upper"]
+    assert urdf.meshes["upper"].position.tolist() == [0, 0, 0.1]
+
+
+def test_a_skin_is_added_to_a_file_or_a_new_one(files):
+    path = files / "new.toml"
+    given = {"name": "hand", "skin": "textile-disc-8", "link": "fore"}
+    path.write_text(add_skin(path, given, "arm.urdf"))
+    path.write_text(add_skin(path, given | {"name": "palm", "link": "upper"}, "arm.urdf"))
+    robot = Robot.load(path)
+    assert [(skin.name, skin.place.link) for skin in robot.skins] == [
+        ("hand", "fore"),
+        ("palm", "upper"),
+    ]
+    with pytest.raises(SkinError, match=r"to the URDF arm\.urdf"):
+        add_skin(path, given, "leg.urdf")
+    with pytest.raises(SkinError, match="unknown key"):
+        add_skin(path, given | {"lnk": "fore"})

@@ -1,0 +1,164 @@
+"""The MQTT sink, before a real broker on this machine."""
+
+from __future__ import annotations
+
+import json
+import queue
+import shutil
+import socket
+import subprocess
+import time
+from dataclasses import replace
+
+import pytest
+from paho.mqtt import client as paho
+
+from conftest import missing
+from files.session.runs import TOUCH
+from run.sinks.conftest import EPOCH, EVENT, PATIENCE, free_port, moment_at, touch_of
+from tomoskin.core import SinkError
+from tomoskin.run.sinks import make_sink
+from tomoskin.run.sinks.mqtt import PERIOD
+from tomoskin.sensing.track import TouchEvent
+
+BROKERS = "/usr/sbin:/usr/local/sbin:/opt/homebrew/sbin"
+
+
+class Broker:
+    """mosquitto on a port of its own, for ``me`` with the password ``secret``."""
+
+    def __init__(self, folder, program):
+        self.port = free_port()
+        self._program, self._folder = program, folder
+        people = folder / "people"
+        people.write_text("me:secret\n")
+        people.chmod(0o600)
+        command = [shutil.which("mosquitto_passwd") or "mosquitto_passwd", "-U", str(people)]
+        subprocess.run(command, check=True, capture_output=True)
+        lines = f"listener {self.port} 127.0.0.1\npassword_file {people}\nuser root\n"
+        (folder / "broker.conf").write_text(lines)
+        self.start()
+
+    @property
+    def url(self):
+        return f"mqtt://me:secret@127.0.0.1:{self.port}/robot/skin"
+
+    def start(self):
+        command = [self._program, "-c", str(self._folder / "broker.conf")]
+        self._process = subprocess.Popen(command, stderr=subprocess.DEVNULL)
+        deadline = time.monotonic() + PATIENCE
+        while time.monotonic() < deadline:
+            try:
+                socket.create_connection(("127.0.0.1", self.port), 1).close()
+                return
+            except ConnectionRefusedError:
+                assert self._process.poll() is None
+
+    def stop(self):
+        self._process.terminate()
+        self._process.wait(PATIENCE)
+
+
+@pytest.fixture
+def broker(tmp_path):
+    program = shutil.which("mosquitto") or shutil.which("mosquitto", path=BROKERS)
+    if program is None:
+        missing("the MQTT sink: no mosquitto (Debian: apt-get install mosquitto)")
+    broker = Broker(tmp_path, program)
+    yield broker
+    broker.stop()
+
+
+@pytest.fixture
+def heard(broker):
+    """The next (topic, content) that a subscriber gets."""
+    came, ready = queue.SimpleQueue(), queue.SimpleQueue()
+    client = paho.Client(paho.CallbackAPIVersion.VERSION2)
+    client.username_pw_set("me", "secret")
+    client.on_message = lambda *told: came.put((told[2].topic, told[2].payload.decode()))
+    client.on_subscribe = lambda *_: ready.put(None)
+    client.connect("127.0.0.1", broker.port)
+    client.loop_start()
+    client.subscribe("robot/#")
+    ready.get(timeout=PATIENCE)
+    yield lambda: came.get(timeout=PATIENCE)
+    client.disconnect()
+    client.loop_stop()
+
+
+def test_touches_events_and_status(broker, heard, stream):
+    sink = make_sink(broker.url)
+    sink.open(stream)
+    assert heard() == ("robot/skin/status", "online")
+    sink.publish(moment_at(1.0, TOUCH, sequence=3))
+    topic, text = heard()
+    assert topic == "robot/skin/touches"
+    told = json.loads(text)
+    assert (told["sequence"], told["touches"][0]["x"]) == (3, TOUCH.detection.x)
+    assert told["touches"][0]["sd_y"] is None
+    assert told["touches"][0]["position"] == [TOUCH.detection.x, TOUCH.detection.y, 0.0]
+    assert (told["skin"], told["frame_id"]) == (stream.skin, "robot/skin/skin")
+    assert told["utc_s"] == EPOCH + told["host_time"]
+    begun = TouchEvent("onset", TOUCH, 1.1)
+    sink.publish(replace(moment_at(1.1, TOUCH, sequence=4), happened=(begun,)))
+    topic, text = heard()
+    assert topic == "robot/skin/touch"
+    told = json.loads(text)
+    assert (told["event"], told["id"], told["time_s"]) == ("onset", TOUCH.id, 1.1)
+    assert (told["utc_s"], told["normal"]) == (EPOCH + 1.1, [0, 0, 1])
+    assert heard()[0] == "robot/skin/touches"
+    sink.publish(EVENT)
+    topic, text = heard()
+    assert topic == "robot/skin/events"
+    assert text.startswith('{"time_s":0.5,"kind":"connected","text":"board 01","utc_s":')
+    sink.close()
+    assert heard() == ("robot/skin/status", "offline")
+
+
+def test_beginnings_and_ends_are_sent_at_once_the_rest_now_and_then(broker, heard, stream):
+    sink = make_sink(broker.url)
+    sink.open(stream)
+    heard()
+    one, two = touch_of(1), touch_of(2)
+    for number, touches in enumerate(((), (one,), (one,), (one, two), (one, two), (), ())):
+        sink.publish(moment_at(0.01 * number, *touches, sequence=number))
+    sink.publish(moment_at(1.0, one, sequence=7))
+    sink.publish(moment_at(1.0 + 1.01 * PERIOD, one, sequence=8))
+    assert [json.loads(heard()[1])["sequence"] for _ in range(6)] == [0, 1, 3, 5, 7, 8]
+    sink.close()
+
+
+def test_a_wrong_password_is_said(broker, stream):
+    sink = make_sink(broker.url.replace("secret", "guess"))
+    with pytest.raises(SinkError, match="refused"):
+        sink.open(stream)
+    sink.close()
+
+
+def test_a_broker_that_goes_is_noticed(broker, heard, stream):
+    sink = make_sink(broker.url)
+    sink.open(stream)
+    heard()
+    broker.stop()
+    deadline = time.monotonic() + PATIENCE
+
+    def go_on():
+        while time.monotonic() < deadline:
+            sink.publish(EVENT)
+
+    with pytest.raises(SinkError, match=f"127.0.0.1:{broker.port}/robot/skin"):
+        go_on()
+    sink.close()
+    with pytest.raises(OSError, match="refused"):
+        sink.open(stream)
+    sink.close()
+
+
+def test_the_listener_of_the_documentation_hears_touches(broker, listener, stream):
+    place = f'client.username_pw_set("me", "secret")\nclient.connect("127.0.0.1", {broker.port})'
+    heard = listener("paho", place=('client.connect("127.0.0.1", 1883)', place))
+    sink = make_sink(broker.url)
+    sink.open(stream)
+    line = heard.hears(lambda number: sink.publish(moment_at(float(number), TOUCH)))
+    sink.close()
+    assert line.split() == ["4", "0.1", "-0.2"]

@@ -1,0 +1,160 @@
+"""The ROS 2 sink, heard by a participant of another process over loopback; nobody else is."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from files.session.runs import TOUCH
+from run.sinks.conftest import EPOCH, EVENT, MESH, PATIENCE, moment_at
+from tomoskin.core import SinkError
+from tomoskin.run.sinks import make_sink
+from tomoskin.run.sinks.ros import TOPICS
+from tomoskin.run.sinks.ros_types import dds_name, type_hash
+
+PEER = Path(__file__).with_name("ros_peer.py")
+LOOPBACK = (
+    "<CycloneDDS><Domain><General><Interfaces><NetworkInterface name='lo'/></Interfaces>"
+    "<AllowMulticast>false</AllowMulticast></General><Discovery>"
+    "<ParticipantIndex>auto</ParticipantIndex><Peers><Peer address='127.0.0.1'/></Peers>"
+    "</Discovery></Domain></CycloneDDS>"
+)
+
+
+@pytest.fixture
+def domain(monkeypatch):
+    """A domain of this process' own, on loopback only."""
+    monkeypatch.setenv("CYCLONEDDS_URI", LOOPBACK)
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(100 + os.getpid() % 100))
+    return os.environ["ROS_DOMAIN_ID"]
+
+
+@pytest.fixture
+def sink(domain, stream):
+    """Open, with all that a stream can have."""
+    assert domain
+    points = np.column_stack([MESH.centroids, np.zeros(len(MESH.cells))])
+    opened = make_sink("ros2:namespace=left_arm,parent=tool0,at=0/0/0.05")
+    opened.open(replace(stream, points=points))
+    yield opened
+    opened.close()
+
+
+def heard_by(peer, sink, enough):
+    """(topics announced, first message of each) once ``enough`` topics were heard."""
+    topics, messages = {}, {}
+    for text in peer.lines(lambda n: publish(sink, n)):
+        line = json.loads(text)
+        if "topic" in line:
+            topics[line["topic"]] = line
+        else:
+            messages.setdefault(line["heard"], line)
+        if len(messages) == enough:
+            return topics, messages
+    raise AssertionError("it goes on for ever")
+
+
+def publish(sink, number):
+    """Everything, so late by the clock that each frame is worth a report."""
+    sink.publish(moment_at(10.0 * number + 0.25, TOUCH, sequence=number))
+    sink.publish(EVENT)
+
+
+def test_another_process_sees_what_ros_2_would(program, domain, sink):
+    topics, messages = heard_by(program(str(PEER), domain), sink, len(TOPICS))
+    named = {f"rt{name}" if name[0] == "/" else f"rt/left_arm/{name}": name for name in TOPICS}
+    assert topics.keys() == messages.keys() == named.keys()
+    for topic, said in topics.items():
+        kind = TOPICS[named[topic]]
+        assert said["type"] == dds_name(kind)
+        assert said["data"] == f"typehash={type_hash(kind)};"
+        assert said["kept"] == (named[topic] == "/tf_static")
+    (contact,) = messages["rt/left_arm/contacts"]["value"]["contacts"]
+    assert contact["name"] == "left_arm/skin/touch_4"
+    assert contact["position"] == {"x": TOUCH.detection.x, "y": TOUCH.detection.y, "z": 0}
+    assert contact["normal"] == {"x": 0, "y": 0, "z": 1}
+    told = json.loads(messages["rt/left_arm/touches"]["value"]["data"])
+    stamp = contact["header"]["stamp"]
+    assert stamp["sec"] + 1e-9 * stamp["nanosec"] > EPOCH
+    assert told["touches"][0]["id"] == 4
+    assert told["utc_s"] == pytest.approx(messages["rt/left_arm/touches"]["stamp"] / 1e9, abs=1e-5)
+    cloud = messages["rt/left_arm/points"]["value"]
+    assert [field["name"] for field in cloud["fields"]] == ["x", "y", "z", "change"]
+    assert cloud["width"] == len(MESH.cells)
+    (status,) = messages["rt/diagnostics"]["value"]["status"]
+    assert (status["level"], status["message"]) == (0, "OK")
+    (transform,) = messages["rt/tf_static"]["value"]["transforms"]
+    assert (transform["header"]["frame_id"], transform["child_frame_id"]) == (
+        "tool0", "left_arm/skin",
+    )  # fmt: skip
+    assert transform["transform"]["translation"]["z"] == 0.05
+
+
+def test_a_subscriber_that_reads_no_more_delays_nobody(program, domain, sink):
+    peer = program(str(PEER), domain)
+    heard_by(peer, sink, len(TOPICS))
+    peer.send(signal.SIGSTOP)
+    begun = time.monotonic()
+    for number in range(40):
+        publish(sink, 1000 + number)
+    assert time.monotonic() - begun < PATIENCE  # none stands still for ever, and none raises
+    peer.send(signal.SIGCONT)
+    peer.hears(lambda n: publish(sink, 2000 + n))
+
+
+def test_a_sink_may_be_opened_again(sink, stream):
+    sink.close()
+    sink.close()
+    sink.open(stream)
+    sink.publish(moment_at(0.25, TOUCH))
+
+
+def test_the_listener_of_the_documentation_hears_touches(listener, domain, stream):
+    own = ("DomainParticipant(0)", f"DomainParticipant({domain})")
+    heard = listener("cyclonedds", domain=own)
+    sink = make_sink("ros2")
+    sink.open(stream)
+    line = heard.hears(lambda number: sink.publish(moment_at(float(number), TOUCH)))
+    sink.close()
+    assert line.strip() == "4 [0.1, -0.2, 0.0]"
+
+
+@pytest.mark.parametrize(
+    ("argument", "said"),
+    [
+        ("node", "expected domain=…, namespace=…, frame=…, parent=…, at=…"),
+        ("namespace=left arm", "expected a namespace"),
+        ("namespace=/arm", "expected a namespace"),
+        ("frame=", "expected domain"),
+        ("domain=233", "expected a domain from 0 to 232"),
+        ("domain=x", "expected a domain"),
+        ("at=0/0/0", "expected parent"),
+        ("parent=tool0,at=0/0", "at: expected X/Y/Z"),
+        ("parent=tool0,at=0/0/nan", "at: expected X/Y/Z"),
+        ("parent=tool0,at=a/b/c", "at: expected X/Y/Z"),
+    ],
+)
+def test_what_cannot_be_meant(argument, said):
+    with pytest.raises(SinkError, match=said):
+        make_sink(f"ros2:{argument}")
+
+
+def test_the_domain_is_the_environments(monkeypatch):
+    monkeypatch.setenv("ROS_DOMAIN_ID", "7")
+    assert make_sink("ros2").name == "ros2 /tomoskin, domain 7"
+    assert make_sink("ros2:domain=3,namespace=left_arm").name == "ros2 /left_arm, domain 3"
+
+
+def test_without_a_network_it_is_said(monkeypatch, stream):
+    monkeypatch.setenv("CYCLONEDDS_URI", LOOPBACK.replace("'lo'", "'no-such-interface'"))
+    sink = make_sink("ros2:domain=99")
+    with pytest.raises(SinkError, match=r"cannot join domain 99.*CYCLONEDDS_URI"):
+        sink.open(stream)
+    sink.close()
