@@ -194,8 +194,8 @@ def crossing(spectrum: Spectrum, quantity: Quantity, level: Level, why: Explanat
             hint=hint,
         )
     at = int(crossed[-1])
-    low, high = (float(np.log(a)) for a in alphas[[at, at + 1]])
-    root = float(np.exp(brentq(lambda t: quantity(float(np.exp(t))) - level.value, low, high)))
+    low, high = (float(a) for a in alphas[[at, at + 1]])
+    root = float(brentq(lambda a: quantity(a) - level.value, low, high, xtol=1e-12 * low))
     nearest = int(np.abs(np.log(alphas / root)).argmin())
     curve = Curve(alphas, values, "alpha", why.quantity, nearest)
     return AlphaChoice(root, why.rule, why.reason, curve)

@@ -10,7 +10,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from tomoskin.core import SkinError
+from tomoskin.core import SkinError, StrPath
 from tomoskin.model.robot.pose import Place, Pose
 from tomoskin.model.robot.urdf import Urdf
 from tomoskin.model.skin import (
@@ -120,7 +120,7 @@ class Robot:
     urdf: Urdf | None = None
 
     @classmethod
-    def load(cls, path: Path) -> Self:
+    def load(cls, path: StrPath) -> Self:
         """From a file.
 
         Raises
@@ -129,16 +129,19 @@ class Robot:
             For a value that cannot be meant, two skins of one name, board or source, or a link
             that the URDF does not have; the message says where.
         """
+        path = Path(path)
         tables = tables_of(read_text(path, "a robot file"), str(path), FORMAT)
         return cls.of(tables, str(path), path.parent)
 
     @classmethod
-    def of(cls, tables: Mapping[str, Any], source: str, folder: Path) -> Self:
+    def of(cls, tables: Mapping[str, Any], source: str, folder: StrPath) -> Self:
         """From the tables of a file: ``source`` for errors, ``folder`` of its paths; SkinError."""
         check_names(tables, list(SECTIONS), "section", source)
         robot = RobotSection.read(tables.get("robot", {}), f"{source}: [robot]")
-        urdf = None if robot.urdf is None else Urdf.read(folder / robot.urdf)
-        skins = tuple(_placed(given, where, folder, urdf) for given, where in _each(tables, source))
+        urdf = None if robot.urdf is None else Urdf.read(Path(folder) / robot.urdf)
+        skins = tuple(
+            _placed(given, where, Path(folder), urdf) for given, where in _each(tables, source)
+        )
         if not 0 < len(skins) <= MOST_SKINS:
             raise SkinError(
                 f"expected 1 to {MOST_SKINS} sections [[skin]], got {len(skins)}", where=source
@@ -151,11 +154,12 @@ class Robot:
         return self.urdf.pose(place.link) if self.urdf and place.link else Pose()
 
 
-def add_skin(path: Path, given: Mapping[str, Any], urdf: str | None = None) -> str:
+def add_skin(path: StrPath, given: Mapping[str, Any], urdf: str | None = None) -> str:
     """Text of the robot file at ``path`` with one more skin; of a new one where there is none.
 
     ``given``: keys of its section as written; ``urdf``: path from the file. Raises SkinError.
     """
+    path = Path(path)
     if path.exists():
         text = read_text(path, "a robot file").rstrip("\n")
         tables = tables_of(text, str(path), FORMAT)

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from tomoskin.core import FloatArray, GeometryError, SkinError
+from tomoskin.core import FloatArray, GeometryError, SkinError, StrPath
 from tomoskin.model.robot.elements import name_of, origin_of
 from tomoskin.model.robot.link_shapes import (
     MOST_TRIANGLES,
@@ -71,7 +71,7 @@ class Urdf:
     shapes: tuple[LinkShape, ...]
 
     @classmethod
-    def read(cls, path: Path) -> Self:
+    def read(cls, path: StrPath) -> Self:
         """From a file.
 
         Raises
@@ -79,6 +79,7 @@ class Urdf:
         SkinError
             When it cannot be read, is no URDF, or its links are no tree.
         """
+        path = Path(path)
         text = read_text(path, "a URDF", _LARGEST)
         where = str(path)
         if "<!ENTITY" in text:
