@@ -62,7 +62,7 @@ class Contents(TyperGroup):
     """Commands with whole sentences: too long ones go on in the next line."""
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """Write names and sentences."""
+        """Write the commands with a sentence each."""
         with formatter.section("Commands"):
             formatter.write_dl([(name, self.sentence(ctx, name)) for name in self.commands])
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 class Unit(StrEnum):
-    """What the labels are in."""
+    """The unit of the labels."""
 
     N = "N"
     G = "g"

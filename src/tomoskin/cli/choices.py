@@ -92,7 +92,7 @@ def with_alpha(skin: Skin, given: str | None) -> tuple[Skin, str | None]:
 
 
 def alpha_line(choice: AlphaChoice) -> str:
-    """One line about a choice."""
+    """One line about the alpha that was chosen."""
     return f"alpha {choice.alpha:.4g} ({choice.rule}: {choice.reason})"
 
 

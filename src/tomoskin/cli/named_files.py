@@ -76,7 +76,7 @@ class Writes:
     files: Callable[[Path | None, Given, str], Iterable[Output]] | None = None
 
     def outputs(self, value: Path | None, given: Given, called: str) -> Iterable[Output]:
-        """What is to be checked."""
+        """The files that are to be checked."""
         from tomoskin.core import Output
 
         if self.files is not None:

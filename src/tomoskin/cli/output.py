@@ -66,7 +66,7 @@ class Bar:
                 self._running = True
 
     def __enter__(self) -> Self:
-        """The bar itself."""
+        """Show the bar."""
         if self._shown:
             self._timer.start()
         return self
@@ -77,7 +77,7 @@ class Bar:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Take it away."""
+        """Remove the bar."""
         self._timer.cancel()
         with self._lock:
             self._over = True

@@ -76,7 +76,7 @@ class Archive(Arrays):
         return iter(self._names)
 
     def __len__(self) -> int:
-        """How many there are."""
+        """Number of arrays."""
         return len(self._names)
 
     @contextmanager
@@ -114,7 +114,7 @@ def unpack_arrays(data: bytes, where: str) -> Arrays:
 
 
 def pack_arrays(arrays: Arrays) -> bytes:
-    """The bytes of a .npz file."""
+    """Bytes of an .npz file with these arrays."""
     file = io.BytesIO()
     np.savez_compressed(file, allow_pickle=False, **arrays)
     return file.getvalue()

@@ -42,7 +42,7 @@ class Output:
     makes_folders: bool = False
 
     def __post_init__(self) -> None:
-        """Take its name too."""
+        """Accept the path as text too."""
         object.__setattr__(self, "path", Path(self.path))
 
 

@@ -194,7 +194,7 @@ class Force:
 
     @property
     def text(self) -> str:
-        """For people."""
+        """The force with its interval, in words."""
         state = "" if self.calibrated else ", uncalibrated"
         return f"{self.newtons:.2g} N ({self.low:.2g} to {self.high:.2g}{state})"
 

@@ -24,7 +24,7 @@ def numbers(arrays: Arrays, key: str, source: str) -> NDArray[Any]:
 
 
 def real_numbers(arrays: Arrays, key: str, source: str) -> FloatArray:
-    """Array ``key`` as float64."""
+    """Array ``key`` as float64 numbers."""
     array = numbers(arrays, key, source)
     if array.dtype.kind == "c":
         raise DataError(f"expected real numbers in {key}, got complex ones", where=source)

@@ -195,7 +195,7 @@ class RunCommands:
                 rest.add_done_callback(partial(_pass_on, future))
 
     def nudge(self) -> None:
-        """End :meth:`wait`."""
+        """Wake whoever waits in :meth:`wait`."""
         self._nudge.set()
 
     def wait(self, seconds: float) -> bool:

@@ -61,7 +61,7 @@ class Losses:
         return cls(device_drops + frames.foreign, link.counters.corrupt, frames.lost)
 
     def __add__(self, other: Losses) -> Losses:
-        """Both together."""
+        """The sum of both losses."""
         return Losses(
             self.dropped + other.dropped,
             self.corrupt + other.corrupt,
@@ -73,7 +73,7 @@ class Ring:
     """The last so many numbers; written by one thread, read by any."""
 
     def __init__(self, size: int = _WINDOW) -> None:
-        """None yet."""
+        """Make an empty ring."""
         self._values = np.zeros(size)
         self.count = 0
 
@@ -99,7 +99,7 @@ class Latency:
     """Times of the last frames, in bounded memory; each is written by one thread, read by any."""
 
     def __init__(self, window: int = _WINDOW) -> None:
-        """Nothing has been timed."""
+        """Make counters without any times."""
         self._rings: dict[Timed, Ring] = {
             name: Ring(window) for name in ("sample", "decode", "reconstruct", "publish")
         }
@@ -109,7 +109,7 @@ class Latency:
 
     @property
     def frames(self) -> int:
-        """Frames since the start."""
+        """Number of frames since the start."""
         return self._arrivals.count
 
     def add_frame(self, frame: Frame, read: float, tick_rate: float) -> None:
@@ -132,7 +132,7 @@ class Latency:
         self._painted[page] = p50, p99
 
     def forget(self, page: object) -> None:
-        """A page draws no longer."""
+        """Forget a page that has stopped drawing."""
         self._painted.pop(page, None)
 
     def age(self) -> tuple[float, float]:

@@ -72,7 +72,7 @@ class Flow:
         self._ended = False
 
     def now(self) -> float:
-        """Host monotonic seconds."""
+        """Monotonic time of the host, s."""
         return self._clock()
 
     def begin(self, transport: Transport) -> None:

@@ -26,7 +26,7 @@ _log = logging.getLogger(__name__)
 
 
 class _StoppedError(Exception):
-    """The run is to end."""
+    """The run has to end."""
 
 
 class Loop:

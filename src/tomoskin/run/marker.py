@@ -43,7 +43,7 @@ class ReplaySource(Protocol):
 
     @property
     def paused(self) -> bool:
-        """Whether it stands still."""
+        """Whether the replay is paused."""
 
     def now(self) -> float:
         """The time in the recording, host monotonic s."""
@@ -58,7 +58,7 @@ class ReplaySource(Protocol):
         """What became of a frame that was just read; None: it never reached the pipeline."""
 
     def pause(self, on: bool) -> None:
-        """Stand still, or go on."""
+        """Pause the replay, or go on."""
 
 
 def play(replay: ReplaySource, command: ReplayCommand) -> None:

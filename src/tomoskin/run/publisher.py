@@ -68,7 +68,7 @@ class Subscriber(Consumer):
         return message if isinstance(message, FrameResult) else None
 
     def take(self, item: FrameResult) -> None:
-        """Call the function."""
+        """Call the function with a result."""
         self._call(item)
 
     def handle_failure(self, error: Exception) -> None:
@@ -204,7 +204,7 @@ class Publisher:
         self._audience.wake()
 
     def sink_reports(self) -> tuple[SinkReport, ...]:
-        """How each sink is doing."""
+        """The state of each sink."""
         return tuple(map(sink_report, self._sinks))
 
     def stop(self) -> None:

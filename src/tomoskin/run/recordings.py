@@ -42,7 +42,7 @@ class PreRoll:
     """
 
     def __init__(self) -> None:
-        """No frame has come."""
+        """Make an empty pre-roll."""
         self._since: list[Marked] = []
         self._complete = True
         self._number = 0

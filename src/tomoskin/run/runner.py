@@ -133,12 +133,12 @@ class Runner:
         self._loop.flow.out.say(kind, text)
 
     def status(self) -> Status:
-        """How it is doing now."""
+        """The status of this moment."""
         return self._loop.flow.status(self._loop.trouble)
 
     @property
     def prepared(self) -> Prepared:
-        """The skin of the moment."""
+        """The prepared skin of this moment."""
         return self._loop.flow.prepared
 
     @property

@@ -110,7 +110,7 @@ class Status:
 
     @property
     def text(self) -> str:
-        """One line in words."""
+        """The status in one line of words."""
         if self.problem:
             return f"{self.source}: {self.problem}"
         if self.paused:

@@ -15,13 +15,13 @@ class Turns:
     """
 
     def __init__(self) -> None:
-        """Nobody is in."""
+        """Make turns that nobody holds."""
         self._lock = threading.Lock()
         self._waiting: deque[threading.Lock] = deque()
         self._taken = False
 
     def __enter__(self) -> None:
-        """Wait for the turn."""
+        """Wait for the turn and take it."""
         with self._lock:
             if not self._taken:
                 self._taken = True
@@ -32,7 +32,7 @@ class Turns:
         ticket.acquire()
 
     def __exit__(self, *_: object) -> None:
-        """Let the next one in."""
+        """Give the turn to the next one."""
         with self._lock:
             if self._waiting:
                 self._waiting.popleft().release()

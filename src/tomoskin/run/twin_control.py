@@ -68,7 +68,7 @@ class Pressable(Protocol):
     """A source that can be pressed, as the twin can."""
 
     def set_presses(self, presses: tuple[Contact, ...]) -> None:
-        """All presses from now on."""
+        """Set all presses from now on."""
 
 
 @runtime_checkable
@@ -87,7 +87,7 @@ class Bendable(Protocol):
     """A source whose sheet can be bent and stretched, as the twin's can."""
 
     def set_pose(self, pose: Pose) -> None:
-        """How it lies from now on."""
+        """Set the pose of the sheet from now on."""
 
 
 class TwinControl:

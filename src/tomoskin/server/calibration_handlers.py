@@ -27,7 +27,7 @@ class CalibrationHandlers:
         hub.serve({UseCalibration: self._use}, self.greeting)
 
     def greeting(self) -> Sequence[str]:
-        """Which are in use."""
+        """The calibrations in use."""
         prepared = self._hub.runner.prepared
         if self._used_on != prepared.mesh.identity:
             self._used_on = prepared.mesh.identity

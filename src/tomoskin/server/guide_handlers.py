@@ -75,7 +75,7 @@ class GuideHandlers:
         )
 
     def greeting(self) -> Sequence[str]:
-        """Where the flow is."""
+        """The state of the guided flow."""
         mesh = self._hub.runner.prepared.mesh
         if self._flow is not None and self._flow.prepared.mesh.identity != mesh.identity:
             self._leave()

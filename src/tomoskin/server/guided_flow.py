@@ -99,7 +99,7 @@ class GuidedFlow(ABC):
             return self.estimate_from(examples)
 
     def fields(self) -> dict[str, Any]:
-        """What a page shows of it."""
+        """What a page shows of the flow."""
         estimate = self.estimate or Estimate("")
         return {
             "kind": self.kind,

@@ -42,7 +42,7 @@ class NewestTouches:
         return self._made or None
 
     def note_sent(self, message: bytes) -> None:
-        """Nothing is measured here."""
+        """Do nothing: no latency is measured here."""
 
     def renew(self) -> None:
         """Make it of the newest results; the same object where nothing has changed."""
@@ -108,7 +108,7 @@ class Overview:
         return True
 
     def leave(self, page: Listener, why: str = "") -> None:
-        """Serve ``page`` no longer."""
+        """Stop serving ``page``."""
         self._pages.discard(page)
         if why:
             for runner in self.run.runners.values():
@@ -184,7 +184,7 @@ def _skin(skin: PlacedSkin, stream: Stream, pose: Pose) -> dict[str, Any]:
 
 
 def states(run: RobotRun) -> str:
-    """How each skin is doing."""
+    """The state of each skin, in words."""
     skins = {name: _state(status) for name, status in run.statuses().items()}
     recording = None if run.recording is None else run.recording.name
     return text_of(type="robot-state", skins=skins, recording=recording)

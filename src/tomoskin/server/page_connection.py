@@ -31,7 +31,7 @@ class NewestMessage(Protocol):
         """The message; None before the first."""
 
     def note_sent(self, message: bytes) -> None:
-        """A page's connection has it."""
+        """Note that a page has the message."""
 
 
 class Host(Protocol):
@@ -39,13 +39,13 @@ class Host(Protocol):
 
     @property
     def frame(self) -> NewestMessage:
-        """What it is sent."""
+        """The newest message for the page."""
 
     def join(self, page: Listener) -> bool:
         """Serve ``page`` from now on; False where there are too many."""
 
     def leave(self, page: Listener, why: str = "") -> None:
-        """Serve ``page`` no longer."""
+        """Stop serving ``page``."""
 
     def obey(self, page: Listener, request: Request) -> None:
         """Do what a page asks. Raises WireError where that cannot be."""

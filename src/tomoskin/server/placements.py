@@ -39,7 +39,7 @@ class Placement:
 
     @property
     def xy(self) -> tuple[float, float]:
-        """Where it lies, m."""
+        """Position of the weight, m."""
         detection = self.detections[self.still]
         return detection.x, detection.y
 

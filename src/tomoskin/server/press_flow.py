@@ -76,7 +76,7 @@ class PressFlow(GuidedFlow):
         return EFFORTS[len(self.presses) % len(EFFORTS)] if self.kind == "touch" else None
 
     def _undo(self) -> bool:
-        """Take the last press back."""
+        """Remove the last press."""
         if not self.presses:
             raise WireError("there is no press to undo")
         self._dot = self.presses.pop().place

@@ -68,7 +68,7 @@ class UndoSettings(StrictRequest, frozen=True, tag="undo"):
 
 
 class RedoSettings(StrictRequest, frozen=True, tag="redo"):
-    """Make it again."""
+    """Repeat the change that was undone."""
 
 
 class SaveSkin(StrictRequest, frozen=True, tag="save_skin"):
@@ -135,7 +135,7 @@ class Annotate(StrictRequest, frozen=True, tag="annotate"):
 
 
 class ListSources(StrictRequest, frozen=True, tag="sources"):
-    """What can be connected."""
+    """Ask what can be connected."""
 
 
 class Connect(StrictRequest, frozen=True, tag="connect"):
@@ -152,7 +152,7 @@ class BeginFlow(StrictRequest, frozen=True, tag="flow_begin"):
 
 
 class UndoPress(StrictRequest, frozen=True, tag="flow_undo"):
-    """Take the last press back."""
+    """Remove the last press."""
 
 
 class DeletePress(StrictRequest, frozen=True, tag="flow_delete"):
@@ -180,7 +180,7 @@ class LearnFlow(StrictRequest, frozen=True, tag="flow_learn"):
 
 
 class StopLearning(StrictRequest, frozen=True, tag="flow_stop"):
-    """End that."""
+    """End what is being learnt."""
 
 
 class EndFlow(StrictRequest, frozen=True, tag="flow_end"):

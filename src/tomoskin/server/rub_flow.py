@@ -87,7 +87,7 @@ class Rubbed:
 
     @property
     def text(self) -> str:
-        """What is missing, in words."""
+        """What is still missing, in words."""
         said = []
         if self.frames > _FEWEST / 3 and self.several > _SEVERAL * self.frames:
             said.append(
@@ -147,7 +147,7 @@ class RubbedTouches:
         self._covered = self._covered + (apart < self.near)
 
     def now(self) -> Rubbed:
-        """What there is."""
+        """The touches so far."""
         dv = np.array(self._dv).reshape(-1, self._pattern.n_meas)
         some = dv[:: max(1, len(dv) // _GOOD)]
         quiet = quiet_electrodes(some, self._pattern) if len(dv) >= _FEWEST else ()

@@ -131,7 +131,7 @@ def _ends(host: Host, state: Callable[[], str]) -> list[BaseRoute]:
 
 
 def _page(static: Path) -> BaseRoute:
-    """The built page."""
+    """The route to the built page."""
     # Whether Python knows the page's typeface depends on its version and on the machine's list.
     mimetypes.add_type("font/woff2", ".woff2")
     return Mount("/", StaticFiles(directory=static, html=True))

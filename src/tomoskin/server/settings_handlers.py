@@ -278,7 +278,7 @@ class SettingsHandlers:
         return None
 
     def _message(self) -> str:
-        """The settings message."""
+        """The message with the settings."""
         skin = self._present()
         return text_of(
             type="settings",

@@ -46,7 +46,7 @@ class Tasks:
     """Work that is under way, kept until it is done: the loop itself would forget it."""
 
     def __init__(self) -> None:
-        """None is."""
+        """Make an empty set of tasks."""
         self._tasks: set[asyncio.Task[None]] = set()
 
     def keep(self, work: Coroutine[None, None, None]) -> None:

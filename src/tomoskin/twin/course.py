@@ -72,7 +72,7 @@ class ScriptedPress:
 
     @property
     def end(self) -> float:
-        """When the force has gone, s."""
+        """When the force is gone, s."""
         return self.start + self.force[-1][0]
 
     def at(self, time: float, friction: Friction) -> Probe | None:
@@ -169,7 +169,7 @@ class ScriptedBend:
 
     @property
     def end(self) -> float:
-        """When nothing is left, s."""
+        """When the sheet is flat again, s."""
         return self.start + self.course[-1][0]
 
     def amount(self, time: float) -> float:

@@ -45,7 +45,7 @@ class Load:
 
     @classmethod
     def none(cls, n: int) -> Self:
-        """Nothing presses."""
+        """A load without a press."""
         return cls(np.zeros((4, n)))
 
     @property
@@ -55,7 +55,7 @@ class Load:
 
     @property
     def depth(self) -> FloatArray:
-        """(n,) m."""
+        """Depths (n,) m of the sheet."""
         return np.asarray(self.felt[3])
 
 

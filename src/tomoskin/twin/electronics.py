@@ -133,7 +133,7 @@ class TwinElectronics:
 
     @property
     def faults(self) -> Faults:
-        """What is broken now."""
+        """The faults of this moment."""
         return self._faults
 
     def set_faults(self, faults: Faults) -> None:

@@ -99,17 +99,17 @@ class Press:
 
     @property
     def shape(self) -> Circle:
-        """Its face."""
+        """The face of the tip."""
         return _circle(self.radius)
 
     @property
     def angle(self) -> float:
-        """None: it is round."""
+        """The angle is zero, for the tip is round."""
         return 0.0
 
     @property
     def drag(self) -> tuple[float, float]:
-        """None: it does not slide."""
+        """The drag is zero, for the tip does not slide."""
         return 0.0, 0.0
 
 

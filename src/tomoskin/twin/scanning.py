@@ -109,12 +109,12 @@ class SampleTable:
 
     @cached_property
     def source(self) -> IntArray:
-        """(n_samples,)."""
+        """Source electrodes (n_samples,)."""
         return np.asarray(self.drives[self.drive, 0])
 
     @cached_property
     def sink(self) -> IntArray:
-        """(n_samples,)."""
+        """Sink electrodes (n_samples,)."""
         return np.asarray(self.drives[self.drive, 1])
 
     @cached_property

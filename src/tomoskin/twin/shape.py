@@ -63,7 +63,7 @@ class Circle(Shape):
 
     @property
     def extent(self) -> float:
-        """Radius, m."""
+        """Radius of the face, m."""
         return self.radius
 
     @property
@@ -73,11 +73,11 @@ class Circle(Shape):
 
     @property
     def flat(self) -> bool:
-        """Without a crown."""
+        """Whether the face has no crown."""
         return math.isinf(self.crown)
 
     def gap(self, points: FloatArray) -> FloatArray:
-        """(n,) m; inf off the face."""
+        """Gaps (n,) m; infinite off the face."""
         squared = (points**2).sum(axis=1)
         return _within(squared < self.radius**2, squared / (2 * self.crown))
 
@@ -96,7 +96,7 @@ class Square(Shape):
 
     @property
     def extent(self) -> float:
-        """Half a diagonal, m."""
+        """Half of a diagonal, m."""
         return self.side / math.sqrt(2)
 
     @property
@@ -106,11 +106,11 @@ class Square(Shape):
 
     @property
     def flat(self) -> bool:
-        """Without a crown."""
+        """Whether the face has no crown."""
         return math.isinf(self.crown)
 
     def gap(self, points: FloatArray) -> FloatArray:
-        """(n,) m; inf off the face."""
+        """Gaps (n,) m; infinite off the face."""
         inside = np.abs(points).max(axis=1) < self.side / 2
         return _within(inside, (points**2).sum(axis=1) / (2 * self.crown))
 
@@ -150,11 +150,11 @@ class Finger(Shape):
 
     @property
     def flat(self) -> bool:
-        """Never."""
+        """A fingertip is never flat."""
         return False
 
     def gap(self, points: FloatArray) -> FloatArray:
-        """(n,) m; inf off the pad."""
+        """Gaps (n,) m; infinite off the pad."""
         squared = points**2
         inside = squared @ np.array([4 / self.length**2, 4 / self.width**2]) < 1
         return _within(inside, squared @ np.array([0.5 / self.along, 0.5 / self.across]))
@@ -194,11 +194,11 @@ class Face(Shape):
 
     @property
     def flat(self) -> bool:
-        """Without a crown."""
+        """Whether the face has no crown."""
         return math.isinf(self.crown)
 
     def gap(self, points: FloatArray) -> FloatArray:
-        """(n,) m; inf off the face."""
+        """Gaps (n,) m; infinite off the face."""
         return _within(self._polygon.contains(points), (points**2).sum(axis=1) / (2 * self.crown))
 
 

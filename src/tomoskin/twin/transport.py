@@ -28,7 +28,7 @@ class Clock(Protocol):
 
 
 class WallClock:
-    """The computer's own time."""
+    """The clock of the computer."""
 
     def now(self) -> float:
         """Monotonic seconds."""

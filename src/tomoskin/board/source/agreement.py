@@ -42,7 +42,7 @@ class Rated(Protocol):
 
     @property
     def rate(self) -> int:
-        """Bd."""
+        """Bits per second on the line."""
 
     def use_rate(self, rate: int) -> None:
         """Send and read at ``rate`` Bd from now on; SourceError when the device has gone away."""
@@ -67,7 +67,7 @@ class LineQuality:
         return next((slower for slower in RATES if slower < rate), None)
 
     def forget(self, counters: Counters) -> None:
-        """Begin a new window."""
+        """Count from zero again."""
         self._messages, self._corrupt = counters.messages, counters.corrupt
 
 

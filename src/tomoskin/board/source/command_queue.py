@@ -34,7 +34,7 @@ class SequenceFilter:
     """Checks each frame against the configuration and the sequence."""
 
     def __init__(self, configuration: Configuration) -> None:
-        """No frame passes yet."""
+        """Make a filter that waits for the first frame."""
         self._configuration = configuration
         self._expected: int | None = None
         self._foreign_run = False
@@ -55,7 +55,7 @@ class SequenceFilter:
 
     @property
     def counters(self) -> FrameCounters:
-        """Counts so far."""
+        """The counts since the start."""
         return FrameCounters(self._passed, self._lost, self._foreign, self._stale)
 
     def take(self, frame: Frame) -> list[Frame | Event]:
@@ -113,7 +113,7 @@ class CommandQueue:
     """
 
     def __init__(self, timing: Timing, now: float, where: str) -> None:
-        """Nothing to be sent."""
+        """Make a queue without commands."""
         self.last_sent = now
         self._timing, self._where = timing, where
         self._waiting: deque[Command] = deque()

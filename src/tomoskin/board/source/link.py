@@ -149,7 +149,7 @@ class Link(AbstractContextManager["Link"]):
                         return
 
     def __exit__(self, *_: object) -> None:
-        """Close."""
+        """Close the link."""
         self.close()
 
     def _listen(self, timeout: float) -> list[Frame | Event]:

@@ -66,7 +66,7 @@ def list_ports() -> tuple[Port, ...]:
 
 
 def say_ports() -> str:
-    """The ports in words."""
+    """The names of the ports, in words."""
     ports = ", ".join(map(str, list_ports()))
     return f"ports here: {ports}" if ports else "no serial port is connected"
 
@@ -139,7 +139,7 @@ class SerialTransport:
             raise self._gone(error) from None
 
     def write(self, data: bytes) -> None:
-        """Send ``data``."""
+        """Send ``data`` to the board."""
         try:
             self._serial.write(data)
         except (OSError, TypeError) as error:
@@ -147,7 +147,7 @@ class SerialTransport:
 
     @property
     def rate(self) -> int:
-        """Bd."""
+        """Bits per second on the line."""
         return int(self._serial.baudrate)
 
     def use_rate(self, rate: int) -> None:

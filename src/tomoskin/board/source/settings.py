@@ -97,7 +97,7 @@ class ScanSettings:
 
     @property
     def conversion(self) -> float:
-        """One conversion, s."""
+        """Seconds that one conversion takes."""
         return conversion_time(self.prescaler)
 
     @classmethod

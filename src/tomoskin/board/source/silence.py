@@ -92,6 +92,6 @@ def is_bootloader(answer: bytes) -> bool:
 
 
 def is_text(heard: bytes) -> bool:
-    """Whether that reads as text."""
+    """Whether the bytes read as text."""
     printable = sum(32 <= byte < 127 or byte in b"\r\n\t" for byte in heard)
     return bool(heard) and printable >= _TEXT * len(heard)

@@ -14,7 +14,7 @@ from tomoskin.core import Frame
 
 
 class Result(IntEnum):
-    """Outcome of a command."""
+    """The outcome of a command."""
 
     OK = 0
     UNKNOWN_COMMAND = 1
@@ -44,7 +44,7 @@ class FaultCode(IntEnum):
 
 
 class Reset(IntEnum):
-    """Why the board started."""
+    """Why the board started anew."""
 
     UNKNOWN = 0
     POWER = 1
@@ -68,7 +68,7 @@ class DriveMode(IntEnum):
 
 
 class FrameFlag(IntFlag):
-    """Bits of ``Frame.flags``."""
+    """The bits of ``Frame.flags``."""
 
     FIRST = 1
     DROPPED = 2
@@ -201,7 +201,7 @@ class ChoppedFrame:
 
     @classmethod
     def of(cls, frame: Frame) -> Self:
-        """Of a frame with sums."""
+        """The same frame with sums."""
         assert frame.sums is not None
         both = np.column_stack([frame.samples, frame.sums]).astype(np.uint16).ravel()
         return cls(
@@ -238,7 +238,7 @@ class BoardLimits:
 
     @property
     def text(self) -> str:
-        """The name, for people."""
+        """The name of the limit, for people."""
         return self.name.rstrip(b"\0").decode(errors="replace")
 
 
@@ -262,7 +262,7 @@ class GetInfo:
 
 @dataclass(frozen=True, slots=True)
 class Ping:
-    """The host is alive."""
+    """Tell the board that the host is alive."""
 
     request: int
 

@@ -68,7 +68,7 @@ class Film(Protocol):
     def __call__(
         self, path: StrPath, pictures: Pictures, fps: float, *, overwrite: bool = False
     ) -> None:
-        """Raises DataError."""
+        """Write the film. Raises DataError."""
 
 
 FILMS: dict[str, Film] = {".gif": write_gif, ".mp4": write_mp4}

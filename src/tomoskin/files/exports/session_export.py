@@ -65,7 +65,7 @@ class Export:
         write_parquet(path, self.session, self.advance, overwrite=self.overwrite)
 
     def hdf5(self, path: StrPath) -> None:
-        """Write everything."""
+        """Write all that the session holds."""
         write_hdf5(path, self.session, self.advance, overwrite=self.overwrite)
 
     def lerobot(self, path: StrPath) -> None:

@@ -102,7 +102,7 @@ def _check_separator(header: list[str], source: str) -> None:
 
 
 def _rows(lines: Iterable[str], source: str) -> Iterator[list[str]]:
-    """Fields of each line."""
+    """The fields of each line."""
     rows = csv.reader(lines)
     try:
         yield from rows

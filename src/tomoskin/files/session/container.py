@@ -88,7 +88,7 @@ class ContainerWriter:
             return False
 
     def attach(self, name: str, media_type: str, data: bytes, log_time: int = 0) -> None:
-        """Put a whole file inside."""
+        """Add a whole file."""
         self.flush()
         record = encode(Attachment(0, log_time, name, media_type, data))
         index = AttachmentIndex(
@@ -98,7 +98,7 @@ class ContainerWriter:
         self._totals.attachment_count += 1
 
     def describe(self, name: str, values: Mapping[str, str]) -> None:
-        """Put named strings inside."""
+        """Add named strings."""
         self.flush()
         record = encode(Metadata(name, dict(values)))
         index = MetadataIndex(self._write(record), len(record), name)

@@ -70,7 +70,7 @@ class ContainerReader:
             raise
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Close the file."""
         self._file.close()
 
     def description(self, name: str) -> dict[str, str] | None:

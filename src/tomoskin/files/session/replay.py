@@ -114,7 +114,7 @@ class ReplayTransport:
         return last.mark(sequence) if last else None
 
     def pause(self, on: bool) -> None:
-        """Stand still, or go on."""
+        """Pause the replay, or go on."""
         with self._condition:
             self.paused = on
             self._condition.notify()
@@ -164,7 +164,7 @@ class ReplayTransport:
             self._condition.notify()
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Close the file."""
         with self._condition:
             self._closed = True
             self._session.close()

@@ -53,14 +53,14 @@ class ReplayBoard:
         self.scanning = False
 
     def obey(self, data: bytes) -> None:
-        """Act on commands."""
+        """Carry out the commands."""
         for payload in self._deframer.feed(data):
             command = decode_payload(payload, 0.0)
             if command is not None and is_command(command):
                 self._out += encode(self._answer(command))
 
     def answer(self) -> bytes:
-        """What it has to say, once."""
+        """The answers that wait, each once."""
         data = bytes(self._out)
         self._out.clear()
         return data

@@ -51,7 +51,7 @@ class RobotLog:
 
     @property
     def path(self) -> Path:
-        """The file."""
+        """The path of the file."""
         return self.log.path
 
     @property
@@ -60,7 +60,7 @@ class RobotLog:
         return self.log.epoch
 
     def leave(self) -> None:
-        """One part is complete."""
+        """Note that one part is complete."""
         with self.lock:
             self._open -= 1
             if not self._open:
@@ -91,7 +91,7 @@ class LogPart:
             self._whole.log.put(self._first + channel, host_time, data)
 
     def log_time(self, host_time: float) -> int:
-        """Ns of a message."""
+        """Time of a message, ns."""
         return self._whole.log.log_time(host_time)
 
     def settle(self) -> None:

@@ -66,11 +66,11 @@ class SessionReader(AbstractContextManager["SessionReader"]):
             raise
 
     def __exit__(self, *_: object) -> None:
-        """Close."""
+        """Close the file."""
         self.close()
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Close the file."""
         self.container.close()
 
     @property
@@ -79,7 +79,7 @@ class SessionReader(AbstractContextManager["SessionReader"]):
         return self.container.torn
 
     def attachments(self) -> dict[str, bytes]:
-        """Files inside by their name."""
+        """The attached files by their names."""
         return {attachment.name: attachment.data for attachment in self.container.attachments()}
 
     def frames(self, since: float | None = None) -> Iterator[MarkedFrame]:
@@ -107,11 +107,11 @@ class SessionReader(AbstractContextManager["SessionReader"]):
         return map(truth_of, _documents(self, channels.TRUTH))
 
     def events(self) -> Iterator[Event]:
-        """What happened."""
+        """The events of the run."""
         return map(event_of, _documents(self, channels.EVENTS))
 
     def notes(self) -> Iterator[Event]:
-        """What a person remarked."""
+        """The notes that a person made."""
         return map(event_of, _documents(self, channels.NOTES))
 
     def device(self) -> dict[str, Any]:
@@ -123,7 +123,7 @@ class SessionReader(AbstractContextManager["SessionReader"]):
         return _last(self, channels.CLOCK)
 
     def settings(self) -> dict[str, Any]:
-        """How the run was set."""
+        """The settings of the run."""
         return _last(self, channels.SETTINGS)
 
 

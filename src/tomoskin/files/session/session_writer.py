@@ -52,22 +52,22 @@ class Log(Protocol):
     epoch: float
 
     def describe(self, name: str, about: Mapping[str, str]) -> None:
-        """Put named strings inside."""
+        """Add named strings to the file."""
 
     def attach(self, name: str, media_type: str, data: bytes) -> None:
-        """Put a file inside."""
+        """Add a whole file."""
 
     def put(self, channel: int, host_time: float, data: bytes) -> None:
-        """Add a message."""
+        """Add one message."""
 
     def log_time(self, host_time: float) -> int:
-        """Ns of a message."""
+        """Time of a message, ns."""
 
     def settle(self) -> None:
-        """Write what waits."""
+        """Write what is buffered."""
 
     def close(self) -> None:
-        """No more comes."""
+        """Close the log: no more messages come."""
 
 
 class SessionWriter(AbstractContextManager["SessionWriter"]):
@@ -125,7 +125,7 @@ class SessionWriter(AbstractContextManager["SessionWriter"]):
         self._log.close()
 
     def __exit__(self, *_: object) -> None:
-        """Close."""
+        """Close the file."""
         self.close()
 
     def raw(self, host_time: float, data: bytes) -> None:
@@ -168,7 +168,7 @@ class SessionWriter(AbstractContextManager["SessionWriter"]):
         _put_json(self._log, channels.TRUTH, host_time, content)
 
     def event(self, event: Event) -> None:
-        """Something that happened."""
+        """Write an event of the run."""
         content = log_message(event, self._log.log_time(event.host_time))
         _put_json(self._log, channels.EVENTS, event.host_time, content)
 

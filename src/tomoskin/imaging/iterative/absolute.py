@@ -70,7 +70,7 @@ class Absolute:
 
     @classmethod
     def of(cls, point: ModelPoint, descent: Descent) -> Absolute:
-        """What an iteration came to."""
+        """The result of the last iteration."""
         mesh = point.of.model.mesh
         unit = "S" if mesh.dimension == 2 else "S/m"
         return cls(
@@ -181,12 +181,12 @@ class AbsoluteImaging:
 
 @dataclass(frozen=True, eq=False)
 class Quadratic:
-    """A cost xᵀQx that stays."""
+    """A cost xᵀQx that does not change with x."""
 
     joint: Penalty
 
     def penalty(self, unknowns: FloatArray, jacobian: FloatArray) -> Penalty:
-        """Q."""
+        """The matrix Q, which is the same everywhere."""
         del unknowns, jacobian
         return self.joint
 
@@ -211,7 +211,7 @@ class Sharp:
         return Joint(self.prior.touching(self.mesh, image), self.strength, self.others)
 
     def energy(self, unknowns: FloatArray, force: FloatArray) -> float:
-        """The sharp cost itself."""
+        """Value of the sharp cost."""
         del force
         n = len(self.mesh.cells)
         rest = unknowns[n:]

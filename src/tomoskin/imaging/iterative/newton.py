@@ -22,7 +22,7 @@ class Point(Protocol):
 
     @property
     def predicted(self) -> FloatArray:
-        """(m,) values of unit noise."""
+        """Predicted values (m,) of unit noise."""
         ...
 
     @property
@@ -89,7 +89,7 @@ class Descent:
 
     @classmethod
     def begin(cls, n: int) -> Descent:
-        """Begin at zero."""
+        """The state before the first step, at zero."""
         return cls(np.zeros(n), np.zeros(n), (), "not begun", False)
 
 

@@ -99,7 +99,7 @@ class SharpDifference:
 
 @dataclass(frozen=True, eq=False)
 class _Linear:
-    """f(x) = Jx."""
+    """The linear model f(x) = Jx."""
 
     jacobian: FloatArray
 

@@ -46,11 +46,11 @@ class Cells:
     size: int
 
     def contrast(self, latent: FloatArray) -> FloatArray:
-        """(n_cells,) as it is."""
+        """The latent values are the contrast itself."""
         return latent
 
     def chain(self, latent: FloatArray, jacobian: FloatArray) -> FloatArray:
-        """(m, n_cells) as it is."""
+        """The derivatives need no change."""
         del latent
         return jacobian
 
@@ -115,17 +115,17 @@ class ModelPoint:
 
     @property
     def latent(self) -> FloatArray:
-        """The latent image."""
+        """Latent values of the image."""
         return self.unknowns[: self.of.image.size]
 
     @property
     def background(self) -> float:
-        """S or S/m."""
+        """Conductivity of the background, S or S/m."""
         return float(self.of.background * np.exp(self.unknowns[self.of.image.size]))
 
     @property
     def contact_impedance(self) -> FloatArray:
-        """(n_electrodes,)."""
+        """Contact impedances (n_electrodes,)."""
         start = self.of.model.contact_impedance
         if not self.of.n_contacts:
             return np.asarray(start)
@@ -139,7 +139,7 @@ class ModelPoint:
 
     @cached_property
     def state(self) -> State:
-        """The forward model here."""
+        """The forward model at this point."""
         model = self.of.model
         if self.of.n_contacts:
             impedance = self.contact_impedance
@@ -150,12 +150,12 @@ class ModelPoint:
 
     @property
     def predicted(self) -> FloatArray:
-        """(m,) values of unit noise."""
+        """Predicted values (m,) of unit noise."""
         return np.asarray(self.of.rows @ self.state.voltages)
 
     @property
     def jacobian(self) -> FloatArray:
-        """(m, size)."""
+        """Derivatives (m, size) of the predicted values."""
         rows, by_contrast = self.of.rows, self.by_contrast
         parts = [self.of.image.chain(self.latent, by_contrast), by_contrast.sum(axis=1)[:, None]]
         if self.of.n_contacts:
@@ -197,7 +197,7 @@ class Joint:
 
     @property
     def matrix(self) -> FloatArray:
-        """Q, dense."""
+        """The matrix Q, dense."""
         image = self.image.matrix * self.strength
         n = len(image)
         both = np.zeros((n + len(self.others.matrix),) * 2)

@@ -215,7 +215,7 @@ class Assembly:
 
     @property
     def done(self) -> bool:
-        """Whether every row is there."""
+        """Whether the operator is complete."""
         return self._made == len(self._matrix)
 
     def advance(self, rows: int) -> None:

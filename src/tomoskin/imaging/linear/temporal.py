@@ -150,7 +150,7 @@ def advance(
 
 
 def image_of(modes: Modes, mean: NDArray[Any]) -> Image:
-    """The image of ``mean`` (k,)."""
+    """The image of the state's ``mean`` (k,)."""
     values = modes.quick_synthesis @ mean.astype(modes.quick_synthesis.dtype)
     values = values.astype(np.result_type(values, np.float64))
     return Image(values, modes.operator.unit, modes.operator.model.mesh.identity)

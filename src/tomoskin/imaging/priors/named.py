@@ -55,7 +55,7 @@ class TotalVariation:
         return self.touching(mesh, np.zeros(jacobian.shape[1]))
 
     def touching(self, mesh: Mesh, image: FloatArray) -> Penalty:
-        """Weighted graph Laplacian."""
+        """The weighted graph Laplacian near an image."""
         step = self._jumps(mesh, image)
         return sparse_penalty(
             graph_laplacian(mesh, _edges(mesh) / np.sqrt(step**2 + self._beta**2))
@@ -95,7 +95,7 @@ class Sparse:
         return self.touching(mesh, np.zeros(jacobian.shape[1]))
 
     def touching(self, mesh: Mesh, image: FloatArray) -> Penalty:
-        """Diagonal."""
+        """The diagonal matrix near an image."""
         share = mesh.volumes / mesh.volumes.sum()
         return Diagonal(share / np.sqrt(image**2 + _positive(self.smoothing) ** 2))
 
@@ -136,10 +136,10 @@ class Prior(Protocol):
 
 @dataclass(frozen=True)
 class Identity:
-    """Q = I (Tikhonov)."""
+    """The identity, Q = I (Tikhonov)."""
 
     def penalty(self, mesh: Mesh, jacobian: NDArray[Any]) -> Penalty:
-        """Return Q on ``mesh``."""
+        """The matrix Q for the cells of ``mesh``."""
         del jacobian
         return Diagonal(np.ones(len(mesh.cells)))
 
@@ -154,7 +154,7 @@ class Noser:
     exponent: float = 0.5
 
     def penalty(self, mesh: Mesh, jacobian: NDArray[Any]) -> Penalty:
-        """Return Q on ``mesh``."""
+        """The matrix Q for the cells of ``mesh``."""
         del mesh
         power = np.einsum("mc,mc->c", jacobian, jacobian.conj()).real
         return Diagonal(np.asarray(power**self.exponent))

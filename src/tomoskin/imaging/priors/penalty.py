@@ -70,7 +70,7 @@ class Diagonal:
 
     @property
     def free(self) -> FloatArray:
-        """No image is free."""
+        """The null space of the prior, which is empty."""
         return np.empty((len(self.matrix), 0))
 
     def carry(self, jacobian: NDArray[Any]) -> Carried:
@@ -96,7 +96,7 @@ class Factored:
 
     @property
     def matrix(self) -> FloatArray:
-        """Q, dense."""
+        """The matrix Q, dense."""
         return self.dense()
 
     def carry(self, jacobian: NDArray[Any]) -> Carried:

@@ -45,7 +45,7 @@ class Laplace:
     """Q = twice the graph Laplacian of cells that share a facet, as in EIDORS."""
 
     def penalty(self, mesh: Mesh, jacobian: NDArray[Any]) -> Penalty:
-        """Return Q on ``mesh``."""
+        """The matrix Q for the cells of ``mesh``."""
         del jacobian
         return sparse_penalty(graph_laplacian(mesh, np.full(len(mesh.neighbours), 2.0)))
 
@@ -214,12 +214,12 @@ class _Covariance:
 
     @property
     def free(self) -> FloatArray:
-        """No image is free."""
+        """The null space of the prior, which is empty."""
         return np.empty((len(self.positions), 0))
 
     @property
     def matrix(self) -> FloatArray:
-        """Q = C⁻¹, dense."""
+        """The matrix Q = C⁻¹, dense."""
         return np.asarray(inv(self.correlation(cdist(self.positions, self.positions))))
 
     def carry(self, jacobian: NDArray[Any]) -> Carried:

@@ -14,7 +14,7 @@ from tomoskin.model.forward.solution import Solution
 
 
 def by_conductivity(solution: Solution) -> NDArray[Any]:
-    """See :attr:`State.jacobian`."""
+    """Derivative of the voltages; see :attr:`State.jacobian`."""
     if solution.conductivity.ndim > 1:
         return _by_tensor(solution)
     model = solution.model

@@ -25,7 +25,7 @@ class Compressed:
 
     @cached_property
     def matrix(self) -> csc_array:
-        """The same as scipy has it."""
+        """The matrix in scipy's form."""
         n = len(self.indptr) - 1
         return csc_array((self.values, self.indices, self.indptr), shape=(n, n))
 

@@ -78,7 +78,7 @@ class State:
 
     @cached_property
     def factor(self) -> Factor:
-        """The factorised system."""
+        """The system matrix, factorised."""
         return self.model.factorise(self._matrix.values)
 
     @cached_property

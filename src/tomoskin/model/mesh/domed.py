@@ -26,7 +26,7 @@ class Cap(Surface):
         positive("radius", self.radius)
 
     def point(self, uv: ArrayLike) -> FloatArray:
-        """(n, 3) m."""
+        """Points (n, 3) m of the surface."""
         uv = rows_of(uv)
         angle = np.linalg.norm(uv, axis=1) / self.radius
         return np.column_stack(
@@ -69,17 +69,17 @@ class Saddle(Surface):
     radius_v: float
 
     def __post_init__(self) -> None:
-        """Refuse impossible radii."""
+        """Check that the radii are possible."""
         positive("radius_u", self.radius_u)
         positive("radius_v", self.radius_v)
 
     def point(self, uv: ArrayLike) -> FloatArray:
-        """(n, 3) m."""
+        """Points (n, 3) m of the surface."""
         u, v = rows_of(uv).T
         return np.column_stack([u, v, v**2 / (2 * self.radius_v) - u**2 / (2 * self.radius_u)])
 
     def jacobian(self, uv: ArrayLike) -> FloatArray:
-        """The slopes of the height."""
+        """Derivatives (n, 3, 2) of the points."""
         u, v = rows_of(uv).T
         out = np.tile(np.eye(3)[:, :2], (len(u), 1, 1))
         out[:, 2] = np.column_stack([-u / self.radius_u, v / self.radius_v])

@@ -94,7 +94,7 @@ class Draped(Surface):
         return Polygon(self.flat[rim_of(self.cells)])
 
     def point(self, uv: ArrayLike) -> FloatArray:
-        """(n, 3) m."""
+        """Points (n, 3) m of the surface."""
         cell, share = self._within(rows_of(uv))
         return np.asarray(np.einsum("nk,nkd->nd", share, self.points[self.cells[cell]]))
 

@@ -111,7 +111,7 @@ class Mesh:
 
     @cached_property
     def centroids(self) -> FloatArray:
-        """(n_cells, d) m."""
+        """Middles (n_cells, d) m of the cells."""
         return np.asarray(self.points[self.cells].mean(axis=1))
 
     @cached_property

@@ -97,12 +97,12 @@ class Ellipse(Outline):
 
     @property
     def centre(self) -> FloatArray:
-        """The origin."""
+        """The middle, which is the origin."""
         return np.zeros(2)
 
     @property
     def corners(self) -> FloatArray:
-        """None."""
+        """An ellipse has no corners."""
         return np.zeros(0)
 
     def point(self, s: ArrayLike) -> FloatArray:
@@ -182,12 +182,12 @@ class Disc(Outline):
 
     @property
     def centre(self) -> FloatArray:
-        """The origin."""
+        """The middle, which is the origin."""
         return np.zeros(2)
 
     @property
     def corners(self) -> FloatArray:
-        """None."""
+        """A disc has no corners."""
         return np.zeros(0)
 
     def point(self, s: ArrayLike) -> FloatArray:

@@ -115,10 +115,10 @@ def _of_lengths(mesh: Mesh, surface: Surface) -> FloatArray:
 
 @dataclass(frozen=True)
 class Plane(Surface):
-    """The flat sheet itself."""
+    """A sheet that lies flat."""
 
     def point(self, uv: ArrayLike) -> FloatArray:
-        """(n, 3) m, z = 0."""
+        """Points (n, 3) m with z = 0."""
         uv = rows_of(uv)
         return np.column_stack([uv, np.zeros(len(uv))])
 

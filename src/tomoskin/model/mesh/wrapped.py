@@ -34,7 +34,7 @@ class Cylinder(Surface):
         positive("radius", self.radius)
 
     def point(self, uv: ArrayLike) -> FloatArray:
-        """(n, 3) m."""
+        """Points (n, 3) m of the surface."""
         across, along = (rows_of(uv) @ self._frame).T
         angle = across / self.radius
         x, height = self.radius * np.sin(angle), self.radius * (np.cos(angle) - 1.0)
@@ -88,7 +88,7 @@ class Arm(Surface):
             )
 
     def point(self, uv: ArrayLike) -> FloatArray:
-        """(n, 3) m."""
+        """Points (n, 3) m of the surface."""
         u, v = rows_of(uv).T
         around = u / self.radius
         turn, middle = _middle_line(v, self.angle, self.joint)
@@ -143,7 +143,7 @@ class Hinge(Surface):
     at: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse an impossible strip."""
+        """Check that the strip is possible."""
         positive("length", self.length)
         if not abs(self.angle) <= 2 * math.pi:
             raise GeometryError(
@@ -151,7 +151,7 @@ class Hinge(Surface):
             )
 
     def point(self, uv: ArrayLike) -> FloatArray:
-        """(n, 3) m."""
+        """Points (n, 3) m of the surface."""
         across, along = (rows_of(uv) @ self._frame).T
         _, position = _middle_line(across - self.at, self.angle, self.length)
         x, height = position.T
@@ -164,7 +164,7 @@ class Hinge(Surface):
         return _rolled(turn, self._frame)
 
     def check(self, uv: ArrayLike) -> None:
-        """The sides must not cross."""
+        """Check that the sides do not cross."""
         across = (rows_of(uv) @ self._frame)[:, 0] - self.at
         beyond = float(np.abs(across).max()) > self.length / 2 * (1 + _ROUNDING)
         if beyond and abs(self.angle) > math.pi * (1 + _ROUNDING):

@@ -173,7 +173,7 @@ class Pattern:
 
     @property
     def n_meas(self) -> int:
-        """Number of rows."""
+        """Number of measurements."""
         return len(self.measure)
 
     @property

@@ -28,7 +28,7 @@ class Box:
     size: FloatArray
 
     def triangles(self) -> FloatArray:
-        """(12, 3, 3) m."""
+        """Triangles (12, 3, 3) m of the faces."""
         corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
         sides = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
         table = [part for a, b, c, d in sides for part in ((a, b, c), (a, c, d))]
@@ -50,12 +50,12 @@ class Rod:
 
 @dataclass(frozen=True, slots=True)
 class Ball:
-    """A sphere; m."""
+    """A sphere, measures in m."""
 
     radius: float
 
     def triangles(self) -> FloatArray:
-        """(n, 3, 3) m."""
+        """Triangles (n, 3, 3) m of the surface."""
         up = np.linspace(-np.pi / 2, np.pi / 2, _UPWARDS + 1)
         return _turned(self.radius * np.cos(up), self.radius * np.sin(up))
 

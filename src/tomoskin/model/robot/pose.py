@@ -55,7 +55,7 @@ class Pose:
         return found[0], found[1], found[2]
 
     def quaternion(self) -> tuple[float, ...]:
-        """X, y, z, w of the rotation."""
+        """The rotation as x, y, z, w."""
         return quaternion(self.rotation.T.tolist())
 
     def __call__(self, points: FloatArray) -> FloatArray:
@@ -111,15 +111,15 @@ class Moved(Surface):
     pose: Pose
 
     def point(self, uv: ArrayLike) -> FloatArray:
-        """(n, 3) m."""
+        """Points (n, 3) m of the surface."""
         return self.pose(self.surface.point(uv))
 
     def jacobian(self, uv: ArrayLike) -> FloatArray:
-        """(n, 3, 2)."""
+        """Derivatives (n, 3, 2) of the points."""
         return np.asarray(self.pose.rotation @ self.surface.jacobian(uv))
 
     def check(self, uv: ArrayLike) -> None:
-        """As the surface itself."""
+        """Check the surface that is moved."""
         self.surface.check(uv)
 
 

@@ -106,7 +106,7 @@ class PlacedSkin:
 
     @property
     def name(self) -> str:
-        """Of the skin on the robot."""
+        """Name of the skin on the robot."""
         return self.place.name
 
 

@@ -70,7 +70,7 @@ class MaterialMemory:
 
     @cached_property
     def half_widths(self) -> FloatArray:
-        """(n_play, 1) of the plays."""
+        """Half widths (n_play, 1) of the play operators."""
         return np.array(self.play_widths).reshape(-1, 1)
 
     def kept(self, dt: float) -> tuple[FloatArray, FloatArray]:

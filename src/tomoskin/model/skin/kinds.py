@@ -40,13 +40,13 @@ class Text(ValueKind[str]):
 
     @property
     def expected(self) -> str:
-        """The phrase."""
+        """What a value must be, for messages."""
         if self.most is None:
             return "text"
         return f"text of 1 to {self.most} characters on one line"
 
     def accept(self, value: object) -> str | None:
-        """The text."""
+        """The text, or None where the value is none."""
         if not isinstance(value, str):
             return None
         if self.most is None:
@@ -57,34 +57,34 @@ class Text(ValueKind[str]):
 
 @dataclass(frozen=True)
 class Choice(ValueKind[str]):
-    """One of a few words."""
+    """A value that is one of a few words."""
 
     words: tuple[str, ...]
 
     @property
     def expected(self) -> str:
-        """The phrase."""
+        """What a value must be, for messages."""
         return " or ".join(f'"{word}"' for word in self.words)
 
     def accept(self, value: object) -> str | None:
-        """The word."""
+        """The word, or None where the value is none of them."""
         return value if isinstance(value, str) and value in self.words else None
 
 
 @dataclass(frozen=True)
 class Whole(ValueKind[int]):
-    """A whole number in a range."""
+    """A value that is a whole number in a range."""
 
     low: int
     high: int
 
     @property
     def expected(self) -> str:
-        """The phrase."""
+        """What a value must be, for messages."""
         return f"a whole number from {self.low} to {self.high}"
 
     def accept(self, value: object) -> int | None:
-        """The number."""
+        """The number, or None where the value is none."""
         if isinstance(value, bool) or not isinstance(value, int):
             return None
         return value if self.low <= value <= self.high else None
@@ -99,11 +99,11 @@ class Number(ValueKind[float]):
 
     @property
     def expected(self) -> str:
-        """The phrase."""
+        """What a value must be, for messages."""
         return f"a number from {self.low:g} to {self.high:g}"
 
     def accept(self, value: object) -> float | None:
-        """The number; NaN is none."""
+        """The number, or None; NaN is not accepted."""
         if isinstance(value, bool) or not isinstance(value, int | float):
             return None
         return float(value) if self.low <= value <= self.high else None
@@ -118,11 +118,11 @@ class NumberOrWord(ValueKind[float | str]):
 
     @property
     def expected(self) -> str:
-        """The phrase."""
+        """What a value must be, for messages."""
         return f"{self.number.expected}, or {self.words.expected}"
 
     def accept(self, value: object) -> float | str | None:
-        """The number or the word."""
+        """The number or the word, or None where the value is neither."""
         return self.words.accept(value) or self.number.accept(value)
 
 
@@ -137,7 +137,7 @@ class Quantity(ValueKind[float]):
 
     @property
     def expected(self) -> str:
-        """The phrase."""
+        """What a value must be, for messages."""
         article = "an" if self.dimension[0] in "aeiou" else "a"
         return f"{article} {self.dimension} from {self.low:g} to {self.high:g} {self.unit}"
 
@@ -165,7 +165,7 @@ class OneOrMore(ValueKind[tuple[Any, ...]]):
 
     @property
     def expected(self) -> str:
-        """The phrase."""
+        """What a value must be, for messages."""
         return f"{self.inner.expected}, or a list of these"
 
     def accept(self, value: object) -> tuple[Any, ...]:
@@ -181,7 +181,7 @@ class OneOrEach(OneOrMore):
 
     @property
     def expected(self) -> str:
-        """The phrase."""
+        """What a value must be, for messages."""
         return f"{super().expected}, one per electrode"
 
 
@@ -193,7 +193,7 @@ class OneOrSpan(ValueKind[tuple[Any, Any]]):
 
     @property
     def expected(self) -> str:
-        """The phrase."""
+        """What a value must be, for messages."""
         return f"{self.inner.expected}, or a pair [low, high] of these"
 
     def accept(self, value: object) -> tuple[Any, Any]:
@@ -215,11 +215,11 @@ class Words(ValueKind[tuple[str, ...]]):
 
     @property
     def expected(self) -> str:
-        """The phrase."""
+        """What a value must be, for messages."""
         return f"{self.words.expected}, or a list of different ones"
 
     def accept(self, value: object) -> tuple[str, ...] | None:
-        """The words."""
+        """The words, or None where the value is no list of them."""
         given = value if isinstance(value, list) else [value]
         accepted = [word for item in given if (word := self.words.accept(item))]
         different = len(set(accepted)) == len(given) > 0
@@ -248,11 +248,11 @@ class Row(ValueKind[tuple[Any, ...]]):
 
     @property
     def expected(self) -> str:
-        """The phrase."""
+        """What a value must be, for messages."""
         return f"a {self.noun} {self.layout}"
 
     def accept(self, value: object) -> tuple[Any, ...] | None:
-        """The entries."""
+        """The entries, or None where one does not fit."""
         if not isinstance(value, list) or len(value) != len(self.entries):
             return None
         entries = zip(self.entries.items(), value, strict=True)
@@ -275,13 +275,13 @@ class Table(ValueKind[tuple[tuple[Any, ...], ...]]):
 
     @property
     def expected(self) -> str:
-        """The phrase."""
+        """What a value must be, for messages."""
         if self.ascending:
             return f"a list of {self.row.noun}s {self.row.layout}, in the order of their times"
         return f"a list of at least {self.least} {self.row.noun}s {self.row.layout}"
 
     def accept(self, value: object) -> tuple[tuple[Any, ...], ...] | None:
-        """The rows."""
+        """The rows, or None where one does not fit."""
         if not isinstance(value, list) or len(value) < self.least:
             return None
         rows = tuple(_entry(f"row {i}", self.row, item) for i, item in enumerate(value))
@@ -299,7 +299,7 @@ def show(value: object) -> str:
 
 
 def literal(value: object) -> str:
-    """``value`` as TOML."""
+    """The ``value`` as TOML writes it."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):

@@ -44,7 +44,7 @@ class BoardIdentity:
 
     @classmethod
     def of(cls, info: Info, board: str) -> Self:
-        """What the firmware says."""
+        """The identity that the firmware reports."""
         return cls(info.current / 1e6, info.unique_id, board)
 
     def change(self, current: float | None, name: str | None) -> Self:

@@ -139,7 +139,7 @@ class SkinMemory:
         _SEQUENCE.pack_into(self._map, _SEQUENCE_AT, self._sequence)
 
     def close(self) -> None:
-        """Give the memory back."""
+        """Free the shared memory."""
         self._map.close()
 
 
@@ -177,7 +177,7 @@ class BoardProcess:
 
     @property
     def alive(self) -> bool:
-        """Whether it runs."""
+        """Whether the process runs."""
         return self._process.poll() is None
 
     @property
@@ -187,7 +187,7 @@ class BoardProcess:
         return self._said.read().decode(errors="replace")
 
     def close(self) -> None:
-        """Power off."""
+        """Switch the board off."""
         if self._said.closed:
             return
         self._process.kill()

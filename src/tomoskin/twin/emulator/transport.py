@@ -84,7 +84,7 @@ class EmulatorTransport:
         return self._open.waited
 
     def write(self, data: bytes) -> None:
-        """Send ``data``."""
+        """Send ``data`` to the board."""
         self._open.write(data)
 
     def close(self) -> None:
