@@ -11,11 +11,11 @@ import numpy as np
 import force as weighing
 from report import Report, progress
 from tomoskin.board.source import Link, ScanSettings, Transport
-from tomoskin.core import Frame, Touch
+from tomoskin.core import Frame, Touch, VirtualClock
 from tomoskin.learning import FORCE
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import FrameResult, Pipeline, Prepared, prepare
-from tomoskin.twin import Press, TwinSettings, VirtualClock, make_twin
+from tomoskin.twin import Press, TwinSettings, make_twin
 
 SEEDS = (11,)
 """Nothing here was chosen on them."""

@@ -16,7 +16,7 @@ from report import Report
 from served import served
 from tomoskin.board.source import Configuration, ScanSettings
 from tomoskin.board.wire import Decoder
-from tomoskin.core import Frame, SourceError
+from tomoskin.core import Frame, SourceError, WallClock
 from tomoskin.files.session import session_info
 from tomoskin.model.pattern import Scan
 from tomoskin.model.skin import Skin
@@ -29,7 +29,6 @@ from tomoskin.twin import (
     Press,
     TwinSettings,
     TwinTransport,
-    WallClock,
     make_twin,
 )
 

@@ -21,12 +21,12 @@ import numpy as np
 
 from figure_file import FigureFile, chosen, parser_of
 from tomoskin.board.source import Link, ScanSettings, Transport, open_source
-from tomoskin.core import DataError, FloatArray, Frame
+from tomoskin.core import DataError, FloatArray, Frame, VirtualClock
 from tomoskin.files.session import SessionReader, SessionWriter
 from tomoskin.model.pattern import Pattern, Scan
 from tomoskin.model.skin import Skin
 from tomoskin.sensing.signal import Readout
-from tomoskin.twin import Pose, Probe, TwinSettings, TwinTransport, VirtualClock, make_twin
+from tomoskin.twin import Pose, Probe, TwinSettings, TwinTransport, make_twin
 
 FRAMES = 10
 """Frames of a stage, as many as the thesis averaged."""

@@ -21,12 +21,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tomoskin.core import FloatArray
+from tomoskin.core import FloatArray, WallClock
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import prepare
 from tomoskin.run import Runner
 from tomoskin.run.sinks import ContactListener, Contacts
-from tomoskin.twin import Press, TwinSettings, TwinTransport, WallClock, make_twin
+from tomoskin.twin import Press, TwinSettings, TwinTransport, make_twin
 
 LINKS = (0.30, 0.25)
 """Lengths of upper arm and forearm, m; the skin lies on the middle of the forearm."""

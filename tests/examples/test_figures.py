@@ -8,8 +8,8 @@ import struct
 import numpy as np
 import pytest
 
-from tomoskin.core import DataError
-from tomoskin.twin import TwinSettings, WallClock, make_twin
+from tomoskin.core import DataError, WallClock
+from tomoskin.twin import TwinSettings, make_twin
 
 MEASURED = [
     "fig52_potentials",

@@ -13,6 +13,7 @@ import pytest
 from run.test_robot_run import Watch
 from server.serving import PATIENCE, Site
 from server.watching import Watched
+from tomoskin.core import WallClock
 from tomoskin.files.session import split_names
 from tomoskin.model.robot import Robot
 from tomoskin.pipeline import colour_limit
@@ -20,7 +21,7 @@ from tomoskin.run import Member, RobotRun
 from tomoskin.server import Hub, Overview, Server, listen, robot_application, serve_requests
 from tomoskin.server.access import AccessPolicy
 from tomoskin.server.server import STATIC
-from tomoskin.twin import Press, TwinSettings, WallClock, make_twin
+from tomoskin.twin import Press, TwinSettings, make_twin
 
 ROBOT = """format = 1
 [robot]

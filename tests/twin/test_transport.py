@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tomoskin.board.source import Link, ScanSettings, Transport
-from tomoskin.core import Frame, GeometryError, SkinError, SourceError
+from tomoskin.core import Frame, GeometryError, SkinError, SourceError, WallClock
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.pattern import Scan
 from tomoskin.sensing.signal import Readout
@@ -17,7 +17,6 @@ from tomoskin.twin import (
     LineSettings,
     Press,
     TwinSettings,
-    WallClock,
     make_twin,
     open_twin,
 )

@@ -25,7 +25,7 @@ from tomoskin.core.written import write_text, written
 if TYPE_CHECKING:
     from tomoskin.core.archive import Arrays, load_arrays, pack_arrays, save_arrays, unpack_arrays
     from tomoskin.core.cache import cache_folder, kept
-    from tomoskin.core.clocks import clock_ahead
+    from tomoskin.core.clocks import Clock, VirtualClock, WallClock, clock_ahead
     from tomoskin.core.colours import AMOUNT, CHANGE, CHANGE_ON_DARK, ColourScale
     from tomoskin.core.extras import install_hint
     from tomoskin.core.json_bytes import encode_json, plain_values
@@ -63,6 +63,9 @@ _HOME = {
     "electrode_table": "typed_arrays",
     "encode_json": "json_bytes",
     "cache_folder": "cache",
+    "Clock": "clocks",
+    "VirtualClock": "clocks",
+    "WallClock": "clocks",
     "clock_ahead": "clocks",
     "install_hint": "extras",
     "kept": "cache",
@@ -89,6 +92,7 @@ __all__ = [
     "MOST_ELECTRODES",
     "RECORDING",
     "Arrays",
+    "Clock",
     "ColourScale",
     "ComplexArray",
     "DataError",
@@ -113,7 +117,9 @@ __all__ = [
     "StrPath",
     "TomoskinError",
     "Touch",
+    "VirtualClock",
     "Voltages",
+    "WallClock",
     "WireError",
     "cache_folder",
     "check_fits",

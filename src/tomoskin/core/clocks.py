@@ -1,11 +1,51 @@
-"""How far one clock is ahead of another."""
+"""Clocks, of the computer or virtual, and how far one is ahead of another."""
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable
+from typing import Protocol
 
 _READS = 16
+
+
+class Clock(Protocol):
+    """Where a source takes its time from."""
+
+    def now(self) -> float:
+        """Monotonic seconds."""
+
+    def wait(self, condition: threading.Condition, seconds: float) -> None:
+        """Wait for ``condition`` (held) at most that long."""
+
+
+class WallClock:
+    """The clock of the computer."""
+
+    def now(self) -> float:
+        """Monotonic seconds."""
+        return time.monotonic()
+
+    def wait(self, condition: threading.Condition, seconds: float) -> None:
+        """Wait for ``condition`` (held) at most that long."""
+        condition.wait(seconds)
+
+
+class VirtualClock:
+    """Time that passes only by being waited for, from 0 s: faster than real, the same each time."""
+
+    def __init__(self) -> None:
+        self.time = 0.0
+
+    def now(self) -> float:
+        """Seconds since the start."""
+        return self.time
+
+    def wait(self, condition: threading.Condition, seconds: float) -> None:
+        """Let the time pass at once; nothing else can happen meanwhile."""
+        del condition
+        self.time += seconds
 
 
 def clock_ahead(clock: Callable[[], float], own: Callable[[], float] = time.monotonic) -> float:

@@ -9,7 +9,7 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from tomoskin.board.source import Configuration, Link, ScanSettings, Transport
-from tomoskin.core import DataError, Event, Frame, StrPath
+from tomoskin.core import DataError, Event, Frame, StrPath, VirtualClock
 from tomoskin.files.session import Advance, Mark, SessionWriter, no_report
 from tomoskin.model.pattern import Scan
 from tomoskin.model.skin import Skin
@@ -24,7 +24,6 @@ from tomoskin.twin import (
     Script,
     TwinSettings,
     TwinTransport,
-    VirtualClock,
     bent,
     bent_truth,
     check_script,

@@ -31,7 +31,7 @@ from tomoskin.twin.shards import SetPlan, make_shard
 from tomoskin.twin.sheet import TwinSkin
 from tomoskin.twin.source import make_electronics, make_twin, open_twin, read_settings
 from tomoskin.twin.stepped import Step, SteppedSkin
-from tomoskin.twin.transport import Clock, TwinTransport, VirtualClock, WallClock
+from tomoskin.twin.transport import TwinTransport
 
 __all__ = [
     "COMMON_PRESSES",
@@ -42,7 +42,6 @@ __all__ = [
     "Bent",
     "Board",
     "Circle",
-    "Clock",
     "Contact",
     "ContactSettings",
     "Deformation",
@@ -85,8 +84,6 @@ __all__ = [
     "TwinSettings",
     "TwinSkin",
     "TwinTransport",
-    "VirtualClock",
-    "WallClock",
     "advance",
     "bent",
     "bent_truth",

@@ -6,14 +6,14 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from tomoskin.board.source import read_options
-from tomoskin.core import SourceError
+from tomoskin.core import Clock, SourceError, WallClock
 from tomoskin.twin.board import Board
 from tomoskin.twin.device import TwinDevice
 from tomoskin.twin.electronics import TwinElectronics
 from tomoskin.twin.line import Line
 from tomoskin.twin.presets import PRESETS, TwinSettings
 from tomoskin.twin.sheet import TwinSkin
-from tomoskin.twin.transport import Clock, TwinTransport, WallClock
+from tomoskin.twin.transport import TwinTransport
 
 if TYPE_CHECKING:
     from tomoskin.model.skin import Skin

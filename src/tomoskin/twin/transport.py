@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import threading
-import time
 from dataclasses import replace
-from typing import Protocol
 
-from tomoskin.core import SourceError
+from tomoskin.core import Clock, SourceError
 from tomoskin.twin.bend import Pose
 from tomoskin.twin.device import TwinDevice
 from tomoskin.twin.electronics import TwinElectronics
@@ -15,44 +13,6 @@ from tomoskin.twin.faults import Faults
 from tomoskin.twin.line import Line, LineSettings
 from tomoskin.twin.probe import Contact
 from tomoskin.twin.sheet import TwinSkin
-
-
-class Clock(Protocol):
-    """Where the twin takes its time from."""
-
-    def now(self) -> float:
-        """Monotonic seconds."""
-
-    def wait(self, condition: threading.Condition, seconds: float) -> None:
-        """Wait for ``condition`` (held) at most that long."""
-
-
-class WallClock:
-    """The clock of the computer."""
-
-    def now(self) -> float:
-        """Monotonic seconds."""
-        return time.monotonic()
-
-    def wait(self, condition: threading.Condition, seconds: float) -> None:
-        """Wait for ``condition`` (held) at most that long."""
-        condition.wait(seconds)
-
-
-class VirtualClock:
-    """Time that passes only by being waited for, from 0 s: faster than real, the same each time."""
-
-    def __init__(self) -> None:
-        self.time = 0.0
-
-    def now(self) -> float:
-        """Seconds since the start."""
-        return self.time
-
-    def wait(self, condition: threading.Condition, seconds: float) -> None:
-        """Let the time pass at once; nothing else can happen meanwhile."""
-        del condition
-        self.time += seconds
 
 
 class TwinTransport:

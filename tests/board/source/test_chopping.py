@@ -21,11 +21,11 @@ from board.source.boards import (
 )
 from tomoskin.board.source import Link, ScanSettings, choose_periods, chop_limit
 from tomoskin.board.wire import OLDER, BoardLimits, DriveMode, GetInfo, HeldMode, SetMode
-from tomoskin.core import SourceError
+from tomoskin.core import SourceError, VirtualClock
 from tomoskin.files.session import SessionReader, SessionWriter, read_session
 from tomoskin.model.skin import Skin
 from tomoskin.sensing.signal import Readout, directions
-from tomoskin.twin import TwinSettings, VirtualClock, make_twin
+from tomoskin.twin import TwinSettings, make_twin
 
 CHOPPED = replace(SETTINGS, chop_frequency=500)
 TICKS = 250e3

@@ -13,14 +13,13 @@ from typing import TYPE_CHECKING
 
 from tomoskin.board.source import Configuration, ScanSettings
 from tomoskin.board.wire import OLDER, SCHEMA
-from tomoskin.core import SourceError
+from tomoskin.core import Clock, SourceError, WallClock
 from tomoskin.files.session.info import References
 from tomoskin.files.session.layout import Mark, MarkedFrame
 from tomoskin.files.session.playback import Item, Playhead
 from tomoskin.files.session.replay_board import ReplayBoard
 from tomoskin.files.session.session_reader import SessionReader, end_time, touches_before
 from tomoskin.model.pattern import Scan
-from tomoskin.twin import Clock, WallClock
 
 if TYPE_CHECKING:
     from tomoskin.model.skin import Skin
