@@ -18,8 +18,8 @@ from tomoskin.twin import TwinSettings, TwinSkin
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 PAGES = (
-    *("bodies", "imaging", "interchange", "outputs", "simulate", "states"),
-    *("touch", "touch-fit", "twin", "wiring"),
+    *("bodies", "imaging", "interchange", "outputs", "simulate", "classes"),
+    *("touch", "touch-fit", "twin", "channel-mapping"),
 )
 BLOCK = re.compile(r"^```python\n(.*?)^```", re.DOTALL | re.MULTILINE)
 NOISE, DEPTH = 2e-5, 0.25

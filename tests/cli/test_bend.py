@@ -69,7 +69,7 @@ def test_angles_and_touches_of_a_session_that_bends(recorded, tomoskin):
     model = BENDS.read(recorded / "c.npz").model
     assert np.degrees(model.error) < 2.0
     code, out, err = tomoskin(
-        "image", recorded / "used.mcap", "--bend", recorded / "c.npz", "--json"
+        "image", recorded / "used.mcap", "--calibration", recorded / "c.npz", "--json"
     )
     assert code == 0, err
     found = json.loads(out)
@@ -96,7 +96,7 @@ def test_a_recording_that_lacks_rows_keeps_its_bends(recorded, tomoskin):
     )
     code, out, err = tomoskin(
         "image", recorded / "less.npz", "--skin", "textile-disc-8",
-        "--bend", recorded / "c.npz", "--json",
+        "--calibration", recorded / "c.npz", "--json",
     )  # fmt: skip
     assert code == 0, err
     found = json.loads(out)
@@ -132,7 +132,9 @@ def test_a_file_that_is_no_calibration_is_refused(recorded, tomoskin, lost):
     with np.load(recorded / "c.npz") as arrays:
         cut = {key: arrays[key] for key in arrays.files if key != lost}
     np.savez(recorded / f"{lost}.npz", **cut)
-    code, _, err = tomoskin("image", recorded / "used.mcap", "--bend", recorded / f"{lost}.npz")
+    code, _, err = tomoskin(
+        "image", recorded / "used.mcap", "--calibration", recorded / f"{lost}.npz"
+    )
     assert code == 1
     assert "is not a calibration" in err
 

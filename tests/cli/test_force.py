@@ -1,4 +1,4 @@
-"""``tomoskin calibrate force`` and ``tomoskin image --newtons``."""
+"""``tomoskin calibrate force`` and ``tomoskin image --calibration``."""
 
 import csv
 import json
@@ -53,7 +53,7 @@ def test_weights_in_grams_become_newtons_in_the_table(tomoskin, tmp_path, files)
     assert "10 presses, 0.98 to 15 N" in said
     assert "the tip that pressed" in said
     code, _, err = tomoskin(
-        "image", path, "--skin", skin, "--newtons", out, "--touches", table
+        "image", path, "--skin", skin, "--calibration", out, "--touches", table
     )  # fmt: skip
     assert (code, err) == (0, "")
     with path.open("rb") as file, np.load(file) as kept:
@@ -64,7 +64,7 @@ def test_weights_in_grams_become_newtons_in_the_table(tomoskin, tmp_path, files)
     assert len(rows) >= 20
     assert np.abs(ratio - 1).mean() < 0.25
     assert {row["force_state"] for row in rows} == {"calibrated"}
-    code, said, _ = tomoskin("image", path, "--skin", skin, "--newtons", out, "--json")
+    code, said, _ = tomoskin("image", path, "--skin", skin, "--calibration", out, "--json")
     touch = json.loads(said)["touches"][-1]
     assert touch["force_n"]["low"] < touch["force_n"]["newtons"] < touch["force_n"]["high"]
 
@@ -103,6 +103,6 @@ def test_the_calibration_of_another_skin_is_refused(tomoskin, tmp_path, files):
     assert tomoskin("calibrate", "force", path, "--skin", skin, "--unit", "g", "--out", out)[0] == 0
     other = tmp_path / "other.toml"
     other.write_text(SKIN.altered({"material": {"sheet_resistance": "7 ohm/sq"}}).to_toml())
-    code, _, err = tomoskin("image", path, "--skin", other, "--newtons", out)
+    code, _, err = tomoskin("image", path, "--skin", other, "--calibration", out)
     assert code == 1
     assert "to another sheet" in err

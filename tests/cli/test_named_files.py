@@ -60,11 +60,11 @@ CASES = {
     ("locate", "touches"): Case(
         "locate {presses} --calibration {calibration} --touches {out}", ".csv"
     ),
-    ("states", "out"): Case("states {presses} --calibration {states} --out {out}", ".csv"),
+    ("classify", "out"): Case("classify {presses} --calibration {class} --out {out}", ".csv"),
     ("calibrate touch", "out"): Case("calibrate touch {presses} --out {out}", ".npz"),
     ("calibrate rub", "out"): Case("calibrate rub {rubbed} --skin {skin} --out {out}", ".npz"),
-    ("calibrate states", "out"): Case(
-        "calibrate states {presses} --state a=0:8 --state b=8:16 --out {out}", ".npz"
+    ("calibrate class", "out"): Case(
+        "calibrate class {presses} --class a=0:8 --class b=8:16 --out {out}", ".npz"
     ),
     ("calibrate force", "out"): Case(
         "calibrate force {presses} --skin {skin} --out {out}", ".npz", ("--weight", "4=0:16")
@@ -72,8 +72,8 @@ CASES = {
     ("calibrate bend", "out"): Case(
         "calibrate bend {bends} --skin {skin} --out {out}", ".npz", BENDS
     ),
-    ("calibrate wiring", "out"): Case(
-        "calibrate wiring {presses} --skin {skin} --out {out}", ".toml"
+    ("calibrate mapping", "out"): Case(
+        "calibrate mapping {presses} --skin {skin} --out {out}", ".toml"
     ),
     ("design", "out"): Case("design --skin {skin} --out {out}", ".png", ("--electrodes", "")),
     ("skin alpha", "out"): Case("skin alpha {skin} --rule light-touch --out {out}", ".png"),
@@ -108,7 +108,7 @@ def force(case: Case) -> tuple[str, ...]:
 # What there is to read: for the refusals nothing of use, so that whoever looks at it says so.
 
 NAMES = {
-    "presses": ".npz", "bends": ".npz", "calibration": ".npz", "states": ".npz", "skin": ".toml",
+    "presses": ".npz", "bends": ".npz", "calibration": ".npz", "class": ".npz", "skin": ".toml",
     "surface": ".stl", "places": ".csv", "session": ".mcap", "population": ".toml",
     "rubbed": ".npz",
 }  # fmt: skip
@@ -139,7 +139,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     meshio.write(files["surface"], meshio.Mesh(flat, [("triangle", disc(cells=300).cells)]))
     turn = 2 * np.pi * np.arange(8) / 8
     np.savetxt(files["places"], 100 * np.c_[np.cos(turn), np.sin(turn), 0 * turn], "%.3f", ",")
-    for name in ("touch", "states"):
+    for name in ("touch", "class"):
         case, out = CASES[f"calibrate {name}", "out"], "calibration" if name == "touch" else name
         with pytest.raises(SystemExit) as end:
             import_module("tomoskin.cli").main(case.line(files, files[out]))

@@ -132,4 +132,4 @@ def test_the_command_line_takes_them_beside_a_calibration(run, calibration, monk
     assert TOUCH.name in runners[0].prepared.calibrations
     last = json.loads(out.splitlines()[-1])
     assert set(last["bend"]) == {"angle_rad", "sd_rad", "axis_rad", "state"}
-    assert last["state"] is None
+    assert last["class"] is None

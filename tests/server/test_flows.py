@@ -422,13 +422,13 @@ def test_scrambled_wires_are_found_kept_and_applied(prepared, tmp_path):
         runner = site.runner
         until = Watch(runner).until
         until(lambda: runner.newest and runner.newest.result.ready)
-        page.ask("flow_begin", kind="wiring")
+        page.ask("flow_begin", kind="mapping")
         told = press_dots(site, page, 4)
         assert told["ready"], told["text"]
-        assert told["figures"]["wiring"] == wiring.text(ring)
-        page.ask("flow_keep", name="wired")
+        assert told["figures"]["mapping"] == wiring.text(ring)
+        page.ask("flow_keep", name="mapped")
         page.told("scene")
-        saved = Skin.load(tmp_path / "wired.toml")
+        saved = Skin.load(tmp_path / "mapped.toml")
         assert saved.electrode_centres == pytest.approx(scrambled.electrode_centres, abs=1e-5)
         until(lambda: runner.newest and runner.newest.result.ready)
         runner.ask(commands.HoldPresses(page, (Press(0.03, 0.05, 5.0, 0.015),)))

@@ -83,12 +83,12 @@ def test_touch_is_taught_by_pressing_dots(opened, folder):
 
 
 def test_the_wires_are_found_by_pressing_dots(opened, folder):
-    guided(opened, "wiring", 3)
+    guided(opened, "mapping", 3)
     opened.test_id("flow-text").filter(has_text="as the skin file says").wait_for()
-    looks_right(opened, "wiring")
+    looks_right(opened, "mapping")
     opened.test_id("flow-keep").click()
     opened.test_id("flow-begin").wait_for()
-    assert Skin.load(folder / "wired.toml").n_electrodes == 8
+    assert Skin.load(folder / "mapped.toml").n_electrodes == 8
 
 
 def lay(opened, newtons, place, done):

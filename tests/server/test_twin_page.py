@@ -101,14 +101,14 @@ def place(element):
     return box["x"], box["y"], box["height"]
 
 
-def test_the_state_is_said_on_one_line_that_does_not_move(opened):
-    said, runner = opened.test_id("sheet-state"), opened.site.runner
+def test_the_class_is_said_on_one_line_that_does_not_move(opened):
+    said, runner = opened.test_id("sheet-class"), opened.site.runner
     said.filter(has_text="straight").wait_for()
     straight = place(said)
     runner.ask(SetPose(BendRequest(TRUE, length=WIDTH)))
     said.filter(has_text="bent").wait_for()
     assert place(said) == straight
-    assert said.get_attribute("title").startswith("State")
+    assert said.get_attribute("title").startswith("Class")
     runner.ask(SetPose())
     said.filter(has_text="straight").wait_for()
 

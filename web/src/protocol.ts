@@ -75,7 +75,7 @@ export interface Stage {
   readonly p99_ms: number | null;
 }
 
-export interface StateReading {
+export interface ClassReading {
   readonly name: string;
   readonly probability: number;
   /** It looks like none that was learnt; `name` is the nearest. */
@@ -118,8 +118,8 @@ export interface Status {
   /** Electrodes that are not good, counted from 0. */
   readonly sick: readonly Sick[];
   readonly replay: Replay | null;
-  /** Which of the states that were learnt the newest frame shows; null where none were. */
-  readonly state: StateReading | null;
+  /** Which of the learnt classes the newest frame shows; null where none was learnt. */
+  readonly class: ClassReading | null;
   /** Null where no calibration of touch is in use, or nothing has touched the skin yet. */
   readonly calibration: CalibrationHealth | null;
   readonly noise_v: number | null;

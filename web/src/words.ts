@@ -1,7 +1,7 @@
 /** The state as a word, what someone must act on, and the figures of the top line. */
 
 import { duration, fixed } from "./format";
-import type { Scene, StateReading, Status } from "./protocol";
+import type { ClassReading, Scene, Status } from "./protocol";
 import type { LinkState } from "./socket";
 
 export interface Warning {
@@ -139,8 +139,8 @@ export function alphaInFull(status: Status): string {
   return `Weight of the prior, ${status.alpha.toPrecision(4)}, ${by}`;
 }
 
-/** Which of the states that were learnt the sheet is in. */
-export function stateInWords({ name, probability, unknown }: StateReading): string {
-  if (unknown) return `State unknown (nearest: ${name})`;
-  return `State: ${name}, ${fixed(100 * probability, 0)} %`;
+/** The class that the sheet shows. */
+export function classInWords({ name, probability, unknown }: ClassReading): string {
+  if (unknown) return `Class unknown (nearest: ${name})`;
+  return `Class: ${name}, ${fixed(100 * probability, 0)} %`;
 }

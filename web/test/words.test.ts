@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 import type { Scene, Status } from "../src/protocol";
 import { backOff, socketAddress } from "../src/socket";
-import { alpha, alphaInFull, facts, headline, stateInWords } from "../src/words";
+import { alpha, alphaInFull, classInWords, facts, headline } from "../src/words";
 
 const scene = { source: "twin of textile-disc-8" } as Scene;
 const status: Status = {
@@ -19,7 +19,7 @@ const status: Status = {
   baseline: null,
   sick: [],
   replay: null,
-  state: null,
+  class: null,
   calibration: null,
   noise_v: 1e-5,
   alpha: 0.0509,
@@ -111,14 +111,14 @@ it("finds the socket beside the page and leaves the token out", () => {
   expect(socketAddress({ href: "https://lab:1/x/" })).toBe("wss://lab:1/x/ws");
 });
 
-describe("the state that the sheet is in", () => {
+describe("the class that the sheet shows", () => {
   it("is named with its probability", () => {
-    expect(stateInWords({ name: "bend", probability: 0.974, unknown: false })).toBe("State: bend, 97 %");
+    expect(classInWords({ name: "bend", probability: 0.974, unknown: false })).toBe("Class: bend, 97 %");
   });
 
   it("is said to be unknown where it is none that was learnt", () => {
-    expect(stateInWords({ name: "bend", probability: 1, unknown: true })).toMatch(
-      /^State unknown \(nearest: bend\)$/,
+    expect(classInWords({ name: "bend", probability: 1, unknown: true })).toMatch(
+      /^Class unknown \(nearest: bend\)$/,
     );
   });
 });

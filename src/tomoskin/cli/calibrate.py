@@ -10,10 +10,10 @@ import typer
 
 from tomoskin.cli.app import group
 from tomoskin.cli.calibrate_bend import calibrate_bend
+from tomoskin.cli.calibrate_class import calibrate_class
 from tomoskin.cli.calibrate_force import calibrate_force
+from tomoskin.cli.calibrate_mapping import calibrate_mapping
 from tomoskin.cli.calibrate_rub import calibrate_rub
-from tomoskin.cli.calibrate_states import calibrate_states
-from tomoskin.cli.calibrate_wiring import calibrate_wiring
 from tomoskin.cli.named_files import ForceFlag, Reads
 from tomoskin.cli.options import CalibrationOut, KnownSkinOption, LabelledArgument, ReferenceOption
 from tomoskin.cli.output import Bar, JsonFlag, emit, remark
@@ -37,8 +37,8 @@ _DRIFTED = 2.0
 app.command("bend")(calibrate_bend)
 app.command("force")(calibrate_force)
 app.command("rub")(calibrate_rub)
-app.command("states")(calibrate_states)
-app.command("wiring")(calibrate_wiring)
+app.command("class")(calibrate_class)
+app.command("mapping")(calibrate_mapping)
 
 
 @app.command("touch")

@@ -12,7 +12,7 @@ from tomoskin.core import DataError
 def labels_of_frames(given: Sequence[str], n: int, option: str, label: str) -> list[str]:
     """(n,) label of each frame, "" without one.
 
-    ``option`` and ``label`` are what the command calls them: ``--state``, ``NAME``.
+    ``option`` and ``label`` are what the command calls them: ``--class``, ``NAME``.
     Raises BadParameter on a malformed text, DataError on frames that do not exist or that have
     two labels.
     """

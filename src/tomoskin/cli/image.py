@@ -120,8 +120,8 @@ def _lines(result: Reconstruction, spans: tuple[Span, ...], prepared: Prepared) 
         seconds = prepared.skin.inverse.time_constant
         yield f"filtered over frames, time constant {seconds:g} s"
     bends = [reading.state for reading in result.bends if reading]
-    states = [("unknown" if state.unknown else state.name) for state in result.states if state]
-    for names in filter(None, (bends, states)):
+    classes = [("unknown" if one.unknown else one.name) for one in result.classes if one]
+    for names in filter(None, (bends, classes)):
         yield ", ".join(f"{name}: {count} frames" for name, count in Counter(names).items())
     yield from span_lines(spans, result.unit)
     if spans:
@@ -174,9 +174,9 @@ def _document(
             for f, b in zip(result.frames.tolist(), result.bends, strict=False)
             if b
         ],
-        "states": [
+        "classes": [
             {"frame": f, **asdict(state)}
-            for f, state in zip(result.frames.tolist(), result.states, strict=False)
+            for f, state in zip(result.frames.tolist(), result.classes, strict=False)
             if state
         ],
         "spans": [

@@ -68,11 +68,8 @@ CalibrationsOption = Annotated[
     list[Path] | None,
     typer.Option(
         "--calibration",
-        "--bend",
-        "--states",
-        "--newtons",
         metavar="C.npz",
-        help="File from tomoskin calibrate, of any kind: positions, forces, bends or states are "
+        help="File from tomoskin calibrate, of any kind: positions, forces, bends or classes are "
         "estimated in each frame. Once for each kind.",
     ),
     Reads(),

@@ -72,7 +72,7 @@ class Reconstruction:
         return self.readings.get(BENDS.name, ())
 
     @property
-    def states(self) -> tuple[ClassReading | None, ...]:
+    def classes(self) -> tuple[ClassReading | None, ...]:
         """The class of each frame; empty where none were learnt."""
         return self.readings.get(CLASSES.name, ())
 

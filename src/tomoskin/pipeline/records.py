@@ -133,7 +133,7 @@ class FrameResult:
         return self.readings.get(BENDS.name)
 
     @property
-    def state(self) -> ClassReading | None:
+    def class_reading(self) -> ClassReading | None:
         """Which of the classes that were learnt it shows; None where none were."""
         return self.readings.get(CLASSES.name)
 

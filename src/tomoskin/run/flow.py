@@ -168,7 +168,7 @@ class Flow:
             left_out=result.left_out if result else 0,
             electrodes=result.health.sick if result and result.health else (),
             bend=result.bend if result and result.ready else None,
-            state=result.state if result and result.ready else None,
+            class_reading=result.class_reading if result and result.ready else None,
             calibration=result.calibration if result and result.ready else None,
             problem=trouble
             or self._standstill

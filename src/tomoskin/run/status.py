@@ -71,7 +71,7 @@ class Status:
     bend
         How the sheet is bent; None where its bends were not learnt.
     state
-        Which of the states that were learnt it shows; None where none were.
+        Which of the learnt classes it shows; None where none was learnt.
     calibration
         How touches fit the calibration that locates them; None where none does.
     problem
@@ -103,7 +103,7 @@ class Status:
     electrodes: tuple[ElectrodeHealth, ...] = ()
     replay: ReplayStatus | None = None
     bend: BendReading | None = None
-    state: ClassReading | None = None
+    class_reading: ClassReading | None = None
     calibration: CalibrationHealth | None = None
     board: Info | None = None
     board_name: str = ""
@@ -133,4 +133,4 @@ class Status:
 
     @property
     def _state_text(self) -> str:
-        return "" if self.state is None else f", {self.state.text}"
+        return "" if self.class_reading is None else f", {self.class_reading.text}"

@@ -95,7 +95,7 @@ def estimate_wiring(
     solution = solve_channel_mapping(dv, xy, prepared.skin, reference=rest, noise=noise)
     ring = ring_of(prepared.skin)
     figures = {
-        "wiring": solution.mapping.text(ring),
+        "mapping": solution.mapping.text(ring),
         "probability": solution.probability,
         "odds": min(solution.odds, 1e9),
         "runner_up": solution.runner_up.text(ring),
@@ -109,12 +109,12 @@ def estimate_wiring(
 
 def _in_words(solution: MappingAnswer, figures: dict[str, object]) -> str:
     if solution.sure:
-        return f"Sure: {figures['wiring']}"
+        return f"Sure: {figures['mapping']}"
     if solution.doubtful:
         return "Many presses fit other positions better. Was each press on its dot?"
     if solution.unexplained > 1 - solution.probability - solution.unexplained:
         return "No channel mapping explains these presses well. Press on the dot, and harder"
-    return f"Not sure yet: {figures['wiring']}, or {figures['runner_up']}. The next dot decides"
+    return f"Not sure yet: {figures['mapping']}, or {figures['runner_up']}. The next dot decides"
 
 
 class Dots:

@@ -117,7 +117,7 @@ def readings(status: Status) -> dict[str, Any]:
     """What calibrations say of the newest frame, or of themselves; null where there are none."""
     return {
         "bend": _bend(status.bend),
-        "state": _state(status.state),
+        "class": _class(status.class_reading),
         "calibration": _calibration(status.calibration),
     }
 
@@ -141,7 +141,7 @@ def _bend(now: BendReading | None) -> dict[str, Any] | None:
     return {"angle_rad": now.angle, "sd_rad": now.sd, "axis_rad": now.axis, "state": now.state}
 
 
-def _state(now: ClassReading | None) -> dict[str, Any] | None:
+def _class(now: ClassReading | None) -> dict[str, Any] | None:
     """Which state the newest frame shows, as ``tomoskin image --json`` tells it."""
     return None if now is None else asdict(now)
 

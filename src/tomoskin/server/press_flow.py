@@ -113,7 +113,7 @@ class PressFlow(GuidedFlow):
             calibration = TOUCH.of(answer, self.prepared.pattern, skin)
             return keep_calibration(calibration, folder, name, runner)
         path = folder.free(name, ".toml")
-        wired = answer.mapping.applied(skin)
-        write_text(path, wired.to_toml())
-        runner.ask(commands.Change(prepare(wired)))
+        mapped = answer.mapping.applied(skin)
+        write_text(path, mapped.to_toml())
+        runner.ask(commands.Change(prepare(mapped)))
         return path.name

@@ -25,7 +25,7 @@ Stem = Annotated[str, Meta(pattern=rf"^{STEM}\Z")]
 
 Format = Literal["touches", "csv", "npz", "mat", "h5", "parquet", "png", "gif"]
 
-FlowKind = Literal["touch", "wiring", "force", "rub"]
+FlowKind = Literal["touch", "mapping", "force", "rub"]
 
 Calibrated = Literal["touch", "force"]
 """What a calibration that a page can choose is of."""
@@ -145,8 +145,8 @@ class Connect(StrictRequest, frozen=True, tag="connect"):
 
 
 class BeginFlow(StrictRequest, frozen=True, tag="flow_begin"):
-    """Ask for presses: where the dot is, to learn touch or to find the wiring; with known weights,
-    to learn forces; everywhere, to learn touch without labels."""
+    """Ask for presses: where the dot is, to learn touch or to find the channel mapping; with known
+    weights, to learn forces; everywhere, to learn touch without labels."""
 
     kind: FlowKind
 

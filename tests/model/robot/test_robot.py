@@ -40,7 +40,7 @@ name = "right"
 skin = "own.toml"
 source = "replay:run.mcap@2"
 board = "0102"
-force = "force.npz"
+calibration = "force.npz"
 """
 
 

@@ -5,7 +5,7 @@ import { send } from "../state";
 import { flow, type FlowKind } from "./model";
 
 const names: Readonly<Record<FlowKind, ReturnType<typeof signal<string>>>> = {
-  wiring: signal("wired"),
+  mapping: signal("mapped"),
   touch: signal("touch"),
   rub: signal("rubbed"),
   force: signal("force"),

@@ -11,10 +11,10 @@ import { askFiles, askSources, flow, type FlowKind, type Phase, sources } from "
 import { Rub } from "./Rub";
 import { Weigh } from "./Weigh";
 
-type Step = "board" | "wiring" | "touch" | "force";
+type Step = "board" | "mapping" | "touch" | "force";
 const STEPS: readonly (readonly [Step, string])[] = [
   ["board", "1 Board"],
-  ["wiring", "2 Channels"],
+  ["mapping", "2 Channels"],
   ["touch", "3 Touch"],
   ["force", "4 Force"],
 ];
@@ -118,9 +118,9 @@ interface Teaching {
 }
 
 const TEACHING: Readonly<Record<Exclude<Step, "board">, readonly Teaching[]>> = {
-  wiring: [
+  mapping: [
     {
-      kind: "wiring",
+      kind: "mapping",
       text: "This finds the channel mapping: which wire ends at which electrode. Press the skin where the dot is, a few times. The answer is saved as a skin file.",
       begin: "Begin",
     },
@@ -167,7 +167,7 @@ function Going({ kind }: { kind: FlowKind }) {
         {thinking ? ", computing…" : ""}
       </p>
       <p data-testid="flow-text">{text}</p>
-      {kind === "wiring" && figures?.probability !== undefined && (
+      {kind === "mapping" && figures?.probability !== undefined && (
         <progress value={figures.probability} max={1} aria-label="How sure the answer is" />
       )}
       {doubtful.length > 0 && (

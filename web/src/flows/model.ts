@@ -45,7 +45,7 @@ interface Sources {
   readonly problem: string | null;
 }
 
-export type FlowKind = "touch" | "wiring" | "force" | "rub";
+export type FlowKind = "touch" | "mapping" | "force" | "rub";
 export type Phase = "rest" | "press" | "hold" | "release" | "several" | "name" | "rub";
 export type Unit = "N" | "g" | "kg";
 
@@ -86,7 +86,7 @@ export interface Flow {
     readonly median_mm?: number;
     readonly doubtful?: readonly number[];
     readonly probability?: number;
-    readonly wiring?: string;
+    readonly mapping?: string;
     /** Relative error of each force, its press left out. */
     readonly errors?: readonly number[];
     /** What is wrong, in words. */

@@ -5,7 +5,7 @@ import type { Force, Touch } from "../decode";
 import { fixed, inScale, millimetres, scaleFor, type Scale } from "../format";
 import { fingers } from "../screen";
 import { limit, link, scene, shown, status } from "../state";
-import { stateInWords } from "../words";
+import { classInWords } from "../words";
 import { asChange, forceState } from "./forces";
 
 const ROWS = 4;
@@ -132,13 +132,13 @@ function Announcer() {
   );
 }
 
-/** Which of the states that were learnt the sheet is in. */
-function State() {
-  const state = status.value?.reference.ready ? status.value.state : null;
-  if (!state) return null;
-  const words = stateInWords(state);
+/** The class that the sheet shows. */
+function ClassOfSheet() {
+  const shown = status.value?.reference.ready ? status.value.class : null;
+  if (!shown) return null;
+  const words = classInWords(shown);
   return (
-    <span class="reading-of-state" title={words} data-testid="sheet-state">
+    <span class="reading-of-class" title={words} data-testid="sheet-class">
       {words}
     </span>
   );
@@ -153,7 +153,7 @@ export function Touches() {
       <h2>
         <span id="touches-title">Touches</span>
         {touches.length > ROWS && <span class="small">{touches.length - ROWS} more on the sheet</span>}
-        <State />
+        <ClassOfSheet />
       </h2>
       <div class="list" data-testid="touch-list">
         {touches.length === 0 ? (

@@ -66,7 +66,7 @@ def _apply(model: BendModel, conditions: Conditions) -> Applied:
 
 
 BENDS = Kind(
-    name="bends",
+    name="bend",
     title="tomoskin bend calibration",
     version=1,
     subject="bends",

@@ -130,7 +130,7 @@ def _doubts(prior: Mixture, fitted: Mixture, rest: FloatArray | None) -> tuple[s
     if rest is not None and shows(fitted, rest) != 0:
         doubts.append("an untouched frame would have flags set")
     if len(prior.templates) > 2 and _margin(_cosines(fitted, prior)) < _MARGIN:
-        doubts.append("its responses do not distinguish the states")
+        doubts.append("its responses do not distinguish the classes")
     return tuple(doubts)
 
 

@@ -1,4 +1,4 @@
-"""The classifier of states: examples → which state a frame shows, how sure, or none of them."""
+"""The classifier: examples → which class a frame shows, how sure, or none of them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tomoskin.model.pattern import Pattern
 
 _FOLDS = 5
 _KNOWN = 0.99
-"""Part of the frames of known states that are not called unknown."""
+"""Part of the frames of known classes that are not called unknown."""
 
 _SHARPNESS = np.geomspace(0.05, 1.6, 16)
 _TEMPERED = np.geomspace(1e-3, 1.6, 60)
@@ -83,7 +83,7 @@ class Classifier:
         Parameters
         ----------
         labels
-            (n,) names of states of which one holds, or (n, f) flags 0 or 1 of which any may.
+            (n,) names of classes of which one holds, or (n, f) flags 0 or 1 of which any may.
         names
             Of the flags; by default 1, 2, ….
         pattern, skin_id
@@ -193,7 +193,7 @@ class Classifier:
         """Classifier for a new session, from its frames (n, n_meas), labelled or not.
 
         ``flags`` (n, f) as far as they are known, rows of NaN otherwise. The frames should show
-        the states as they come: which ones they show is found while the rest is fitted. Where
+        the classes as they come: which ones they show is found while the rest is fitted. Where
         that cannot be believed (:attr:`alignment`), the classifier stays as it was and calls the
         session's frames unknown. Raises DataError as :meth:`fit`, and for fewer than ten frames
         without a label.
@@ -213,7 +213,7 @@ class Classifier:
             if mine and other and mine != other:
                 raise DataError(
                     f"the calibration is for {name} {mine}, but the data are of {name} {other}",
-                    hint=f"calibrate this {name}: tomoskin calibrate states",
+                    hint=f"calibrate this {name}: tomoskin calibrate class",
                 )
 
 

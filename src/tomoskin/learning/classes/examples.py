@@ -27,14 +27,14 @@ class Codes:
     Attributes
     ----------
     names
-        Of the states or flags.
+        Of the classes or flags.
     exclusive
         Whether exactly one holds at a time; otherwise any of them, or none.
 
     Raises
     ------
     DataError
-        For less than two states, no flag, names that stand twice, more than ten flags.
+        For less than two classes, no flag, names that stand twice, more than ten flags.
     """
 
     names: tuple[str, ...]
@@ -48,7 +48,7 @@ class Codes:
         if self.exclusive and len(self.names) < 2:
             only = f' only "{self.names[0]}"' if self.names else " none"
             raise DataError(
-                f"expected at least two states, got{only}",
+                f"expected at least two classes, got{only}",
                 hint='label some frames as another state too, such as "idle"',
             )
         if not self.exclusive and not 1 <= len(self.names) <= _MOST_FLAGS:
@@ -68,7 +68,7 @@ class Codes:
         return rows
 
     def flags_of(self, labels: Sequence[str]) -> FloatArray:
-        """(n, f) of states by name, NaN for "". Raises DataError for a name that is not known."""
+        """(n, f) of classes by name, NaN for "". Raises DataError for a name that is not known."""
         unknown = sorted({str(name) for name in labels} - {"", *self.names})
         if unknown:
             raise DataError(
@@ -161,7 +161,7 @@ class Examples:
             raise DataError(f"expected {self.dv.shape[1]} rows, got {other.dv.shape[1]}")
         if other.codes != self.codes:
             raise DataError(
-                f"expected the states {', '.join(self.codes.names)}, "
+                f"expected the classes {', '.join(self.codes.names)}, "
                 f"got {', '.join(other.codes.names)}"
             )
         later = other.session + self.session.max() + 1

@@ -50,7 +50,7 @@ class ClassReading:
     def text(self) -> str:
         """For people."""
         if self.unknown:
-            return f"unknown state (nearest: {self.name})"
+            return f"unknown class (nearest: {self.name})"
         return f"{self.name} {100 * self.probability:.0f} %"
 
 
@@ -143,11 +143,11 @@ def _apply(frames: FrameClassifier, _conditions: Conditions) -> Applied:
 
 
 CLASSES = Kind(
-    name="classes",
+    name="class",
     title="tomoskin states calibration",
     version=1,
-    subject="states",
-    command="states",
+    subject="classes",
+    command="class",
     attachment="states.npz",
     keys=frozenset({"dv", "flags", "session", "names", "exclusive"}),
     pack=_pack,

@@ -206,7 +206,7 @@ class Rubbing:
         if self.alike < _ALIKE and not self.by_labels:
             found.append(
                 "the voltages do not change as this skin's model predicts: the pattern or the "
-                "skin may be another one, or wires may be swapped (tomoskin calibrate wiring)"
+                "skin may be another one, or wires may be swapped (tomoskin calibrate mapping)"
             )
         if self._unsure and not self.by_labels:
             found.append(

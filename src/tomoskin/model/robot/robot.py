@@ -39,7 +39,6 @@ _ANGLE = Quantity("angle", "deg", -360, 360)
 _XYZ = Row({"x": _LENGTH, "y": _LENGTH, "z": _LENGTH})
 _RPY = Row({"roll": _ANGLE, "pitch": _ANGLE, "yaw": _ANGLE})
 _FILE = Text(1000)
-_OLDER = "The same as `calibration`, for older files."
 
 
 class RobotSection(Section, section="robot"):
@@ -72,9 +71,6 @@ class SkinSection(Section, section="skin", many=True):
     calibration: tuple[str, ...] = key(
         OneOrMore(_FILE), "Files from `tomoskin calibrate`, one of each kind.", default=None
     )
-    force: tuple[str, ...] = key(OneOrMore(_FILE), _OLDER, default=None)
-    bend: tuple[str, ...] = key(OneOrMore(_FILE), _OLDER, default=None)
-    states: tuple[str, ...] = key(OneOrMore(_FILE), _OLDER, default=None)
 
 
 SECTIONS = {section.section: section for section in (RobotSection, SkinSection)}
@@ -197,7 +193,6 @@ def _placed(given: SkinSection, where: str, folder: Path, urdf: Urdf | None) -> 
             raise SkinError(f'expected a {what}, got "{text}"', where=where)
     if given.link is not None and urdf is not None:
         urdf.check_link(given.link, where)
-    calibrations = (given.calibration, given.force, given.bend, given.states)
     zero = np.zeros(3)
     pose = Pose.of(given.position or zero, given.angles or zero)
     return PlacedSkin(
@@ -205,7 +200,7 @@ def _placed(given: SkinSection, where: str, folder: Path, urdf: Urdf | None) -> 
         skin=str(folder / given.skin) if given.skin.endswith(".toml") else given.skin,
         source=_from(folder, given.source),
         board=given.board,
-        calibrations=tuple(folder / path for some in calibrations for path in some or ()),
+        calibrations=tuple(folder / path for path in given.calibration or ()),
     )
 
 

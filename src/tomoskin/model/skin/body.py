@@ -163,7 +163,7 @@ class DriveSection(Section, section="drive"):
     polarity: str | None = key(
         Choice(("normal", "reversed")),
         "reversed: voltages come with the opposite sign, as from swapped amplifier inputs; "
-        "`tomoskin calibrate wiring` finds it.",
+        "`tomoskin calibrate mapping` finds it.",
         default=None,
     )
 

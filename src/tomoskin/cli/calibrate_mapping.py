@@ -1,4 +1,4 @@
-"""``tomoskin calibrate wiring``: which wire ends at which electrode."""
+"""``tomoskin calibrate mapping``: which wire ends at which electrode."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ if TYPE_CHECKING:
     from tomoskin.sensing.signal import Recording
 
 
-def calibrate_wiring(
+def calibrate_mapping(
     recording: LabelledArgument,
     out: Annotated[
         Path,
         typer.Option(
-            metavar="WIRED.toml", help="New skin file with the channel mapping that was found."
+            metavar="MAPPED.toml", help="New skin file with the channel mapping that was found."
         ),
         Writes(SKIN),
     ],
@@ -89,7 +89,7 @@ def _findings(answer: MappingAnswer, skin: Skin, frames: list[int]) -> dict[str,
     return {
         "presses": len(frames),
         "sure": answer.sure,
-        "wiring": answer.mapping.text(ring),
+        "mapping": answer.mapping.text(ring),
         "places": list(answer.mapping.electrodes),
         "polarity": _polarity(answer),
         "probability": answer.probability,
@@ -111,7 +111,7 @@ def _polarity(answer: MappingAnswer) -> str:
 
 
 def _say(facts: dict[str, Any]) -> None:
-    typer.echo(f"{facts['presses']} presses: {facts['wiring']}")
+    typer.echo(f"{facts['presses']} presses: {facts['mapping']}")
     typer.echo(
         f"probability {facts['probability']:.3f}; {min(facts['odds'], 1e6):.3g} times as likely as "
         f"the next: {facts['runner_up']}"

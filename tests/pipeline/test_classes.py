@@ -32,7 +32,7 @@ def volts(prepared, samples, count, seed):
 
 
 @pytest.fixture(scope="module")
-def states(prepared):
+def classes(prepared):
     """Idle, and a press on either side, as the runs of this module show them."""
     idle = samples_of(prepared)
     sides = [samples_of(prepared, pressed(prepared, x, 0.01)) for x in (-0.03, 0.03)]
@@ -46,9 +46,9 @@ def states(prepared):
 
 
 @pytest.fixture(scope="module")
-def run(prepared, states, tmp_path_factory):
-    """A recorded run of all three states, and its status at the end."""
-    taught = prepared.calibrated(states)
+def run(prepared, classes, tmp_path_factory):
+    """A recorded run of all three classes, and its status at the end."""
+    taught = prepared.calibrated(classes)
     with Recorded(taught, tmp_path_factory.mktemp("run") / "run.mcap") as recorded:
         recorded.idle(FIRST + 5)
         for side in (0, 1):
@@ -59,25 +59,26 @@ def run(prepared, states, tmp_path_factory):
     return recorded.path, taught, status
 
 
-def test_a_run_says_which_state_it_is_in(run):
+def test_a_run_says_which_class_it_shows(run):
     _, _, status = run
-    assert status.state == ClassReading("right", status.state.probability, False)
-    assert status.text.endswith(f", right {100 * status.state.probability:.0f} %")
-    told = json.loads(message(status))["state"]
-    assert told == {"name": "right", "probability": status.state.probability, "unknown": False}
-    assert json.loads(message(replace(status, state=None)))["state"] is None
+    shown = status.class_reading
+    assert shown == ClassReading("right", shown.probability, False)
+    assert status.text.endswith(f", right {100 * shown.probability:.0f} %")
+    told = json.loads(message(status))["class"]
+    assert told == {"name": "right", "probability": shown.probability, "unknown": False}
+    assert json.loads(message(replace(status, class_reading=None)))["class"] is None
 
 
-def test_a_replay_tells_the_same_states_to_the_bit(run):
+def test_a_replay_tells_the_same_classes_to_the_bit(run):
     path, taught, status = run
     with SessionReader(path) as session:
-        again = [result.state for result in replayed(as_recorded(session), session)]
+        again = [result.class_reading for result in replayed(as_recorded(session), session)]
         frames = [item.frame for item in session.frames()]
         pipeline = Pipeline(taught)
         pipeline.tick_rate = tick_rate(session)
-    here = [pipeline.push(frame).state for frame in frames]
+    here = [pipeline.push(frame).class_reading for frame in frames]
     assert again == here
-    assert again[-1] == status.state
+    assert again[-1] == status.class_reading
     assert again[: FIRST - 1] == [None] * (FIRST - 1), "no reference yet"
     names = [state.name for state in again[FIRST:]]
     assert (
@@ -91,60 +92,60 @@ def test_a_recording_says_the_same_off_line(run):
     path, taught, _ = run
     recording = read_recording(path).in_order_of(taught.pattern)
     found = reconstruct(taught, recording, recording.voltages[:FIRST])
-    assert [s.name for s in found.states][-12:] == ["idle"] * 6 + ["right"] * 6
+    assert [s.name for s in found.classes][-12:] == ["idle"] * 6 + ["right"] * 6
     untaught = taught.uncalibrated(CLASSES)
-    assert reconstruct(untaught, recording, recording.voltages[:5]).states == ()
+    assert reconstruct(untaught, recording, recording.voltages[:5]).classes == ()
 
 
-def test_what_was_not_learnt_is_unknown(prepared, states):
-    teller = states.model
+def test_what_was_not_learnt_is_unknown(prepared, classes):
+    classifier = classes.model
     rng = np.random.default_rng(1)
-    strange = teller(rng.normal(size=prepared.pattern.n_meas))
+    strange = classifier(rng.normal(size=prepared.pattern.n_meas))
     assert strange.unknown
-    assert strange.text == f"unknown state (nearest: {strange.name})"
-    assert teller(np.full(prepared.pattern.n_meas, np.nan)).unknown, "nothing was read"
+    assert strange.text == f"unknown class (nearest: {strange.name})"
+    assert classifier(np.full(prepared.pattern.n_meas, np.nan)).unknown, "nothing was read"
 
 
-def test_rows_that_are_lost_or_left_out_do_not_count(prepared, states):
-    teller, n = states.model, prepared.pattern.n_meas
-    sample = states.model.classifier.examples.dv[EACH + 1]
-    assert teller(sample).name == "left"
+def test_rows_that_are_lost_or_left_out_do_not_count(prepared, classes):
+    classifier, n = classes.model, prepared.pattern.n_meas
+    sample = classes.model.classifier.examples.dv[EACH + 1]
+    assert classifier(sample).name == "left"
     lost = np.where(np.arange(n) % 5 == 0, np.nan, sample)
     out = np.arange(0, n, 5)
-    assert teller(lost) == teller.without(out)(np.delete(sample, out))
-    assert teller(lost).name == "left"
+    assert classifier(lost) == classifier.without(out)(np.delete(sample, out))
+    assert classifier(lost).name == "left"
     assert (
-        prepared.calibrated(states).without(out).calibrations[CLASSES.name].model.rows.tolist()
+        prepared.calibrated(classes).without(out).calibrations[CLASSES.name].model.rows.tolist()
         == np.delete(np.arange(n), out).tolist()
     )
 
 
-def test_states_of_another_skin_are_refused(states):
+def test_states_of_another_skin_are_refused(classes):
     with pytest.raises(DataError, match="belongs to another scan: it was learnt on"):
-        prepare(Skin.load("textile-disc-16")).calibrated(states)
+        prepare(Skin.load("textile-disc-16")).calibrated(classes)
 
 
-def test_on_the_command_line_states_of_another_skin_are_refused(run, states, tmp_path, capfd):
-    other = replace(states.model.classifier, skin_id="another")
-    states.with_model(FrameClassifier.of(other)).write(tmp_path / "c.npz")
+def test_on_the_command_line_states_of_another_skin_are_refused(run, classes, tmp_path, capfd):
+    other = replace(classes.model.classifier, skin_id="another")
+    classes.with_model(FrameClassifier.of(other)).write(tmp_path / "c.npz")
     with pytest.raises(SystemExit) as end:
-        main(["image", str(run[0]), "--states", str(tmp_path / "c.npz")])
+        main(["image", str(run[0]), "--calibration", str(tmp_path / "c.npz")])
     assert end.value.code == 1
     err = capfd.readouterr().err
-    assert "the calibration of states belongs to another skin: it was learnt on" in err
+    assert "the calibration of classes belongs to another skin: it was learnt on" in err
 
 
-def test_the_command_line_tells_them(run, states, tmp_path, capfd):
+def test_the_command_line_tells_them(run, classes, tmp_path, capfd):
     path, c = run[0], tmp_path / "c.npz"
-    states.write(c)
-    assert CLASSES.read(c).model.classifier.right == states.model.classifier.right
+    classes.write(c)
+    assert CLASSES.read(c).model.classifier.right == classes.model.classifier.right
     said = []
     for more in ([], ["--json", "--alpha", "0.1"]):
         with pytest.raises(SystemExit) as end:
-            main(["image", str(path), "--states", str(c), *more])
+            main(["image", str(path), "--calibration", str(c), *more])
         assert not end.value.code
         said.append(capfd.readouterr().out)
-    told = json.loads(said[1])["states"]
+    told = json.loads(said[1])["classes"]
     assert (told[-1]["name"], told[-1]["unknown"]) == ("right", False)
     assert 0.5 < told[-1]["probability"] <= 1
     assert "right: 12 frames" in said[0]

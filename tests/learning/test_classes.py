@@ -42,7 +42,7 @@ def hit(told: FloatArray, truth: FloatArray) -> float:
 
 
 @pytest.mark.parametrize("each", [3, 10, 50])
-def test_states_are_told_from_few_examples(each: int) -> None:
+def test_classes_are_told_from_few_examples(each: int) -> None:
     flags, labels = one_of(3 * each, 0)
     known = Classifier.fit(sheet(0, flags), labels)
     asked, names = one_of(90, 1)
@@ -149,7 +149,7 @@ def test_frames_at_rest_share_their_noise() -> None:
 @pytest.mark.parametrize(
     ("labels", "words"),
     [
-        (["a"] * 6, 'two states, got only "a"'),
+        (["a"] * 6, 'two classes, got only "a"'),
         (["a"] * 5 + ["b"], "at least 3 labelled frames with b"),
         (["a"] * 4 + ["b"] * 3, "flags of shape"),
         (np.full((6, 2), 0.5), "expected 0 or 1"),
@@ -181,7 +181,7 @@ def test_what_does_not_belong_together_is_refused() -> None:
     with pytest.raises(DataError, match="finite untouched"):
         against_rest(dv, dv[:5])
     examples = known.examples
-    with pytest.raises(DataError, match="expected the states"):
+    with pytest.raises(DataError, match="expected the classes"):
         examples.and_then(replace(examples, codes=Codes(("x", "y"), exclusive=False)))
     with pytest.raises(DataError, match="rows"):
         examples.and_then(Examples.of(examples.codes, dv[:, :5], flags))
@@ -247,7 +247,7 @@ def test_ten_labels_mend_a_session_that_cannot_be_aligned() -> None:
     assert abs(answers.probability.mean() - hit(answers.flags, asked)) < 0.1
 
 
-def test_states_of_which_one_holds_are_named_by_labels() -> None:
+def test_classes_of_which_one_holds_are_named_by_labels() -> None:
     flags, _ = one_of(150, 0)
     known = Classifier.fit(sheet(0, flags), [NAMES[k] for k in flags.argmax(axis=1)])
     asked, names = one_of(150, 1)

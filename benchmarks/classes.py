@@ -1,4 +1,4 @@
-"""Labelled states in another session, and wirings told by a few presses."""
+"""Labelled classes in another session, and channel mappings from a few presses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``tomoskin calibrate states``: learn what state a frame shows."""
+"""``tomoskin calibrate class``: learn which class a frame shows."""
 
 from __future__ import annotations
 
@@ -39,19 +39,19 @@ def marked(path: Path, dv: FloatArray, given: list[str], codes: Codes | None) ->
         names = arrays.get("flag_names", np.arange(1, count + 1)).ravel().tolist()
         own = Codes(tuple(map(str, names)), exclusive=False)
         return Examples.of(codes or own, dv, flags)
-    if given or "state" in arrays:
+    if given or "class" in arrays:
         labels = (
-            labels_of_frames(given, len(dv), "--state", "NAME")
+            labels_of_frames(given, len(dv), "--class", "NAME")
             if given
-            else [str(s) for s in arrays["state"].tolist()]
+            else [str(s) for s in arrays["class"].tolist()]
         )
         codes = codes or Codes.of_labels(labels)
         return Examples.of(codes, dv, codes.flags_of(labels))
     if codes is None:
         raise DataError(
-            "holds no states: expected state (n_frames,) or flags (n_frames, f)",
+            "holds no classes: expected class (n_frames,) or flags (n_frames, f)",
             where=str(path),
-            hint="add one of them, or --state idle=0:40 --state touch=40:80",
+            hint="add one of them, or --class idle=0:40 --class touch=40:80",
         )
     return Examples.of(codes, dv, np.full((len(dv), len(codes.names)), np.nan))
 
@@ -71,19 +71,20 @@ def _arrays(path: Path) -> Arrays:
 _HARDLY = 0.5
 
 
-def calibrate_states(
+def calibrate_class(
     recording: Annotated[
         Path,
-        typer.Argument(metavar="INPUT", help="Frames; some have a label with their state."),
+        typer.Argument(metavar="INPUT", help="Frames; some have a label with their class."),
         Reads(),
     ],
     out: CalibrationOut,
     skin: KnownSkinOption = None,
-    state: Annotated[
+    label: Annotated[
         list[str] | None,
         typer.Option(
+            "--class",
             metavar="NAME=A:B",
-            help="Label: frames A to B-1 show this state. Can be repeated. Default: state or "
+            help="Label: frames A to B-1 show this class. Can be repeated. Default: class or "
             "flags of the file.",
         ),
     ] = None,
@@ -100,8 +101,8 @@ def calibrate_states(
     force: ForceFlag = False,
     json: JsonFlag = False,
 ) -> None:
-    """Learn the state of a frame, or flags, from a few examples of each."""
-    from tomoskin.cli.calibrate_states import marked
+    """Learn the class of a frame, or flags, from a few examples of each."""
+    from tomoskin.cli.calibrate_class import marked
     from tomoskin.files.imports import read_recording
     from tomoskin.learning import CLASSES
     from tomoskin.model.pattern import Pattern
@@ -115,7 +116,7 @@ def calibrate_states(
     data = data.in_order_of(pattern)
     dv = changes(data, reference, pattern)
     examples = marked(
-        recording, dv, state or [], old.model.classifier.examples.codes if old else None
+        recording, dv, label or [], old.model.classifier.examples.codes if old else None
     )
     with Bar("learning"):
         made = _learnt(examples, old, pattern, chosen)
@@ -171,7 +172,7 @@ def _report(made: Calibration[FrameClassifier], n_frames: int, fitted: bool, *, 
             }
         )
         return
-    kind = "states" if codes.exclusive else "flags"
+    kind = "classes" if codes.exclusive else "flags"
     typer.echo(f"{len(codes.names)} {kind}: {', '.join(codes.names)}")
     share = f"{100 * classifier.right:.0f} % of the labelled frames"
     typer.echo(

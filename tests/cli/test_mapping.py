@@ -1,4 +1,4 @@
-"""``tomoskin calibrate wiring``: presses on scrambled wires give a skin file that is right."""
+"""``tomoskin calibrate mapping``: presses on scrambled wires give a skin file that is right."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ def presses(tmp_path: Path) -> Path:
 
 
 def test_the_skin_file_is_as_it_is_wired(tomoskin: Run, tmp_path: Path, presses: Path) -> None:
-    out = tmp_path / "wired.toml"
-    code, said, err = tomoskin("calibrate", "wiring", presses, "--skin", NAME, "--out", out)
+    out = tmp_path / "mapped.toml"
+    code, said, err = tomoskin("calibrate", "mapping", presses, "--skin", NAME, "--out", out)
     assert (code, err) == (0, "")
     assert WIRING.text(ring_of(SKIN)) in said
     wired = Skin.load(out)
@@ -63,9 +63,9 @@ def test_too_few_presses_are_refused_with_what_would_tell(
     labels = np.full_like(arrays["xy_m"], np.nan)
     labels[nearest] = 0.0
     np.savez(presses, **(arrays | {"xy_m": labels}))
-    out = tmp_path / "wired.toml"
+    out = tmp_path / "mapped.toml"
     code, said, err = tomoskin(
-        "calibrate", "wiring", presses, "--skin", NAME, "--out", out, "--json"
+        "calibrate", "mapping", presses, "--skin", NAME, "--out", out, "--json"
     )
     assert code == 1
     assert "do not decide it" in err
@@ -78,19 +78,19 @@ def test_too_few_presses_are_refused_with_what_would_tell(
 
 
 def test_another_skin_or_no_label_is_refused(tomoskin: Run, tmp_path: Path, presses: Path) -> None:
-    out = tmp_path / "wired.toml"
+    out = tmp_path / "mapped.toml"
     code, _, err = tomoskin(
-        "calibrate", "wiring", presses, "--skin", "textile-disc-16", "--out", out
+        "calibrate", "mapping", presses, "--skin", "textile-disc-16", "--out", out
     )
     assert code == 1
     assert "rows are not in the recording" in err
     with np.load(presses) as kept:
         arrays = dict(kept)
     np.savez(presses, **{key: arrays[key] for key in KEYS[:-1]})
-    code, _, err = tomoskin("calibrate", "wiring", presses, "--skin", NAME, "--out", out)
+    code, _, err = tomoskin("calibrate", "mapping", presses, "--skin", NAME, "--out", out)
     assert code == 1
     assert "no labels" in err
     np.savez(presses, **(arrays | {"xy_m": 1e3 * arrays["xy_m"]}))
-    code, _, err = tomoskin("calibrate", "wiring", presses, "--skin", NAME, "--out", out)
+    code, _, err = tomoskin("calibrate", "mapping", presses, "--skin", NAME, "--out", out)
     assert code == 1
     assert "outside the skin" in err

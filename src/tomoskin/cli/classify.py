@@ -1,4 +1,4 @@
-"""``tomoskin states``: what state each frame shows, by a calibration."""
+"""``tomoskin classify``: which class each frame shows, by a calibration."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ if TYPE_CHECKING:
     from tomoskin.sensing.signal import Recording
 
 _SHOWN = 20
-"""Changes of state that are said."""
+"""Changes of class that are printed."""
 
 
-def states(
+def classify(
     recording: RecordingArgument,
     calibration: Annotated[
-        Path, typer.Option(metavar="C.npz", help="File from tomoskin calibrate states."), Reads()
+        Path, typer.Option(metavar="C.npz", help="File from tomoskin calibrate class."), Reads()
     ],
     out: Annotated[
         Path | None,
@@ -41,7 +41,7 @@ def states(
     ] = 0,
     json: JsonFlag = False,
 ) -> None:
-    """Tell the state of each frame, or that it is none of those that were learnt."""
+    """Tell the class of each frame, or that it is none of those that were learnt."""
     from tomoskin.cli.choices import skin_if_any
     from tomoskin.files.imports import read_recording
     from tomoskin.learning import CLASSES
@@ -55,7 +55,7 @@ def states(
         loaded.check_skin(chosen)
     data = data.in_order_of(loaded.pattern)
     dv = changes(data, reference, loaded.pattern)
-    with Bar("telling states"):
+    with Bar("classifying"):
         answers = classifier.predict(dv)
     asked = _spread(min(ask, len(dv)), len(dv))
     names = classifier.examples.codes.names
@@ -68,7 +68,7 @@ def states(
 
 
 def _spread(count: int, n: int) -> list[int]:
-    """``count`` of n frames, evenly: those that are least sure would show one state too often."""
+    """``count`` of n frames, evenly: those that are least sure would show one class too often."""
     return [(2 * k + 1) * n // (2 * count) for k in range(count)]
 
 
@@ -77,7 +77,7 @@ def _documents(data: Recording, answers: Answers) -> list[dict[str, Any]]:
         {
             "frame": frame,
             "time_s": float(data.time[frame]),
-            "state": label,
+            "class": label,
             "probability": float(answers.probability[frame]),
             "unknown": bool(answers.rejected[frame]),
             "each": answers.each[frame].tolist(),
@@ -96,12 +96,12 @@ def _write(
         part.open("w", newline="", encoding="utf-8") as file,
     ):
         table = csv.writer(file, lineterminator="\n")
-        table.writerow(["frame", "time_s", "state", "probability", "unknown", *names])
+        table.writerow(["frame", "time_s", "class", "probability", "unknown", *names])
         for row in _documents(data, answers):
             each = [f"{p:.4f}" for p in row["each"]]
             sure, unknown = f"{row['probability']:.4f}", int(row["unknown"])
             when = f"{row['time_s']:.6f}"
-            table.writerow([row["frame"], when, row["state"], sure, unknown, *each])
+            table.writerow([row["frame"], when, row["class"], sure, unknown, *each])
 
 
 def _say(answers: Answers, asked: list[int]) -> None:
@@ -114,6 +114,6 @@ def _say(answers: Answers, asked: list[int]) -> None:
         typer.echo(f"frames {first:>4} to {last:>4}  {text}")
     if len(runs) > _SHOWN:
         typer.echo(f"… and {len(rows) - runs[_SHOWN][0][0]} more frames: --out writes all")
-    typer.echo(f"{int(answers.rejected.sum())} of {len(rows)} frames show an unknown state")
+    typer.echo(f"{int(answers.rejected.sum())} of {len(rows)} frames show an unknown class")
     if asked:
         typer.echo(f"label frames {', '.join(map(str, asked))}")
