@@ -107,7 +107,7 @@ class InData:
             return self
         other = yield from InData.making(prepared.spots, prepared, reference, self._pace)
         yield from other._spots.preparing(self._spots.nuisance)
-        other._spots.watch.go_on(self._spots.watch)
+        other._spots.go_on(self._spots)
         return other
 
     def push(self, view: FrameView) -> list[Detection]:

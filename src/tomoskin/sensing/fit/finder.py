@@ -254,6 +254,13 @@ class SpotFinder:
         self._nuisance = nuisance
         yield from self._renewed(self._noise, self._scale)
 
+    def go_on(self, other: SpotFinder) -> None:
+        """Go on from the frames of an ``other`` finder of the same skin: its touches, and where
+        others were."""
+        self._before, self._expected = other._before, other._expected
+        self._residual = other._residual
+        self.watch.go_on(other.watch)
+
     def _renewed(self, noise: FloatArray, scale: FloatArray) -> Generator[None, None, None]:
         nuisance, excess = self._nuisance / scale[:, None], self.watch.excess
         made = yield from self._making(noise, nuisance)

@@ -18,7 +18,7 @@ from tomoskin.sensing.fit.spot import CONTENT, LOG_RADIUS
 HELD = 0.6
 """Part of the ratio at which a touch begins above which one that is there stays."""
 
-MISSHAPEN = 0.02
+MISSHAPEN = 0.04
 """A wrong profile leaves up to this part of what a touch changes: no evidence of another one."""
 
 _TRUE = 0.25

@@ -14,10 +14,17 @@ from tomoskin.sensing.fit.expectation import Expectation, Known
 from tomoskin.sensing.fit.spot import CONTENT, FILLING, LOG_RADIUS
 
 _RADIUS = 0.11
-"""Median radius, in parts of the breadth of a square as large as the sheet."""
+"""Median radius where touches are as large as the sheet lets them be, in parts of its breadth: that
+of a square of the same area."""
+
+_FINGER = 0.0195
+"""Median radius of the dent of a finger, m, however large the sheet is."""
 
 _SPREAD = 0.45
-"""Standard deviation of the radius's logarithm: a factor of 1.6 either way."""
+"""Standard deviation of the radius's logarithm where both agree: a factor of 1.6 either way."""
+
+_LEAST, _MOST = 0.045, 0.45
+"""Radii that a sheet can show, in parts of its breadth: larger than its cells, smaller than it."""
 
 _DEPTH = 0.5
 """Standard deviation of log(σ/σ₀) at the centre of a spot of median radius, about none."""
@@ -49,10 +56,15 @@ class SpotPrior:
 
     @classmethod
     def of(cls, mesh: Mesh) -> Self:
-        """For the fingers of somebody who made a sheet of this size."""
+        """For a sheet of this size, whose touches may be fingers or as small as the sheet.
+
+        The median lies between the two sizes, and the spread holds both.
+        """
         area = float(mesh.volumes.sum())
-        radius = _RADIUS * math.sqrt(area)
-        return cls(area, radius, _SPREAD, _DEPTH * FILLING * radius**2)
+        scaled = _RADIUS * math.sqrt(area)
+        radius = math.sqrt(scaled * _FINGER)
+        spread = math.hypot(_SPREAD, math.log(scaled / _FINGER) / 2)
+        return cls(area, radius, spread, _DEPTH * FILLING * radius**2)
 
     def away(self, spots: FloatArray) -> FloatArray:
         """(k, 4) deviations of spots (k, 4) from the prior's middle; positions have none."""
@@ -101,8 +113,9 @@ class SpotPrior:
     @property
     def log_radii(self) -> tuple[float, float]:
         """Least and largest logarithm of a radius in m."""
-        middle, margin = math.log(self.radius), 2 * self.spread
-        return middle - margin, middle + margin
+        middle, margin, breadth = math.log(self.radius), 2 * self.spread, math.log(self.area) / 2
+        least, most = (breadth + math.log(part) for part in (_LEAST, _MOST))
+        return max(middle - margin, least), min(middle + margin, most)
 
     @staticmethod
     def depths(sign: str) -> tuple[float, float]:

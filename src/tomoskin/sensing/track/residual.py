@@ -28,6 +28,9 @@ _NOISE = 2.0
 _CREEP = 10.0
 """A level that rises slower than over so many seconds is the sheet's drift."""
 
+_FALLS = 0.5
+"""Part by which the level follows what is lower: the least of many frames would be their noise."""
+
 _BESIDE = 1.25
 """A residual lies within this many radii of its region, or of its press's."""
 
@@ -70,9 +73,10 @@ class Residual:
         if self.unseen:
             self.level, self.unseen = min(self.level, least_snr * noise), False
         grown = size > _GROWTH * self.level + _NOISE * noise
-        if size > self.level and not grown:
-            self.level += (size - self.level) * -np.expm1((self.time - time) / _CREEP)
-        self.level, self.time = min(self.level, size), time
+        if not grown:
+            creeps = -np.expm1((self.time - time) / _CREEP)
+            self.level += (size - self.level) * (creeps if size > self.level else _FALLS)
+        self.time = time
         return not grown
 
 
