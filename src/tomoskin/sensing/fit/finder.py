@@ -415,6 +415,7 @@ class SpotFinder:
             cells=self._cells.within(x, y, radius),
             cov_xy=xy,
             snr=float(detected.ratio[k]),
+            weak=bool(detected.fresh[k] < self._settings.snr),
             close=bool(detected.close[k]),
         )
 

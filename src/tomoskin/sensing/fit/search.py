@@ -30,6 +30,8 @@ class SpotDetections:
         The most likely spots.
     ratio
         (k,) deviations by which each stands out of the noise, the others given.
+    fresh
+        (k,) the same out of noise and residual responses: what a new touch needs.
     covariance
         (4k, 4k), noise and a wrong profile together.
     close
@@ -38,6 +40,7 @@ class SpotDetections:
 
     fit: Fit
     ratio: FloatArray
+    fresh: FloatArray
     covariance: FloatArray
     close: NDArray[np.bool_]
 
@@ -71,10 +74,12 @@ def judged(selection: ForwardSelection, fit: Fit) -> SpotDetections:
     """How sure each touch of a fit is."""
     if not len(fit.spots):
         none = np.zeros(0)
-        return SpotDetections(fit, none, np.zeros((0, 0)), none.astype(bool))
+        return SpotDetections(fit, none, none, np.zeros((0, 0)), none.astype(bool))
     problem = selection.problem
     squares, covariance = problem.solver.judged(problem, fit, _UNEVEN)
-    return SpotDetections(fit, np.sqrt(squares), covariance, _close(selection, fit))
+    ratio = np.sqrt(squares)
+    fresh = selection.ratios(fit) if len(problem.left) else ratio
+    return SpotDetections(fit, ratio, fresh, covariance, _close(selection, fit))
 
 
 def _close(selection: ForwardSelection, fit: Fit) -> NDArray[np.bool_]:
@@ -122,8 +127,10 @@ def _merged(detected: SpotDetections, i: int, j: int) -> SpotDetections:
         mix[4 * i : 4 * i + 2, 4 * column : 4 * column + 2] = part * np.eye(2)
     rows = (4 * keep[:, None] + np.arange(N_PARAMETERS)).ravel()
     covariance = (mix @ detected.covariance @ mix.T)[np.ix_(rows, rows)]
-    ratio = detected.ratio.copy()
-    ratio[i] = np.hypot(*detected.ratio[[i, j]])
+    ratio, fresh = detected.ratio.copy(), detected.fresh.copy()
+    for each in (ratio, fresh):
+        each[i] = np.hypot(*each[[i, j]])
     close = detected.close.copy()
     close[i] = True
-    return SpotDetections(replace(fit, spots=spots[keep]), ratio[keep], covariance, close[keep])
+    kept = replace(fit, spots=spots[keep])
+    return SpotDetections(kept, ratio[keep], fresh[keep], covariance, close[keep])

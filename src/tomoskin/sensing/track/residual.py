@@ -21,7 +21,7 @@ _PART = 0.25
 _FALL = 1.0
 """A press that is lifted falls from half its size to that part within so many seconds."""
 
-_GROWTH = 1.3
+_GROWTH = 1.5
 """What grows by this factor, and by two deviations of its noise, is a new press."""
 
 _NOISE = 2.0
