@@ -17,6 +17,7 @@ from tomoskin.learning import BENDS, BendExamples, BendModel, Differences, Frame
 from tomoskin.model.mesh import Cylinder, Hinge
 from tomoskin.pipeline import FrameResult, Pipeline
 from tomoskin.pipeline.finding import finding, voltage_covariance
+from tomoskin.pipeline.nuisance import JUMP
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
 from tomoskin.sensing.signal import Reference
 from tomoskin.twin import Bent, Pose, Press
@@ -168,8 +169,14 @@ class Bench:
         image = self.lab.image
         n_meas = self.lab.prepared.pattern.n_meas
         none, excluded = np.zeros((n_meas, 0)), np.zeros(n_meas, bool)
+        jumps = JUMP * reference.mean[:, None]
         return lambda dv, blind: found.push(
-            FrameView(0.0, image(dv), None, Differences(dv, blind, dv, none, dv, excluded))
+            FrameView(
+                0.0,
+                image(dv),
+                None,
+                Differences(dv, blind, dv, blind, jumps, dv, none, dv, excluded),
+            )
         )
 
     def static(self, pose: Pose) -> list[float]:
@@ -179,7 +186,7 @@ class Bench:
         for _ in range(TOUCHES):
             reference, press = Reference.of(self.frames(IDLE, pose)), drawn(self.random, 1)
             change = self.volts(press, pose) - reference.mean
-            readings = self.finder(reference)(change, reference.mean[:, None])
+            readings = self.finder(reference)(change, self.model.directions[:, :0])
             found.append(missed(readings, press))
             self.volts((), pose)
         return found
@@ -247,7 +254,7 @@ class Bench:
                 volts = self.volts(press, hinged(angle))
                 for reference, found in zip((there, told), errors, strict=True):
                     find = self.finder(reference)
-                    blind = np.hstack([reference.mean[:, None], self.model.directions])
+                    blind = self.model.directions
                     found.append(missed(find(volts - reference.mean, blind), press))
                 self.volts((), hinged(angle))
         return errors
@@ -261,7 +268,8 @@ class Plain:
 
     def __call__(self, result: FrameResult) -> list[Detection]:
         """Of one frame."""
-        return self._find(result.voltages - result.reference, result.reference[:, None])
+        none = np.zeros((len(result.reference), 0))
+        return self._find(result.voltages - result.reference, none)
 
 
 def missed(readings: Sequence[Detection], press: Sequence[Press]) -> float:

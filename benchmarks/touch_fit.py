@@ -19,6 +19,7 @@ from tomoskin.learning import Differences, FrameView
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import prepare
 from tomoskin.pipeline.finding import Finder, finding
+from tomoskin.pipeline.nuisance import JUMP
 from tomoskin.pipeline.tune import tuned, tuned_sheet
 from tomoskin.sensing.fit import Whitener, row_covariance
 from tomoskin.sensing.signal import Reference
@@ -82,10 +83,13 @@ class Lab:
         return self._shown(self.volts(presses) - self.reference.mean)
 
     def _shown(self, dv: Floats) -> FrameView:
-        """All voltages in proportion say nothing, as they do live."""
+        """What all voltages have in common may jump, as it may live."""
         differences = Differences(
             dv=dv,
             nuisance=self.reference.mean[:, None],
+            whole=dv,
+            unknown=np.zeros((len(dv), 0)),
+            jumps=JUMP * self.reference.mean[:, None],
             change=dv,
             drift=np.zeros((len(dv), 0)),
             from_rest=dv,

@@ -19,6 +19,7 @@ from tomoskin.model.mesh import Mesh
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import prepare
 from tomoskin.pipeline.finding import Finder, finding
+from tomoskin.pipeline.nuisance import JUMP
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.pipeline.tune import tuned, tuned_sheet
 from tomoskin.sensing.signal import NuisanceSubspace, Reference
@@ -179,6 +180,9 @@ class Lab:
         differences = Differences(
             dv=dv,
             nuisance=self._nuisance.directions,
+            whole=change,
+            unknown=np.eye(len(self.lost))[:, self.lost],
+            jumps=JUMP * self.reference.mean[:, None],
             change=change,
             drift=self._nuisance.directions,
             from_rest=change,

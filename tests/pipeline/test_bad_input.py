@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -23,11 +25,11 @@ def fitted(request):
 class Run:
     """A pipeline that is shown samples, a little noisy, after a reference of ``rest``."""
 
-    def __init__(self, prepared, rest, seed=21):
+    def __init__(self, prepared, rest, seed=21, needed=NEEDED):
         self.pipeline = Pipeline(prepared, reference_frames=NEEDED)
         self.random = np.random.default_rng(seed)
         self.prepared, self.number = prepared, 0
-        self.show(rest, NEEDED)
+        self.show(rest, needed)
 
     def show(self, samples, count=1):
         """Results of so many frames."""
@@ -95,6 +97,37 @@ def test_a_gain_that_doubles_is_no_touch(fitted, modes, seed):
     results = run.show(2 * half, 100)
     assert seen(results) == []
     assert "all voltages are 2.0 times those of the reference" in said(results)
+
+
+@pytest.mark.parametrize("part", [0.001, 0.002, 0.003, 0.005, 0.01, 0.1, -0.003, -0.01, -0.1])
+def test_a_step_of_all_voltages_is_no_touch_and_is_named(fitted, part):
+    usual = 0.8 * samples_of(fitted)
+    run = Run(fitted, usual)
+    run.show(usual, 20)
+    step = run.show((1 + part) * usual, 80)
+    assert seen(step + run.show(usual, 60)) == []
+    if abs(part) > 0.004:
+        told = re.search(
+            r"all voltages have changed by (\S+) % at once: gain or", said(step[-80:-70])
+        )
+        assert told is not None
+        assert float(told[1]) == pytest.approx(100 * part, rel=0.3)
+        assert "press" not in said(step)
+    touched = 0.8 * samples_of(fitted, pressed(fitted, 0.03, 0.02, loss=0.4))
+    assert len(run.show(touched, 5)[-1].touches) == 1
+
+
+@pytest.mark.parametrize("ripple", [0.001, 0.004])
+def test_a_supply_that_wavers_is_learnt_and_no_touch(fitted, ripple):
+    usual, random = 0.8 * samples_of(fitted), np.random.default_rng(22)
+    wavers = 1 + ripple * random.standard_normal(NEEDED + 300)
+    run = Run(fitted, wavers[0] * usual, needed=1)
+    results = [run.show(gain * usual)[0] for gain in wavers[1:]]
+    assert seen(results[NEEDED:]) == []
+    assert sum("gain or supply" in (r.problem or "") for r in results) < 0.02 * len(results)
+    touched = 0.8 * samples_of(fitted, pressed(fitted, 0.03, 0.02, loss=0.4))
+    found = [run.show(gain * touched)[0] for gain in wavers[:5]]
+    assert len(found[-1].touches) == 1
 
 
 def test_ten_measurements_make_no_touch(fitted):

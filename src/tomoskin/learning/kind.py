@@ -51,6 +51,12 @@ class Differences:
         (n_meas,) difference data without their part in the nuisance subspace.
     nuisance
         (n_meas, k) directions of the difference data that carry no information.
+    whole
+        (n_meas,) difference data with their part in the common modes.
+    unknown
+        (n_meas, k) directions along which these carry no information.
+    jumps
+        (n_meas, j) common modes, each as long as the deviation of what it may jump by.
     change
         (n_meas,) V by which the frame differs from the baseline, with all that is in it.
     drift
@@ -63,6 +69,9 @@ class Differences:
 
     dv: FloatArray
     nuisance: FloatArray
+    whole: FloatArray
+    unknown: FloatArray
+    jumps: FloatArray
     change: FloatArray
     drift: FloatArray
     from_rest: FloatArray

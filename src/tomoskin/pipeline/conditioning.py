@@ -242,10 +242,13 @@ class Followed:
             return Conditioned(None, n_excluded, health, f"{_gain_text(times)}; no image is shown")
         if times is not None:
             values = values / times  # touches and noise are then as large as they were learnt
-        dv = subspace.nuisance(difference(values, mean, self._prepared.operator.difference))
+        whole = difference(values, mean, self._prepared.operator.difference)
         differences = Differences(
-            dv=dv,
+            dv=subspace.nuisance(whole),
             nuisance=subspace.nuisance.directions,
+            whole=whole,
+            unknown=subspace.unknown,
+            jumps=subspace.jumps,
             change=values - mean,
             drift=subspace.drift,
             from_rest=measured.values - baseline.start,
@@ -317,11 +320,16 @@ class GivenDifferences:
         """Of a frame whose values are difference data already."""
         operator, excluded = self.prepared.operator, measured.excluded
         change = measured.values * _scale(self.prepared, operator.reference)
+        dv, unknown = operator.filled(measured.values, excluded), np.eye(len(excluded))[:, excluded]
+        none = np.zeros((len(excluded), 0))
         differences = Differences(
-            dv=operator.filled(measured.values, excluded),
-            nuisance=np.eye(len(excluded))[:, excluded],
+            dv=dv,
+            nuisance=unknown,
+            whole=dv,
+            unknown=unknown,
+            jumps=none,
             change=change,
-            drift=np.zeros((len(excluded), 0)),
+            drift=none,
             from_rest=change,
             excluded=excluded,
         )

@@ -11,12 +11,14 @@ import numpy as np
 from tomoskin.board.source import Configuration, ScanSettings
 from tomoskin.core import Detection, FloatArray, finished
 from tomoskin.learning import FrameView, TouchFit
+from tomoskin.pipeline.nuisance import JUMP
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.sensing.fit import (
     EXHAUSTIVE,
     Pace,
     SpotFinder,
     SpotModel,
+    common_mode_variance,
     idle_covariance,
     measured_covariance,
 )
@@ -106,18 +108,18 @@ class InData:
             yield from self._spots.renewing(noise, gain)
             return self
         other = yield from InData.making(prepared.spots, prepared, reference, self._pace)
-        yield from other._spots.preparing(self._spots.nuisance)
-        other._spots.go_on(self._spots)
+        yield from other._spots.preparing(self._spots)
         return other
 
     def push(self, view: FrameView) -> list[Detection]:
         """See :class:`Finder`."""
-        return self._spots.push(view.differences.dv, view.differences.nuisance)
+        differences = view.differences
+        return self._spots.push(differences.whole, differences.unknown, differences.jumps)
 
     @property
     def like_touch(self) -> bool:
         """See :class:`Finder`."""
-        return self._spots.watch.like_touch
+        return self._spots.watch.like_touch or self._spots.jump is not None
 
     @property
     def rises(self) -> bool:
@@ -127,7 +129,15 @@ class InData:
     @property
     def problem(self) -> str | None:
         """See :class:`Finder`."""
-        return self._spots.watch.problem
+        jump = self._spots.jump
+        return self._spots.watch.problem or (None if jump is None else _jump_text(JUMP * jump))
+
+
+def _jump_text(part: float) -> str:
+    return (
+        f"all voltages have changed by {100 * part:+.2g} % at once: gain or supply, and no touch; "
+        "check current, supply and cables"
+    )
 
 
 def finding(prepared: Prepared, reference: Reference | None, pace: Pace = EXHAUSTIVE) -> Finder:
@@ -205,6 +215,9 @@ def _noise(
 ) -> Generator[None, None, FloatArray]:
     """(n_meas, n_meas) covariance of difference data: one frame less the reference."""
     volts = yield from _voltage_covariance(prepared, reference, gain)
+    if reference is not None and prepared.skin.signal.common_modes == "projected":
+        variance = common_mode_variance(volts, reference)
+        volts = volts + variance * np.outer(reference.mean, reference.mean)
     if prepared.operator.difference == "plain":
         return volts
     size = np.abs(prepared.operator.reference if reference is None else reference.mean)

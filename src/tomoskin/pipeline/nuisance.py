@@ -20,6 +20,9 @@ from tomoskin.sensing.signal import (
 _KEPT = 8
 """Sets of excluded measurements whose subspace is remembered."""
 
+JUMP = 0.02
+"""Standard deviation of a jump of the gain, in parts of it."""
+
 _LEARN = 8
 """Idle blocks after which directions of drift are looked for anew."""
 
@@ -31,7 +34,7 @@ class Drift:
     ----------
     directions
         (n_meas, k) V; the first is the gain: all voltages in proportion, as a conductivity moves
-        them that changes everywhere alike. No column where the skin projects no common modes.
+        them that changes everywhere alike. No column where the skin keeps its common modes.
     revision
         How often they have been learnt.
     """
@@ -41,6 +44,12 @@ class Drift:
         gain = reference.mean[:, None]
         self.directions: FloatArray = gain if self._projects else gain[:, :0]
         self.revision = 0
+
+    @property
+    def jumps(self) -> FloatArray:
+        """(n_meas, k) V: the directions, each as long as the deviation of what it may jump by."""
+        size = np.linalg.norm(self.directions, axis=0)
+        return np.asarray(JUMP * self.directions * (size[:1] / size))
 
     def learn(self, baseline: Baseline, signatures: Callable[[], FloatArray]) -> None:
         """Take the end of an idle block.
@@ -65,10 +74,14 @@ class FrameSubspace:
         Takes it out of difference data.
     drift
         (n_meas, k) V: directions of drift and of excluded measurements alone.
+    unknown, jumps
+        (n_meas, k) and (n_meas, j) of difference data: all but the drift, and that with a size.
     """
 
     nuisance: NuisanceSubspace
     drift: FloatArray
+    unknown: FloatArray
+    jumps: FloatArray
 
 
 class Nuisance:
@@ -107,9 +120,13 @@ class Nuisance:
 
     def _made(self, health: Health | None) -> FrameSubspace:
         drift, excluded = self._drift.directions, self._excluded(health)
-        parts = [drift[:, 1:] if self._null_space.shape[1] else drift, self._calibrated, excluded]
-        subspace = self._subspace(np.hstack(parts) / self._scale[:, None])
-        return FrameSubspace(subspace, np.hstack([drift, excluded]))
+        scale = self._scale[:, None]
+        unknown = np.hstack([self._calibrated, excluded]) / scale
+        projected = drift[:, 1:] if self._null_space.shape[1] else drift
+        subspace = self._subspace(np.hstack([projected / scale, unknown]))
+        return FrameSubspace(
+            subspace, np.hstack([drift, excluded]), unknown, self._drift.jumps / scale
+        )
 
     def _excluded(self, health: Health | None) -> FloatArray:
         pattern = self._prepared.pattern

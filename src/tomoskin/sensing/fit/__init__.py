@@ -13,7 +13,7 @@ from tomoskin.sensing.fit.bounds import (
     resolution_bounds,
     variants,
 )
-from tomoskin.sensing.fit.covariance import idle_covariance
+from tomoskin.sensing.fit.covariance import common_mode_variance, idle_covariance
 from tomoskin.sensing.fit.finder import SpotFinder, SpotModel
 from tomoskin.sensing.fit.noise import Whitener, measured_covariance, row_covariance
 from tomoskin.sensing.fit.pace import EXHAUSTIVE, LIVE, Pace
@@ -33,6 +33,7 @@ __all__ = [
     "Spots",
     "Variant",
     "Whitener",
+    "common_mode_variance",
     "depth_of",
     "detection_bound",
     "fisher_information",

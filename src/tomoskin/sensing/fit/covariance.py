@@ -14,7 +14,7 @@ from tomoskin.core import FloatArray
 from tomoskin.model.pattern import Scan
 from tomoskin.sensing.fit.noise import rounding_left, row_covariance
 from tomoskin.sensing.fit.targets import Blocks, target
-from tomoskin.sensing.signal import Scatter
+from tomoskin.sensing.signal import Reference, Scatter
 
 _EDGE = 1.15
 """A factor is one whose variance is so many times the largest that noise has by chance."""
@@ -29,6 +29,12 @@ _TAIL = 5.0
 _DEGREES = 4
 """Degrees of freedom of the variance along a touch's signature that a frame is worth, at the least:
 many rows tell of it. Between 4 and 100 in the cases of the benchmark."""
+
+_WAVERS, _WORTH = 3e-4, 20
+"""By what part of them all voltages move together between the reference and a frame, before idle
+frames say; and so many frames that this is worth."""
+
+_TINY = np.finfo(float).tiny
 
 _PASSES = 3
 """Structure and factors are fitted by turns."""
@@ -111,6 +117,24 @@ def idle_covariance(
     matrix = scatter.matrix + shared * size[:, None] * size
     learnt = yield from learnt_covariance(blocks, matrix, scatter.frames, signatures)
     return _uncertain(scatter.frames) * learnt
+
+
+def common_mode_variance(covariance: FloatArray, reference: Reference) -> float:
+    """By what part of them all voltages move together from the reference to a frame, squared,
+    beyond a ``covariance`` (n_meas, n_meas) V² of it.
+
+    What idle frames show of it, mixed with what is usual: a factor like a touch's signature is no
+    part of the covariance, and the change of all voltages in proportion is like a central touch's.
+    """
+    scatter = reference.scatter
+    if scatter is None:
+        return _WAVERS**2
+    variance = np.diag(covariance)
+    weights = np.where(variance > 0, reference.mean / np.maximum(variance, _TINY), 0.0)
+    weights /= max(float(weights @ reference.mean), _TINY)
+    beyond = float(weights @ (scatter.matrix - covariance) @ weights)
+    frames = scatter.frames
+    return (_WORTH * _WAVERS**2 + frames * max(beyond, 0.0)) / (_WORTH + frames)
 
 
 def _uncertain(frames: int) -> float:

@@ -6,9 +6,9 @@ import math
 from collections import OrderedDict
 from collections.abc import Generator
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from operator import is_
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -19,7 +19,8 @@ from tomoskin.model.skin import Skin
 from tomoskin.sensing.fit.candidates import Candidates, Matched, footprints_of
 from tomoskin.sensing.fit.cell_discs import CellDiscs
 from tomoskin.sensing.fit.certificate import Certificate, Reduced
-from tomoskin.sensing.fit.excess import Gauge
+from tomoskin.sensing.fit.common_mode import CommonModeJump, Explained, Jumps
+from tomoskin.sensing.fit.excess import Excess, Gauge
 from tomoskin.sensing.fit.expectation import Expectation
 from tomoskin.sensing.fit.native import NativeSolver
 from tomoskin.sensing.fit.noise import ResidualDirections, ResidualResponse, Whitener
@@ -55,8 +56,20 @@ _MASKS = 8
 """Nuisance subspaces whose whitening is kept."""
 
 
-Seen = tuple[WhitenedTable, Matched, Gauge]
-"""How frames of one noise are seen: the table, candidates and channels."""
+class Seen(NamedTuple):
+    """How frames of one noise are seen: the table, candidates, channels and jumps."""
+
+    table: WhitenedTable
+    matched: Matched
+    gauge: Gauge
+    jumps: Jumps
+
+    def louder(self, times: float) -> Seen:
+        """The same in so many times the noise's variance."""
+        if times == 1.0:
+            return self
+        table, matched = self.table.louder(times), self.matched.louder(times)
+        return Seen(table, matched, self.gauge, self.jumps.louder(times))
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,11 +249,12 @@ class SpotFinder:
         self._deficit = Deficit.none(len(model.solver.table.basis))
         self._expected = Expectation.none()
         self._rival: Rival | None = None
+        self._jump = CommonModeJump()
         pattern = model.response.state.model.pattern
         self.watch = FrameWatch(pattern, skin.touch.sign, skin.touch.snr)
         self._scale = model.scale * gain
         self._noise = noise / self._scale[:, None] / self._scale
-        self._nuisance = np.zeros((len(noise), 0))
+        self._nuisance = self._jumps = np.zeros((len(noise), 0))
         self._matched: OrderedDict[bytes, Seen] = OrderedDict()
         self._newest_seen: tuple[tuple[object, ...], Seen] | None = None
 
@@ -249,43 +263,45 @@ class SpotFinder:
         scale = self._model.scale * gain
         yield from self._renewed(noise / scale[:, None] / scale, scale)
 
-    def preparing(self, nuisance: FloatArray) -> Generator[None, None, None]:
-        """Make ready for frames of that ``nuisance`` subspace; see :meth:`push`."""
-        self._nuisance = nuisance
+    def preparing(self, other: SpotFinder) -> Generator[None, None, None]:
+        """Make ready for frames as those of an ``other`` finder of the same skin, and go on where
+        that is: with its touches, and what stayed behind others."""
+        self._nuisance, self._jumps = other._nuisance, other._jumps
         yield from self._renewed(self._noise, self._scale)
-
-    def go_on(self, other: SpotFinder) -> None:
-        """Go on from the frames of an ``other`` finder of the same skin: its touches, and where
-        others were."""
         self._before, self._expected = other._before, other._expected
-        self._residual = other._residual
+        self._residual, self._jump = other._residual, other._jump
         self.watch.go_on(other.watch)
 
     def _renewed(self, noise: FloatArray, scale: FloatArray) -> Generator[None, None, None]:
-        nuisance, excess = self._nuisance / scale[:, None], self.watch.excess
-        made = yield from self._making(noise, nuisance)
+        scaled = self._nuisance / scale[:, None], self._jumps / scale[:, None]
+        made = yield from self._making(noise, *scaled)
         self._scale, self._noise = scale, noise
-        self._matched = OrderedDict({nuisance.tobytes() + excess.key: made})
+        self._matched = OrderedDict({_key(scaled, self.watch.excess): made})
 
     @property
-    def nuisance(self) -> FloatArray:
-        """(n_meas, k) of the newest frame; see :meth:`push`."""
-        return self._nuisance
+    def jump(self) -> float | None:
+        """What the common mode has jumped by, where it has, in deviations of :meth:`push`."""
+        return self._jump.size if self._jump.jumped else None
 
-    def push(self, dv: FloatArray, nuisance: FloatArray) -> list[Detection]:
+    def push(
+        self, dv: FloatArray, nuisance: FloatArray, jumps: FloatArray | None = None
+    ) -> list[Detection]:
         """Touches of ``dv`` (n_meas,), strongest first.
 
         ``nuisance`` (n_meas, k) spans the directions along which the data tell nothing of a
-        touch: a unit vector for each excluded row. There must be more rows than that.
+        touch: a unit vector for each excluded row. There must be more rows than that. Along each of
+        ``jumps`` (n_meas, j) the data may have jumped, by so much as a standard deviation.
         """
         self._nuisance = nuisance
+        self._jumps = np.zeros((len(dv), 0)) if jumps is None else jumps
         data = dv / self._scale
-        self.watch.begin(data, self._seen()[2])
-        detected, matched = self._searched(data)
+        self.watch.begin(data, self._seen().gauge)
+        (detected, rival), jump, matched = self._searched(data)
         solver = self._model.solver
         times = self.watch.unexplained(solver, detected.fit, matched)
         if times > 1.0:  # it may be no touch in as much noise
-            detected, matched = self._searched(data, times)
+            (detected, rival), jump, matched = self._searched(data, times)
+        self._rival, self._jump = rival, jump
         self.watch.end(solver, detected.fit, matched, times)
         self._unrest = self._motion(detected.fit.spots)
         self._before, self._deficit = detected.fit.spots, detected.fit.deficit
@@ -296,11 +312,12 @@ class SpotFinder:
         detections.sort(key=lambda detection: -abs(detection.peak))
         return detections
 
-    def _searched(self, data: FloatArray, times: float = 1.0) -> tuple[SpotDetections, Matched]:
-        """Touches of ``data`` (n_meas,) in so many times the noise that is known."""
-        seen, matched, _ = self._seen()
-        if times != 1.0:
-            seen, matched = seen.louder(times), matched.louder(times)
+    def _searched(
+        self, data: FloatArray, times: float = 1.0
+    ) -> tuple[Explained, CommonModeJump, Matched]:
+        """Touches of ``data`` (n_meas,) in so many times the noise that is known; and whether the
+        common mode has jumped."""
+        seen, matched, _, jumps = self._seen().louder(times)
         whitened, rest = seen.whitened(data)
         self._left = self._left.of(seen.matrix, self._residual.changes)
         problem = Problem(
@@ -316,6 +333,11 @@ class SpotFinder:
             left=self._left.rows,
             expected=self._expected,
         )
+        explain = partial(self._explained, matched)
+        return *self._jump.decided(problem, jumps, self._settings.snr, explain), matched
+
+    def _explained(self, matched: Matched, problem: Problem) -> Explained:
+        """Touches of the frame of ``problem``, and one more that frames may speak for."""
         sign = self.watch.sign(problem, matched)
         if sign != problem.sign:
             problem = replace(problem, sign=sign)
@@ -327,14 +349,14 @@ class SpotFinder:
             pressed = search(own, self._before)
             if not problem.favours(detected.fit, pressed.fit):
                 detected = pressed
-        rival, self._rival = self._rival, None
+        rival: Rival | None = None
         if self._reach and sign != "both":
-            detected, self._rival = challenged(selection, detected, rival, self._going_on)
+            detected, rival = challenged(selection, detected, self._rival, self._going_on)
         if self.watch.puzzled(problem, detected.fit):
             both = self._anew(selection, len(detected.fit.spots) + 1)
             if self.watch.turns(both, detected.fit) and problem.favours(both.fit, detected.fit):
                 detected = both
-        return detected, matched
+        return detected, rival
 
     def _anew(self, selection: ForwardSelection, most: int) -> SpotDetections:
         """Touches of both signs, ``most`` of them, as if there had been none in the last frame."""
@@ -365,35 +387,40 @@ class SpotFinder:
 
     def _seen(self) -> Seen:
         """How the newest frame is seen: as the one before, where nothing has changed."""
-        now, newest = (self._nuisance, self._noise, self.watch.excess), self._newest_seen
+        now, newest = (
+            (self._nuisance, self._jumps, self._noise, self.watch.excess),
+            self._newest_seen,
+        )
         if newest is None or not all(map(is_, now, newest[0])):
             newest = self._newest_seen = now, self._kept()
         return newest[1]
 
     def _kept(self) -> Seen:
-        nuisance = self._nuisance / self._scale[:, None]
-        key = nuisance.tobytes() + self.watch.excess.key
+        scaled = self._nuisance / self._scale[:, None], self._jumps / self._scale[:, None]
+        key = _key(scaled, self.watch.excess)
         if key not in self._matched:
-            self._matched[key] = finished(self._making(self._noise, nuisance))
+            self._matched[key] = finished(self._making(self._noise, *scaled))
             if len(self._matched) > _MASKS:
                 self._matched.popitem(last=False)
         self._matched.move_to_end(key)
         return self._matched[key]
 
-    def _making(self, noise: FloatArray, nuisance: FloatArray) -> Generator[None, None, Seen]:
-        """What frames of this noise and nuisance subspace are seen by."""
+    def _making(
+        self, noise: FloatArray, nuisance: FloatArray, jumps: FloatArray
+    ) -> Generator[None, None, Seen]:
+        """What frames of this noise, nuisance subspace and jumps are seen by."""
         model, channels = self._model, self.watch.channels
         noise = self.watch.excess.added(noise, channels)
         white = Whitener.of(noise)
         yield
         white = white.without(nuisance)
         yield
-        seen = yield from WhitenedTable.making(model.solver, white, model.response.times)
+        seen = yield from WhitenedTable.making(model.solver, white, model.response.times, jumps)
         yield
-        gauge = yield from Gauge.making(channels, noise, nuisance)
+        gauge = yield from Gauge.making(channels, noise, np.hstack([nuisance, jumps]))
         yield
         matched, _ = model.candidates.matched(seen), seen.kept
-        return seen, matched, gauge
+        return Seen(seen, matched, gauge, Jumps((seen.matrix @ jumps).T))
 
     def _detections(self, detected: SpotDetections) -> list[Detection]:
         spots = detected.fit.spots
@@ -418,6 +445,10 @@ class SpotFinder:
             weak=bool(detected.fresh[k] < self._settings.snr),
             close=bool(detected.close[k]),
         )
+
+
+def _key(directions: tuple[FloatArray, ...], excess: Excess) -> bytes:
+    return b"".join(part.tobytes() for part in directions) + excess.key
 
 
 def _solver(response: Response, table: ResponseTable, prior: SpotPrior) -> Solver:

@@ -21,10 +21,6 @@ HELD = 0.6
 MISSHAPEN = 0.04
 """A wrong profile leaves up to this part of what a touch changes: no evidence of another one."""
 
-_TRUE = 0.25
-"""Part of the ratio at which a touch begins that a wrong profile may leave where the evidence
-decides on further ones."""
-
 _WIDE = 1.2
 """Deviations of the prior by which a spot is so wide that it may be two."""
 
@@ -107,9 +103,8 @@ class Openings:
         return [] if fresh is None else _starts(fit, fresh)
 
     def is_open(self, fit: Fit) -> bool:
-        """Whether the evidence decides on further spots: where sets are tried, and a wrong profile
-        leaves little of those that are there."""
-        return bool(self.pace.joint) and len(fit.spots) > 1 and misshapen(fit) < _TRUE * self.least
+        """Whether the evidence decides on further spots: where sets are tried."""
+        return bool(self.pace.joint) and len(fit.spots) > 0
 
     def threshold(self, fit: Fit, part: float) -> float:
         """Deviations for that ``part`` of a touch; a wrong profile adds to the noise."""

@@ -179,19 +179,21 @@ class WhitenedTable:
     @classmethod
     def of(cls, solver: Solver, whiten: Whitener, times: FloatArray) -> WhitenedTable:
         """``times`` (n_meas,) of the measurements about the middle of the scan."""
-        return finished(cls.making(solver, whiten, times))
+        return finished(cls.making(solver, whiten, times, np.zeros((len(times), 0))))
 
     @classmethod
     def making(
-        cls, solver: Solver, whiten: Whitener, times: FloatArray
+        cls, solver: Solver, whiten: Whitener, times: FloatArray, jumps: FloatArray
     ) -> Generator[None, None, WhitenedTable]:
-        """As :meth:`of`, a piece of work between two yields."""
+        """As :meth:`of`, a piece of work between two yields; the axes hold ``jumps`` (n_meas, j)
+        as well."""
         full, table = whiten.matrix, solver.table
         direct, timed = full @ table.basis.T, full @ (times[:, None] * table.basis.T)
         yield
         axes = _axes(direct @ table.typical, least=1)
         yield
-        more = _axes(_less(timed @ table.typical, axes), least=0)
+        others = np.hstack([timed @ table.typical, full @ jumps])
+        more = _axes(_less(others, axes), least=0)
         yield
         both, narrow = np.column_stack([axes, more]), axes.shape[1]
         direct = both.T @ direct

@@ -10,7 +10,7 @@ import numpy as np
 from tomoskin.core import FloatArray
 from tomoskin.sensing.fit.candidates import Matched, limits_of
 from tomoskin.sensing.fit.expectation import Known, less
-from tomoskin.sensing.fit.openings import HELD, MISSHAPEN, Beside, Openings, Start
+from tomoskin.sensing.fit.openings import HELD, MISSHAPEN, Beside, Openings, Start, misshapen
 from tomoskin.sensing.fit.pace import Pace
 from tomoskin.sensing.fit.refine import Deficit, Fit, Problem, Question, Rules
 
@@ -22,8 +22,8 @@ _FAINT = 0.7
 """Part of the ratio at which a touch begins that each spot keeps where the evidence decides: a
 faint one may explain much."""
 
-_ONE_SIGN = float(np.log(2))
-"""Evidence of a spot that is not counted: the prior has contents of both signs."""
+_FURTHER = 1.0
+"""Evidence that a further spot needs beyond what a wrong profile of the others may give."""
 
 _DETOUR = 1.5
 """Evidence that a spot may cost beside which one more is tried: the two may be worth it."""
@@ -129,7 +129,8 @@ class ForwardSelection:
             least = self.openings.threshold(fit, _FAINT if open_ else 1.0)
             worth = self.ratios(more).min() >= least
             gain = self.problem.evidence(more) - self.problem.evidence(best)
-            if worth and gain > (-_ONE_SIGN if open_ else self.pace.rare):
+            odds = _FURTHER + misshapen(fit) ** 2 / 2 if open_ else self.pace.rare
+            if worth and gain > odds:
                 best = more
             elif not open_ or gain < -_DETOUR:
                 self.turn_down(fit, more)

@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from tomoskin.core import FloatArray
+from tomoskin.sensing.signal.common_mode import CommonMode
 from tomoskin.sensing.signal.health import Mask
 from tomoskin.sensing.signal.idle import Idle
 from tomoskin.sensing.signal.reference import Reference
@@ -111,6 +112,9 @@ class BaselineState:
 class Baseline:
     """Scalar Kalman filters of a random walk, one a row (Kalman 1960), fed while nothing touches.
 
+    All voltages in proportion are followed by a filter of their own (:class:`CommonMode`), and what
+    each row does beside that by the row's: a jump of the gain is no matter of single rows.
+
     While a touch stands nothing is learnt, and the variance grows by what the skin drifts as a
     rule, so that afterwards the baseline comes back the faster the longer it was held.
 
@@ -140,6 +144,9 @@ class Baseline:
         self._n_frames = reference.n_frames
         self.idle = Idle(noise, reference.n_frames, SLOWEST, reference.least)
         self._least = reference.least
+        self._common = (
+            CommonMode(reference.mean, noise, reference.n_frames) if self._known else None
+        )
         self._variance = noise**2 / reference.n_frames
         self._time: float | None = None
         self._held = 0.0
@@ -180,7 +187,7 @@ class Baseline:
     def _learn(self, values: FloatArray, lost: Mask, time: float, step: float, noise: bool) -> bool:
         deviation = values - self.mean
         if self._follows:
-            self._follow(values, lost, step)
+            self._follow(values, lost, time, step)
         if self._fading > 0:
             self._fading -= step
             self.idle.interrupt()
@@ -193,21 +200,28 @@ class Baseline:
             self._deviations.clear()
         return ended
 
-    def _follow(self, values: FloatArray, lost: Mask, step: float) -> None:
+    def _follow(self, values: FloatArray, lost: Mask, time: float, step: float) -> None:
         noise = self.idle.noise**2
+        assert self._common is not None
+        apart = values - self.mean
+        part = self._common.of(apart, self.idle.noise, lost)
+        apart -= part * self.mean
+        moved = self.mean * self._common.push(part, time, step)
         if self._fading > 0:
             gain = 1.0 - np.exp(-step / _FADE)
             self._variance = np.maximum(self._variance, noise * gain / (1.0 - gain + 1e-12))
         gain = self._variance / (self._variance + noise)
         gain[lost] = 0.0
         most = _CUT * np.sqrt(self._variance + noise)
-        self.mean = self.mean + gain * np.clip(values - self.mean, -most, most)
+        self.mean = self.mean + moved + gain * np.clip(apart, -most, most)
         self._variance = (1.0 - gain) * self._variance
 
     def _interrupted(self) -> bool:
         self._waiting.clear()
         self._deviations.clear()
         self.idle.interrupt()
+        if self._common is not None:
+            self._common.interrupt()
         return False
 
     @property

@@ -1,0 +1,147 @@
+"""Touches, or a jump of the common mode: which of the two explains a frame.
+
+The common mode is what all voltages have in common, as a gain or a supply. As a rule it moves by
+parts in 10⁴, which the covariance of the noise holds. Now and then it jumps by any amount.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from tomoskin.core import FloatArray
+from tomoskin.sensing.fit.openings import misshapen
+from tomoskin.sensing.fit.refine import Fit, Problem
+from tomoskin.sensing.fit.rival import Rival
+from tomoskin.sensing.fit.search import SpotDetections
+
+_SUDDEN = 1.0
+"""Logarithm of how much more often the common mode jumps than a touch begins."""
+
+_SURE = 8.0
+"""Logarithm of the odds from which frames have decided between the two."""
+
+_LEAVES = 5.0
+"""Deviations left along a jump, from which the common mode may have jumped."""
+
+_USUAL = 3.0
+"""Deviations along a jump within which the common mode is where it is expected."""
+
+_STEPS = 4
+"""Towards touches as they would be, were the common mode unknown."""
+
+Explained = tuple[SpotDetections, Rival | None]
+
+
+@dataclass(frozen=True, eq=False)
+class Jumps:
+    """What whitened data are changed by where a common mode jumps.
+
+    Attributes
+    ----------
+    rows
+        (j, c), each as long as the deviation of the jump.
+    """
+
+    rows: FloatArray
+
+    def along(self, residual: FloatArray) -> tuple[float, float]:
+        """Deviations of the noise that a residual (c,) has along the jumps, with the sign of the
+        first; and what that is in deviations of the first jump."""
+        onto = self.rows @ residual
+        parts = self._inverse @ onto
+        size = float(parts[0])
+        return math.copysign(math.sqrt(max(float(onto @ parts), 0.0)), size), size
+
+    def free(self, usual: Problem) -> Problem:
+        """A frame in which nothing is known of the common modes."""
+        return replace(usual, left=np.concatenate([usual.left, self.rows]))
+
+    def louder(self, times: float) -> Jumps:
+        """The same in so many times the noise's variance."""
+        return Jumps(self.rows / math.sqrt(times))
+
+    @cached_property
+    def _inverse(self) -> FloatArray:
+        """(j, j) covariance of the jumps in one frame: with their own, so where no row shows one it
+        is 0."""
+        return np.asarray(np.linalg.inv(self.rows @ self.rows.T + np.eye(len(self.rows))))
+
+
+@dataclass(frozen=True, slots=True)
+class CommonModeJump:
+    """Whether the common mode has jumped since the skin was idle: a test over frames (Wald 1945).
+
+    Attributes
+    ----------
+    odds
+        Logarithm of those for touches without a jump, as long as frames leave it open.
+    proven
+        So many touches are there, whatever the common mode has done.
+    rest
+        Deviations along a jump that these leave: a wrong profile does so in every frame.
+    jumped
+        Whether it has: then nothing is known of it.
+    size
+        What it has jumped by, in deviations of a jump.
+    """
+
+    odds: float = -_SUDDEN
+    proven: int = 0
+    rest: float = 0.0
+    jumped: bool = False
+    size: float = 0.0
+
+    def decided(
+        self, usual: Problem, jumps: Jumps, least: float, explain: Callable[[Problem], Explained]
+    ) -> tuple[Explained, CommonModeJump]:
+        """What explains a frame, ``usual`` or with ``jumps``.
+
+        A touch stands out by ``least`` deviations.
+        """
+        if not len(jumps.rows):
+            return explain(usual), self
+        if self.jumped:
+            explained = explain(jumps.free(usual))
+            return explained, self._after_jump(jumps, explained[0].fit)
+        explained = explain(usual)
+        fit = explained[0].fit
+        count, (rest, _) = len(fit.spots), jumps.along(fit.residual)
+        if self._is_clear(usual, fit, rest, jumps, least):
+            return explained, CommonModeJump(proven=count, rest=rest) if count else _NONE
+        other = explain(jumps.free(usual))
+        beside, size = jumps.along(other[0].fit.residual)
+        if abs(beside) < math.hypot(_USUAL, misshapen(other[0].fit)):  # there is none
+            return explained, CommonModeJump(proven=count, rest=rest)
+        gain = usual.evidence(fit) - usual.evidence(other[0].fit)
+        odds = self.odds + float(np.clip(gain, -2 * _SURE, 2 * _SURE))
+        if odds > 0:
+            proven = count if odds > _SURE else min(self.proven, count)
+            return explained, CommonModeJump(odds, proven, rest)
+        return other, CommonModeJump(odds, jumped=odds < -_SURE, size=size)
+
+    def _is_clear(self, usual: Problem, fit: Fit, rest: float, jumps: Jumps, least: float) -> bool:
+        """Whether no jump explains the frame as the touches of a ``fit`` do, which leave ``rest``
+        deviations along it: as much as before, and they stand out whatever the jump."""
+        moved = abs(rest - self.rest)
+        if moved > _LEAVES and moved > math.hypot(_LEAVES, misshapen(fit)):
+            return False
+        if len(fit.spots) <= self.proven:
+            return True
+        free = jumps.free(usual)
+        again = free.refined(fit.spots, fit.deficit, _STEPS, fit.known)
+        return bool(free.solver.standing(free.left, again).min() > least**2)
+
+    def _after_jump(self, jumps: Jumps, fit: Fit) -> CommonModeJump:
+        """After a further frame: over where the common mode is as it was, and nothing touches."""
+        rest, size = jumps.along(fit.residual)
+        if len(fit.spots) or abs(rest) > _USUAL:
+            return replace(self, size=max(self.size, size, key=abs))
+        return _NONE
+
+
+_NONE = CommonModeJump()
