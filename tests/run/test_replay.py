@@ -32,6 +32,7 @@ class Recorded:
 
     def __init__(self, prepared, path):
         self.path, self.board = path, Board()
+        self.board.tick = 800_000  # 50 ms a frame: a pause after a touch has ten of them
         self._idle, self._drift = samples_of(prepared), 0
         self._places = [samples_of(prepared, pressed(prepared, x, 0.01)) for x in (-0.03, 0.03)]
         self.runner = Runner(prepared, lambda: self.board)

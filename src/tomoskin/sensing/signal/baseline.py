@@ -18,8 +18,8 @@ from tomoskin.sensing.signal.reference import Reference
 SLOWEST = 60.0
 """Time constant with which the baseline follows where no drift has been seen, s."""
 
-_LINGER = 10
-"""Frames after a touch for which the baseline still holds."""
+_LINGER = 0.5
+"""Seconds after a touch for which the baseline still holds."""
 
 _FADING = 10.0
 """Seconds after a release in which the residual response fades into the baseline."""
@@ -150,7 +150,7 @@ class Baseline:
         self._variance = noise**2 / reference.n_frames
         self._time: float | None = None
         self._held = 0.0
-        self._linger = 0
+        self._linger = 0.0
         self._fading = 0.0
         self._followed = 0.0
         self._waiting: deque[tuple[FloatArray, Mask, float, float, bool]] = deque()
@@ -174,8 +174,8 @@ class Baseline:
             self._held += step
             self._linger, self._fading = _LINGER, _FADING
             return self._interrupted()
-        if self._linger:
-            self._linger -= 1
+        if self._linger > 0:
+            self._linger -= step
             return self._interrupted()
         self._held = 0.0
         self._followed += step
