@@ -1,4 +1,4 @@
-"""Standing presses on every skin, one after the other: torn, doubled, or told after their release."""
+"""Standing presses on every skin, one after the other: torn, doubled, or late."""
 
 from __future__ import annotations
 
@@ -88,8 +88,15 @@ def report(names: tuple[str, ...], seeds: tuple[int, ...], presses: int) -> Repo
             counts.add(standing(prepared, seed, presses))
         median = 1e3 * float(np.median(counts.away)) if counts.away else None
         rows.append(
-            (name, presses * len(seeds), counts.missed, counts.torn, counts.doubled, counts.late)
-            + (None if median is None else round(median, 1),)
+            (
+                name,
+                presses * len(seeds),
+                counts.missed,
+                counts.torn,
+                counts.doubled,
+                counts.late,
+                None if median is None else round(median, 1),
+            )
         )
     return Report(
         "standing presses, one after the other",

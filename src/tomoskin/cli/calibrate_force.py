@@ -14,7 +14,7 @@ from tomoskin.cli.frame_ranges import labels_of_frames
 from tomoskin.cli.named_files import ForceFlag, Reads
 from tomoskin.cli.options import CalibrationOut, ReferenceOption, SkinOption
 from tomoskin.cli.output import Bar, JsonFlag, emit, remark
-from tomoskin.cli.recording import idle_frames, say_notes
+from tomoskin.cli.recording import reconstructed, say_notes
 from tomoskin.core import DataError, FloatArray
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def calibrate_force(
     from tomoskin.cli.choices import skin_for_file
     from tomoskin.files.imports import read_recording
     from tomoskin.learning import FORCE, NEWTONS, ForceModel, ForceReport
-    from tomoskin.pipeline import prepare, reconstruct
+    from tomoskin.pipeline import prepare
 
     chosen = skin_for_file(skin, recording)
     data = read_recording(recording)
@@ -67,9 +67,8 @@ def calibrate_force(
         prepared = prepare(chosen)
     data = data.in_order_of(prepared.pattern)
     say_notes(data)
-    idle = idle_frames(data, reference, prepared.pattern)
     with Bar("finding touches") as bar:
-        result = reconstruct(prepared, data, idle, advance=bar)
+        result = reconstructed(data, prepared, reference, None, bar)
     presses = _weighed(recording, result, newtons, data.time)
     with Bar("learning"):
         model = ForceModel.fit(presses, chosen)

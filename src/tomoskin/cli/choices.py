@@ -164,3 +164,15 @@ def with_calibrations(prepared: Prepared, paths: Iterable[Path] | None, skin: Sk
             calibration.check_skin(skin)
         prepared = prepared.calibrated(calibration)
     return prepared
+
+
+def with_recorded_calibrations(prepared: Prepared, path: Path) -> Prepared:
+    """The skin with those that were on where ``path`` is a session; else as it is."""
+    from tomoskin.files.imports import is_session
+    from tomoskin.files.session import SessionReader, recorded_calibrations
+
+    if is_session(path):
+        with SessionReader(path) as session:
+            for calibration in recorded_calibrations(session):
+                prepared = prepared.calibrated(calibration)
+    return prepared

@@ -16,9 +16,10 @@ from tomoskin.cli.choices import (
     skin_for_file,
     with_alpha,
     with_calibrations,
+    with_recorded_calibrations,
     with_time_constant,
 )
-from tomoskin.cli.named_files import ForceFlag, Writes
+from tomoskin.cli.named_files import TABLE, ForceFlag, Writes
 from tomoskin.cli.options import (
     AlphaOption,
     CalibrationsOption,
@@ -33,7 +34,7 @@ from tomoskin.cli.options import (
     TouchesOut,
 )
 from tomoskin.cli.output import Bar, JsonFlag, remark, tell
-from tomoskin.cli.recording import frame_range, idle_frames, say_notes, span_lines
+from tomoskin.cli.recording import first_time, reconstructed, say_notes, span_lines
 from tomoskin.core import DataError
 
 if TYPE_CHECKING:
@@ -48,6 +49,9 @@ if TYPE_CHECKING:
 
 _MOST_FIELDS = 200
 """Frames of a .vtu file."""
+
+_TOLD = 3
+"""Problems that are told: those that most frames have."""
 
 IMAGES = {
     ".png": "pictures of some frames",
@@ -74,13 +78,21 @@ def image(
     percent: PercentFlag = False,
     limit: LimitOption = None,
     smooth: SmoothOption = None,
+    thorough: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="X.csv",
+            help="File for what a longer search of each frame by itself finds; slower.",
+        ),
+        Writes(TABLE),
+    ] = None,
     json: JsonFlag = False,
 ) -> None:
     """Write the images of a recording and the touches in them, or say what they are."""
     from tomoskin.files.exports import write_touches
     from tomoskin.files.imports import read_recording
     from tomoskin.learning import FORCE
-    from tomoskin.pipeline import prepare, reconstruct
+    from tomoskin.pipeline import ALONE, prepare
     from tomoskin.sensing.track import touch_spans
 
     own = skin_for_file(skin, recording)
@@ -89,30 +101,39 @@ def image(
     display = display_of(chosen, percent=percent, limit=limit, smooth=smooth)
     data = read_recording(recording)  # what cannot be read is said before the work
     with Bar("preparing"):
-        prepared = with_calibrations(prepare(chosen), calibration, own)
+        prepared = prepare(chosen)
+        if calibration or skin is not None:
+            prepared = with_calibrations(prepared, calibration, own)
+        else:
+            prepared = with_recorded_calibrations(prepared, recording)
     recorded = data.in_order_of(prepared.pattern)
     say_notes(recorded)
-    idle = idle_frames(recorded, reference, prepared.pattern)
-    start, stop = frame_range(recorded, frames)
     with Bar("reconstructing") as bar:
-        result = reconstruct(prepared, recorded.part(start, stop), idle, rule=rule, advance=bar)
-    result = result.numbered_from(start)
-    times = recorded.time[result.frames].tolist()
-    if touches is not None:
-        rows = zip(result.frames.tolist(), times, result.touches, strict=True)
-        surface, forces = prepared.skin.surface, FORCE.name in prepared.calibrations
-        write_touches(touches, rows, surface, forces=forces, overwrite=force)
+        result = reconstructed(recorded, prepared, reference, frames, bar, rule=rule)
+    surface, forces = prepared.skin.surface, FORCE.name in prepared.calibrations
+    tables = {touches: result}
+    if thorough is not None:
+        with Bar("searching each frame") as bar:
+            tables[thorough] = reconstructed(
+                recorded, prepared, reference, frames, bar, rule=rule, setting=ALONE
+            )
+    for path, found in tables.items():
+        if path is not None:
+            rows = zip(found.frames.tolist(), found.time.tolist(), found.touches, strict=True)
+            write_touches(path, rows, surface, forces=forces, overwrite=force)
     if out is not None:
         WRITERS[out.suffix.lower()](out, prepared, result, display, overwrite=force)
     _warn(recording, result, prepared.pattern)
-    since = (time - float(recorded.time[0]) for time in times)
+    since = (result.time - first_time(recorded)).tolist()
     spans = touch_spans(zip(since, result.touches, strict=True))
     tell(_document(result, spans, prepared), _lines(result, spans, prepared), json=json)
 
 
 def _lines(result: Reconstruction, spans: tuple[Span, ...], prepared: Prepared) -> Iterator[str]:
     number = "1 touch" if len(spans) == 1 else f"{len(spans)} touches"
-    yield f"{len(result.frames)} frames, {number}"
+    yield f"{len(result.frames) + len(result.unseen)} frames, {number}"
+    if len(result.unseen):
+        yield f"{len(result.unseen)} of them were held or skipped in the run"
     if math.isfinite(result.agreement):
         yield result.model_agreement.text
     yield alpha_line(result.choice)
@@ -138,13 +159,18 @@ def _warn(source: Path, result: Reconstruction, pattern: Pattern) -> None:
             f"{source}: {len(rows)} rows hold no finite values and were left out: "
             + "; ".join(map(pattern.row_text, rows))
         )
-    counted = zip(result.frames.tolist(), result.rows_missing.tolist(), strict=True)
+    if is_session(source):  # there, what is missing is said as live: by electrode
+        counted: list[tuple[int, int]] = []
+    else:
+        counted = list(zip(result.frames.tolist(), result.rows_missing.tolist(), strict=True))
     named = [f"{frame} ({_rows(count)})" for frame, count in counted if count]
     if named:
         remark(
             f"{source}: {len(named)} frames hold values that are not finite; these rows were "
             f"left out: {_listed(named)}"
         )
+    for text, some in sorted(result.problems.items(), key=lambda item: -len(item[1]))[:_TOLD]:
+        remark(f"{source}: {len(some)} frames, from {some[0]} on: {text}")
     if len(result.left_out):
         remark(
             f"{source}: {len(result.left_out)} frames hold too many values that are not finite "
@@ -162,6 +188,7 @@ def _document(
         "frames": len(result.frames),
         "rows_missing": {str(frame): rows for frame, rows in missing if rows},
         "left_out": result.left_out.tolist(),
+        "unseen": result.unseen.tolist(),
         "rows_left_out": result.rows_left_out.tolist(),
         "agreement": result.agreement,
         "size": result.model_agreement.size,

@@ -12,11 +12,12 @@ import typer
 from tomoskin.cli.named_files import ForceFlag, Reads
 from tomoskin.cli.options import RecordingArgument, ReferenceOption, SameSkinOption, TouchesOut
 from tomoskin.cli.output import Bar, JsonFlag, emit, remark
-from tomoskin.cli.recording import changes, say_notes
+from tomoskin.cli.recording import changes, reconstructed, say_notes
 
 if TYPE_CHECKING:
     from tomoskin.core import FloatArray, Touch
     from tomoskin.learning import Calibration, CalibrationHealth, Locator
+    from tomoskin.model.skin import Skin
     from tomoskin.sensing.signal import Recording
 
 _BLOCK = 256
@@ -37,34 +38,60 @@ def locate(
     ] = False,
     json: JsonFlag = False,
 ) -> None:
-    """Locate the one touch in every frame by a calibration, or with --several up to two."""
-    import numpy as np
-
+    """Find the touches of a session by a calibration, or the one press (with --several up to two)
+    in every frame of another file."""
     from tomoskin.files.exports import write_touches
-    from tomoskin.files.imports import read_recording
+    from tomoskin.files.imports import is_session, read_recording
     from tomoskin.learning import TOUCH
 
     with Bar("learning") as bar:
         loaded = TOUCH.read(calibration, bar)
     data = read_recording(recording)
     say_notes(data)
-    _check_skin(loaded, skin, recording)
+    own = _check_skin(loaded, skin, recording)
     data = data.in_order_of(loaded.pattern)
+    if own is not None and is_session(recording) and not several:
+        frames, located = _in_flow(data, own, loaded, reference)
+    else:
+        frames, located = _alone(data, loaded, reference, several=several)
+    if touches is not None:
+        rows = zip(frames, located, strict=True)
+        timed = ((k, float(data.time[k]), t) for k, t in rows)
+        write_touches(touches, timed, overwrite=force)
+    _report(data, frames, located, json=json)
+
+
+Located = tuple[list[int], list[tuple["Touch", ...]]]
+"""Frames, and the touches in each."""
+
+
+def _in_flow(
+    data: Recording, skin: Skin, loaded: Calibration[Locator], reference: str | None
+) -> Located:
+    """As a live run with the calibration finds and locates them."""
+    from tomoskin.pipeline import prepare
+
+    with Bar("preparing"):
+        prepared = prepare(skin).calibrated(loaded)
+    with Bar("locating") as bar:
+        result = reconstructed(data, prepared, reference, None, bar)
+    return result.frames.tolist(), list(result.touches)
+
+
+def _alone(
+    data: Recording, loaded: Calibration[Locator], reference: str | None, *, several: bool
+) -> Located:
+    """By the calibration alone: each frame is one press, or two, of a skin that may be unknown."""
+    import numpy as np
+
     dv = changes(data, reference, loaded.pattern)
     frames = np.flatnonzero(np.isfinite(dv[:, loaded.model.features.rows]).any(axis=1))
     if len(frames) < len(dv):
-        typer.echo(
-            f"tomoskin: {recording}: {len(dv) - len(frames)} frames hold no finite value and "
-            "were left out",
-            err=True,
+        remark(
+            f"{data.source}: {len(dv) - len(frames)} frames hold no finite value and were left out"
         )
     _say_health(_strangeness(loaded.model, dv[frames]))
-    located = list((_several if several else _single)(loaded, dv[frames]))
-    if touches is not None:
-        rows = zip(frames.tolist(), located, strict=True)
-        timed = ((k, float(data.time[k]), t) for k, t in rows)
-        write_touches(touches, timed, overwrite=force)
-    _report(data, frames.tolist(), located, json=json)
+    return frames.tolist(), list((_several if several else _single)(loaded, dv[frames]))
 
 
 def _strangeness(locator: Locator, dv: FloatArray) -> CalibrationHealth:
@@ -82,11 +109,13 @@ def _say_health(health: CalibrationHealth) -> None:
         remark(finding)
 
 
-def _check_skin(loaded: Calibration[Locator], name: str | None, path: Path) -> None:
+def _check_skin(loaded: Calibration[Locator], name: str | None, path: Path) -> Skin | None:
+    """The skin, where it is known."""
     from tomoskin.cli.choices import skin_if_any
 
     if (skin := skin_if_any(name, path)) is not None:
         loaded.check_skin(skin)
+    return skin
 
 
 def _several(loaded: Calibration[Locator], dv: FloatArray) -> Iterator[tuple[Touch, ...]]:

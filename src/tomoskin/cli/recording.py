@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import typer
 
@@ -16,8 +16,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from tomoskin.core import FloatArray, IntArray
+    from tomoskin.files.session import Advance
     from tomoskin.model.pattern import Pattern
-    from tomoskin.pipeline import Idle
+    from tomoskin.pipeline import Idle, Prepared, Reconstruction, Setting
     from tomoskin.sensing.signal import Recording
     from tomoskin.sensing.track import Span
 
@@ -25,8 +26,15 @@ _SHOWN = 20
 """Touches that are listed."""
 
 
-def idle_frames(recording: Recording, spec: str | None, pattern: Pattern) -> Idle:
-    """What the frames are held against; None for a file of differences."""
+def idle_frames(
+    recording: Recording, spec: str | None, pattern: Pattern
+) -> NDArray[Any] | Literal["previous"] | None:
+    """(n_idle, n_meas) what the frames are held against; None for a file of differences."""
+    idle = _idle(recording, spec, pattern)
+    return recording.voltages[idle.start : idle.stop] if isinstance(idle, range) else idle
+
+
+def _idle(recording: Recording, spec: str | None, pattern: Pattern) -> Idle:
     from tomoskin.files.imports import read_recording
 
     if recording.is_change:
@@ -44,7 +52,7 @@ def idle_frames(recording: Recording, spec: str | None, pattern: Pattern) -> Idl
     given = f"first:{recording.idle}" if spec is None else spec
     kind, _, number = given.partition(":")
     if kind in ("first", "frame") and number.isdigit():
-        return _frames_of(recording, kind, int(number))
+        return _range_of(recording, kind, int(number))
     if not given or not Path(given).exists():
         raise DataError(
             f'expected first:N, frame:K, previous or a file, got "{given}"', where="--reference"
@@ -53,6 +61,52 @@ def idle_frames(recording: Recording, spec: str | None, pattern: Pattern) -> Idl
     if other.is_change:
         raise DataError("holds differences, not voltages of the untouched skin", where=other.source)
     return other.in_order_of(pattern).voltages
+
+
+def reconstructed(
+    recording: Recording,
+    prepared: Prepared,
+    reference: str | None,
+    frames: str | None,
+    advance: Advance,
+    *,
+    rule: str | None = None,
+    setting: Setting | None = None,
+) -> Reconstruction:
+    """What the pipeline makes of some ``frames`` of a file: a session is replayed unless another
+    ``reference`` is asked for, or the skin has other rows than it."""
+    from tomoskin.files.imports import is_session
+    from tomoskin.files.session import SessionReader, reconstruct_session
+    from tomoskin.pipeline import reconstruct, recorded_frames, tuned_by_rule, with_choice
+
+    path, (start, stop) = Path(recording.source), frame_range(recording, frames)
+    idle = _idle(recording, reference, prepared.pattern)
+    if reference is None and is_session(path):
+        with SessionReader(path) as session:
+            if session.skin.pattern().identity == prepared.pattern.identity:
+                if rule is not None:
+                    known = recorded_frames(prepared, recording, idle)
+                    choice = tuned_by_rule(known.prepared, rule, known.evidence()).choice
+                    prepared = with_choice(prepared, choice)
+                return reconstruct_session(
+                    prepared, session, start=start, stop=stop, setting=setting, advance=advance
+                )
+    return reconstruct(
+        prepared, recording, idle, start=start, stop=stop, rule=rule, setting=setting,
+        advance=advance,
+    )  # fmt: skip
+
+
+def first_time(recording: Recording) -> float:
+    """When the first frame of a file was scanned, s; those from before a session do not count."""
+    from tomoskin.files.imports import is_session
+    from tomoskin.files.session import SessionReader, first_scan
+
+    path = Path(recording.source)
+    if not is_session(path):
+        return float(recording.time[0])
+    with SessionReader(path) as session:
+        return first_scan(session)
 
 
 def say_notes(recording: Recording) -> None:
@@ -71,17 +125,17 @@ def span_lines(spans: Sequence[Span], unit: str = "") -> Iterator[str]:
         yield f"… and {len(spans) - _SHOWN} more touches"
 
 
-def _frames_of(recording: Recording, kind: str, number: int) -> NDArray[Any]:
+def _range_of(recording: Recording, kind: str, number: int) -> range:
     n = len(recording)
     if kind == "frame":
         if number >= n:
             raise DataError(
                 f"expected a frame from 0 to {n - 1}, got {number}", where="--reference"
             )
-        return recording.voltages[number : number + 1]
+        return range(number, number + 1)
     if not 1 <= number <= n:
         raise DataError(f"expected first:1 to first:{n}, got first:{number}", where="--reference")
-    return recording.voltages[:number]
+    return range(number)
 
 
 def frame_range(recording: Recording, spec: str | None) -> tuple[int, int]:

@@ -1,19 +1,22 @@
 """The one frame flow, pure: a reference is collected, then frames are followed to touches."""
 
 from tomoskin.pipeline.finding import voltage_covariance
+from tomoskin.pipeline.following import Setting
 from tomoskin.pipeline.model_agreement import DOUBTED, ModelAgreement
-from tomoskin.pipeline.offline import Reconstruction, reconstruct
+from tomoskin.pipeline.offline import ALONE, Gathered, Reconstruction, reconstruct
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES, Pipeline
 from tomoskin.pipeline.prepare import Prepared, colour_limit, prepare
 from tomoskin.pipeline.recorded import Idle, RecordedFrames, recorded_frames
 from tomoskin.pipeline.records import FrameResult, Measured, ReferenceState
-from tomoskin.pipeline.tune import tuned, tuned_image
+from tomoskin.pipeline.tune import tuned, tuned_by_rule, tuned_image, with_choice
 from tomoskin.pipeline.unresolved import Unresolved
 
 __all__ = [
+    "ALONE",
     "DOUBTED",
     "REFERENCE_FRAMES",
     "FrameResult",
+    "Gathered",
     "Idle",
     "Measured",
     "ModelAgreement",
@@ -22,12 +25,15 @@ __all__ = [
     "Reconstruction",
     "RecordedFrames",
     "ReferenceState",
+    "Setting",
     "Unresolved",
     "colour_limit",
     "prepare",
     "reconstruct",
     "recorded_frames",
     "tuned",
+    "tuned_by_rule",
     "tuned_image",
     "voltage_covariance",
+    "with_choice",
 ]

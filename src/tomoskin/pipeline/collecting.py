@@ -60,7 +60,7 @@ class Collecting:
         same.
     """
 
-    def __init__(self, needed: int, model: FloatArray, least: float = 0.0) -> None:
+    def __init__(self, needed: int, model: FloatArray, least: FloatArray | float = 0.0) -> None:
         self._values = np.empty((needed, len(model)))
         self._times = np.empty(needed)
         self._model, self._least = model, least

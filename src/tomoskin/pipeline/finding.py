@@ -79,10 +79,10 @@ class InImage:
 class InData:
     """Touches are fitted to the data themselves; a filter over frames does not enter."""
 
-    def __init__(self, model: SpotModel, spots: SpotFinder, pace: Pace) -> None:
+    def __init__(self, model: SpotModel, spots: SpotFinder, pace: Pace, interval: float) -> None:
         self.model = model
         """The sheet on which touches are fitted."""
-        self._spots, self._pace = spots, pace
+        self._spots, self._pace, self._interval = spots, pace, interval
 
     @classmethod
     def making(
@@ -91,14 +91,24 @@ class InData:
         prepared: Prepared,
         reference: Reference | None,
         pace: Pace = EXHAUSTIVE,
+        interval: float = np.nan,
     ) -> Generator[None, None, Self]:
-        """On the sheet of ``model``, a piece of work between two yields."""
+        """On the sheet of ``model``, a piece of work between two yields.
+
+        ``interval`` s between frames, by the board's own clock: a scan takes no longer. NaN where
+        it is not known: then both last as long as on the slowest board.
+        """
         gain = _gain(model, prepared, reference)
         noise = yield from _noise(prepared, reference, gain)
-        skin, settings = prepared.skin, ScanSettings.of(prepared.skin)
-        scan_time = Configuration.of(prepared.scan, settings).scan_time
-        spots = SpotFinder(model, skin, prepared.mesh, noise, gain, scan_time=scan_time, pace=pace)
-        return cls(model, spots, pace)
+        skin = prepared.skin
+        longest = Configuration.of(prepared.scan, ScanSettings.of(skin)).scan_time
+        between = interval if interval > 0 else longest
+        scan_time = min(longest, between)
+        spots = SpotFinder(
+            model, skin, prepared.mesh, noise, gain,
+            scan_time=scan_time, interval=between, pace=pace,
+        )  # fmt: skip
+        return cls(model, spots, pace, interval)
 
     def renewing(self, prepared: Prepared, reference: Reference | None) -> Finding:
         """See :class:`Finder`; where the sheet is another one, what is found begins anew."""
@@ -107,7 +117,9 @@ class InData:
             noise = yield from _noise(prepared, reference, gain)
             yield from self._spots.renewing(noise, gain)
             return self
-        other = yield from InData.making(prepared.spots, prepared, reference, self._pace)
+        other = yield from InData.making(
+            prepared.spots, prepared, reference, self._pace, self._interval
+        )
         yield from other._spots.preparing(self._spots)
         return other
 
@@ -140,14 +152,19 @@ def _jump_text(part: float) -> str:
     )
 
 
-def finding(prepared: Prepared, reference: Reference | None, pace: Pace = EXHAUSTIVE) -> Finder:
+def finding(
+    prepared: Prepared,
+    reference: Reference | None,
+    pace: Pace = EXHAUSTIVE,
+    interval: float = np.nan,
+) -> Finder:
     """What finds the touches: the method that the skin names, unless a calibration locates them.
 
-    ``pace`` says how much of a fit is tried in a frame.
+    ``pace`` says how much of a fit is tried in a frame; ``interval`` s between frames, or NaN.
     """
     if prepared.spots is None or not prepared.fits_touches:
         return InImage(prepared)
-    return finished(InData.making(prepared.spots, prepared, reference, pace))
+    return finished(InData.making(prepared.spots, prepared, reference, pace, interval))
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from tomoskin.core import Detection, Image, ModelError, Touch
+from tomoskin.core import Detection, FloatArray, Image, ModelError, Touch
 from tomoskin.learning import Differences, FrameView
 from tomoskin.model.pattern import Scan
 from tomoskin.pipeline.collecting import Rest
@@ -17,18 +18,35 @@ from tomoskin.pipeline.imaging import Filtered, SingleFrame, imaging
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.pipeline.records import FrameResult, Measured
 from tomoskin.pipeline.tune import Steps, tune, tuned_sheet
-from tomoskin.sensing.fit import EXHAUSTIVE, Pace
+from tomoskin.sensing.fit import LIVE, Pace
 from tomoskin.sensing.signal import Reference
 from tomoskin.sensing.track import FingerTracker, Tracker
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Setting:
-    """How frames are followed, whatever the skin: ``pace`` of the fit, and ``scan``, what samples
-    are, where frames bring them."""
+    """How frames are followed, whatever the skin.
 
-    pace: Pace = EXHAUSTIVE
+    Attributes
+    ----------
+    pace
+        Of the fit.
+    scan
+        What samples are, where frames bring them; None where they bring voltages only.
+    rounding
+        V, or (n_meas,) V, below which no measurement's noise is; None: what the skin's read-out
+        rounds.
+    interval
+        Between frames, s, where a single one makes the reference.
+    alone
+        Whether each frame is taken as if it were the only one.
+    """
+
+    pace: Pace = LIVE
     scan: Scan | None = None
+    rounding: FloatArray | float | None = None
+    interval: float = math.nan
+    alone: bool = False
 
 
 class Following:
@@ -67,7 +85,10 @@ class Following:
         self._prepared, self._conditioning = prepared, conditioning
         self._tracker = FingerTracker(tracker, prepared.skin.touch.slide_lag)
         self._imaging = _imaging(conditioning, rest, reference)
-        self._finder: Finder = finding(prepared, reference, setting.pace)
+        interval = np.nan if rest is None else rest.interval
+        if not interval > 0:
+            interval = setting.interval
+        self._finder: Finder = finding(prepared, reference, setting.pace, interval)
         self._finding: Finding | None = None
         self._is_outdated = False
         conditions = Fitting(prepared, reference)
@@ -85,9 +106,9 @@ class Following:
         return cls(prepared, rest, conditioning, tracker, setting, reference=rest.reference)
 
     @classmethod
-    def of_differences(cls, prepared: Prepared, tracker: Tracker) -> Following:
+    def of_differences(cls, prepared: Prepared, tracker: Tracker, setting: Setting) -> Following:
         """Of frames that are difference data already."""
-        return cls(prepared, None, GivenDifferences(prepared), tracker, Setting(), reference=None)
+        return cls(prepared, None, GivenDifferences(prepared), tracker, setting, reference=None)
 
     def with_settings(self, prepared: Prepared, tracker: Tracker) -> Following:
         """One for other settings of the same body that goes on where this one is."""

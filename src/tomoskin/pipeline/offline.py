@@ -1,25 +1,37 @@
-"""The frame flow over a recording: reference, images and touches without a clock."""
+"""The frame flow over a recording: the pipeline's own results, gathered without a clock."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from tomoskin.core import DataError, FloatArray, IntArray, Touch, check_fits
+from tomoskin.core import FloatArray, Image, IntArray, Touch, check_fits
 from tomoskin.imaging import AlphaChoice
 from tomoskin.learning import BENDS, CLASSES, BendReading, ClassReading
-from tomoskin.pipeline.collecting import Rest
-from tomoskin.pipeline.following import Following, Setting
+from tomoskin.pipeline.following import Setting
 from tomoskin.pipeline.model_agreement import ModelAgreement
+from tomoskin.pipeline.pipeline import Pipeline
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.pipeline.recorded import Idle, RecordedFrames, recorded_frames
-from tomoskin.pipeline.records import Measured
-from tomoskin.pipeline.tune import tuned, tuned_by_rule
+from tomoskin.pipeline.records import FrameResult, Measured
+from tomoskin.pipeline.tune import tuned_by_rule
+from tomoskin.sensing.fit import EXHAUSTIVE
 from tomoskin.sensing.signal import Recording
-from tomoskin.sensing.track import STILL, Tracker
+
+Advance = Callable[[float, float], None]
+"""Called with how many frames of how many are done."""
+
+
+class Gathered(NamedTuple):
+    """What the pipeline made of a frame: its ``number`` in the recording, and its ``time``, s."""
+
+    number: int
+    time: float
+    result: FrameResult
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,15 +40,17 @@ class Reconstruction:
 
     Attributes
     ----------
-    frames
-        (n,) indices in the recording of the frames that were reconstructed.
+    frames, time
+        (n,) indices in the recording of the frames that were taken, and when they were scanned, s.
     rows_missing
         (n,) number of rows that each of them lacks beside ``rows_left_out``: they were filled in
         so that they do not count.
-    left_out
-        (k,) indices of those that lack too many rows.
-    images
-        (n, n_cells) change of conductivity, in ``unit``.
+    left_out, unseen
+        (k,) indices of those that lack too many rows, and of those that a run held or skipped.
+    shown
+        The images, computed where somebody looks at them; see :attr:`images`.
+    unit
+        Of the images.
     touches
         One tuple a frame.
     model_agreement
@@ -48,18 +62,61 @@ class Reconstruction:
     readings
         What the skin's calibrations read, by the name of their kind: one a frame, None where too
         little was left of it.
+    problems
+        What was wrong with frames, in a sentence each, and with which of them.
     """
 
     frames: IntArray
+    time: FloatArray
     rows_missing: IntArray
     left_out: IntArray
-    images: FloatArray
+    shown: tuple[Image, ...]
     unit: str
     touches: tuple[tuple[Touch, ...], ...]
     model_agreement: ModelAgreement
     choice: AlphaChoice
     rows_left_out: IntArray
     readings: Mapping[str, tuple[Any, ...]] = field(default_factory=dict)
+    problems: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
+    unseen: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+
+    @classmethod
+    def of(
+        cls, pipeline: Pipeline, prepared: Prepared, frames: Iterable[Gathered]
+    ) -> Reconstruction:
+        """What ``pipeline`` made of some ``frames``, which are asked for one by one."""
+        kept: list[tuple[Any, ...]] = []
+        problems: dict[str, list[int]] = {}
+        for number, time, result in frames:
+            kept.append(
+                (number, time, result.left_out, result.image, result.touches, result.readings)
+            )
+            if result.problem is not None:
+                problems.setdefault(result.problem, []).append(number)
+        numbers, times, missing, shown, touches, readings = (
+            zip(*kept, strict=True) if kept else 6 * ((),)
+        )
+        return cls(
+            frames=np.array(numbers, dtype=np.int64),
+            time=np.array(times, dtype=np.float64),
+            rows_missing=np.array(missing, dtype=np.int64),
+            left_out=np.zeros(0, dtype=np.int64),
+            shown=shown,
+            unit=prepared.operator.unit,
+            touches=touches,
+            model_agreement=pipeline.reference_state.agreement,
+            choice=pipeline.choice,
+            rows_left_out=np.zeros(0, dtype=np.int64),
+            readings={k: tuple(r.get(k) for r in readings) for k in prepared.calibrations},
+            problems={text: tuple(some) for text, some in problems.items()},
+        )
+
+    @property
+    def images(self) -> FloatArray:
+        """(n, n_cells) change of conductivity, in ``unit``; DataError where memory is too small."""
+        n_cells = len(self.shown[0].values) if self.shown else 0
+        check_fits(8 * len(self.shown) * n_cells, f"images of {len(self.shown)} frames")
+        return np.array([image.values for image in self.shown])
 
     @property
     def agreement(self) -> float:
@@ -76,9 +133,9 @@ class Reconstruction:
         """The class of each frame; empty where none were learnt."""
         return self.readings.get(CLASSES.name, ())
 
-    def numbered_from(self, first: int) -> Reconstruction:
-        """Frames counted from ``first``, for a part of a longer recording."""
-        return replace(self, frames=self.frames + first, left_out=self.left_out + first)
+
+ALONE = Setting(pace=EXHAUSTIVE, alone=True)
+"""Each frame searched as if it were the only one: more than a live frame has time for."""
 
 
 def reconstruct(
@@ -86,101 +143,79 @@ def reconstruct(
     recording: Recording,
     idle: Idle,
     *,
+    start: int = 0,
+    stop: int | None = None,
     rule: str | None = None,
-    advance: Callable[[float, float], None] = lambda _done, _total: None,
+    setting: Setting | None = None,
+    advance: Advance = lambda _done, _total: None,
 ) -> Reconstruction:
-    """Reconstruct every frame of ``recording``, whose rows are in the pattern's order.
+    """What the pipeline makes of ``recording``, whose rows are in the pattern's order.
 
-    Where the skin has a time constant, the images are those of the filter that runs live: each
-    rests on its own frame and the ones before.
+    The flow is that of a live run which brings the same voltages at the same times. The frames of
+    its own that make the reference show nothing, and nothing is learnt of them twice.
 
     Parameters
     ----------
     idle
         What the frames are held against; see :data:`Idle`.
+    start, stop
+        The frames that are wanted; those before ``start`` run through the pipeline all the same.
     rule
         Chooses alpha from this recording, by a name of :data:`tomoskin.imaging.RULES`; without
-        it the skin's alpha holds, "auto" at the noise of the idle frames.
+        it the skin's alpha holds, and "auto" follows the noise of the idle frames as it does live.
+    setting
+        How frames are followed: as they are live, or :data:`ALONE`.
     advance
-        Told how many frames of how many are done.
+        Called with how many frames of how many are done.
 
     Raises
     ------
     DataError
         When the rows are not in the pattern's order, the reference does not look like this
-        skin, too few frames or rows are left, the recording lacks what the rule needs, or its
-        times do not go on where the skin has a time constant.
+        skin, too few frames or rows are left, or the recording lacks what the rule needs.
     ModelError
         When the rule is not known or finds no alpha.
     """
     recorded = recorded_frames(prepared, recording, idle)
-    prepared = _tuned(recorded, rule)
-    time = recording.time[recorded.frames]
-    if prepared.modes is not None:
-        _check_times(time, idle, recording.source)
-    following = _following(prepared, recorded, time)
-    images = _room(len(time), len(prepared.mesh.cells), recording.source)
-    touches, readings = [], []
-    for number, now in enumerate(time.tolist()):
-        values, missing = recorded.values[number], recorded.missing[number]
-        result = following.push(Measured(values, missing, now, now, number))
-        images[number] = result.image.values
-        touches.append(result.touches)
-        readings.append(result.readings)
-        advance(number + 1, len(time))
-    return Reconstruction(
-        frames=recorded.frames,
-        rows_missing=recorded.missing.sum(axis=1),
-        left_out=recorded.left_out,
-        images=images,
-        unit=prepared.operator.unit,
-        touches=tuple(touches),
+    prepared = recorded.prepared
+    if rule is not None:
+        prepared = tuned_by_rule(prepared, rule, recorded.evidence())
+    pipeline = Pipeline(
+        prepared,
+        reference_frames=len(recorded.idle),
+        setting=replace(
+            setting or Setting(), rounding=recorded.rounding, interval=recorded.interval
+        ),
+    )
+    stop = len(recording) if stop is None else stop
+    wanted = (recorded.frames >= start) & (recorded.frames < stop)
+    flow = sorted(_flow(pipeline, recorded, stop, advance))
+    found = Reconstruction.of(pipeline, prepared, (one for one in flow if one.number >= start))
+    return replace(
+        found,
+        rows_missing=recorded.missing[wanted].sum(axis=1),
+        left_out=recorded.left_out[(recorded.left_out >= start) & (recorded.left_out < stop)],
         model_agreement=recorded.agreement,
-        choice=prepared.choice,
         rows_left_out=recorded.rows_left_out,
-        readings={
-            kind: tuple(reading.get(kind) for reading in readings) for kind in prepared.calibrations
-        },
     )
 
 
-def _room(n_frames: int, n_cells: int, source: str) -> FloatArray:
-    """(n_frames, n_cells) for images; DataError where they are too many for memory."""
-    check_fits(8 * n_frames * n_cells, f"{source}, images of {n_frames} frames")
-    return np.empty((n_frames, n_cells))
-
-
-def _tuned(recorded: RecordedFrames, rule: str | None) -> Prepared:
-    if rule is not None:
-        return tuned_by_rule(recorded.prepared, rule, recorded.evidence())
-    if recorded.reference is None:
-        return recorded.prepared
-    return tuned(recorded.prepared, recorded.reference)
-
-
-def _following(prepared: Prepared, recorded: RecordedFrames, time: FloatArray) -> Following:
-    """The state that the pipeline is in from the idle frames on."""
-    tracker = Tracker(replace(STILL, snr=prepared.skin.touch.snr))
-    if recorded.reference is None:
-        return Following.of_differences(prepared, tracker)
-    interval = float(np.median(np.diff(time))) if len(time) > 1 else np.nan
-    rest = Rest(recorded.reference, np.zeros(prepared.pattern.n_meas, bool), interval)
-    return Following.from_rest(prepared, rest, tracker, Setting())
-
-
-def _check_times(time: FloatArray, idle: Idle, source: str) -> None:
-    """Raises DataError where a filter over the frames makes no sense."""
-    if isinstance(idle, str):
-        raise DataError(
-            "differences to the previous frame cannot be filtered over frames as well",
-            where=source,
-            hint='choose another --reference, or --time-constant "0 s"',
-        )
-    back = np.flatnonzero(~(np.diff(time) > 0))
-    if len(back) or not np.isfinite(time).all():
-        at = int(back[0]) + 1 if len(back) else 0
-        raise DataError(
-            f"expected increasing times for a filter over frames, got {time[at]:g} s",
-            where=f"{source}, usable frame {at}",
-            hint='give the times as time_s, or use --time-constant "0 s"',
-        )
+def _flow(
+    pipeline: Pipeline, recorded: RecordedFrames, stop: int, advance: Advance
+) -> Iterator[Gathered]:
+    """First the reference, then all other frames before ``stop``, in their order."""
+    for values, number, time in zip(
+        recorded.idle, recorded.idle_frames, recorded.idle_time, strict=True
+    ):
+        none: NDArray[np.bool_] = np.zeros(len(values), bool)
+        result = pipeline.follow(Measured(values, none, time, time, max(number, 0)))
+        if 0 <= number < stop:
+            yield Gathered(number, time, result)
+    rest = np.flatnonzero(
+        ~np.isin(recorded.frames, recorded.idle_frames) & (recorded.frames < stop)
+    )
+    for done, k in enumerate(rest.tolist(), start=1):
+        number, time = int(recorded.frames[k]), float(recorded.time[k])
+        measured = Measured(recorded.values[k], recorded.missing[k], time, time, number)
+        yield Gathered(number, time, pipeline.follow(measured))
+        advance(done, len(rest))

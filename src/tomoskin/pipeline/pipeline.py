@@ -10,7 +10,6 @@ from tomoskin.pipeline.collecting import Collecting
 from tomoskin.pipeline.following import Following, Setting
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.pipeline.records import FrameResult, Measured, ReferenceState
-from tomoskin.sensing.fit import LIVE
 from tomoskin.sensing.signal import Reference
 from tomoskin.sensing.track import Tracker, TrackSettings
 
@@ -27,7 +26,9 @@ class Pipeline:
         What was made once for the skin.
     reference_frames
         Frames that make a reference; the first ones do, and again after
-        :meth:`take_reference`.
+        :meth:`take_reference`. 0: frames are difference data, which need none.
+    setting
+        How frames are followed where they are no frames of a board; see :class:`Setting`.
 
     Attributes
     ----------
@@ -39,10 +40,16 @@ class Pipeline:
         Of the frames' ticks, Hz: the skin's, until the board has said its own.
     """
 
-    def __init__(self, prepared: Prepared, *, reference_frames: int = REFERENCE_FRAMES) -> None:
-        self._given = prepared
-        self._needed = reference_frames
-        self._tracker = _tracker(prepared)
+    def __init__(
+        self,
+        prepared: Prepared,
+        *,
+        reference_frames: int = REFERENCE_FRAMES,
+        setting: Setting | None = None,
+    ) -> None:
+        self._given, self._needed = prepared, reference_frames
+        self._setting = setting or Setting(scan=prepared.scan)
+        self._tracker = self._new_tracker()
         self.tick_rate = prepared.skin.readout.tick_rate
         self.paused = False
         self.refused = 0
@@ -51,21 +58,33 @@ class Pipeline:
     def take_reference(self) -> None:
         """Forget the reference; the next frames make a new one."""
         # the same frames make the same operator, whatever came before
-        given = self._given
+        given, rounding = self._given, self._setting.rounding
         self._tracker.reset()
-        self._state: Collecting | Following = Collecting(
-            self._needed, given.operator.reference, given.readout.rounding
+        self._state: Collecting | Following
+        if not self._needed:
+            self._state = Following.of_differences(given, self._tracker, self._setting)
+            return
+        self._state = Collecting(
+            self._needed,
+            given.operator.reference,
+            given.readout.rounding if rounding is None else rounding,
         )
+
+    def collect(self, frames: int) -> None:
+        """Make references of so many ``frames``; one of another number begins anew."""
+        if frames != self._needed:
+            self._needed = frames
+            self.take_reference()
 
     def adopt(self, prepared: Prepared) -> None:
         """Go on with other settings of the same body; the reference stands, and what has been
         learnt of it and of the electrodes.
         """
-        if prepared.skin.touch.snr != self._given.skin.touch.snr:
+        before, self._given = self._given, prepared
+        if prepared.skin.touch.snr != before.skin.touch.snr:
             numbered = self.numbered
-            self._tracker = _tracker(prepared)
+            self._tracker = self._new_tracker()
             self.number_after(numbered)
-        self._given = prepared
         if isinstance(self._state, Following):
             self._state = self._state.with_settings(prepared, self._tracker)
 
@@ -81,7 +100,8 @@ class Pipeline:
         state, needed = self._state, self._needed
         if isinstance(state, Collecting):
             return ReferenceState(state.taken, needed)
-        assert state.rest is not None, "a pipeline follows from its rest on"
+        if state.rest is None:
+            return ReferenceState(0, 0)
         noise = float(np.sqrt(np.mean(state.rest.reference.noise**2)))
         baseline = state.conditioning.state
         return ReferenceState(
@@ -114,7 +134,10 @@ class Pipeline:
         if len(frame.samples) != given.scan.n_samples:
             self.refused += 1
             return None
-        measured = Measured.of(given.readout(frame), frame.samples, self.tick_rate)
+        return self.follow(Measured.of(given.readout(frame), frame.samples, self.tick_rate))
+
+    def follow(self, measured: Measured) -> FrameResult:
+        """Take one frame whose voltages are known already: what :meth:`push` does with counts."""
         if isinstance(self._state, Following):
             return self._state.push(measured)
         return self._collect(self._state, measured)
@@ -123,13 +146,11 @@ class Pipeline:
         given = self._given
         rest = state.push(measured)
         if rest is not None:
-            setting = Setting(LIVE, given.scan)
-            self._state = Following.from_rest(given, rest, self._tracker, setting)
+            self._state = Following.from_rest(given, rest, self._tracker, self._setting)
             return self._state.first(measured)
         return FrameResult.at_rest(
             measured, given.no_image, given.operator.reference, self._tracker.events
         )
 
-
-def _tracker(prepared: Prepared) -> Tracker:
-    return Tracker(TrackSettings(snr=prepared.skin.touch.snr))
+    def _new_tracker(self) -> Tracker:
+        return Tracker(TrackSettings(self._given.skin.touch.snr, still=self._setting.alone))

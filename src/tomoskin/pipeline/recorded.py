@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -24,9 +24,10 @@ _MOST_SCALE = 30.0
 _STILL = 1e-9
 """Idle values within this part of their size of each other are the same but for arithmetic."""
 
-Idle = NDArray[Any] | Literal["previous"] | None
-"""(n_idle, n_meas) frames of the untouched skin; "previous" for dynamic imaging, each frame
-against the one before it; None where the recording holds differences."""
+Idle = range | NDArray[Any] | Literal["previous"] | None
+"""Frames of the untouched skin: a range of the recording's own, or (n_idle, n_meas) of another;
+"previous" for dynamic imaging, each frame against the one before it; None where the recording holds
+differences."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +55,12 @@ class RecordedFrames:
         Mean and noise of the idle frames; None where there are none.
     agreement
         Of the reference with the model's voltages.
+    time
+        (n,) s, later from frame to frame.
+    idle
+        (n_idle, n_meas) V, the frames of which the reference is; none where there are differences.
+    idle_frames
+        (n_idle,) indices of these in the recording; −1 for those of another.
     """
 
     prepared: Prepared
@@ -65,6 +72,30 @@ class RecordedFrames:
     positions: FloatArray | None
     reference: Reference | None
     agreement: ModelAgreement
+    time: FloatArray
+    idle: FloatArray
+    idle_frames: IntArray
+
+    @property
+    def interval(self) -> float:
+        """Between frames, s; NaN where there is a single one."""
+        return float(np.median(np.diff(self.time))) if len(self.time) > 1 else np.nan
+
+    @property
+    def idle_time(self) -> list[float]:
+        """(n_idle,) s: as recorded where the recording begins with them, else just before it."""
+        own, n = self.idle_frames, len(self.idle)
+        others = np.flatnonzero(~np.isin(self.frames, own))
+        if n and own[0] >= 0 and (not len(others) or own[-1] < self.frames[others[0]]):
+            return list(map(float, self.time[np.searchsorted(self.frames, own)]))
+        interval = self.interval if len(self.time) > 1 else 1.0
+        begin = self.time[others[0]] if len(others) else 0.0
+        return [float(begin - interval * before) for before in range(n, 0, -1)]
+
+    @property
+    def rounding(self) -> FloatArray | float:
+        """V below which no measurement's noise is; see :class:`Reference`."""
+        return 0.0 if self.reference is None else self.reference.least
 
     @property
     def differences(self) -> FloatArray:
@@ -103,10 +134,13 @@ def recorded_frames(prepared: Prepared, recording: Recording, idle: Idle) -> Rec
         When the rows are not in the pattern's order, the reference does not look like this
         skin, or too few frames or rows are left.
     """
-    pattern, recording = prepared.pattern, recording.plausible()
+    pattern, recording = prepared.pattern, recording.plausible().steady()
     prepared.operator.accept(
         Pattern.from_tables(recording.drive, recording.measure, pattern.n_electrodes)
     )
+    own = np.array(idle if isinstance(idle, range) else (), dtype=np.int64)
+    if isinstance(idle, range):
+        idle = recording.voltages[own]
     rest = None if isinstance(idle, str) else idle
     dead = dead_rows(recording.voltages, rest, pattern, recording.source)
     left = _Left.of(prepared.without(dead), recording, dead)
@@ -114,11 +148,16 @@ def recorded_frames(prepared: Prepared, recording: Recording, idle: Idle) -> Rec
         return left.frames_of(left.missing, _given(left, recording, dead))
     if isinstance(idle, str):
         return _against_the_one_before(left)
-    quiet = _complete(np.delete(idle, dead, axis=1), recording.source)
-    values, quiet, agreement = _in_volts(left, quiet)
+    living = np.delete(idle, dead, axis=1)
+    complete = _complete(living, recording.source)
+    values, quiet, agreement = _in_volts(left, living[complete])
     reference = Reference.of(quiet, _rounding(left.prepared, quiet))
     values = np.where(left.missing, reference.mean, values)
-    return left.frames_of(left.missing, values, reference, agreement)
+    return replace(
+        left.frames_of(left.missing, values, reference, agreement),
+        idle=quiet,
+        idle_frames=own[complete] if len(own) else np.full(len(quiet), -1),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,11 +204,14 @@ class _Left:
             positions=None if labels is None else labels[frames],
             reference=reference,
             agreement=agreement,
+            time=self.recording.time[frames],
+            idle=np.zeros((0, values.shape[1])),
+            idle_frames=np.zeros(0, dtype=np.int64),
         )
 
 
-def _complete(idle: NDArray[Any], source: str) -> NDArray[Any]:
-    """Idle frames with a value in every row: a mean of others would hang on which they are."""
+def _complete(idle: NDArray[Any], source: str) -> NDArray[np.bool_]:
+    """(n_idle,) bool: those with a value in every row: others would shift the mean."""
     complete = np.isfinite(idle).all(axis=1)
     if not complete.any():
         raise DataError(
@@ -177,7 +219,7 @@ def _complete(idle: NDArray[Any], source: str) -> NDArray[Any]:
             where=source,
             hint="choose other frames with --reference",
         )
-    return np.asarray(idle[complete])
+    return np.asarray(complete)
 
 
 def _rounding(prepared: Prepared, quiet: FloatArray) -> FloatArray:

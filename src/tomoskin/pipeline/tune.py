@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import ModelError
-from tomoskin.imaging import Assembly, Evidence, Spectrum, choose
+from tomoskin.imaging import AlphaChoice, Assembly, Evidence, Spectrum, choose
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.sensing.signal import Reference
 
@@ -110,7 +110,11 @@ def tuned_by_rule(prepared: Prepared, rule: str, evidence: Evidence) -> Prepared
             where=prepared.skin.name,
             hint="leave out the rule, or change the method in the skin's [inverse]",
         )
+    return with_choice(prepared, choose(Spectrum.of(prepared.problem), rule, evidence))
+
+
+def with_choice(prepared: Prepared, choice: AlphaChoice) -> Prepared:
+    """The skin with that alpha, which no noise changes any more."""
     spectrum = Spectrum.of(prepared.problem)
-    choice = choose(spectrum, rule, evidence)
     found = prepared.with_alpha(choice, spectrum, spectrum.operator(choice.alpha))
     return replace(found, light_touch=None)

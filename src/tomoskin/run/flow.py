@@ -93,6 +93,7 @@ class Flow:
         self.marker.begin(transport)
         self.twin.attach(transport)
         if self.marker.replay:
+            self.pipeline.collect(self.marker.replay.reference_frames)
             self.pipeline.number_after(self.marker.replay.touches_before)
         return Link(
             transport,

@@ -35,6 +35,9 @@ class ReplaySource(Protocol):
     touches_before: int
     """The last identity that a touch had before it begins."""
 
+    reference_frames: int
+    """How many of its frames make a reference."""
+
     loop: bool
     """Whether it begins again at the end."""
 

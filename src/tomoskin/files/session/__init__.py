@@ -40,7 +40,13 @@ from tomoskin.files.session.recorder import (
 )
 from tomoskin.files.session.repair import Lost, Repaired, repair
 from tomoskin.files.session.replay import ReplayTransport, open_replay, parse_replay
-from tomoskin.files.session.replayed import advance, as_recorded, recorded_calibrations, replayed
+from tomoskin.files.session.replayed import (
+    advance,
+    as_recorded,
+    reconstruct_session,
+    recorded_calibrations,
+    replayed,
+)
 from tomoskin.files.session.robot_log import LogPart, RobotLog
 from tomoskin.files.session.scanned import first_scan, idle_count, scanned_touches
 from tomoskin.files.session.session import Session
@@ -102,6 +108,7 @@ __all__ = [
     "press_positions",
     "read_session",
     "read_timeline",
+    "reconstruct_session",
     "recorded_calibrations",
     "recording_of",
     "repair",

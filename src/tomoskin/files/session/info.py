@@ -13,12 +13,15 @@ from tomoskin.core import StrPath
 from tomoskin.files.session.blocks import Advance, no_report
 from tomoskin.files.session.clock import ClockFit, ClockFitter
 from tomoskin.files.session.layout import Mark, MarkedFrame
-from tomoskin.files.session.session_reader import SessionReader, indexed_frames, message_counts
+from tomoskin.files.session.scanned import first_scan, scanned_touches
+from tomoskin.files.session.session_reader import (
+    SessionReader,
+    indexed_frames,
+    message_counts,
+    reference_frames,
+)
 from tomoskin.files.session.session_writer import OLD_INDEX_FILE, SKIN_FILE
 from tomoskin.sensing.track import Span, touch_spans
-
-_USUAL = 20
-"""Frames that make a reference, where the session does not say."""
 
 _KEPT = 3
 """So many times those are played: the operator follows the reference's noise during the rest."""
@@ -36,8 +39,7 @@ class References:
     """
 
     def __init__(self, path: Path, settings: Mapping[str, Any]) -> None:
-        count = settings.get("reference_frames")
-        self._count = _KEPT * (count if isinstance(count, int) and count > 0 else _USUAL)
+        self._count = _KEPT * reference_frames(settings)
         self._path = path
         self._begun: list[float] = []
         self._searched = float("-inf")
@@ -187,7 +189,8 @@ def session_info(path: StrPath, advance: Advance = no_report) -> SessionInfo:
             clock.add(item.frame.ticks, item.frame.host_time)
             if number % _OFTEN == 0:
                 advance(number, max(total, number + 1))
-        touched = ((item.host_time - frames.first, item.touches) for item in session.touches())
+        begun = first_scan(session)
+        touched = ((time - begun, touches) for _, time, touches in scanned_touches(session))
         spans = touch_spans(touched)
         messages = message_counts(session)
         return SessionInfo(

@@ -18,7 +18,12 @@ from tomoskin.files.session.info import References
 from tomoskin.files.session.layout import Mark, MarkedFrame
 from tomoskin.files.session.playback import Item, Playhead
 from tomoskin.files.session.replay_board import ReplayBoard
-from tomoskin.files.session.session_reader import SessionReader, end_time, touches_before
+from tomoskin.files.session.session_reader import (
+    SessionReader,
+    end_time,
+    reference_frames,
+    touches_before,
+)
 from tomoskin.model.pattern import Scan
 
 if TYPE_CHECKING:
@@ -54,8 +59,8 @@ class ReplayTransport:
         Host time of its first frame, those from before the recording left out.
     paused
         Whether it stands still.
-    touches_before
-        The last identity that a touch had before it begins.
+    touches_before, reference_frames
+        The last identity that a touch had before it begins, and the frames that make a reference.
 
     Raises
     ------
@@ -75,6 +80,7 @@ class ReplayTransport:
         self.path, self.name = session.path, f"replay:{session.path.name}"
         self.speed, self.loop, self.paused = speed, loop, False
         self.touches_before, self.epoch = touches_before(session), session.epoch
+        self.reference_frames = reference_frames(session.settings())
         self._session, self._clock = session, clock or WallClock()
         self._condition = threading.Condition()
         self._board = ReplayBoard(skin, session.device())

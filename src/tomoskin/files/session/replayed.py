@@ -3,13 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from tomoskin.core import DataError, Frame
+from tomoskin.files.session.blocks import Advance, no_report
 from tomoskin.files.session.layout import Mark
-from tomoskin.files.session.session_reader import SessionReader, tick_rate, touches_before
+from tomoskin.files.session.scanned import ScannedFrame, timed
+from tomoskin.files.session.session_reader import (
+    SessionReader,
+    indexed_frames,
+    reference_frames,
+    tick_rate,
+    touches_before,
+)
 from tomoskin.learning import KINDS, Calibration
-from tomoskin.pipeline import FrameResult, Pipeline, Prepared, prepare
+from tomoskin.model.pattern import Scan
+from tomoskin.pipeline import (
+    FrameResult,
+    Gathered,
+    Pipeline,
+    Prepared,
+    Reconstruction,
+    Setting,
+    prepare,
+)
 
 
 def as_recorded(session: SessionReader) -> Prepared:
@@ -44,19 +64,90 @@ def advance(pipeline: Pipeline, frame: Frame, mark: Mark) -> FrameResult | None:
     return pipeline.push(frame)
 
 
+def replaying(
+    prepared: Prepared, session: SessionReader, setting: Setting | None = None
+) -> Pipeline:
+    """A pipeline that begins where that of the run began; ``setting``: unless it is a live one."""
+    pipeline = Pipeline(
+        prepared, reference_frames=reference_frames(session.settings()), setting=setting
+    )
+    pipeline.tick_rate = tick_rate(session)
+    pipeline.number_after(touches_before(session))
+    return pipeline
+
+
+def gathered(
+    pipeline: Pipeline, session: SessionReader, scan: Scan
+) -> Iterator[tuple[ScannedFrame, FrameResult | None]]:
+    """Every frame of ``scan`` but those from before the recording, and what ``pipeline`` makes of
+    it: None where it was held, skipped or refused."""
+    for frame in timed(session.frames(), tick_rate(session), scan):
+        try:
+            result = advance(pipeline, frame.item.frame, frame.item.mark)
+        except DataError:
+            result = None
+        if not frame.item.mark & Mark.EARLIER:
+            yield frame, result
+
+
 def replayed(prepared: Prepared, session: SessionReader) -> Iterator[FrameResult]:
     """What the pipeline made of every frame of ``session``, and makes of it again.
 
     ``prepared`` is that of the session's own skin for the same touches, or of another with the
     same scan. Frames that the pipeline refused are refused again.
     """
-    pipeline = Pipeline(prepared)
-    pipeline.tick_rate = tick_rate(session)
-    pipeline.number_after(touches_before(session))
-    for item in session.frames():
-        try:
-            result = advance(pipeline, item.frame, item.mark)
-        except DataError:
-            continue
-        if result is not None and not item.mark & Mark.EARLIER:
+    for _, result in gathered(replaying(prepared, session), session, prepared.scan):
+        if result is not None:
             yield result
+
+
+def reconstruct_session(
+    prepared: Prepared,
+    session: SessionReader,
+    *,
+    start: int = 0,
+    stop: int | None = None,
+    setting: Setting | None = None,
+    advance: Advance = no_report,
+) -> Reconstruction:
+    """A whole session as its replay tells it, to the bit; ``unseen`` are the frames that the run
+    held or skipped.
+
+    Parameters
+    ----------
+    start, stop
+        Numbers of the frames that are wanted; all before run through the pipeline all the same.
+    setting
+        How frames are followed: as they are live, or another way.
+
+    Raises
+    ------
+    DataError
+        When the session is of another scan than the skin, or too short for a reference.
+    """
+    if setting is not None:
+        setting = replace(setting, scan=prepared.scan)
+    pipeline, without = replaying(prepared, session, setting), list[int]()
+    total = indexed_frames(session)
+
+    def wanted() -> Iterator[Gathered]:
+        for frame, result in gathered(pipeline, session, prepared.scan):
+            if stop is not None and frame.number >= stop:
+                return
+            advance(frame.number, max(total, frame.number + 1))
+            if frame.number < start:
+                continue
+            if result is None:
+                without.append(frame.number)
+            else:
+                yield Gathered(frame.number, frame.time, result)
+
+    found = Reconstruction.of(pipeline, prepared, wanted())
+    if pipeline.reference is None:
+        state = pipeline.reference_state
+        raise DataError(
+            f"holds too few frames for a reference: {state.frames} of {state.needed}",
+            where=str(session.path),
+            hint="choose untouched frames with --reference",
+        )
+    return replace(found, unseen=np.array(without, dtype=np.int64))

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from typing import NamedTuple
 
 from tomoskin.core import DataError, Frame
 from tomoskin.files.session.layout import Mark, MarkedFrame
-from tomoskin.files.session.session_reader import SessionReader, indexed_frames, tick_rate
+from tomoskin.files.session.session_reader import (
+    SessionReader,
+    indexed_frames,
+    reference_frames,
+    tick_rate,
+)
 from tomoskin.model.pattern import Scan
 from tomoskin.sensing.track import TouchedFrame
 
@@ -20,6 +25,22 @@ class ScannedFrame(NamedTuple):
     item: MarkedFrame
 
 
+def timed(items: Iterable[MarkedFrame], rate: float, scan: Scan) -> Iterator[ScannedFrame]:
+    """Those of ``items`` that are of ``scan``, by a clock of ``rate`` Hz."""
+    number, before = 0, -1
+    first: Frame | None = None
+    for item in items:
+        frame = item.frame
+        if len(frame.samples) != scan.n_samples:
+            continue
+        if first is None or frame.ticks <= before:
+            first = frame  # the device's clock begins again
+        before = frame.ticks
+        # frames of one read have one host time, but not one tick
+        yield ScannedFrame(number, first.host_time + (frame.ticks - first.ticks) / rate, item)
+        number += 1
+
+
 def scanned_frames(session: SessionReader, scan: Scan) -> Iterator[ScannedFrame]:
     """Frames of ``scan``; those of another are left out.
 
@@ -28,18 +49,15 @@ def scanned_frames(session: SessionReader, scan: Scan) -> Iterator[ScannedFrame]
     DataError
         At the end, when some that were written are missing.
     """
-    rate, number, read, before = tick_rate(session), 0, 0, None
-    first: Frame | None = None
-    for read, item in enumerate(session.frames(), start=1):  # noqa: B007
-        frame = item.frame
-        if len(frame.samples) != scan.n_samples:
-            continue
-        if first is None or (before is not None and frame.ticks <= before):
-            first = frame  # the device's clock begins again
-        before = frame.ticks
-        # frames of one read have one host time, but not one tick
-        yield ScannedFrame(number, first.host_time + (frame.ticks - first.ticks) / rate, item)
-        number += 1
+    read = 0
+
+    def counted() -> Iterator[MarkedFrame]:
+        nonlocal read
+        for item in session.frames():
+            read += 1
+            yield item
+
+    yield from timed(counted(), tick_rate(session), scan)
     if session.container.summary and read != (expected := indexed_frames(session)):
         raise DataError(
             f"is damaged: {expected} frames were written, but only {read} can be read",
@@ -85,6 +103,5 @@ def first_scan(session: SessionReader) -> float:
 def idle_count(session: SessionReader, scan: Scan) -> int:
     """Frames of the first reference where the recording begins with it; 1 where it does not."""
     first = next(scanned_frames(session, scan), None)
-    needed = session.settings().get("reference_frames", 1)
-    begins = first is not None and first.item.mark & Mark.REFERENCE and isinstance(needed, int)
-    return max(1, needed) if begins else 1
+    begins = first is not None and first.item.mark & Mark.REFERENCE
+    return reference_frames(session.settings()) if begins else 1

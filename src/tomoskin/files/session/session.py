@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from tomoskin.core import StrPath
 from tomoskin.files.session.blocks import read_session
-from tomoskin.files.session.replayed import as_recorded, replayed
-from tomoskin.files.session.scanned import frame_numbers
+from tomoskin.files.session.replayed import as_recorded, gathered, replayed, replaying
 from tomoskin.files.session.session_reader import SessionReader
 from tomoskin.model.mesh import Mesh
 from tomoskin.pipeline import FrameResult, Prepared
@@ -75,11 +74,11 @@ class Session:
 
         The columns are those of :func:`tomoskin.sensing.track.touch_columns`.
         """
-        touched = [(r.host_time, r.sequence, r.touches) for r in self if r.touches]
         with SessionReader(self.path) as reader:
-            numbers = frame_numbers(reader, {(time, sequence) for time, sequence, _ in touched})
-        frames = [
-            (*numbers.get((time, sequence), (None, time)), touches)
-            for time, sequence, touches in touched
-        ]
+            pipeline = replaying(self.prepared, reader)
+            frames = [
+                (frame.number, frame.time, result.touches)
+                for frame, result in gathered(pipeline, reader, self.prepared.scan)
+                if result is not None
+            ]
         return touch_columns(frames, self.skin.surface, forces=has_forces(frames))

@@ -141,6 +141,16 @@ def touches_before(session: SessionReader) -> int:
     return number if isinstance(number, int) and number >= 0 else 0
 
 
+_USUAL = 20
+"""Frames that make a reference, where a session does not say."""
+
+
+def reference_frames(settings: Mapping[str, Any]) -> int:
+    """Frames that make a reference, by the ``settings`` of a session."""
+    count = settings.get("reference_frames")
+    return count if isinstance(count, int) and count > 0 else _USUAL
+
+
 def message_counts(session: SessionReader) -> dict[str, int]:
     """Messages by topic; goes through a file without its end."""
     if session.container.summary is not None:

@@ -216,7 +216,9 @@ class SpotFinder:
     gain
         Of the data against the model: the ratio of their references.
     scan_time
-        Between two frames, s: in it touches move and grow. 0 where rows are read all at once.
+        That a scan takes, s: in it touches move and grow. 0 where rows are read all at once.
+    interval
+        Between two frames, s: how many of them a residual response lasts.
     pace
         How much is tried in a frame.
 
@@ -235,12 +237,13 @@ class SpotFinder:
         gain: float = 1.0,
         *,
         scan_time: float = 0.0,
+        interval: float = 0.0,
         pace: Pace = EXHAUSTIVE,
     ) -> None:
         self._model, self._settings = model, skin.touch
         self._cells = CellDiscs.of(mesh)
         self._pace, self._reach, self._unrest = pace, pace.speed * scan_time, 1.0
-        self._fading = math.ceil(pace.fading / scan_time) if scan_time else 0
+        self._fading = math.ceil(pace.fading / interval) if interval else 0
         self._residual = ResidualResponse.none()
         self._left = ResidualDirections.none()
         self._unit = skin.conductivity

@@ -20,7 +20,7 @@ from tomoskin.sensing.signal.monitor import Monitor
 from tomoskin.sensing.signal.nuisance import NuisanceSubspace
 from tomoskin.sensing.signal.power_up import STAGES, MeterStep, meter_steps
 from tomoskin.sensing.signal.readout import FIGURES, BoardFigures, Readout, directions
-from tomoskin.sensing.signal.recording import Recording, frame_times
+from tomoskin.sensing.signal.recording import Recording, frame_times, time_notes
 from tomoskin.sensing.signal.reference import Reference
 from tomoskin.sensing.signal.scatter import Scatter
 
@@ -57,5 +57,6 @@ __all__ = [
     "in_phase",
     "meter_steps",
     "nuisance_directions",
+    "time_notes",
     "undone",
 ]

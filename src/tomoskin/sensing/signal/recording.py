@@ -21,6 +21,9 @@ and an input at its rail is some hundred. Differences have no such scale, as idl
 _MOST_TIME = 1e18
 """s; what counts nanoseconds since 1970 as seconds is below."""
 
+_JUMP, _LONG = 100, 10.0
+"""A time jumps that is more than so many usual intervals, and seconds, after the one before."""
+
 _LISTED = 5
 """Frames that a note names."""
 
@@ -113,6 +116,21 @@ class Recording:
             notes.append(_absurd(key, absurd, limit))
         return replace(self, **changes, notes=(*self.notes, *notes)) if changes else self
 
+    def steady(self) -> Recording:
+        """The recording with times that go on, for what follows frames; notes name what did not.
+
+        A frame whose time is unknown, or not after the one before, is one usual interval later.
+        """
+        step = np.diff(self.time)
+        good = step > 0
+        notes = time_notes(self.time)
+        if good.all() and np.isfinite(self.time[:1]).all():
+            return replace(self, notes=(*self.notes, *notes)) if notes else self
+        usual = float(np.median(step[good])) if good.any() else 1.0
+        start = self.time[0] if np.isfinite(self.time[0]) else 0.0
+        time = start + np.cumsum(np.concatenate([[0.0], np.where(good, step, usual)]))
+        return replace(self, time=time, notes=(*self.notes, *notes))
+
     def _most(self) -> float:
         """The largest number that can be a voltage of this recording."""
         size = np.abs(self.voltages)
@@ -152,6 +170,23 @@ class Recording:
             measure=pattern.measure,
             reference=None if self.reference is None else match.apply(self.reference),
         )
+
+
+def time_notes(time: FloatArray) -> list[str]:
+    """What of (n,) s is wrong with the times of frames, in sentences."""
+    step = np.diff(time)
+    usual = np.median(step[step > 0]) if (step > 0).any() else np.inf
+    stands = 1 + np.flatnonzero(~(step > 0))
+    jumps = 1 + np.flatnonzero(step > max(_JUMP * usual, _LONG))
+    return [
+        f"{len(at)} times {what}: frames {', '.join(map(str, at[:_LISTED].tolist()))}"
+        f"{', …' if len(at) > _LISTED else ''}; {then}"
+        for at, what, then in (
+            (stands, "do not go on", "each is taken to be one interval after the frame before"),
+            (jumps, "jump ahead", "touches from before have ended there"),
+        )
+        if len(at)
+    ]
 
 
 def _beyond(values: NDArray[Any], most: float) -> NDArray[np.bool_]:

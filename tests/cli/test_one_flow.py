@@ -1,0 +1,146 @@
+"""One flow: every way from a session to its touches gives the same, to the bit."""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+
+import pytest
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_typestore
+
+from run.board import Board, samples_of
+from run.scripted import fault
+from run.test_replay import Recorded, late
+from run.test_robot_run import Watch as RobotWatch
+from run.test_robot_run import grown, member, running
+from run.test_runner import Watch
+from tomoskin.core import Touch
+from tomoskin.files.session import (
+    ReplayTransport,
+    Session,
+    SessionReader,
+    reconstruct_session,
+    scanned_touches,
+    session_info,
+    split,
+)
+from tomoskin.model.skin import Skin
+from tomoskin.pipeline import Prepared, prepare
+from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
+from tomoskin.run import Runner, commands, simulate
+from tomoskin.twin import Script
+
+HEAD = 'format = 1\n[script]\nduration = "1800 ms"\nlead_in = "1400 ms"\n'
+PRESSES = """[[press]]
+id = "{id}"
+radius = "12 mm"
+at = ["{x} mm", "{y} mm"]
+start = "{start} ms"
+force = "5 N"
+hold = "700 ms"
+{more}
+"""
+A = PRESSES.format(id="a", x=30, y=20, start=100, more="")
+B = PRESSES.format(id="b", x=-30, y=-20, start=200, more="")
+SLIDE = PRESSES.format(id="a", x=-30, y=10, start=100, more='path = [["700 ms", "30 mm", "10 mm"]]')
+LOST = fault("cut", "600 ms", "1800 ms", electrode=2)
+SCRIPTS = {"two presses": A + B, "a slide": SLIDE, "an electrode lost": A + LOST}
+WAYS = (*SCRIPTS, "a late recording", "one skin of a robot")
+
+
+@pytest.fixture(scope="module")
+def fitted() -> Prepared:
+    return prepare(Skin.load("textile-disc-8"))
+
+
+@pytest.fixture(scope="module", params=WAYS)
+def session(request: pytest.FixtureRequest, tmp_path_factory, fitted: Prepared) -> Path:
+    path = Path(tmp_path_factory.mktemp("flow") / "session.mcap")
+    if request.param in SCRIPTS:
+        simulate(Script.from_toml(HEAD + SCRIPTS[request.param]), fitted.skin, path)
+    elif request.param == "a late recording":
+        with Recorded(fitted, path.with_name("whole.mcap")) as live:
+            live.idle(REFERENCE_FRAMES)
+            late(live, path)
+    else:
+        boards = {name: Board(samples_of(fitted)) for name in ("left", "right")}
+        with running([member(fitted, name, board) for name, board in boards.items()]) as run:
+            run.record(path)
+            RobotWatch(run).until(grown(run, boards))
+            run.stop_recording()
+        split(path)
+        return path.with_name("session-right.mcap")
+    return path
+
+
+def again(path: Path, prepared: Prepared) -> Path:
+    """The session as a run that replays it records it."""
+    out = path.with_name(f"{path.stem}-again.mcap")
+    with SessionReader(path) as session:
+        count = sum(1 for _ in session.frames())
+        transport = ReplayTransport(session, prepared.skin, speed=math.inf)
+        runner = Runner(prepared, lambda: transport)
+        runner.ask(commands.Record(out))
+        until = Watch(runner).until
+        runner.start()
+        until(lambda: runner.status().frames == count)
+        runner.stop()
+    return out
+
+
+def places(frames) -> list[tuple[int, int, float, float, float]]:
+    """(number of a touched frame, identity, x, y, peak) of every touch."""
+    rows = []
+    for number, _, touches in frames:
+        touch: Touch
+        for touch in touches:
+            d = touch.detection
+            rows.append((number, touch.id, d.x, d.y, d.peak))
+    return rows
+
+
+def table(path: Path) -> list[list[str]]:
+    """Rows of a .csv file of touches, without the columns that one of them lacks."""
+    with path.open(newline="", encoding="utf-8") as file:
+        return [row[:10] for row in csv.reader(file)]
+
+
+def test_all_ways_are_the_same(session: Path, fitted: Prepared, tmp_path: Path, tomoskin) -> None:
+    with SessionReader(session) as reader:
+        whole = reconstruct_session(fitted, reader)
+    found = places(zip(whole.frames.tolist(), whole.time, whole.touches, strict=True))
+    columns = Session(session).touches()
+    names = ("frame", "id", "x_m", "y_m", "peak")
+    assert found == list(zip(*(columns[name].tolist() for name in names), strict=True))
+
+    one, two, bag = tmp_path / "image.csv", tmp_path / "export.csv", tmp_path / "bag.mcap"
+    code, out, err = tomoskin("image", session, "--touches", one)
+    assert code == 0, err
+    replayed = again(session, fitted)
+    with SessionReader(replayed) as reader:
+        assert places(scanned_touches(reader)) == found
+    exported = tmp_path / "frames.npz"
+    code, _, err = tomoskin("session", "export", replayed, exported, "--touches", two)
+    assert code == 0, err
+    assert table(one) == table(two)
+    code, _, err = tomoskin("session", "export", session, bag, "--every", "1e9")
+    assert code == 0, err
+    assert bag_positions(bag) == [(x, y) for _, _, x, y, _ in found]
+
+    info = session_info(session)
+    assert out.startswith(f"{info.frames} frames, ")
+    if info.spans:
+        again_info = session_info(replayed)
+        assert [span.begin for span in info.spans] == [span.begin for span in again_info.spans]
+    if "right" not in session.name:
+        assert found
+
+
+def bag_positions(path: Path) -> list[tuple[float, float]]:
+    """Positions of all touches, in their order."""
+    with AnyReader([path], default_typestore=get_typestore(Stores.EMPTY)) as reader:
+        chosen = [c for c in reader.connections if c.topic == "/tomoskin/track"]
+        tracks = [reader.deserialize(d, c.msgtype).pose.pose for c, _, d in reader.messages(chosen)]
+    return [(track.position.x, track.position.y) for track in tracks]
