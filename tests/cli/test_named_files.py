@@ -57,6 +57,7 @@ class Case:
 CASES = {
     ("image", "out"): Case("image {presses} --skin {skin} --out {out}", ".npz"),
     ("image", "touches"): Case("image {presses} --skin {skin} --touches {out}", ".csv"),
+    ("image", "thorough"): Case("image {presses} --skin {skin} --thorough {out}", ".csv"),
     ("locate", "touches"): Case(
         "locate {presses} --calibration {calibration} --touches {out}", ".csv"
     ),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import math
 from pathlib import Path
+from typing import Any
 
 import pytest
 from rosbags.highlevel import AnyReader
@@ -142,5 +143,6 @@ def bag_positions(path: Path) -> list[tuple[float, float]]:
     """Positions of all touches, in their order."""
     with AnyReader([path], default_typestore=get_typestore(Stores.EMPTY)) as reader:
         chosen = [c for c in reader.connections if c.topic == "/tomoskin/track"]
-        tracks = [reader.deserialize(d, c.msgtype).pose.pose for c, _, d in reader.messages(chosen)]
-    return [(track.position.x, track.position.y) for track in tracks]
+        tracks: list[Any] = [reader.deserialize(d, c.msgtype) for c, _, d in reader.messages(chosen)]
+    poses = [track.pose.pose for track in tracks]
+    return [(pose.position.x, pose.position.y) for pose in poses]

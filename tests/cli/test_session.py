@@ -89,6 +89,13 @@ def test_a_session_is_imaged_with_its_own_skin(tomoskin, tmp_path):
     assert json.loads(out)["frames"] == 2
 
 
+def test_a_session_without_a_whole_reference_is_said(tomoskin, tmp_path):
+    code, _, errors = tomoskin("image", write_frames(tmp_path / "few.mcap", 3))
+    assert code == 1
+    assert "holds too few frames for a reference: 3 of 20" in errors
+    assert "choose untouched frames with --reference" in errors
+
+
 def test_a_session_imaged_with_another_skin_is_said(tomoskin, recorded, tmp_path):
     """The pattern of all discs is the same: only the size, and the file itself, tell."""
     other = Skin.load("textile-disc-8").altered(
@@ -101,12 +108,12 @@ def test_a_session_imaged_with_another_skin_is_said(tomoskin, recorded, tmp_path
     )
     file = tmp_path / "other.toml"
     file.write_text(other.to_toml())
-    code, out, errors = tomoskin("image", recorded, "--frames", "0:2", "--skin", file)
+    code, out, errors = tomoskin("image", recorded, "--frames", "0:22", "--skin", file)
     assert code == 0
     assert "model by 1.000" in out
     assert "was recorded on textile-disc-8, but other has another" in errors
     assert "times its size: check the skin, its current and its sheet resistance" in errors
-    code, out, errors = tomoskin("image", recorded, "--frames", "0:2", "--skin", "textile-disc-8")
+    code, out, errors = tomoskin("image", recorded, "--frames", "0:22", "--skin", "textile-disc-8")
     assert (code, errors) == (0, "")
     assert "model by 1.000" in out
 

@@ -89,8 +89,8 @@ def test_the_moving_ball_is_one_body_on_a_path(tanks: Path) -> None:
 )
 def test_a_target_carried_round_is_seen_to_go_round(tanks: Path, name: str) -> None:
     found = images(tanks / f"{name}.npz", Skin.load("tank-16"), None)
-    places = np.array([(t[0].detection.x, t[0].detection.y) for t in found.touches])
-    assert len(places) == 80
+    places = np.array([(t[0].detection.x, t[0].detection.y) for t in found.touches if t])
+    assert len(places) >= 79  # a touch of the image is believed in its second frame
     steps = np.diff(np.unwrap(np.arctan2(places[:, 1], places[:, 0])))
     assert abs(steps.sum()) > 2 * np.pi * 0.7
     assert np.mean(np.sign(steps) == np.sign(steps.sum())) > 0.95

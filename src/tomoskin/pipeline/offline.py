@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import FloatArray, Image, IntArray, Touch, check_fits
+from tomoskin.core import DataError, FloatArray, Image, IntArray, Touch, check_fits
 from tomoskin.imaging import AlphaChoice
 from tomoskin.learning import BENDS, CLASSES, BendReading, ClassReading
 from tomoskin.pipeline.following import Setting
@@ -164,7 +164,8 @@ def reconstruct(
         Chooses alpha from this recording, by a name of :data:`tomoskin.imaging.RULES`; without
         it the skin's alpha holds, and "auto" follows the noise of the idle frames as it does live.
     setting
-        How frames are followed: as they are live, or :data:`ALONE`.
+        How frames are followed: as they are live, or :data:`ALONE`, which holds where frames have
+        no times.
     advance
         Called with how many frames of how many are done.
 
@@ -172,20 +173,22 @@ def reconstruct(
     ------
     DataError
         When the rows are not in the pattern's order, the reference does not look like this
-        skin, too few frames or rows are left, or the recording lacks what the rule needs.
+        skin, too few frames or rows are left, or the recording lacks what the rule, or a filter
+        over frames, needs.
     ModelError
         When the rule is not known or finds no alpha.
     """
     recorded = recorded_frames(prepared, recording, idle)
     prepared = recorded.prepared
+    if prepared.modes is not None:
+        _check_follows(recording, idle)
+    setting = setting or (Setting() if recording.timed else ALONE)
     if rule is not None:
         prepared = tuned_by_rule(prepared, rule, recorded.evidence())
     pipeline = Pipeline(
         prepared,
         reference_frames=len(recorded.idle),
-        setting=replace(
-            setting or Setting(), rounding=recorded.rounding, interval=recorded.interval
-        ),
+        setting=replace(setting, rounding=recorded.rounding, interval=recorded.interval),
     )
     stop = len(recording) if stop is None else stop
     wanted = (recorded.frames >= start) & (recorded.frames < stop)
@@ -198,6 +201,22 @@ def reconstruct(
         model_agreement=recorded.agreement,
         rows_left_out=recorded.rows_left_out,
     )
+
+
+def _check_follows(recording: Recording, idle: Idle) -> None:
+    """Raises DataError where a filter over the frames makes no sense."""
+    if isinstance(idle, str):
+        raise DataError(
+            "differences to the previous frame cannot be filtered over frames as well",
+            where=recording.source,
+            hint='choose another --reference, or --time-constant "0 s"',
+        )
+    if not recording.timed:
+        raise DataError(
+            "holds no times of its frames, which a filter over them needs",
+            where=recording.source,
+            hint='give them as time_s, or use --time-constant "0 s"',
+        )
 
 
 def _flow(

@@ -24,7 +24,9 @@ LEFT = 0.12
 
 
 def finder(pace: Pace = LIVE, scan_time: float = SCAN) -> SpotFinder:
-    return SpotFinder(model(), skin(), skin().mesh(), covariance(), scan_time=scan_time, pace=pace)
+    return SpotFinder(
+        model(), skin(), skin().mesh(), covariance(), scan_time=scan_time, interval=SCAN, pace=pace
+    )
 
 
 def is_at(detection: Detection, x: float, y: float) -> bool:
@@ -128,7 +130,9 @@ def test_a_frame_has_a_bounded_number_of_steps() -> None:
     counting = Counting(model().solver)
     counted = replace(model())
     vars(counted)["solver"] = counting
-    ours = SpotFinder(counted, skin(), skin().mesh(), covariance(), scan_time=SCAN, pace=LIVE)
+    ours = SpotFinder(
+        counted, skin(), skin().mesh(), covariance(), scan_time=SCAN, interval=SCAN, pace=LIVE
+    )
     three = np.concatenate([press(-0.05, 0.0), press(0.05, 0.02), press(0.0, -0.06)])
     frames = [*[three] * 4, np.add(three, [0.01, 0.0, 0.0, 0.0]), STANDING, three]
     steps = []

@@ -73,6 +73,7 @@ def parse(lines: Iterable[str], source: str) -> Recording:
         is_change=kinds == {"dv"},
         source=source,
         idle=_idle(by_name["idle"], source) if "idle" in by_name else 1,
+        timed="time_s" in by_name,
     )
 
 

@@ -21,7 +21,7 @@ from scipy.sparse import issparse
 
 from tomoskin.core import DataError, FloatArray, IntArray
 from tomoskin.files.imports.tables import pairs_of, voltages_of
-from tomoskin.sensing.signal import Recording, frame_times
+from tomoskin.sensing.signal import Recording
 
 _DATA = ("vi", "vv", "v", "data", "meas")
 _REFERENCE = ("vh", "reference")
@@ -61,7 +61,7 @@ def parse(variables: Mapping[str, Any], source: str) -> Recording:
         source,
         voltages,
         (drive, measure),
-        time=_times(variables, len(voltages)),
+        time=_numbers(variables, "time_s", (len(voltages),)),
         reference=None if reference is None else reference[0],
     )
     labels = _numbers(variables, "xy_m", (len(voltages), 2))
@@ -128,11 +128,6 @@ def _read(
         if data.ndim == 2 and len(data) == n_rows:
             return np.ascontiguousarray(data.T)
     return None
-
-
-def _times(variables: Mapping[str, Any], n: int) -> FloatArray:
-    time = _numbers(variables, "time_s", (n,))
-    return frame_times(n) if time is None else time
 
 
 def _numbers(variables: Mapping[str, Any], name: str, shape: tuple[int, ...]) -> FloatArray | None:

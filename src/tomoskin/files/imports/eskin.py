@@ -55,6 +55,7 @@ def parse(arrays: Arrays, source: str) -> Recording:
         labels=_labels(arrays, n, source),
         is_change=kind != "v",
         source=source,
+        timed="t_s" in arrays,
     )
 
 

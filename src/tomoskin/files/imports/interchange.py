@@ -55,6 +55,7 @@ def parse(arrays: Arrays, source: str) -> Recording:
         is_change=key == "dv",
         source=source,
         idle=whole_number(arrays, "idle", source) if "idle" in arrays else 1,
+        timed="time_s" in arrays,
     )
 
 
@@ -64,9 +65,10 @@ def write_interchange(path: StrPath, recording: Recording, *, overwrite: bool = 
         "dv" if recording.is_change else "voltages": recording.voltages,
         "drive": recording.drive,
         "measure": recording.measure,
-        "time_s": recording.time,
         "idle": np.array(recording.idle),
     }
+    if recording.timed:
+        arrays["time_s"] = recording.time
     if recording.reference is not None:
         arrays["reference"] = recording.reference
     if recording.labels is not None:

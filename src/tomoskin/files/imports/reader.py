@@ -67,7 +67,7 @@ def read_recording(path: StrPath) -> Recording:
     DataError
         When the file cannot be read or is of no known kind; the message lists its keys.
     """
-    return _read(Path(path)).plausible()
+    return _read(Path(path)).plausible().steady()
 
 
 def _read(path: Path) -> Recording:

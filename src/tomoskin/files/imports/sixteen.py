@@ -65,7 +65,7 @@ def parse(arrays: Arrays, source: str) -> Recording:
         source,
         values,
         (number[drive], number[measure]),
-        time=frame_times(len(voltages), _rate(arrays, source)),
+        time=_times(arrays, len(voltages), source),
         reference=None if reference is None else reference[columns],
     )
 
@@ -127,14 +127,14 @@ def _angles(xy: FloatArray, source: str) -> FloatArray:
     return np.asarray(np.arctan2(centred[:, 1], centred[:, 0]))
 
 
-def _rate(arrays: Arrays, source: str) -> float:
-    """Frames per second; 1 where the file does not say."""
+def _times(arrays: Arrays, n: int, source: str) -> FloatArray | None:
+    """(n,) s of frames at the file's rate; None where it does not say."""
     if "fps" not in arrays:
-        return 1.0
+        return None
     fps = real_numbers(arrays, "fps", source)
     if fps.shape != () or not (np.isfinite(fps) and fps > 0):
         raise DataError(f"expected one fps above 0, got {fps.tolist()}", where=source)
-    return float(fps)
+    return frame_times(n, float(fps))
 
 
 def _electrodes(arrays: Arrays, key: str, source: str) -> IntArray:

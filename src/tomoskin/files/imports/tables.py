@@ -37,6 +37,7 @@ def voltages_of(
         is_change=False,
         source=source,
         notes=tuple(notes),
+        timed=time is not None,
     )
 
 

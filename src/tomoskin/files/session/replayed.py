@@ -127,13 +127,14 @@ def reconstruct_session(
     """
     if setting is not None:
         setting = replace(setting, scan=prepared.scan)
-    pipeline, without = replaying(prepared, session, setting), list[int]()
+    pipeline, without, ended = replaying(prepared, session, setting), list[int](), False
     total = indexed_frames(session)
 
     def wanted() -> Iterator[Gathered]:
+        nonlocal ended
         for frame, result in gathered(pipeline, session, prepared.scan):
             if stop is not None and frame.number >= stop:
-                return
+                break
             advance(frame.number, max(total, frame.number + 1))
             if frame.number < start:
                 continue
@@ -141,9 +142,11 @@ def reconstruct_session(
                 without.append(frame.number)
             else:
                 yield Gathered(frame.number, frame.time, result)
+        else:
+            ended = True
 
     found = Reconstruction.of(pipeline, prepared, wanted())
-    if pipeline.reference is None:
+    if ended and pipeline.reference is None:
         state = pipeline.reference_state
         raise DataError(
             f"holds too few frames for a reference: {state.frames} of {state.needed}",

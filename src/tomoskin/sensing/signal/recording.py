@@ -52,6 +52,9 @@ class Recording:
         What of the file was omitted, in sentences.
     idle
         Frames at the beginning that show the untouched skin; 1 where that is assumed.
+    timed
+        Whether the times were measured. Else the frames are only numbered, and none follows from
+        the one before.
     """
 
     voltages: NDArray[Any]
@@ -64,6 +67,7 @@ class Recording:
     source: str
     notes: tuple[str, ...] = ()
     idle: int = 1
+    timed: bool = True
 
     def __post_init__(self) -> None:
         """Check that the shapes belong together and that there is a frame."""
@@ -117,7 +121,7 @@ class Recording:
         return replace(self, **changes, notes=(*self.notes, *notes)) if changes else self
 
     def steady(self) -> Recording:
-        """The recording with times that go on, for what follows frames; notes name what did not.
+        """The recording with times that go on; notes name what did not.
 
         A frame whose time is unknown, or not after the one before, is one usual interval later.
         """
