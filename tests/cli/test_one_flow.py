@@ -143,6 +143,7 @@ def bag_positions(path: Path) -> list[tuple[float, float]]:
     """Positions of all touches, in their order."""
     with AnyReader([path], default_typestore=get_typestore(Stores.EMPTY)) as reader:
         chosen = [c for c in reader.connections if c.topic == "/tomoskin/track"]
-        tracks: list[Any] = [reader.deserialize(d, c.msgtype) for c, _, d in reader.messages(chosen)]
+        read = reader.messages(chosen)
+        tracks: list[Any] = [reader.deserialize(d, c.msgtype) for c, _, d in read]
     poses = [track.pose.pose for track in tracks]
     return [(pose.position.x, pose.position.y) for pose in poses]
