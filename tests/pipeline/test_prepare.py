@@ -9,7 +9,7 @@ import pytest
 
 from tomoskin.core import DataError, Detection, ModelError, SkinError
 from tomoskin.imaging import Evidence, Greit, OneStep
-from tomoskin.learning import FORCE, Calibration, ForceModel, WeighedPresses
+from tomoskin.learning import FORCE, ForceModel, WeighedPresses
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.pattern import Pattern
@@ -59,17 +59,12 @@ def test_a_rule_cannot_choose_the_alpha_of_a_method_without_one() -> None:
         prepared.skin.altered({"inverse": {"alpha": 0.1}})
 
 
-def test_calibrations_that_cannot_serve_together_or_with_new_settings_are_refused() -> None:
+def test_a_calibration_that_cannot_serve_with_new_settings_is_refused() -> None:
     weighed = WeighedPresses.of(
         [Detection(0.01 * n, 0.0, 1e-3, 1e-3, 4e-4, -0.01 * n, np.empty(0)) for n in range(1, 7)],
         np.arange(1.0, 7.0), np.arange(6), np.arange(6.0),
     )  # fmt: skip
     forces = FORCE.of(ForceModel.fit(weighed, PREPARED.skin), PREPARED.pattern, PREPARED.skin)
-    locating = replace(FORCE, name="places", locates=True, check=None, check_beside=None)
-    places = Calibration(locating, forces.model, PREPARED.pattern)
-    for first, second in ((forces, places), (places, forces)):
-        with pytest.raises(DataError, match="the forces would be wrong"):
-            PREPARED.calibrated(first).calibrated(second)
     weighing = PREPARED.calibrated(forces)
     assert prepare(PREPARED.skin.altered({"inverse": {"alpha": 0.2}}), weighing).calibrations
     with pytest.raises(DataError, match="touches found by"):

@@ -92,7 +92,7 @@ def image(
     from tomoskin.files.exports import write_touches
     from tomoskin.files.imports import read_recording
     from tomoskin.learning import FORCE
-    from tomoskin.pipeline import ALONE, prepare
+    from tomoskin.pipeline import ALONE, located_alone, prepare
     from tomoskin.sensing.track import touch_spans
 
     own = skin_for_file(skin, recording)
@@ -124,6 +124,8 @@ def image(
     if out is not None:
         WRITERS[out.suffix.lower()](out, prepared, result, display, overwrite=force)
     _warn(recording, result, prepared.pattern)
+    if located_alone(prepared, result.model_agreement):
+        remark(f"{recording}: the calibration alone locates touches, one at a time")
     since = (result.time - first_time(recorded)).tolist()
     spans = touch_spans(zip(since, result.touches, strict=True))
     tell(_document(result, spans, prepared), _lines(result, spans, prepared), json=json)

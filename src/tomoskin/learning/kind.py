@@ -7,7 +7,7 @@ module that makes a :class:`Kind` and stands in :data:`tomoskin.learning.KINDS`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any, Generic, Protocol, Self, TypeVar
@@ -85,13 +85,26 @@ class Differences:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameView:
-    """What one frame shows: its ``time`` s, its image, the noise of that where it is known, and the
-    differences that it was made of."""
+    """What one frame shows.
+
+    Attributes
+    ----------
+    time
+        s.
+    image, image_noise
+        The image, and its noise where that is known.
+    differences
+        What it was made of.
+    others
+        (k, n_meas) V: for each of the k detections that were fitted, what all others change. None
+        where detections are regions of the image.
+    """
 
     time: float
     image: Image
     image_noise: ImageNoise | None
     differences: Differences
+    others: FloatArray | None = None
 
 
 Detect = Callable[[FrameView, list[Detection]], list[Detection]]
@@ -110,6 +123,11 @@ class TouchFit:
 
 class Conditions(Protocol):
     """Under which a calibration is applied, from one reference on."""
+
+    @property
+    def fitted(self) -> bool:
+        """Whether detections are touches that were fitted to the data."""
+        ...
 
     def touch_fit(self) -> TouchFit | None:
         """The fit of touches beside the calibration; None where no reference is known."""
@@ -182,14 +200,11 @@ class Kind(Generic[M]):
     check
         Raises DataError where a calibration cannot serve a skin of its own scan; None where it
         always can.
-    check_beside
-        Raises DataError where a calibration cannot serve beside one of that other kind; None where
-        it always can.
     directions
         Model → (n_meas, k) V along which what it reads moves the data: images do without them.
         None where it reads nothing of that sort.
     locates
-        Whether its positions stand in for those of the image.
+        Whether its positions stand in for those of the detections.
     fits
         Whether it needs touches fitted to the data of each frame.
     own_settings
@@ -209,7 +224,6 @@ class Kind(Generic[M]):
     apply: Callable[[M, Conditions], Applied]
     skin_id: Callable[[M], str]
     check: Callable[[Calibration[M], Skin], None] | None = None
-    check_beside: Callable[[Calibration[M], Kind[Any]], None] | None = None
     directions: Callable[[M], FloatArray] | None = None
     locates: bool = False
     fits: bool = False
@@ -277,18 +291,12 @@ class Calibration(Generic[M]):
         """The same file's bytes, for a session that holds it."""
         return pack_arrays(self._arrays())
 
-    def check(self, skin: Skin, beside: Iterable[Kind[Any]] = ()) -> None:
-        """Raise DataError where it cannot serve ``skin``: of another scan, or as its kind says.
-
-        ``beside``: kinds of the other calibrations in use.
-        """
+    def check(self, skin: Skin) -> None:
+        """Raise DataError where it cannot serve ``skin``: of another scan, or as its kind says."""
         if skin.pattern().identity != self.pattern.identity:
             raise self.mismatch("scan", skin)
         if self.kind.check is not None:
             self.kind.check(self, skin)
-        if self.kind.check_beside is not None:
-            for other in beside:
-                self.kind.check_beside(self, other)
 
     def check_skin(self, skin: Skin) -> None:
         """Raise DataError where it was learnt on another skin, or on other settings of it."""

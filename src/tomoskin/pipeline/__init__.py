@@ -1,6 +1,6 @@
 """The one frame flow, pure: a reference is collected, then frames are followed to touches."""
 
-from tomoskin.pipeline.finding import voltage_covariance
+from tomoskin.pipeline.finding import located_alone, voltage_covariance
 from tomoskin.pipeline.following import Setting
 from tomoskin.pipeline.model_agreement import DOUBTED, ModelAgreement
 from tomoskin.pipeline.offline import ALONE, Gathered, Reconstruction, reconstruct
@@ -28,6 +28,7 @@ __all__ = [
     "Setting",
     "Unresolved",
     "colour_limit",
+    "located_alone",
     "prepare",
     "reconstruct",
     "recorded_frames",

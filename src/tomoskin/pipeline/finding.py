@@ -11,6 +11,7 @@ import numpy as np
 from tomoskin.board.source import Configuration, ScanSettings
 from tomoskin.core import Detection, FloatArray, finished
 from tomoskin.learning import FrameView, TouchFit
+from tomoskin.pipeline.model_agreement import ModelAgreement
 from tomoskin.pipeline.nuisance import JUMP
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.sensing.fit import (
@@ -37,6 +38,12 @@ class Finder(Protocol):
         ...
 
     @property
+    def others(self) -> FloatArray | None:
+        """(k, n_meas) V: for each reading of the newest frame what all others change; None where
+        they are not fitted."""
+        ...
+
+    @property
     def like_touch(self) -> bool:
         """Whether the newest frame may hold a touch, though none was found."""
         ...
@@ -60,6 +67,7 @@ class InImage:
     """Touches are regions of the picture."""
 
     like_touch = rises = False
+    others: FloatArray | None = None
     problem: str | None = None
 
     def __init__(self, prepared: Prepared) -> None:
@@ -79,10 +87,12 @@ class InImage:
 class InData:
     """Touches are fitted to the data themselves; a filter over frames does not enter."""
 
-    def __init__(self, model: SpotModel, spots: SpotFinder, pace: Pace, interval: float) -> None:
+    def __init__(
+        self, model: SpotModel, spots: SpotFinder, volts: float, pace: Pace, interval: float
+    ) -> None:
         self.model = model
         """The sheet on which touches are fitted."""
-        self._spots, self._pace, self._interval = spots, pace, interval
+        self._spots, self._volts, self._pace, self._interval = spots, volts, pace, interval
 
     @classmethod
     def making(
@@ -108,7 +118,7 @@ class InData:
             model, skin, prepared.mesh, noise, gain,
             scan_time=scan_time, interval=between, pace=pace,
         )  # fmt: skip
-        return cls(model, spots, pace, interval)
+        return cls(model, spots, _voltage_ratio(model, reference), pace, interval)
 
     def renewing(self, prepared: Prepared, reference: Reference | None) -> Finding:
         """See :class:`Finder`; where the sheet is another one, what is found begins anew."""
@@ -116,6 +126,7 @@ class InData:
             gain = _gain(self.model, prepared, reference)
             noise = yield from _noise(prepared, reference, gain)
             yield from self._spots.renewing(noise, gain)
+            self._volts = _voltage_ratio(self.model, reference)
             return self
         other = yield from InData.making(
             prepared.spots, prepared, reference, self._pace, self._interval
@@ -127,6 +138,11 @@ class InData:
         """See :class:`Finder`."""
         differences = view.differences
         return self._spots.push(differences.whole, differences.unknown, differences.jumps)
+
+    @property
+    def others(self) -> FloatArray:
+        """See :class:`Finder`."""
+        return self._volts * self._spots.others()
 
     @property
     def like_touch(self) -> bool:
@@ -152,17 +168,29 @@ def _jump_text(part: float) -> str:
     )
 
 
+def located_alone(prepared: Prepared, agreement: ModelAgreement) -> bool:
+    """Whether a calibration locates touches without a fit.
+
+    Voltages that the skin's model does not know are no ground for a fit, but labels are.
+    """
+    locates = any(c.kind.locates for c in prepared.calibrations.values())
+    return locates and agreement.doubt(volts=True) is not None
+
+
 def finding(
     prepared: Prepared,
     reference: Reference | None,
     pace: Pace = EXHAUSTIVE,
     interval: float = np.nan,
+    *,
+    fitted: bool = True,
 ) -> Finder:
-    """What finds the touches: the method that the skin names, unless a calibration locates them.
+    """What finds the touches: the method that the skin names.
 
-    ``pace`` says how much of a fit is tried in a frame; ``interval`` s between frames, or NaN.
+    ``pace`` says how much of a fit is tried in a frame; ``interval`` s between frames, or NaN;
+    ``fitted``: whether the voltages are those of the skin's model, so that a fit is possible.
     """
-    if prepared.spots is None or not prepared.fits_touches:
+    if prepared.spots is None or prepared.skin.touch.method != "fit" or not fitted:
         return InImage(prepared)
     return finished(InData.making(prepared.spots, prepared, reference, pace, interval))
 
@@ -175,10 +203,13 @@ class Fitting:
     ----------
     prepared, reference
         The skin, and what it reads while nothing touches it, where that is known.
+    fitted
+        Whether detections are touches that were fitted to the data.
     """
 
     prepared: Prepared
     reference: Reference | None
+    fitted: bool
 
     def touch_fit(self) -> TouchFit | None:
         """See :class:`tomoskin.learning.Conditions`."""
@@ -187,7 +218,7 @@ class Fitting:
             return None
         model = prepared.spots
         gain = _voltage_ratio(model, reference)
-        if prepared.skin.touch.method == "fit":
+        if self.fitted:
             return TouchFit(model.response, gain, lambda _, detections: detections)
         beside = finished(InData.making(model, prepared, reference))
         return TouchFit(model.response, gain, lambda view, _: beside.push(view))
@@ -243,12 +274,14 @@ def _noise(
 
 def _gain(model: SpotModel, prepared: Prepared, reference: Reference | None) -> float:
     """Ratio of measured and modelled voltages, which a change has too; 1 for ratios."""
-    if reference is None or prepared.operator.difference == "normalised":
+    if prepared.operator.difference == "normalised":
         return 1.0
     return _voltage_ratio(model, reference)
 
 
-def _voltage_ratio(model: SpotModel, reference: Reference) -> float:
-    """Ratio of measured and modelled voltages."""
+def _voltage_ratio(model: SpotModel, reference: Reference | None) -> float:
+    """Ratio of measured and modelled voltages; 1 where nothing was measured."""
+    if reference is None:
+        return 1.0
     modelled = model.response.reference
     return float(reference.mean @ modelled / (modelled @ modelled))

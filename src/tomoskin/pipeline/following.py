@@ -13,7 +13,14 @@ from tomoskin.learning import Differences, FrameView
 from tomoskin.model.pattern import Scan
 from tomoskin.pipeline.collecting import Rest
 from tomoskin.pipeline.conditioning import Conditioned, Conditioning, Followed, GivenDifferences
-from tomoskin.pipeline.finding import Finder, Finding, Fitting, finding
+from tomoskin.pipeline.finding import (
+    Finder,
+    Finding,
+    Fitting,
+    InImage,
+    finding,
+    located_alone,
+)
 from tomoskin.pipeline.imaging import Filtered, SingleFrame, imaging
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.pipeline.records import FrameResult, Measured
@@ -88,10 +95,12 @@ class Following:
         interval = np.nan if rest is None else rest.interval
         if not interval > 0:
             interval = setting.interval
-        self._finder: Finder = finding(prepared, reference, setting.pace, interval)
+        known = rest is None or not located_alone(prepared, rest.agreement)
+        self._finder: Finder = finding(prepared, reference, setting.pace, interval, fitted=known)
         self._finding: Finding | None = None
         self._is_outdated = False
-        conditions = Fitting(prepared, reference)
+        fitted = not isinstance(self._finder, InImage)
+        conditions = Fitting(prepared, reference, fitted)
         self._applied = {k: c.apply(conditions) for k, c in prepared.calibrations.items()}
         self._tuning: Steps | None = None
         if reference is not None:
@@ -163,6 +172,8 @@ class Following:
         image, noise = self._imaging.push(differences.dv, time)
         view = FrameView(time, image, noise, differences)
         detections = self._finder.push(view)
+        if self._applied:
+            view = replace(view, others=self._finder.others)
         for applied in self._applied.values():
             detections = applied.locate(view, detections)
         return image, view, detections

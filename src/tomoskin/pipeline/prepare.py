@@ -90,11 +90,10 @@ class Prepared:
     def calibrated(self, calibration: Calibration[Any]) -> Prepared:
         """With a calibration, in place of an earlier one of its kind.
 
-        Raises DataError where it is not of this skin, or where two cannot serve together.
+        Raises DataError where it is not of this skin.
         """
-        together = {**self.calibrations, calibration.kind.name: calibration}
-        _check_together(together, self.skin)
-        return self._with(together)
+        calibration.check(self.skin)
+        return self._with({**self.calibrations, calibration.kind.name: calibration})
 
     def uncalibrated(self, kind: Kind[Any]) -> Prepared:
         """Without a calibration of that kind."""
@@ -105,11 +104,6 @@ class Prepared:
         if _fits(self.skin, calibrations):
             spots = self.spots or SpotModel.of(self.skin, self.model)
         return replace(self, calibrations=calibrations, spots=spots)
-
-    @property
-    def fits_touches(self) -> bool:
-        """Whether touches are fitted to the data, rather than found in the image or located."""
-        return _fits_touches(self.skin, self.calibrations)
 
     def warm_up(self) -> None:
         """Do what would hold up the first frames: it takes seconds the first time for a skin."""
@@ -200,7 +194,8 @@ def prepare(skin: Skin, previous: Prepared | None = None) -> Prepared:
         more; the message says which.
     """
     if previous is not None and previous.skin.body == skin.body:
-        _check_together(previous.calibrations, skin)
+        for calibration in previous.calibrations.values():
+            calibration.check(skin)
         return _prepared(skin, _problem_after(previous, skin), previous)
     reach("mesh")
     mesh = skin.mesh()
@@ -288,18 +283,9 @@ def _prepared(skin: Skin, problem: LinearProblem, previous: Prepared | None = No
     )
 
 
-def _check_together(calibrations: Mapping[str, Calibration[Any]], skin: Skin) -> None:
-    for name, one in calibrations.items():
-        one.check(skin, [other.kind for k, other in calibrations.items() if k != name])
-
-
 def _fits(skin: Skin, calibrations: Mapping[str, Calibration[Any]]) -> bool:
     """Whether anything is fitted to the data: touches, or what a calibration needs."""
-    return _fits_touches(skin, calibrations) or any(c.kind.fits for c in calibrations.values())
-
-
-def _fits_touches(skin: Skin, calibrations: Mapping[str, Calibration[Any]]) -> bool:
-    return skin.touch.method == "fit" and not any(c.kind.locates for c in calibrations.values())
+    return skin.touch.method == "fit" or any(c.kind.fits for c in calibrations.values())
 
 
 def _same_difference(one: Skin, other: Skin) -> bool:

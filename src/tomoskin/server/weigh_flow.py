@@ -40,8 +40,6 @@ class _Seen:
 class WeighFlow(GuidedFlow):
     """Weights that lay on the skin so far; see :class:`GuidedFlow`.
 
-    Raises WireError for a skin whose touches are not found as they will be when forces are read.
-
     Attributes
     ----------
     weighed
@@ -54,11 +52,6 @@ class WeighFlow(GuidedFlow):
 
     def __init__(self, prepared: Prepared) -> None:
         super().__init__("force", prepared)
-        if prepared.skin.touch.method == "fit" and not prepared.fits_touches:
-            raise WireError(
-                "forces are learnt from touches that are fitted, and a calibration of touch finds "
-                'them otherwise: choose "none" as the calibration of touch first'
-            )
         self.weighed: list[Weighed] = []
         self.weight: Weight | None = None
         self.asked: Weight | None = None

@@ -9,7 +9,6 @@ Keys of the .npz: ``kind``, ``version``; of n touches in the order of time ``xy_
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -113,24 +112,15 @@ def _check(calibration: Calibration[ForceModel], skin: Skin) -> None:
         raise calibration.mismatch("sheet", skin)
 
 
-def _check_beside(calibration: Calibration[ForceModel], other: Kind[Any]) -> None:
-    """Beside a kind that locates touches none are fitted: peaks and areas are others."""
-    if other.locates and calibration.model.method == "fit":
-        raise DataError(
-            f"the calibration of forces needs fitted touches, but the calibration of "
-            f"{other.subject} finds them in the image: the forces would be wrong",
-            hint=f"use one of the two: leave out the calibration of {other.subject}, or that of "
-            "forces",
-        )
-
-
 def _exclude(model: ForceModel, _measurements: IntArray) -> ForceModel:
     """Touches found without some measurements are touches all the same."""
     return model
 
 
-def _apply(model: ForceModel, _conditions: Conditions) -> Applied:
-    return ForceApplied(model)
+def _apply(model: ForceModel, conditions: Conditions) -> Applied:
+    """Regions of an image have other peaks and areas than fitted touches: they get no force."""
+    is_like = conditions.fitted == (model.method == "fit")
+    return ForceApplied(model) if is_like else Applied()
 
 
 FORCE = Kind(
@@ -144,7 +134,6 @@ FORCE = Kind(
     pack=_pack,
     unpack=_unpack,
     check=_check,
-    check_beside=_check_beside,
     exclude=_exclude,
     apply=_apply,
     skin_id=lambda model: model.skin_id,

@@ -21,6 +21,13 @@ some touches without need in four of six sessions."""
 _SHOWN = 20
 
 
+ALONE = (
+    "the calibration alone locates touches, one at a time: none are fitted, since the voltages do "
+    'not fit the skin\'s model, or its [touch] method is "image"'
+)
+"""What a calibration without a fit says of itself."""
+
+
 @dataclass(frozen=True, slots=True)
 class CalibrationHealth:
     """How the last touches fit the calibration that locates them.
@@ -33,11 +40,14 @@ class CalibrationHealth:
         How many times worse than its own presses they fit it (median).
     excluded
         Measurements that have jumped since, in words; they are left out.
+    alone
+        Whether it locates the strongest region of the image, without a fit.
     """
 
     presses: int
     strangeness: float
     excluded: tuple[str, ...] = ()
+    alone: bool = False
 
     @property
     def known(self) -> bool:
@@ -57,6 +67,9 @@ class CalibrationHealth:
     @property
     def findings(self) -> tuple[str, ...]:
         """What differs and what would mend it, in words; else that nothing does."""
+        return (*self._fits(), ALONE) if self.alone else self._fits()
+
+    def _fits(self) -> tuple[str, ...]:
         found = []
         if self.known and self.strangeness > STRANGE:
             found.append(

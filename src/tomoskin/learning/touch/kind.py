@@ -45,18 +45,21 @@ _SAME_SHAPE = 1e-4
 
 
 class LocatedTouch(Applied):
-    """The image tells that there is a touch, labelled presses where: of one touch at a time.
+    """Detections tell that there are touches, labelled presses where each of them is.
 
+    Of several fitted touches, each is located in the frame without what the others change. Regions
+    of an image tell nothing of that: then the strongest is located, as if it were the only one.
     Measurements that have jumped since the presses are left out where frames do not fit with them.
     """
 
-    def __init__(self, locator: Locator) -> None:
+    def __init__(self, locator: Locator, *, fitted: bool) -> None:
+        self._fitted = fitted
         self._watch = Watch(locator, LIVE)
         self._standing = Standing()
         self._stood = 0
 
     def locate(self, view: FrameView, detections: list[Detection]) -> list[Detection]:
-        """The strongest detection, at the position that the presses tell."""
+        """The detections, each at the position that the presses tell."""
         if not detections:
             self._standing.clear()
             self._stood = 0
@@ -66,18 +69,15 @@ class LocatedTouch(Applied):
         dv = np.where(_excluded(differences.nuisance), np.nan, differences.change)
         if not np.isfinite(dv).any():
             return []
-        (position,), (covariance,) = self._watch(self._standing.push(dv), settled=self._settled())
-        sd_x, sd_y = np.sqrt(np.diag(covariance)).tolist()
+        mean = self._standing.push(dv)
+        if view.others is None:
+            (position,), (covariance,) = self._watch(mean, settled=self._settled())
+            return [_at(detections[0], position, covariance)]
+        settled = len(detections) == 1 and self._settled()
+        answers = zip(*self._watch(mean - view.others, settled=settled), strict=True)
         return [
-            replace(
-                detections[0],
-                x=float(position[0]),
-                y=float(position[1]),
-                sd_x=sd_x,
-                sd_y=sd_y,
-                cov_xy=float(covariance[0, 1]),
-                bias=0.0,
-            )
+            _at(detection, *_together(detection, *answer))
+            for detection, answer in zip(detections, answers, strict=True)
         ]
 
     def _settled(self) -> bool:
@@ -91,7 +91,30 @@ class LocatedTouch(Applied):
     ) -> CalibrationHealth:
         """How the last touches fit the presses."""
         del view, detections, touched
-        return self._watch.health
+        return replace(self._watch.health, alone=not self._fitted)
+
+
+def _together(
+    fitted: Detection, position: FloatArray, covariance: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """What a fit and the presses, ``position`` (2,) m and ``covariance`` (2, 2) m², say together.
+
+    The presses were tried on labels, the fit was not: what both differ by beyond their covariances
+    is the fit's error (the moment estimator of DerSimonian and Laird 1986, all of it given to one).
+    """
+    own = np.array([[fitted.sd_x**2, fitted.cov_xy], [fitted.cov_xy, fitted.sd_y**2]])
+    away = np.array([fitted.x, fitted.y]) - position
+    beyond = max(float(away @ away - np.trace(own + covariance)) / 2, 0.0)
+    gain = covariance @ np.linalg.inv(covariance + own + beyond * np.eye(2))
+    return position + gain @ away, covariance - gain @ covariance
+
+
+def _at(detection: Detection, position: FloatArray, covariance: FloatArray) -> Detection:
+    """The detection at another position (2,) m, with its covariance (2, 2) m²."""
+    x, y = position.tolist()
+    sd_x, sd_y = np.sqrt(np.diag(covariance)).tolist()
+    cov_xy = float(covariance[0, 1])
+    return replace(detection, x=x, y=y, sd_x=sd_x, sd_y=sd_y, cov_xy=cov_xy, bias=0.0)
 
 
 def _pack(locator: Locator) -> Arrays:
@@ -135,8 +158,8 @@ def _exclude(_locator: Locator, _measurements: IntArray) -> None:
     """The locator's features rest on all measurements."""
 
 
-def _apply(locator: Locator, _conditions: Conditions) -> Applied:
-    return LocatedTouch(locator)
+def _apply(locator: Locator, conditions: Conditions) -> Applied:
+    return LocatedTouch(locator, fitted=conditions.fitted)
 
 
 def _excluded(nuisance: FloatArray) -> NDArray[np.bool_]:

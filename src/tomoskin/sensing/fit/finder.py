@@ -248,8 +248,9 @@ class SpotFinder:
         self._left = ResidualDirections.none()
         self._unit = skin.conductivity
         self._most = min(skin.touch.max_touches, _MOST)
-        self._before = np.zeros((0, N_PARAMETERS))
+        self._before = self._shown = np.zeros((0, N_PARAMETERS))
         self._deficit = Deficit.none(len(model.solver.table.basis))
+        self._change = self._deficit.change
         self._expected = Expectation.none()
         self._rival: Rival | None = None
         self._jump = CommonModeJump()
@@ -311,9 +312,13 @@ class SpotFinder:
         self._expected = self._going_on(detected)
         if self._fading:
             self._residual = self._residual.after(self._before, self._model.changes, self._fading)
-        detections = self._detections(joined(detected))
-        detections.sort(key=lambda detection: -abs(detection.peak))
-        return detections
+        self._change = detected.fit.change + detected.fit.deficit.change
+        return self._detections(joined(detected))
+
+    def others(self) -> FloatArray:
+        """(k, n_meas) V of the model: for each touch of the newest frame what all others change."""
+        whole = self._change @ self._model.solver.table.basis
+        return np.asarray(whole - self._model.changes(self._shown))
 
     def _searched(
         self, data: FloatArray, times: float = 1.0
@@ -426,10 +431,13 @@ class SpotFinder:
         return Seen(seen, matched, gauge, Jumps((seen.matrix @ jumps).T))
 
     def _detections(self, detected: SpotDetections) -> list[Detection]:
+        """Strongest first."""
         spots = detected.fit.spots
-        wrong = self.watch.wrong(spots).tolist()
-        shown = [(k, spot) for k, spot in enumerate(spots.tolist()) if not wrong[k]]
-        return [self._detection(detected, k, spot) for k, spot in shown]
+        shown = np.flatnonzero(~self.watch.wrong(spots))
+        found = [self._detection(detected, k, spots[k].tolist()) for k in shown.tolist()]
+        order = sorted(range(len(found)), key=lambda k: -abs(found[k].peak))
+        self._shown = spots[shown[order]]
+        return [found[k] for k in order]
 
     def _detection(self, detected: SpotDetections, k: int, spot: list[float]) -> Detection:
         x, y, log_radius, content = spot
