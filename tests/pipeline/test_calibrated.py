@@ -59,7 +59,9 @@ def shown(prepared: Prepared, *places: FloatArray, size: float = 1.0) -> list[Fr
         dv = change(*places) if places and number >= REFERENCE_FRAMES else 0.0
         values = size * (rest + dv + NOISE * random.standard_normal(len(rest)))
         none = np.zeros(len(rest), bool)
-        results.append(pipeline.follow(Measured(values, none, 0.05 * number, 0.05 * number, number)))
+        results.append(
+            pipeline.follow(Measured(values, none, 0.05 * number, 0.05 * number, number))
+        )
     return results[REFERENCE_FRAMES:]
 
 

@@ -76,7 +76,7 @@ class LocatedTouch(Applied):
         settled = len(detections) == 1 and self._settled()
         answers = zip(*self._watch(mean - view.others, settled=settled), strict=True)
         return [
-            _at(detection, *_together(detection, *answer))
+            _at(detection, *_together(detection, *answer, several=len(detections) > 1))
             for detection, answer in zip(detections, answers, strict=True)
         ]
 
@@ -95,18 +95,20 @@ class LocatedTouch(Applied):
 
 
 def _together(
-    fitted: Detection, position: FloatArray, covariance: FloatArray
+    fitted: Detection, position: FloatArray, covariance: FloatArray, *, several: bool
 ) -> tuple[FloatArray, FloatArray]:
     """What a fit and the presses, ``position`` (2,) m and ``covariance`` (2, 2) m², say together.
 
-    The presses were tried on labels, the fit was not: what both differ by beyond their covariances
-    is the fit's error (the moment estimator of DerSimonian and Laird 1986, all of it given to one).
+    What they differ by beyond their covariances widens them (the moment estimator of DerSimonian
+    and Laird 1986). Of one touch it is the fit's error: the presses were tried on labels. Of
+    ``several`` it is both's: the presses see what the fit has left of the others.
     """
     own = np.array([[fitted.sd_x**2, fitted.cov_xy], [fitted.cov_xy, fitted.sd_y**2]])
     away = np.array([fitted.x, fitted.y]) - position
-    beyond = max(float(away @ away - np.trace(own + covariance)) / 2, 0.0)
-    gain = covariance @ np.linalg.inv(covariance + own + beyond * np.eye(2))
-    return position + gain @ away, covariance - gain @ covariance
+    beyond = max(float(away @ away - np.trace(own + covariance)) / 2, 0.0) * np.eye(2)
+    learnt = covariance + beyond if several else covariance
+    gain = learnt @ np.linalg.inv(learnt + own + beyond)
+    return position + gain @ away, learnt - gain @ learnt
 
 
 def _at(detection: Detection, position: FloatArray, covariance: FloatArray) -> Detection:
