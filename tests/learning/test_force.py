@@ -1,6 +1,5 @@
 """Newtons from presses with known weights: synthetic touches of a law that is known."""
 
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -8,10 +7,7 @@ import pytest
 
 from tomoskin.core import DataError, Detection
 from tomoskin.learning import (
-    BENDS,
-    CLASSES,
     FORCE,
-    TOUCH,
     ForceModel,
     ForceProcess,
     WeighedPresses,
@@ -157,18 +153,6 @@ def test_the_calibration_of_another_skin_is_refused():
         calibration.check(skin.altered({"touch": {"method": other}}))
     with pytest.raises(DataError, match="to another sheet"):
         calibration.check(skin.altered({"material": {"sheet_resistance": "7 ohm/sq"}}))
-
-
-def test_beside_a_calibration_of_touch_no_touches_are_fitted():
-    skin = Skin.load("textile-disc-8")
-    model = ForceModel.fit(WeighedPresses.of(*presses(2, count=6)), skin)
-    calibration = FORCE.of(model, skin.pattern(), skin)
-    calibration.check(skin, [BENDS, CLASSES])
-    with pytest.raises(DataError, match="forces would be wrong") as raised:
-        calibration.check(skin, [BENDS, TOUCH])
-    assert "use one of the two" in str(raised.value)
-    in_image = FORCE.of(replace(model, method="image"), skin.pattern(), skin)
-    in_image.check(skin.altered({"touch": {"method": "image"}}), [TOUCH])
 
 
 def test_grams_are_not_newtons():

@@ -129,6 +129,10 @@ class Conditions(Protocol):
         """Whether detections are touches that were fitted to the data."""
         ...
 
+    def fitted_presses(self, dv: FloatArray) -> list[Detection | None] | None:
+        """What the fit finds in each frame (n, n_meas) V of one press; None where none is."""
+        ...
+
     def touch_fit(self) -> TouchFit | None:
         """The fit of touches beside the calibration; None where no reference is known."""
         ...

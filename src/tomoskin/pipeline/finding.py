@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol, Self
 
 import numpy as np
@@ -24,6 +24,9 @@ from tomoskin.sensing.fit import (
     measured_covariance,
 )
 from tomoskin.sensing.signal import Reference
+
+_PRESSES = replace(EXHAUSTIVE, joint=0, rounds=0)
+"""Of frames that hold one press each, which have nothing to do with each other."""
 
 
 class Finder(Protocol):
@@ -139,6 +142,14 @@ class InData:
         differences = view.differences
         return self._spots.push(differences.whole, differences.unknown, differences.jumps)
 
+    def strongest(self, dv: FloatArray) -> Detection | None:
+        """The strongest touch in difference data (n_meas,), NaN where a value is missing."""
+        lost = ~np.isfinite(dv)
+        if lost.all():
+            return None
+        found = self._spots.push(np.where(lost, 0.0, dv), np.eye(len(dv))[:, lost])
+        return found[0] if found else None
+
     @property
     def others(self) -> FloatArray:
         """See :class:`Finder`."""
@@ -210,6 +221,17 @@ class Fitting:
     prepared: Prepared
     reference: Reference | None
     fitted: bool
+
+    def fitted_presses(self, dv: FloatArray) -> list[Detection | None] | None:
+        """See :class:`tomoskin.learning.Conditions`."""
+        prepared, model, reference = self.prepared, self.prepared.spots, self.reference
+        if not self.fitted or model is None:
+            return None
+        mean = prepared.operator.reference if reference is None else reference.mean
+        is_plain = prepared.operator.difference == "plain"
+        data = dv if is_plain else dv / np.abs(mean)
+        finder = finished(InData.making(model, prepared, reference, _PRESSES))
+        return [finder.strongest(frame) for frame in data]
 
     def touch_fit(self) -> TouchFit | None:
         """See :class:`tomoskin.learning.Conditions`."""

@@ -24,6 +24,7 @@ from tomoskin.learning.kind import (
     Progress,
     located,
 )
+from tomoskin.learning.touch.correction import FitCorrection
 from tomoskin.learning.touch.health import CalibrationHealth
 from tomoskin.learning.touch.locator import Locator
 from tomoskin.learning.touch.lost_rows import LIVE
@@ -40,6 +41,9 @@ _ALL = 0.999
 _EVERY = 8
 """Of the frames in which a touch stands so many are one from which something is concluded."""
 
+_TRIED = 60
+"""Presses that a fit is tried on: each takes a millisecond."""
+
 _SAME_SHAPE = 1e-4
 """Outlines within so many metres of each other are one."""
 
@@ -52,8 +56,8 @@ class LocatedTouch(Applied):
     Measurements that have jumped since the presses are left out where frames do not fit with them.
     """
 
-    def __init__(self, locator: Locator, *, fitted: bool) -> None:
-        self._fitted = fitted
+    def __init__(self, locator: Locator, correction: FitCorrection | None) -> None:
+        self._correction = correction
         self._watch = Watch(locator, LIVE)
         self._standing = Standing()
         self._stood = 0
@@ -70,13 +74,14 @@ class LocatedTouch(Applied):
         if not np.isfinite(dv).any():
             return []
         mean = self._standing.push(dv)
-        if view.others is None:
+        correct = self._correction
+        if view.others is None or correct is None:
             (position,), (covariance,) = self._watch(mean, settled=self._settled())
             return [_at(detections[0], position, covariance)]
         settled = len(detections) == 1 and self._settled()
         answers = zip(*self._watch(mean - view.others, settled=settled), strict=True)
         return [
-            _at(detection, *_together(detection, *answer, several=len(detections) > 1))
+            _at(detection, *_together(correct(detection), answer, several=len(detections) > 1))
             for detection, answer in zip(detections, answers, strict=True)
         ]
 
@@ -91,24 +96,24 @@ class LocatedTouch(Applied):
     ) -> CalibrationHealth:
         """How the last touches fit the presses."""
         del view, detections, touched
-        return replace(self._watch.health, alone=not self._fitted)
+        return replace(self._watch.health, alone=self._correction is None)
 
 
 def _together(
-    fitted: Detection, position: FloatArray, covariance: FloatArray, *, several: bool
+    fitted: tuple[FloatArray, FloatArray], learnt: tuple[FloatArray, FloatArray], *, several: bool
 ) -> tuple[FloatArray, FloatArray]:
-    """What a fit and the presses, ``position`` (2,) m and ``covariance`` (2, 2) m², say together.
+    """What a fit and the presses, each a position (2,) m and a covariance (2, 2) m², say together.
 
     What they differ by beyond their covariances widens them (the moment estimator of DerSimonian
     and Laird 1986). Of one touch it is the fit's error: the presses were tried on labels. Of
     ``several`` it is both's: the presses see what the fit has left of the others.
     """
-    own = np.array([[fitted.sd_x**2, fitted.cov_xy], [fitted.cov_xy, fitted.sd_y**2]])
-    away = np.array([fitted.x, fitted.y]) - position
+    (here, own), (there, covariance) = fitted, learnt
+    away = here - there
     beyond = max(float(away @ away - np.trace(own + covariance)) / 2, 0.0) * np.eye(2)
-    learnt = covariance + beyond if several else covariance
-    gain = learnt @ np.linalg.inv(learnt + own + beyond)
-    return position + gain @ away, learnt - gain @ learnt
+    wider = covariance + beyond if several else covariance
+    gain = wider @ np.linalg.inv(wider + own + beyond)
+    return there + gain @ away, wider - gain @ wider
 
 
 def _at(detection: Detection, position: FloatArray, covariance: FloatArray) -> Detection:
@@ -161,7 +166,22 @@ def _exclude(_locator: Locator, _measurements: IntArray) -> None:
 
 
 def _apply(locator: Locator, conditions: Conditions) -> Applied:
-    return LocatedTouch(locator, fitted=conditions.fitted)
+    return LocatedTouch(locator, _correction(locator, conditions))
+
+
+def _correction(locator: Locator, conditions: Conditions) -> FitCorrection | None:
+    """Of the fit, by some of the presses; None where none is fitted."""
+    presses = locator.presses
+    some = np.unique(np.linspace(0, len(presses) - 1, _TRIED).round().astype(int))
+    fitted = conditions.fitted_presses(presses.dv[some])
+    if fitted is None:
+        return None
+    positions, variances = np.full((len(some), 2), np.nan), np.full(len(some), np.nan)
+    for k, found in enumerate(fitted):
+        if found is not None:
+            positions[k] = found.x, found.y
+            variances[k] = (found.sd_x**2 + found.sd_y**2) / 2
+    return FitCorrection.of(positions, variances, presses.xy[some])
 
 
 def _excluded(nuisance: FloatArray) -> NDArray[np.bool_]:
