@@ -94,6 +94,15 @@ def test_every_stage_is_told_to_pages_and_programs(site):
         assert [stage["name"] for stage in told] == STAGES
 
 
+def test_pages_and_programs_are_told_why_frames_were_slow(site):
+    with site.connect() as page:
+        while not (slowest := state(page)["slowest"]):
+            pass
+        assert " ms: " in slowest[0]["text"]
+        with site.client() as client:
+            assert json.loads(client.get("/status").text)["slowest"]
+
+
 def state(page):
     return first(page, "state")
 

@@ -90,6 +90,13 @@ export interface CalibrationHealth {
   readonly findings: readonly string[];
 }
 
+export interface SlowFrame {
+  readonly sequence: number;
+  readonly host_time_s: number;
+  /** How long it took, and for what, in words. */
+  readonly text: string;
+}
+
 export interface Status {
   readonly type: "state";
   readonly running: boolean;
@@ -102,6 +109,8 @@ export interface Status {
   readonly p99_ms: number | null;
   /** How long each stage takes, from the sample to the page. */
   readonly stages: readonly Stage[];
+  /** What the slowest frames took their time for, the slowest first. */
+  readonly slowest: readonly SlowFrame[];
   readonly reference: {
     readonly frames: number;
     readonly needed: number;

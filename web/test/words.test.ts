@@ -15,6 +15,7 @@ const status: Status = {
   p50_ms: 0.3,
   p99_ms: 0.8,
   stages: [],
+  slowest: [],
   reference: { frames: 20, needed: 20, age_s: 75, ready: true },
   baseline: null,
   sick: [],

@@ -7,6 +7,7 @@ import math
 import signal
 import threading
 from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -40,6 +41,9 @@ def record(
     ] = None,
     frames: Annotated[int | None, typer.Option(min=1, help="Number of frames to record.")] = None,
     sink: SinkOption = None,
+    slow: Annotated[
+        int, typer.Option(min=0, help="Say of so many of the slowest frames why they were slow.")
+    ] = 0,
     json: JsonFlag = False,
 ) -> None:
     """Run source and pipeline into a session file until there is enough."""
@@ -69,8 +73,11 @@ def record(
     size = file.stat().st_size
     document = {"file": str(file), "bytes": size, "frames": status.frames, "lost": status.gaps,
                 "dropped": status.dropped, "corrupt": status.corrupt}  # fmt: skip
-    line = f"{file}: {status.frames} frames, {size / 1e6:.1f} MB, {status.gaps} lost"
-    tell(document, [line], json=json)
+    lines = [f"{file}: {status.frames} frames, {size / 1e6:.1f} MB, {status.gaps} lost"]
+    if slow:
+        document["slowest"] = [asdict(cost) for cost in status.slowest[:slow]]
+        lines += [f"frame {cost.sequence:>6}  {cost.text}" for cost in status.slowest[:slow]]
+    tell(document, lines, json=json)
 
 
 @contextlib.contextmanager

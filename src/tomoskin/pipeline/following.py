@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tomoskin.core import Detection, FloatArray, Image, ModelError, Touch
+from tomoskin.core import Detection, FloatArray, Image, ModelError, Touch, reach
 from tomoskin.learning import Differences, FrameView
 from tomoskin.model.pattern import Scan
 from tomoskin.pipeline.collecting import Rest
@@ -150,6 +150,7 @@ class Following:
         """Take one frame."""
         self._tune()
         self._refind()
+        reach("voltages")
         conditioned = self._conditioning.condition(measured)
         if conditioned.differences is None:
             return self._without_touches(measured, conditioned)
@@ -159,20 +160,26 @@ class Following:
             problem = f"no touch can be found in this frame: {error}"
             failed = replace(conditioned, differences=None, problem=problem)
             return self._without_touches(measured, failed)
+        reach("tracking")
         touches = self._tracker.update(detections, measured.time, measured.host_time)
+        reach("calibrations")
         readings = self._read(view, detections, touched=bool(touches))
         untouched = not (detections or self._finder.like_touch)
         held = bool(touches) or self._finder.rises
+        reach("baseline")
         self._learn(measured.time, touched=held, noise=untouched)
         return self._result(measured, conditioned, image, touches, readings)
 
     def _found(
         self, time: float, differences: Differences
     ) -> tuple[Image, FrameView, list[Detection]]:
+        reach("image")
         image, noise = self._imaging.push(differences.dv, time)
         view = FrameView(time, image, noise, differences)
+        reach("touches")
         detections = self._finder.push(view)
         if self._applied:
+            reach("calibrations")
             view = replace(view, others=self._finder.others)
         for applied in self._applied.values():
             detections = applied.locate(view, detections)
@@ -220,6 +227,7 @@ class Following:
                 return
             conditioning, self._is_outdated = self._conditioning, False
             self._finding = self._finder.renewing(conditioning.prepared, conditioning.reference)
+        reach("new noise")
         try:
             next(self._finding)
         except StopIteration as end:
@@ -229,6 +237,7 @@ class Following:
         """One step towards what the reference says; what there is serves meanwhile."""
         if self._tuning is None or self._finding is not None:
             return
+        reach("tuning")
         try:
             better = next(self._tuning)
         except StopIteration:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tomoskin.core import Frame
+from tomoskin.core import Frame, reach
 from tomoskin.imaging import AlphaChoice
 from tomoskin.pipeline.collecting import Collecting
 from tomoskin.pipeline.following import Following, Setting
@@ -146,6 +146,7 @@ class Pipeline:
         given = self._given
         rest = state.push(measured)
         if rest is not None:
+            reach("reference")
             self._state = Following.from_rest(given, rest, self._tracker, self._setting)
             return self._state.first(measured)
         return FrameResult.at_rest(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ from tomoskin.files.session import BoardInfo, Mark, MarkedFrame, RawRead, Truth,
 from tomoskin.pipeline import FrameResult, Pipeline, Prepared, ReferenceState
 from tomoskin.run.backlog import Backlog
 from tomoskin.run.counters import Latency, Losses
+from tomoskin.run.frame_cost import CostMeter
 from tomoskin.run.marker import Marker, replay_status
 from tomoskin.run.publisher import Audience, Publisher
 from tomoskin.run.recall import Recall
@@ -48,9 +50,10 @@ class Flow:
         Source and skin in words, once it has been opened.
     board
         What the board said of itself, once it has.
-    pipeline, marker, twin, out, latency
-        What makes results, what marks frames, what presses the source, where messages go, and how
-        long all that takes.
+    pipeline, marker, twin, out
+        What makes results, what marks frames, what presses the source, and where messages go.
+    latency, costs
+        How long all that takes, and what the slowest frames took it for.
     """
 
     def __init__(self, prepared: Prepared, audience: Audience) -> None:
@@ -61,7 +64,7 @@ class Flow:
         self.board_name = ""
         self.pipeline, self.marker, self.twin = Pipeline(prepared), Marker(), TwinControl()
         self.out = Publisher(prepared, audience, lambda: self.pipeline.numbered)
-        self.latency = Latency()
+        self.latency, self.costs = Latency(), CostMeter(time.perf_counter)
         self._clock, self._turns = audience.clock, audience.turns
         self._recall, self._backlog = Recall(audience.memory), Backlog()
         self._settings = ScanSettings.of(prepared.skin)
@@ -163,6 +166,7 @@ class Flow:
             p50=p50,
             p99=p99,
             stages=self.latency.stages(),
+            slowest=self.costs.slowest,
             reference=reference,
             reference_age=None if reference.since is None else here - reference.since,
             choice=self.pipeline.choice,
@@ -227,7 +231,8 @@ class Flow:
         self.latency.add_frame(frame, read, self.pipeline.tick_rate)
         self.latency.add("decode", begun - read + self._waited)
         try:
-            result = advance(self.pipeline, frame, mark)
+            with self.costs.of(frame):
+                result = advance(self.pipeline, frame, mark)
         except DataError as error:
             self._skipped += 1
             self.out.say("refused", f"a frame was left out: {error}")

@@ -11,6 +11,7 @@ from tomoskin.imaging import AlphaChoice
 from tomoskin.learning import BendReading, CalibrationHealth, ClassReading
 from tomoskin.pipeline import ReferenceState
 from tomoskin.run.counters import StageLatency
+from tomoskin.run.frame_cost import FrameCost
 from tomoskin.run.sinks import SinkReport
 from tomoskin.sensing.signal import ElectrodeHealth
 
@@ -52,6 +53,8 @@ class Status:
         Latency from a frame's last byte to its touches over the last frames, s; NaN at first.
     stages
         How long each stage takes, from the sample to the page.
+    slowest
+        What the slowest frames took their time for, the slowest first.
     reference
         How far the reference is.
     reference_age
@@ -98,6 +101,7 @@ class Status:
     left_out: int
     problem: str | None
     stages: tuple[StageLatency, ...] = ()
+    slowest: tuple[FrameCost, ...] = ()
     recording: Path | None = None
     sinks: tuple[SinkReport, ...] = ()
     electrodes: tuple[ElectrodeHealth, ...] = ()

@@ -27,6 +27,9 @@ PROBE_FORCE = 3.0
 
 _OUTLINE_POINTS = 240
 
+_SLOWEST = 10
+"""Of the slowest frames, those that a page is told."""
+
 
 def scene(prepared: Prepared, source: str, *, limit: float, pressable: bool) -> str:
     """Everything about the skin that does not change from frame to frame.
@@ -80,6 +83,7 @@ def state(status: Status) -> str:
         p50_ms=finite(1e3 * status.p50),
         p99_ms=finite(1e3 * status.p99),
         stages=stages(status),
+        slowest=slowest(status),
         reference={
             "frames": reference.frames,
             "needed": reference.needed,
@@ -110,6 +114,14 @@ def stages(status: Status) -> list[dict[str, Any]]:
             "p99_ms": finite(1e3 * stage.p99),
         }
         for stage in status.stages
+    ]
+
+
+def slowest(status: Status) -> list[dict[str, Any]]:
+    """What the slowest frames took their time for."""
+    return [
+        {"sequence": cost.sequence, "host_time_s": cost.host_time, "text": cost.text}
+        for cost in status.slowest[:_SLOWEST]
     ]
 
 

@@ -1,4 +1,4 @@
-/** Where the age of an image comes from: a table of stages, from the sample to the page. */
+/** Where the age of an image comes from: a table of stages, and the frames that took longest. */
 
 import { fixed } from "../format";
 import { status } from "../state";
@@ -14,6 +14,31 @@ const MEANINGS: Readonly<Record<string, string>> = {
 const milli = (value: number | null): string => (value === null ? "–" : fixed(value, 2));
 
 export function Budget() {
+  return (
+    <>
+      <Stages />
+      <Slowest />
+    </>
+  );
+}
+
+function Slowest() {
+  const slowest = status.value?.slowest ?? [];
+  return slowest.length === 0 ? null : (
+    <details class="budget" data-testid="slowest">
+      <summary>The slowest frames, and why</summary>
+      <ol>
+        {slowest.map(({ sequence, host_time_s, text }) => (
+          <li key={host_time_s}>
+            frame {sequence}: {text}
+          </li>
+        ))}
+      </ol>
+    </details>
+  );
+}
+
+function Stages() {
   return (
     <table class="budget" data-testid="budget">
       <caption class="unseen">Time of each stage, ms</caption>

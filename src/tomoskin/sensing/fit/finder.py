@@ -12,7 +12,7 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from tomoskin.core import Detection, FloatArray, SkinError, finished
+from tomoskin.core import Detection, FloatArray, SkinError, finished, reach
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.skin import Skin
@@ -346,6 +346,7 @@ class SpotFinder:
 
     def _explained(self, matched: Matched, problem: Problem) -> Explained:
         """Touches of the frame of ``problem``, and one more that frames may speak for."""
+        reach("touches")
         sign = self.watch.sign(problem, matched)
         if sign != problem.sign:
             problem = replace(problem, sign=sign)
@@ -359,8 +360,10 @@ class SpotFinder:
                 detected = pressed
         rival: Rival | None = None
         if self._reach and sign != "both":
+            reach("one touch more")
             detected, rival = challenged(selection, detected, self._rival, self._going_on)
         if self.watch.puzzled(problem, detected.fit):
+            reach("both signs")
             both = self._anew(selection, len(detected.fit.spots) + 1)
             if self.watch.turns(both, detected.fit) and problem.favours(both.fit, detected.fit):
                 detected = both

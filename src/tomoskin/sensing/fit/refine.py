@@ -10,7 +10,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from tomoskin.core import FloatArray, finished
+from tomoskin.core import FloatArray, finished, reach
 from tomoskin.sensing.fit.certificate import Reduced
 from tomoskin.sensing.fit.expectation import Expectation, Known
 from tomoskin.sensing.fit.noise import Whitener
@@ -431,6 +431,7 @@ class Problem:
             return fit
         if len(fit.spots) == 1 and np.linalg.norm(fit.each) < _CERTAIN:
             return fit
+        reach("exact model")
         allowed = max(_EXACT, tolerance * math.sqrt(len(self.seen.full)))
         for _ in range(rounds):
             deficit = (self._reduced(fit, allowed) if tolerance else None) or self._exact(fit)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import FloatArray
+from tomoskin.core import FloatArray, reach
 from tomoskin.sensing.fit.refine import Fit
 from tomoskin.sensing.fit.selection import ForwardSelection
 from tomoskin.sensing.fit.spot import CONTENT, LOG_RADIUS, N_PARAMETERS
@@ -75,6 +75,7 @@ def judged(selection: ForwardSelection, fit: Fit) -> SpotDetections:
     if not len(fit.spots):
         none = np.zeros(0)
         return SpotDetections(fit, none, none, np.zeros((0, 0)), none.astype(bool))
+    reach("covariances")
     problem = selection.problem
     squares, covariance = problem.solver.judged(problem, fit, _UNEVEN)
     ratio = np.sqrt(squares)
