@@ -311,7 +311,7 @@ class SpotTable:
         candidates: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
         limits: tuple[float, float, float, float, float],
         pace: tuple[int, int, int, int, int, int, bool],
-        rules: tuple[float, float, float, float, float, float, float],
+        rules: tuple[float, float, float, float, float, float, float, float, float],
     ) -> tuple[Fitted, bool, list[NDArray[np.float64]] | None, Fitted | None]:
         """Find the touches of a frame; the last one's were ``spots`` (k, 4).
 

@@ -158,7 +158,7 @@ impl SpotTable {
         candidates: (Any<'py>, Any<'py>, Any<'py>),
         limits: [f64; 5],
         pace: (usize, usize, usize, usize, usize, usize, bool),
-        rules: [f64; 7],
+        rules: [f64; 9],
     ) -> PyResult<Searched<'py>> {
         let (py, spots) = (frame.0.py(), spots_of(spots)?);
         let arrays = Arrays::of(self, seen, &frame)?;
@@ -179,7 +179,7 @@ impl SpotTable {
         };
         let left = Metric::of(left).ok_or_else(|| invalid("left: expected finite directions"))?;
         let (warm, glance, cold, finalists, tries, most, restart) = pace;
-        let [least, held, look, sure, rare, misshapen, volume] = rules;
+        let [least, held, look, sure, rare, misshapen, within, near, volume] = rules;
         let search = Search {
             frames: [frame, bare],
             left: &left,
@@ -202,6 +202,8 @@ impl SpotTable {
                 sure,
                 rare,
                 misshapen,
+                within,
+                near,
                 volume,
             },
         };

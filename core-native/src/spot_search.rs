@@ -43,6 +43,10 @@ pub struct Rules {
     pub rare: f64,
     /// Part of what touches change that a wrong profile may leave.
     pub misshapen: f64,
+    /// Radii within which there is no room for another touch.
+    pub within: f64,
+    /// Radii within which a touch may stand for what the profile of another one does not say.
+    pub near: f64,
     /// Logarithm of the volume of a spot's prior.
     pub volume: f64,
 }
@@ -200,7 +204,7 @@ impl Search<'_> {
             let more = self.best(&starts(fit, fresh), found.bare)?;
             let worth = self.weakest(&more.fit)?.1 >= self.threshold(fit, 1.0);
             let gain = self.evidence(&more.fit) - self.evidence(fit);
-            if !worth || gain <= self.rules.rare {
+            if !worth || gain <= self.rules.rare + self.against(fit, &more.fit) {
                 found.turned_down = Some(more.fit);
                 return Some((found, tried + 1, changed));
             }
@@ -240,9 +244,34 @@ impl Search<'_> {
 
     /// What a wrong profile may leave adds to the noise.
     fn threshold(&self, fit: &Fit, part: f64) -> f64 {
+        part * self.rules.least * 1.0_f64.hypot(self.misshapen(fit) / self.rules.least)
+    }
+
+    /// Deviations that a wrong profile of the spots of a fit may leave.
+    fn misshapen(&self, fit: &Fit) -> f64 {
         let square: f64 = fit.predicted.iter().map(|value| value * value).sum();
-        let misshapen = self.rules.misshapen * square.sqrt();
-        part * self.rules.least * 1.0_f64.hypot(misshapen / self.rules.least)
+        self.rules.misshapen * square.sqrt()
+    }
+
+    /// Logarithm of the odds that a wrong profile of what was found may give to a fit with one
+    /// spot more: infinite where two are at one place.
+    fn against(&self, found: &Fit, more: &Fit) -> f64 {
+        let mut least = f64::INFINITY;
+        for (i, one) in more.spots.iter().enumerate() {
+            for (j, other) in more.spots.iter().enumerate() {
+                if i != j {
+                    let apart = (one[0] - other[0]).hypot(one[1] - other[1]);
+                    least = least.min(apart / one[2].exp());
+                }
+            }
+        }
+        if least < self.rules.within {
+            f64::INFINITY
+        } else if least < self.rules.near {
+            self.misshapen(found).powi(2) / 2.0
+        } else {
+            0.0
+        }
     }
 
     /// Logarithm of the evidence, by Laplace's method.

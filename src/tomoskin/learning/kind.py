@@ -57,6 +57,9 @@ class Differences:
         (n_meas, k) directions along which these carry no information.
     jumps
         (n_meas, j) common modes, each as long as the deviation of what it may jump by.
+    wander
+        Deviation of what the first of them may have moved by since the baseline was followed, as a
+        part of that.
     change
         (n_meas,) V by which the frame differs from the baseline, with all that is in it.
     drift
@@ -72,6 +75,7 @@ class Differences:
     whole: FloatArray
     unknown: FloatArray
     jumps: FloatArray
+    wander: float
     change: FloatArray
     drift: FloatArray
     from_rest: FloatArray

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tomoskin.core import FloatArray, IntArray
 from tomoskin.learning import Differences
 from tomoskin.model.pattern import Scan
-from tomoskin.pipeline.nuisance import Drift, Nuisance
+from tomoskin.pipeline.nuisance import JUMP, Drift, Nuisance
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.pipeline.records import Measured
 from tomoskin.sensing.signal import (
@@ -249,6 +249,7 @@ class Followed:
             whole=whole,
             unknown=subspace.unknown,
             jumps=subspace.jumps,
+            wander=baseline.common_deviation / JUMP,
             change=values - mean,
             drift=subspace.drift,
             from_rest=measured.values - baseline.start,
@@ -328,6 +329,7 @@ class GivenDifferences:
             whole=dv,
             unknown=unknown,
             jumps=none,
+            wander=0.0,
             change=change,
             drift=none,
             from_rest=change,

@@ -140,7 +140,9 @@ class InData:
     def push(self, view: FrameView) -> list[Detection]:
         """See :class:`Finder`."""
         differences = view.differences
-        return self._spots.push(differences.whole, differences.unknown, differences.jumps)
+        return self._spots.push(
+            differences.whole, differences.unknown, differences.jumps, differences.wander
+        )
 
     def strongest(self, dv: FloatArray) -> Detection | None:
         """The strongest touch in difference data (n_meas,), NaN where a value is missing."""

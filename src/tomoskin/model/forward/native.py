@@ -20,7 +20,7 @@ from tomoskin.model.forward.engine import (
 )
 from tomoskin.model.pattern import Pattern
 
-INTERFACE = 5
+INTERFACE = 6
 """The interface of tomoskin_core that is called here and in ``touch``; raised with its own."""
 
 

@@ -31,6 +31,9 @@ _LEAVES = 5.0
 _USUAL = 3.0
 """Deviations along a jump within which the common mode is where it is expected."""
 
+_FAINT = 0.3
+"""Deviations of the noise below which it does not matter where the common mode has moved."""
+
 _STEPS = 4
 """Towards touches as they would be, were the common mode unknown."""
 
@@ -45,14 +48,35 @@ class Jumps:
     ----------
     rows
         (j, c), each as long as the deviation of the jump.
+    left
+        (k, c) residual responses, each as long as its deviation: what they may be is no jump.
     """
 
     rows: FloatArray
+    left: FloatArray
+
+    def beside(self, left: FloatArray) -> Jumps:
+        """The same where these residual responses (k, c) are. The last is kept: they stay, as a
+        rule."""
+        kept = self._kept
+        if not kept or kept[0].left is not left:
+            kept[:] = [replace(self, left=left)]
+        return kept[0]
+
+    def wandered(self, part: float) -> FloatArray:
+        """(k, c): what data are changed by where the first has moved by so many of its deviations;
+        none where that is far below the noise. In steps, so that it is the same for some time."""
+        shows = len(self.rows) and part * self._size > _FAINT
+        step = math.ceil(2 * math.log2(part)) if shows else None
+        if step not in self._walked:
+            size = 0.0 if step is None else math.sqrt(2.0**step)
+            self._walked[step] = size * self.rows[: step is not None]
+        return self._walked[step]
 
     def along(self, residual: FloatArray) -> tuple[float, float]:
         """Deviations of the noise that a residual (c,) has along the jumps, with the sign of the
         first; and what that is in deviations of the first jump."""
-        onto = self.rows @ residual
+        onto = self._weighed @ residual
         parts = self._inverse @ onto
         size = float(parts[0])
         return math.copysign(math.sqrt(max(float(onto @ parts), 0.0)), size), size
@@ -63,13 +87,38 @@ class Jumps:
 
     def louder(self, times: float) -> Jumps:
         """The same in so many times the noise's variance."""
-        return Jumps(self.rows / math.sqrt(times))
+        return Jumps(self.rows / math.sqrt(times), self.left)
+
+    @cached_property
+    def _responses(self) -> FloatArray:
+        """(k, c) from a residual to the likeliest sizes of the residual responses."""
+        inner = np.eye(len(self.left)) + self.left @ self.left.T
+        return np.asarray(np.linalg.solve(inner, self.left))
+
+    @cached_property
+    def _size(self) -> float:
+        return float(np.linalg.norm(self.rows[0]))
+
+    @cached_property
+    def _walked(self) -> dict[int | None, FloatArray]:
+        """What :meth:`wandered` has said, by steps of the root of two."""
+        return {}
+
+    @cached_property
+    def _kept(self) -> list[Jumps]:
+        """The last of :meth:`beside`."""
+        return []
+
+    @cached_property
+    def _weighed(self) -> FloatArray:
+        """(j, c) rows by the inverse of the covariance that the residual responses make."""
+        return self.rows - (self.rows @ self._responses.T) @ self.left
 
     @cached_property
     def _inverse(self) -> FloatArray:
         """(j, j) covariance of the jumps in one frame: with their own, so where no row shows one it
         is 0."""
-        return np.asarray(np.linalg.inv(self.rows @ self.rows.T + np.eye(len(self.rows))))
+        return np.asarray(np.linalg.inv(self._weighed @ self.rows.T + np.eye(len(self.rows))))
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,6 +154,7 @@ class CommonModeJump:
         """
         if not len(jumps.rows):
             return explain(usual), self
+        jumps = jumps.beside(usual.left)
         if self.jumped:
             explained = explain(jumps.free(usual))
             return explained, self._after_jump(jumps, explained[0].fit)

@@ -260,6 +260,8 @@ class SpotFinder:
         self._noise = noise / self._scale[:, None] / self._scale
         self._nuisance = self._jumps = np.zeros((len(noise), 0))
         self._matched: OrderedDict[bytes, Seen] = OrderedDict()
+        self._wander = 0.0
+        self._newest_slow: tuple[tuple[FloatArray, ...], FloatArray] | None = None
         self._newest_seen: tuple[tuple[object, ...], Seen] | None = None
 
     def renewing(self, noise: FloatArray, gain: float = 1.0) -> Generator[None, None, None]:
@@ -288,16 +290,22 @@ class SpotFinder:
         return self._jump.size if self._jump.jumped else None
 
     def push(
-        self, dv: FloatArray, nuisance: FloatArray, jumps: FloatArray | None = None
+        self,
+        dv: FloatArray,
+        nuisance: FloatArray,
+        jumps: FloatArray | None = None,
+        wander: float = 0.0,
     ) -> list[Detection]:
         """Touches of ``dv`` (n_meas,), strongest first.
 
         ``nuisance`` (n_meas, k) spans the directions along which the data tell nothing of a
         touch: a unit vector for each excluded row. There must be more rows than that. Along each of
-        ``jumps`` (n_meas, j) the data may have jumped, by so much as a standard deviation.
+        ``jumps`` (n_meas, j) the data may have jumped, by so much as a standard deviation; along
+        the first they have moved by ``wander`` deviations of that, one standard deviation.
         """
         self._nuisance = nuisance
         self._jumps = np.zeros((len(dv), 0)) if jumps is None else jumps
+        self._wander = wander
         data = dv / self._scale
         self.watch.begin(data, self._seen().gauge)
         (detected, rival), jump, matched = self._searched(data)
@@ -338,11 +346,20 @@ class SpotFinder:
             grows=self._unrest * _GROWS,
             data=whitened,
             rest=rest,
-            left=self._left.rows,
+            left=self._slow(jumps),
             expected=self._expected,
         )
         explain = partial(self._explained, matched)
         return *self._jump.decided(problem, jumps, self._settings.snr, explain), matched
+
+    def _slow(self, jumps: Jumps) -> FloatArray:
+        """(k, c) what stays from frame to frame and is no touch: residual responses, and how far
+        the common mode has wandered."""
+        now = self._left.rows, jumps.wandered(self._wander)
+        newest = self._newest_slow
+        if newest is None or not all(map(is_, now, newest[0])):
+            newest = self._newest_slow = now, np.concatenate(now)
+        return newest[1]
 
     def _explained(self, matched: Matched, problem: Problem) -> Explained:
         """Touches of the frame of ``problem``, and one more that frames may speak for."""
@@ -431,7 +448,8 @@ class SpotFinder:
         gauge = yield from Gauge.making(channels, noise, np.hstack([nuisance, jumps]))
         yield
         matched, _ = model.candidates.matched(seen), seen.kept
-        return Seen(seen, matched, gauge, Jumps((seen.matrix @ jumps).T))
+        rows = (seen.matrix @ jumps).T
+        return Seen(seen, matched, gauge, Jumps(rows, np.zeros((0, rows.shape[1]))))
 
     def _detections(self, detected: SpotDetections) -> list[Detection]:
         """Strongest first."""

@@ -82,7 +82,7 @@ class NativeSolver:
             ),
             (
                 *(rules.least, rules.held, pace.look, rules.sure, pace.rare),
-                *(rules.misshapen, self._prior.log_volume),
+                *(rules.misshapen, rules.within, rules.near, self._prior.log_volume),
             ),
         )
         rank = len(self.table.basis)

@@ -21,6 +21,10 @@ HELD = 0.6
 MISSHAPEN = 0.04
 """A wrong profile leaves up to this part of what a touch changes: no evidence of another one."""
 
+WITHIN, NEAR = 0.5, 1.5
+"""Radii of a touch within which there is no room for another one, since together they are one of
+another profile; and within which one may stand for what the profile does not say."""
+
 _WIDE = 1.2
 """Deviations of the prior by which a spot is so wide that it may be two."""
 
@@ -125,6 +129,17 @@ class Openings:
 def misshapen(fit: Fit) -> float:
     """Deviations that a wrong profile of the spots of a fit may leave."""
     return MISSHAPEN * float(np.linalg.norm(fit.predicted))
+
+
+def against(found: Fit, more: Fit) -> float:
+    """Logarithm of the odds that a wrong profile of what was ``found`` may give to a fit with one
+    spot more: infinite where two are at one place."""
+    apart = np.linalg.norm(more.spots[:, None, :2] - more.spots[:, :2], axis=2)
+    apart[np.diag_indices_from(apart)] = np.inf
+    least = float((apart / np.exp(more.spots[:, LOG_RADIUS])).min())
+    if least < WITHIN:
+        return np.inf
+    return misshapen(found) ** 2 / 2 if least < NEAR else 0.0
 
 
 def _starts(fit: Fit, fresh: FloatArray) -> list[Start]:

@@ -350,12 +350,17 @@ class Rules:
         Times that ratio from which no frame is explained better without the touch.
     misshapen
         Part of what touches change that a wrong profile may leave: no evidence of another one.
+    within, near
+        Radii within which there is no room for another one, and within which one may stand for
+        what the profile does not say.
     """
 
     least: float
     held: float
     sure: float
     misshapen: float
+    within: float
+    near: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)

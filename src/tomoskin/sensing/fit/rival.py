@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from tomoskin.sensing.fit.expectation import Expectation, newcomers
-from tomoskin.sensing.fit.openings import HELD, misshapen
+from tomoskin.sensing.fit.openings import HELD, against, misshapen
 from tomoskin.sensing.fit.refine import Fit
 from tomoskin.sensing.fit.search import SpotDetections, judged
 from tomoskin.sensing.fit.selection import ForwardSelection
@@ -52,16 +52,17 @@ def challenged(
     """What explains a frame, if not what was ``found`` in it; and the rival in the next one.
 
     A rival wins as soon as the frames speak for it, where each of its touches stands out as one
-    that stays does. A wrong profile says the same in every frame, so it is no evidence.
+    that stays does, at a place of its own. What a wrong profile of those that were found may leave
+    is no evidence: it would say the same in every frame.
     """
     if rival is not None and _is_beside(rival, found.fit):
         fit, gain = _followed(selection, found.fit, rival, going_on)
-        odds = rival.odds + gain
+        odds = rival.odds + gain - against(found.fit, fit)
     else:
         proposed, gain = _proposed(selection, found.fit)
         if proposed is None or gain < _BORN:
             return found, None
-        fit, odds = proposed, gain - selection.pace.rare
+        fit, odds = proposed, gain - against(found.fit, proposed) - selection.pace.rare
     if odds < _DROPPED:
         return found, None
     fit = replace(fit, known=newcomers(len(fit.spots)))  # of what was found

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, reach
+from tomoskin.sensing.fit.openings import against
 from tomoskin.sensing.fit.refine import Fit
 from tomoskin.sensing.fit.selection import ForwardSelection
 from tomoskin.sensing.fit.spot import CONTENT, LOG_RADIUS, N_PARAMETERS
@@ -67,7 +68,7 @@ def _confirmed(selection: ForwardSelection, fit: Fit, before: FloatArray) -> Fit
     other = problem.corrected(fewer, pace.closing, pace.near, pace.tolerance)
     worth = selection.ratios(exact).min() >= selection.openings.threshold(other, 1.0)
     gain = problem.evidence(exact) - problem.evidence(other)
-    return exact if worth and gain > pace.rare else other
+    return exact if worth and gain > pace.rare + against(other, exact) else other
 
 
 def judged(selection: ForwardSelection, fit: Fit) -> SpotDetections:

@@ -10,7 +10,17 @@ import numpy as np
 from tomoskin.core import FloatArray
 from tomoskin.sensing.fit.candidates import Matched, limits_of
 from tomoskin.sensing.fit.expectation import Known, less
-from tomoskin.sensing.fit.openings import HELD, MISSHAPEN, Beside, Openings, Start, misshapen
+from tomoskin.sensing.fit.openings import (
+    HELD,
+    MISSHAPEN,
+    NEAR,
+    WITHIN,
+    Beside,
+    Openings,
+    Start,
+    against,
+    misshapen,
+)
 from tomoskin.sensing.fit.pace import Pace
 from tomoskin.sensing.fit.refine import Deficit, Fit, Problem, Question, Rules
 
@@ -61,7 +71,7 @@ class ForwardSelection:
         """The same for a solver that searches in one call."""
         matched = self.matched
         candidates = matched.spots, matched.signatures, matched.squares
-        rules = Rules(self.least, HELD, _SURE, MISSHAPEN)
+        rules = Rules(self.least, HELD, _SURE, MISSHAPEN, WITHIN, NEAR)
         limits = limits_of(self.problem.sign)
         return Question(self.problem, candidates, limits, rules, self.pace, self.most, self.deficit)
 
@@ -129,7 +139,9 @@ class ForwardSelection:
             least = self.openings.threshold(fit, _FAINT if open_ else 1.0)
             worth = self.ratios(more).min() >= least
             gain = self.problem.evidence(more) - self.problem.evidence(best)
-            odds = _FURTHER + misshapen(fit) ** 2 / 2 if open_ else self.pace.rare
+            odds = self.pace.rare + against(fit, more)
+            if open_:
+                odds = _FURTHER + misshapen(fit) ** 2 / 2
             if worth and gain > odds:
                 best = more
             elif not open_ or gain < -_DETOUR:

@@ -173,10 +173,10 @@ class Baseline:
         if touched:
             self._held += step
             self._linger, self._fading = _LINGER, _FADING
-            return self._interrupted()
+            return self._interrupted(step)
         if self._linger > 0:
             self._linger -= step
-            return self._interrupted()
+            return self._interrupted(step)
         self._held = 0.0
         self._followed += step
         self._waiting.append((values, lost, time, step, noise))
@@ -216,12 +216,17 @@ class Baseline:
         self.mean = self.mean + moved + gain * np.clip(apart, -most, most)
         self._variance = (1.0 - gain) * self._variance
 
-    def _interrupted(self) -> bool:
+    @property
+    def common_deviation(self) -> float:
+        """By what part all voltages together may have moved since they were followed."""
+        return self._common.deviation if self._common is not None and self._follows else 0.0
+
+    def _interrupted(self, step: float) -> bool:
         self._waiting.clear()
         self._deviations.clear()
         self.idle.interrupt()
         if self._common is not None:
-            self._common.interrupt()
+            self._common.interrupt(step)
         return False
 
     @property

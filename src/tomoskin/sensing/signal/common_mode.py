@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from tomoskin.core import FloatArray
@@ -16,6 +18,10 @@ _STANDS = 8
 
 _SLOWEST = 5.0
 """Time constant with which it is followed where no drift has been seen, s."""
+
+_WALKS, _WORTH = 3e-4, 2
+"""Part of itself by which the level walks in the root of a second under a touch, before touches
+have told; and so many touches that this is worth."""
 
 _NOBODY = np.zeros(1, bool)
 
@@ -35,6 +41,7 @@ class CommonMode:
         deviation = 1 / float(np.linalg.norm(mean / noise))
         self._idle = Idle(np.array([deviation]), frames, _SLOWEST)
         self._level, self._variance = 1.0, deviation**2 / frames
+        self._held, self._walks = 0.0, [_WORTH * _WALKS**2, float(_WORTH)]
         self._apart: list[float] = []
         self._mean = mean
         self._weights: tuple[FloatArray, Mask | None, FloatArray] = noise, None, mean
@@ -55,6 +62,8 @@ class CommonMode:
         self._idle.push(np.array([self._level * (1 + part)]), time, _NOBODY)
         noise = float(self._idle.noise[0]) ** 2
         self._variance += float(self._idle.drift[0]) * step
+        if self._held:
+            self._walked(part**2 - self._variance - noise)
         total = self._variance + noise
         if part**2 > _CUT**2 * total:
             return self._moved(self._jumped(part, noise))
@@ -63,8 +72,27 @@ class CommonMode:
         self._variance *= 1 - gain
         return self._moved(gain * part)
 
-    def interrupt(self) -> None:
-        """Something touches."""
+    @property
+    def deviation(self) -> float:
+        """What the level may have walked by since it was followed, as a part of it."""
+        return math.sqrt(self._variance + self._walk * self._held)
+
+    @property
+    def _walk(self) -> float:
+        """1/s, variance of the level under a touch."""
+        total, count = self._walks
+        return total / count
+
+    def _walked(self, square: float) -> None:
+        """Take by how much beyond the noise, squared, the level is elsewhere after a touch."""
+        total, count = self._walks
+        self._walks = [total + max(square, 0.0) / self._held, count + 1]
+        self._variance += self._walk * self._held
+        self._held = 0.0
+
+    def interrupt(self, step: float) -> None:
+        """Something touches, for a further ``step`` s."""
+        self._held += step
         self._apart.clear()
         self._idle.interrupt()
 
