@@ -57,9 +57,6 @@ class Differences:
         (n_meas, k) directions along which these carry no information.
     jumps
         (n_meas, j) common modes, each as long as the deviation of what it may jump by.
-    wander
-        Deviation of what the first of them may have moved by since the baseline was followed, as a
-        part of that.
     change
         (n_meas,) V by which the frame differs from the baseline, with all that is in it.
     drift
@@ -68,6 +65,9 @@ class Differences:
         (n_meas,) V by which it differs from the reference as that was taken.
     excluded
         (n_meas,) bool: measurements that do not count.
+    wander
+        Deviation of what the first common mode may have moved by since the baseline was followed,
+        as a part of its jump.
     """
 
     dv: FloatArray
@@ -75,11 +75,11 @@ class Differences:
     whole: FloatArray
     unknown: FloatArray
     jumps: FloatArray
-    wander: float
     change: FloatArray
     drift: FloatArray
     from_rest: FloatArray
     excluded: BoolArray
+    wander: float = 0.0
 
     @property
     def since_reference(self) -> FloatArray:

@@ -14,9 +14,7 @@ from tomoskin.sensing.fit.joint_starts import JointStarts
 from tomoskin.sensing.fit.pace import Pace
 from tomoskin.sensing.fit.refine import Fit, Problem
 from tomoskin.sensing.fit.spot import CONTENT, LOG_RADIUS
-
-HELD = 0.6
-"""Part of the ratio at which a touch begins above which one that is there stays."""
+from tomoskin.sensing.track import HELD
 
 MISSHAPEN = 0.04
 """A wrong profile leaves up to this part of what a touch changes: no evidence of another one."""

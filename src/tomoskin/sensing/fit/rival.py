@@ -11,10 +11,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from tomoskin.sensing.fit.expectation import Expectation, newcomers
-from tomoskin.sensing.fit.openings import HELD, against, misshapen
+from tomoskin.sensing.fit.openings import against, misshapen
 from tomoskin.sensing.fit.refine import Fit
 from tomoskin.sensing.fit.search import SpotDetections, judged
 from tomoskin.sensing.fit.selection import ForwardSelection
+from tomoskin.sensing.track import HELD
 
 _BORN = -4.0
 """Logarithm of the odds that one frame must give a rival, beginning apart."""

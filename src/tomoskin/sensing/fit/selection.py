@@ -11,7 +11,6 @@ from tomoskin.core import FloatArray
 from tomoskin.sensing.fit.candidates import Matched, limits_of
 from tomoskin.sensing.fit.expectation import Known, less
 from tomoskin.sensing.fit.openings import (
-    HELD,
     MISSHAPEN,
     NEAR,
     WITHIN,
@@ -23,6 +22,7 @@ from tomoskin.sensing.fit.openings import (
 )
 from tomoskin.sensing.fit.pace import Pace
 from tomoskin.sensing.fit.refine import Deficit, Fit, Problem, Question, Rules
+from tomoskin.sensing.track import HELD
 
 _SURE = 2.0
 """Times the ratio at which a touch begins: half the square of that is more than what a simpler
