@@ -152,7 +152,7 @@ _MOST = 16
 
 @dataclass(frozen=True, eq=False)
 class ResidualResponse:
-    """Where touches have been since there was none for some time.
+    """Where touches have been since the baseline has had time to follow.
 
     Attributes
     ----------
@@ -161,12 +161,12 @@ class ResidualResponse:
     changes
         (n_meas,) V of each, what it did to the rows.
     quiet
-        Frames since there was a touch.
+        Frames without any touch since each was made.
     """
 
     spots: FloatArray
     changes: tuple[FloatArray, ...]
-    quiet: int = 0
+    quiet: tuple[int, ...] = ()
 
     @classmethod
     def none(cls) -> Self:
@@ -176,21 +176,32 @@ class ResidualResponse:
     def after(
         self, spots: FloatArray, changes: Callable[[FloatArray], FloatArray], frames: int
     ) -> Self:
-        """With a frame in which touches ``spots`` (k, 4) were; forgotten ``frames`` after the
-        last of them. ``changes`` gives (k, n_meas) V of spots (k, 4), each alone."""
+        """With a frame in which touches ``spots`` (k, 4) were; each is forgotten after so many
+        ``frames`` without one. ``changes`` gives (k, n_meas) V of spots (k, 4), each alone."""
         if not len(spots):
-            if len(self.spots) and self.quiet >= frames:
-                return self.none()
-            return replace(self, quiet=self.quiet + 1)
+            return self._in_peace(frames)
         kept = self.spots.tolist()
-        news = [not _is_held(spot, kept) for spot in spots.tolist()]
+        held = [_foot_of(spot, kept) for spot in spots.tolist()]
+        news = [foot is None for foot in held]
+        quiet = tuple(0 if n in held else q for n, q in enumerate(self.quiet))
         if not any(news):
-            return self if not self.quiet else replace(self, quiet=0)
+            return self if quiet == self.quiet else replace(self, quiet=quiet)
         fresh = spots[news]
         stays = [not any(_is_near(foot, spot) for spot in fresh.tolist()) for foot in kept]
         return type(self)(
             np.concatenate([self.spots[stays], fresh])[-_MOST:],
             (*compress(self.changes, stays), *changes(fresh))[-_MOST:],
+            (*compress(quiet, stays), *(len(fresh) * (0,)))[-_MOST:],
+        )
+
+    def _in_peace(self, frames: int) -> Self:
+        """After a frame without a touch."""
+        quiet = tuple(q + 1 for q in self.quiet)
+        stays = [q < frames for q in quiet]
+        if all(stays):
+            return replace(self, quiet=quiet) if quiet else self
+        return type(self)(
+            self.spots[stays], tuple(compress(self.changes, stays)), tuple(compress(quiet, stays))
         )
 
 
@@ -236,11 +247,12 @@ def _is_near(foot: list[float], spot: list[float]) -> bool:
     return math.sqrt(x * x + y * y) < _STEP
 
 
-def _is_held(spot: list[float], feet: list[list[float]]) -> bool:
-    """Whether a footprint stands for a touch that is there."""
+def _foot_of(spot: list[float], feet: list[list[float]]) -> int | None:
+    """Which footprint stands for a touch that is there; None where none does."""
     x, y, _, content = spot
-    for there, across, _, strength in reversed(feet):  # it is one of the newest, as a rule
+    for number in range(len(feet) - 1, -1, -1):  # it is one of the newest, as a rule
+        there, across, _, strength = feet[number]
         near = (there - x) ** 2 + (across - y) ** 2 < _STEP**2
         if near and _STRONGER * abs(strength) >= abs(content):
-            return True
-    return False
+            return number
+    return None

@@ -95,7 +95,7 @@ LIVE = Pace(
     joint=0,
     restart=False,
     speed=0.1,
-    fading=4.0,
+    fading=8.0,
 )
 """What is not found in this frame is found in the next. With one try, presses that begin together
 are one touch between them for some frames."""
