@@ -187,7 +187,7 @@ def time_notes(time: FloatArray) -> list[str]:
         f"{', …' if len(at) > _LISTED else ''}; {then}"
         for at, what, then in (
             (stands, "do not go on", "each is taken to be one interval after the frame before"),
-            (jumps, "jump ahead", "touches from before have ended there"),
+            (jumps, "jump ahead", "nothing is known of what was between"),
         )
         if len(at)
     ]
