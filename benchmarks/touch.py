@@ -1,4 +1,4 @@
-"""All that is promised of touch: the parts locator, touch_fit, tracking, classes and health."""
+"""All that is promised of touch: locator, fit, tracking, two fingers, classes and health."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from report import Report
 CORES = 2
 """Parts that run at a time: the processor time in their tables is each part's own."""
 
-PARTS = ("touch_fit", "locator", "tracking", "health", "classes")
+PARTS = ("touch_fit", "locator", "tracking_plant", "two_fingers", "health", "classes")
 LIMIT = 11.5 * 60
 """Seconds after which parts that still run are ended: each is a benchmark by itself."""
 
