@@ -81,5 +81,5 @@ def test_noise_that_is_not_known_is_the_read_outs(fitted):
         finder = finding(fitted, reference)
         assert isinstance(finder, InData)
     louder = replace(fitted, readout=replace(fitted.readout, noise=3 * fitted.readout.noise))
-    quiet, loud = (finding(p, None)._spots._noise for p in (fitted, louder))
+    quiet, loud = (finding(p, None)._spots._sight._noise for p in (fitted, louder))
     assert np.linalg.norm(loud) == pytest.approx(9 * np.linalg.norm(quiet), rel=0.1)

@@ -36,9 +36,13 @@ def test_time_goes_to_the_stage_that_was_reached_last() -> None:
     (cost,) = meter.slowest
     assert cost.sequence == 7
     assert cost.seconds == pytest.approx(5e-3)
-    spent = {name: (us, times) for name, us, times in cost.stages}
-    assert spent["touches"] == (pytest.approx(3000), 2)
-    assert spent["image"] == (pytest.approx(2000), 2)
+    assert {name: times for name, _, times in cost.stages} == {
+        "voltages": 1,
+        "touches": 2,
+        "image": 2,
+    }
+    spent = {name: us for name, us, _ in cost.stages}
+    assert spent == pytest.approx({"voltages": 0.0, "touches": 3000, "image": 2000})
     assert cost.text.startswith("5.00 ms: touches 3.00 (2 times), image 2.00 (2 times)")
 
 

@@ -3,42 +3,30 @@
 from __future__ import annotations
 
 import math
-from collections import OrderedDict
 from collections.abc import Generator
-from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from dataclasses import replace
+from functools import partial
 from operator import is_
-from typing import NamedTuple, Self
 
 import numpy as np
 
-from tomoskin.core import Detection, FloatArray, SkinError, finished, reach
-from tomoskin.model.forward import ForwardModel
+from tomoskin.core import Detection, FloatArray, reach
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.skin import Skin
-from tomoskin.sensing.fit.candidates import Candidates, Matched, footprints_of
+from tomoskin.sensing.fit.candidates import Matched
 from tomoskin.sensing.fit.cell_discs import CellDiscs
-from tomoskin.sensing.fit.certificate import Certificate, Reduced
 from tomoskin.sensing.fit.common_mode import CommonModeJump, Explained, Jumps
-from tomoskin.sensing.fit.excess import Excess, Gauge
 from tomoskin.sensing.fit.expectation import Expectation
-from tomoskin.sensing.fit.native import NativeSolver
-from tomoskin.sensing.fit.noise import ResidualDirections, ResidualResponse, Whitener
+from tomoskin.sensing.fit.noise import ResidualDirections, ResidualResponse
 from tomoskin.sensing.fit.pace import EXHAUSTIVE, Pace
-from tomoskin.sensing.fit.prior import SpotPrior
-from tomoskin.sensing.fit.refine import Deficit, Problem, Solver, WhitenedTable
+from tomoskin.sensing.fit.refine import Deficit, Problem
 from tomoskin.sensing.fit.rival import Rival, challenged
 from tomoskin.sensing.fit.search import SpotDetections, joined, search
 from tomoskin.sensing.fit.selection import ForwardSelection
-from tomoskin.sensing.fit.sheet import fields_of, fitting_sheet
-from tomoskin.sensing.fit.solver import NumpySolver, SheetDomain
-from tomoskin.sensing.fit.spot import FILLING, N_PARAMETERS, Footprints, Response
-from tomoskin.sensing.fit.table import ResponseTable
-from tomoskin.sensing.fit.tabulate import Tabulation, kept_tabulation
+from tomoskin.sensing.fit.sight import Sight
+from tomoskin.sensing.fit.spot import FILLING, N_PARAMETERS
+from tomoskin.sensing.fit.spot_model import SpotModel
 from tomoskin.sensing.fit.watch import FrameWatch
-
-_CELLS = 1500
-"""Of the mesh that spots are fitted on: their profile is smooth, and a frame is quick."""
 
 _MOST = 5
 """Touches at once: more have more parameters than 8 or 16 electrodes tell apart."""
@@ -51,153 +39,6 @@ _REST = 0.5
 
 _SWELLS = 0.08
 """Standard deviation of the logarithm of a touch's radius from frame to frame."""
-
-_MASKS = 8
-"""Nuisance subspaces whose whitening is kept."""
-
-
-class Seen(NamedTuple):
-    """How frames of one noise are seen: the table, candidates, channels and jumps."""
-
-    table: WhitenedTable
-    matched: Matched
-    gauge: Gauge
-    jumps: Jumps
-
-    def louder(self, times: float) -> Seen:
-        """The same in so many times the noise's variance."""
-        if times == 1.0:
-            return self
-        table, matched = self.table.louder(times), self.matched.louder(times)
-        return Seen(table, matched, self.gauge, self.jumps.louder(times))
-
-
-@dataclass(frozen=True, eq=False)
-class Adapted:
-    """What an even sheet's model became for an uneven one.
-
-    Attributes
-    ----------
-    table, certificate, candidates
-        See :class:`ResponseTable`, :class:`Certificate` and :class:`Candidates`.
-    """
-
-    table: ResponseTable
-    certificate: Certificate
-    candidates: Candidates
-
-
-@dataclass(frozen=True, eq=False)
-class SpotModel:
-    """What is made once for a skin and pattern; a table only where touches are fitted on it.
-
-    Attributes
-    ----------
-    response
-        The forward model with spots on it.
-    prior
-        What is likely of a spot.
-    sign
-        Of the touches, as in a skin's ``[touch]``.
-    scale
-        (n_meas,) 1/V by which the model's changes become difference data; ones where these are
-        in volts.
-    adapted
-        Of an uneven sheet; None: what there is is made for this one.
-    even
-        The model that an uneven sheet's began from; None where this is it.
-    """
-
-    response: Response
-    prior: SpotPrior
-    sign: str
-    scale: FloatArray
-    adapted: Adapted | None = None
-    even: SpotModel | None = None
-
-    @classmethod
-    def of(cls, skin: Skin, model: ForwardModel) -> Self:
-        """For ``skin`` with the pattern of ``model``, on a mesh of its own.
-
-        Raises
-        ------
-        ModelError
-            When the mesh has no flat coordinates.
-        """
-        own = ForwardModel(_mesh(skin), model.pattern, model.contact_impedance, model.current)
-        normalised = skin.inverse.difference == "normalised"
-        response, n_meas = Response(own.at(skin.conductivity)), own.pattern.n_meas
-        scale = 1 / np.abs(response.reference) if normalised else np.ones(n_meas)
-        return cls(response, SpotPrior.of(own.mesh), skin.touch.sign, scale)
-
-    @cached_property
-    def tabulation(self) -> Tabulation:
-        """What one spot does, tabulated: seconds of work, unless it is on disk."""
-        return kept_tabulation(self.response, self.prior, self.sign)
-
-    @cached_property
-    def candidates(self) -> Candidates:
-        """Where touches are looked for."""
-        if self.adapted is not None:
-            return self.adapted.candidates
-        return Candidates.of(self.response, self.prior)
-
-    @cached_property
-    def _feet(self) -> tuple[Footprints, ...]:
-        """Of the candidates, for uneven sheets."""
-        return footprints_of(self.response, self.prior)
-
-    @cached_property
-    def solver(self) -> Solver:
-        """What fits spots by a table of what one does."""
-        made = self.tabulation if self.adapted is None else self.adapted
-        return _solver(self.response, made.table, self.prior)
-
-    @cached_property
-    def reduced(self) -> Reduced:
-        """What stands for the exact model on this sheet."""
-        made = self.tabulation if self.adapted is None else self.adapted
-        return Reduced.of(self.response, made.certificate, self.prior)
-
-    def warm_up(self) -> None:
-        """Do what takes seconds the first time, and half a second later on, before frames come."""
-        _ = self.tabulation.lattices, self.candidates, self._feet, self.solver, self.reduced
-        _ = fields_of(self.response.spots.mesh)
-
-    def changes(self, spots: FloatArray) -> FloatArray:
-        """(k, n_meas) V that each of ``spots`` (k, 4) alone adds to the reference, by the table."""
-        return np.asarray(self.solver.expanded(spots)[:, 0] @ self.solver.table.basis)
-
-    def fitted_to(self, reference: FloatArray, deviation: FloatArray | float = 0.0) -> SpotModel:
-        """As :meth:`fitting`, at once."""
-        return finished(self.fitting(reference, deviation))
-
-    def fitting(
-        self, reference: FloatArray, deviation: FloatArray | float = 0.0
-    ) -> Generator[None, None, SpotModel]:
-        """The model of the sheet that a ``reference`` (n_meas,) V shows, a piece between yields.
-
-        Itself where that sheet is even. ``deviation`` (n_meas,) V is the reference's own; see
-        :mod:`tomoskin.sensing.fit.sheet`.
-        """
-        state = yield from fitting_sheet(self.response.state, reference, deviation)
-        if state is self.response.state:
-            return self
-        response = Response(state)
-        table = yield from self.tabulation.adapted(response)
-        certificate = yield from self.tabulation.certificate.adapted(response, table)
-        candidates = yield from self.candidates.adapted(self.response, response, self._feet)
-        scale = self.scale
-        if (scale != 1.0).any():
-            scale = 1 / np.abs(response.reference)
-        adapted = Adapted(table, certificate, candidates)
-        made = replace(self, response=response, scale=scale, adapted=adapted, even=self)
-        yield
-        made.__dict__["reduced"] = yield from Reduced.making(response, certificate, self.prior)
-        yield
-        _ = made.solver
-        table.__dict__["typical"] = yield from table.typifying()
-        return made
 
 
 class SpotFinder:
@@ -256,33 +97,21 @@ class SpotFinder:
         self._jump = CommonModeJump()
         pattern = model.response.state.model.pattern
         self.watch = FrameWatch(pattern, skin.touch.sign, skin.touch.snr)
-        self._scale = model.scale * gain
-        self._noise = noise / self._scale[:, None] / self._scale
-        self._nuisance = self._jumps = np.zeros((len(noise), 0))
-        self._matched: OrderedDict[bytes, Seen] = OrderedDict()
+        self._sight = Sight(model, self.watch.channels, noise, gain)
         self._wander = 0.0
         self._newest_slow: tuple[tuple[FloatArray, ...], FloatArray] | None = None
-        self._newest_seen: tuple[tuple[object, ...], Seen] | None = None
 
     def renewing(self, noise: FloatArray, gain: float = 1.0) -> Generator[None, None, None]:
         """Go on with other noise, or another gain, at the end of some pieces of work."""
-        scale = self._model.scale * gain
-        yield from self._renewed(noise / scale[:, None] / scale, scale)
+        yield from self._sight.renewing(noise, gain, self.watch.excess)
 
     def preparing(self, other: SpotFinder) -> Generator[None, None, None]:
         """Make ready for frames as those of an ``other`` finder of the same skin, and go on where
         that is: with its touches, and what stayed behind others."""
-        self._nuisance, self._jumps = other._nuisance, other._jumps
-        yield from self._renewed(self._noise, self._scale)
+        yield from self._sight.following(other._sight, self.watch.excess)
         self._before, self._expected = other._before, other._expected
         self._residual, self._jump = other._residual, other._jump
         self.watch.go_on(other.watch)
-
-    def _renewed(self, noise: FloatArray, scale: FloatArray) -> Generator[None, None, None]:
-        scaled = self._nuisance / scale[:, None], self._jumps / scale[:, None]
-        made = yield from self._making(noise, *scaled)
-        self._scale, self._noise = scale, noise
-        self._matched = OrderedDict({_key(scaled, self.watch.excess): made})
 
     @property
     def jump(self) -> float | None:
@@ -303,11 +132,10 @@ class SpotFinder:
         ``jumps`` (n_meas, j) the data may have jumped, by so much as a standard deviation; along
         the first they have moved by ``wander`` deviations of that, one standard deviation.
         """
-        self._nuisance = nuisance
-        self._jumps = np.zeros((len(dv), 0)) if jumps is None else jumps
+        self._sight.look(nuisance, np.zeros((len(dv), 0)) if jumps is None else jumps)
         self._wander = wander
-        data = dv / self._scale
-        self.watch.begin(data, self._seen().gauge)
+        data = dv / self._sight.scale
+        self.watch.begin(data, self._sight.of(self.watch.excess).gauge)
         (detected, rival), jump, matched = self._searched(data)
         solver = self._model.solver
         times = self.watch.unexplained(solver, detected.fit, matched)
@@ -333,7 +161,7 @@ class SpotFinder:
     ) -> tuple[Explained, CommonModeJump, Matched]:
         """Touches of ``data`` (n_meas,) in so many times the noise that is known; and whether the
         common mode has jumped."""
-        seen, matched, _, jumps = self._seen().louder(times)
+        seen, matched, _, jumps = self._sight.of(self.watch.excess).louder(times)
         whitened, rest = seen.whitened(data)
         self._left = self._left.of(seen.matrix, self._residual.changes)
         problem = Problem(
@@ -413,44 +241,6 @@ class SpotFinder:
         moved = max([math.sqrt(x * x + y * y) for x, y in way.tolist()])
         return min(1.0, math.hypot(_REST, moved / self._reach))
 
-    def _seen(self) -> Seen:
-        """How the newest frame is seen: as the one before, where nothing has changed."""
-        now, newest = (
-            (self._nuisance, self._jumps, self._noise, self.watch.excess),
-            self._newest_seen,
-        )
-        if newest is None or not all(map(is_, now, newest[0])):
-            newest = self._newest_seen = now, self._kept()
-        return newest[1]
-
-    def _kept(self) -> Seen:
-        scaled = self._nuisance / self._scale[:, None], self._jumps / self._scale[:, None]
-        key = _key(scaled, self.watch.excess)
-        if key not in self._matched:
-            self._matched[key] = finished(self._making(self._noise, *scaled))
-            if len(self._matched) > _MASKS:
-                self._matched.popitem(last=False)
-        self._matched.move_to_end(key)
-        return self._matched[key]
-
-    def _making(
-        self, noise: FloatArray, nuisance: FloatArray, jumps: FloatArray
-    ) -> Generator[None, None, Seen]:
-        """What frames of this noise, nuisance subspace and jumps are seen by."""
-        model, channels = self._model, self.watch.channels
-        noise = self.watch.excess.added(noise, channels)
-        white = Whitener.of(noise)
-        yield
-        white = white.without(nuisance)
-        yield
-        seen = yield from WhitenedTable.making(model.solver, white, model.response.times, jumps)
-        yield
-        gauge = yield from Gauge.making(channels, noise, np.hstack([nuisance, jumps]))
-        yield
-        matched, _ = model.candidates.matched(seen), seen.kept
-        rows = (seen.matrix @ jumps).T
-        return Seen(seen, matched, gauge, Jumps(rows, np.zeros((0, rows.shape[1]))))
-
     def _detections(self, detected: SpotDetections) -> list[Detection]:
         """Strongest first."""
         spots = detected.fit.spots
@@ -477,24 +267,3 @@ class SpotFinder:
             weak=bool(detected.fresh[k] < self._settings.snr),
             close=bool(detected.close[k]),
         )
-
-
-def _key(directions: tuple[FloatArray, ...], excess: Excess) -> bytes:
-    return b"".join(part.tobytes() for part in directions) + excess.key
-
-
-def _solver(response: Response, table: ResponseTable, prior: SpotPrior) -> Solver:
-    """Of the native engine where that runs."""
-    sheet = SheetDomain(response.spots.mesh)
-    core = response.state.model.engine.core
-    if core is None:
-        return NumpySolver(table, sheet, prior)
-    return NativeSolver(core, table, sheet, prior)
-
-
-def _mesh(skin: Skin) -> Mesh:
-    """Of its own; the skin's where so few cells do not resolve the electrodes."""
-    try:
-        return skin.altered({"mesh": {"cells": _CELLS}}).mesh()
-    except SkinError:
-        return skin.mesh()
