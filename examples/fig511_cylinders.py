@@ -67,6 +67,7 @@ def main(arguments: Sequence[str] | None = None) -> dict[str, float]:
 
 def check(imager: Imager, shown: Sequence[Shown]) -> dict[str, float]:
     """What the thesis saw, and what the model says of its cause."""
+    assert min(len(region.cells) for _, _, region in shown) > 2, "a region without length and width"
     long = [elongation(imager.mesh, region) for _, _, region in shown]
     turn = [axis_of(imager, region) for _, _, region in shown[:2]]
     assert min(long[:2]) > LONGER, f"{long[0]:.2f} and {long[1]:.2f} times as long as wide"

@@ -28,6 +28,7 @@ from tomoskin.learning import Differences, FrameView
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, prepare
 from tomoskin.pipeline.finding import finding
+from tomoskin.pipeline.nuisance import JUMP
 from tomoskin.pipeline.tune import tuned_sheet
 from tomoskin.sensing.fit import Whitener, row_covariance
 from tomoskin.sensing.signal import Reference
@@ -79,16 +80,10 @@ class Sheet:
         return tuned_sheet(self.prepared, self.reference)
 
     def view(self, volts: FloatArray) -> FrameView:
-        """What a frame shows; all voltages in proportion say nothing, as they do live."""
+        """What a frame shows; all voltages in proportion may jump, as they may live."""
         mean, dv = self.reference.mean, volts - self.reference.mean
-        differences = Differences(
-            dv=dv,
-            nuisance=mean[:, None],
-            change=dv,
-            drift=np.zeros((len(dv), 0)),
-            from_rest=dv,
-            excluded=np.zeros(len(dv), bool),
-        )
+        jumps, none = JUMP * mean[:, None], np.zeros(len(dv), bool)
+        differences = Differences.of(dv, jumps, none)
         image, noise = self.prepared.operator(dv), self.prepared.image_noise(self.reference)
         return FrameView(0.0, image, noise, differences)
 

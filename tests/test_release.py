@@ -24,7 +24,7 @@ pytestmark = pytest.mark.slow  # make release looks at the same
 
 ROOT = Path(__file__).resolve().parent.parent
 STATIC = "tomoskin/server/static/"
-IMAGES = "tomoskin/emulator/images/"
+IMAGES = "tomoskin/twin/emulator/images/"
 MOST_MB = 6.0
 
 

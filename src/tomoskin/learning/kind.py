@@ -81,6 +81,22 @@ class Differences:
     excluded: BoolArray
     wander: float = 0.0
 
+    @classmethod
+    def of(cls, change: FloatArray, jumps: FloatArray, excluded: BoolArray) -> Differences:
+        """A ``change`` (n_meas,) V in which nothing drifts; see the attributes for the others."""
+        unknown = np.eye(len(change))[:, excluded]
+        return cls(
+            dv=change,
+            nuisance=np.hstack([jumps, unknown]),
+            whole=change,
+            unknown=unknown,
+            jumps=jumps,
+            change=change,
+            drift=np.zeros((len(change), 0)),
+            from_rest=change,
+            excluded=excluded,
+        )
+
     @property
     def since_reference(self) -> FloatArray:
         """(n_meas,) V by which it differs from that reference, NaN where excluded."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple, Protocol, Self
 
 import numpy as np
@@ -321,20 +321,9 @@ class GivenDifferences:
         """Of a frame whose values are difference data already."""
         operator, excluded = self.prepared.operator, measured.excluded
         change = measured.values * _scale(self.prepared, operator.reference)
-        dv, unknown = operator.filled(measured.values, excluded), np.eye(len(excluded))[:, excluded]
-        none = np.zeros((len(excluded), 0))
-        differences = Differences(
-            dv=dv,
-            nuisance=unknown,
-            whole=dv,
-            unknown=unknown,
-            jumps=none,
-            wander=0.0,
-            change=change,
-            drift=none,
-            from_rest=change,
-            excluded=excluded,
-        )
+        filled = operator.filled(measured.values, excluded)
+        given = Differences.of(filled, np.zeros((len(excluded), 0)), excluded)
+        differences = replace(given, change=change, from_rest=change)
         return Conditioned(differences, int(np.count_nonzero(excluded)))
 
     def learn(

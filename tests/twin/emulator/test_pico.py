@@ -146,6 +146,8 @@ def late(pause: str) -> Change:
     )
 
 
+HEARTBEAT = 10_000
+"""ms of silence, far more than a board takes to see that its plug is out."""
 LATE = late("for (volatile uint8_t wait = 0u; wait < 6u; wait++) {\n        }")
 """By half a microsecond; beside the main loop's lock, the multiplexer still has its time."""
 LATER = late("hal_delay_us(1u);")
@@ -203,9 +205,12 @@ def examine(programs: PicoPrograms, folder: Path, impatience: float = PATIENCE) 
         assert seen["jitter"] < MOST_JITTER
         assert seen["unsettled"] > 1
         assert seen["shortestOff"] >= 1e9 * DEAD
-        assert asked(talk, SetHeartbeat(11, 10_000)).result is Result.OK
+        assert asked(talk, SetHeartbeat(11, HEARTBEAT)).result is Result.OK
+        seen = board.watch()
         board.order("unplug")
         board.until(lambda seen: not seen["connected"] and stands(board), impatience)
+        silence = 1e6 * HEARTBEAT * seen["drives"] / seen["now"]
+        assert board.watch()["drives"] - seen["drives"] < silence / 2, "not the plug, but silence"
         board.order("plug")
         assert asked(talk, SetHeartbeat(12, 200)).result is Result.OK
         assert asked(talk, Start(13, 5)).result is Result.OK
