@@ -7,6 +7,7 @@ import math
 from pathlib import Path
 from typing import Any
 
+import h5py
 import pytest
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
@@ -126,6 +127,15 @@ def test_all_ways_are_the_same(session: Path, fitted: Prepared, tmp_path: Path, 
     code, _, err = tomoskin("session", "export", replayed, exported, "--touches", two)
     assert code == 0, err
     assert table(one) == table(two)
+    held, three = tmp_path / "session.h5", tmp_path / "of_h5.csv"
+    code, _, err = tomoskin("session", "export", session, held, "--touches", three)
+    assert code == 0, err
+    assert table(three) == table(two)
+    with h5py.File(held) as file:
+        told = file["touches"][:]
+        assert list(zip(*(told[c].tolist() for c in ("frame", "id", "x", "y")), strict=True)) == [
+            row[:4] for row in found
+        ]
     code, _, err = tomoskin("session", "export", session, bag, "--every", "1e9")
     assert code == 0, err
     assert bag_positions(bag) == [(x, y) for _, _, x, y, _ in found]

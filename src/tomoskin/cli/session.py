@@ -137,7 +137,7 @@ def export(
     ],
     touches: Annotated[
         Path | None,
-        typer.Option(metavar="X.csv", help="File for the recorded touches."),
+        typer.Option(metavar="X.csv", help="File for the touches."),
         Writes(TABLE),
     ] = None,
     every: Annotated[
@@ -159,8 +159,8 @@ def export(
         if session.torn:
             remark(f"{file}: {session.torn}")
         without = ", ".join(omitted(session, out.suffix.lower()))
-    series = out.with_suffix(".pvd")  # names the files of a series
-    for path in dict.fromkeys((out, series, touches)):
+    is_series = out.suffix.lower() in (".vtu", ".pvd")  # a .pvd names the files of a series
+    for path in (out.with_suffix(".pvd") if is_series else out, touches):
         if path is not None and path.is_file():
             but = f", without {without}" if without and path == out else ""
             typer.echo(f"{path}: {path.stat().st_size / 1e6:.1f} MB{but}")

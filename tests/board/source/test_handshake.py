@@ -179,6 +179,8 @@ def test_a_drifted_board_is_refused_with_who_is_older(clock, change, said, where
         ({"max_oversampling": 2}, "needs 4 conversions"),
         ({"adc_bits": 8}, "the board's converter has 8"),
         ({"adc_bits": 13}, "the board's converter has 13 .*multiple of 8"),
+        ({"tick_rate": 0}, "clock of 0 Hz; expected 100 Hz to 100 MHz"),
+        ({"tick_rate": 2**32 - 1}, "clock of 4,294,967,295 Hz"),
         ({"current": 200_000}, "limiter is set to 200 mA, but this skin allows at most 100 mA"),
     ],
 )

@@ -62,6 +62,12 @@ def test_it_is_read_again_as_the_session_is(export, recording, name):
     assert recording.idle == 5
 
 
+def test_a_file_that_was_not_written_is_not_named(tomoskin, whole, tmp_path):
+    (tmp_path / "x.pvd").write_text("of another export", encoding="utf-8")
+    _, out, _ = tomoskin("session", "export", whole, tmp_path / "x.csv")
+    assert "x.pvd" not in out
+
+
 def test_what_a_table_cannot_hold_is_said(tomoskin, whole, tmp_path):
     for ending, said in ((".csv", True), (".npz", True), (".mat", True), (".h5", False)):
         _, out, _ = tomoskin("session", "export", whole, tmp_path / f"x{ending}")

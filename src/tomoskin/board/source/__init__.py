@@ -2,6 +2,7 @@
 
 from tomoskin.board.source.agreement import BOARDS_SINCE
 from tomoskin.board.source.chopping import choose_periods, chop_limit
+from tomoskin.board.source.clock import TICK_RATES, ClockFit, ClockFitter
 from tomoskin.board.source.command_queue import FrameCounters, SequenceFilter
 from tomoskin.board.source.configuration import Configuration
 from tomoskin.board.source.exchange import Exchange
@@ -22,6 +23,9 @@ __all__ = [
     "BOARDS_SINCE",
     "GROUP",
     "PRESCALERS",
+    "TICK_RATES",
+    "ClockFit",
+    "ClockFitter",
     "Configuration",
     "Exchange",
     "FrameCounters",

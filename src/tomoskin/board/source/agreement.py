@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import fields
 from typing import Protocol, runtime_checkable
 
+from tomoskin.board.source.clock import TICK_RATES
 from tomoskin.board.source.settings import ScanSettings
 from tomoskin.board.wire import (
     OLDER,
@@ -123,6 +124,13 @@ def check_version(board: Hello | Info, where: str) -> None:
 
 def fit_board(info: Info, scan: Scan, asked: ScanSettings, where: str) -> ScanSettings:
     """What to set on this board for what is ``asked``; SourceError says what it lacks."""
+    if not TICK_RATES[0] <= info.tick_rate <= TICK_RATES[1]:
+        raise SourceError(
+            f"the board states a clock of {info.tick_rate:,} Hz; expected "
+            f"{TICK_RATES[0]:g} Hz to {TICK_RATES[1] / 1e6:g} MHz",
+            where=where,
+            hint="correct tick_rate in the firmware's INFO, or no time of a touch is right",
+        )
     _check_size(info, scan, asked, where)
     settings = asked.on_board(info.adc_bits)
     if settings is None:

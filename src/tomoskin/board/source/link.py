@@ -8,6 +8,7 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 
 from tomoskin.board.source.agreement import Rated, RateFollower
+from tomoskin.board.source.clock import ClockWatch
 from tomoskin.board.source.command_queue import FrameCounters
 from tomoskin.board.source.configuration import Configuration
 from tomoskin.board.source.protocol_session import ProtocolSession, Stage
@@ -57,6 +58,7 @@ class Link(AbstractContextManager["Link"]):
         self._fetched = transport if isinstance(transport, Fetched) else None
         self._rate = RateFollower(transport) if isinstance(transport, Rated) else None
         self._session = ProtocolSession(scan, settings, self._timing, self._clock(), transport.name)
+        self._watch = ClockWatch()
         self._closed = False
         self._heard = b""
         self.diagnosis: SourceError | None = None
@@ -165,12 +167,20 @@ class Link(AbstractContextManager["Link"]):
         items = []
         for message in self._decoder.feed(data, now):
             items += self._session.receive(message, now)
+        items += self._doubts(items)
         if self._rate:
             self._rate.follow(self._session.take_rate(), silent=self._session.is_silent)
             slower = self._rate.slower(self.counters, running=self.running)
             items += [] if slower is None else [self._session.fall_back(slower, now)]
         self._flush()
         return items
+
+    def _doubts(self, items: list[Frame | Event]) -> list[Event]:
+        """What the times of frames say against the clock that the board states."""
+        if self.info is None:
+            return []
+        pushed = (self._watch.push(i, self.info.tick_rate) for i in items if isinstance(i, Frame))
+        return [event for event in pushed if event is not None]
 
     def _flush(self) -> None:
         data = self._session.commands.take()

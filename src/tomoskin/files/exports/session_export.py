@@ -29,7 +29,7 @@ from tomoskin.files.session import (
     message_counts,
     recording_of,
     replayed,
-    scanned_touches,
+    told_touches,
 )
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, colour_limit
@@ -105,8 +105,8 @@ class Export:
         write_picture(path, prepared.mesh, some, unit, limit, overwrite=self.overwrite)
 
     def touches(self, path: StrPath) -> None:
-        """Write a table of the recorded touches."""
-        rows, surface = list(scanned_touches(self.session)), self.session.skin.surface
+        """Write a table of the touches; of a session without any, those that a replay finds."""
+        rows, surface = list(told_touches(self.session)), self.session.skin.surface
         forces = has_forces(rows)
         begun = first_scan(self.session)
         write_touches(path, rows, surface, forces=forces, begun=begun, overwrite=self.overwrite)

@@ -46,6 +46,7 @@ from tomoskin.files.session.replayed import (
     reconstruct_session,
     recorded_calibrations,
     replayed,
+    told_touches,
 )
 from tomoskin.files.session.robot_log import LogPart, RobotLog
 from tomoskin.files.session.scanned import first_scan, idle_count, scanned_touches
@@ -122,6 +123,7 @@ __all__ = [
     "split_targets",
     "start_time",
     "tick_rate",
+    "told_touches",
     "touch_colour",
     "touch_row",
     "touch_width",

@@ -9,9 +9,9 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+from tomoskin.board.source import ClockFit, ClockFitter
 from tomoskin.core import StrPath
 from tomoskin.files.session.blocks import Advance, no_report
-from tomoskin.files.session.clock import ClockFit, ClockFitter
 from tomoskin.files.session.layout import Mark, MarkedFrame
 from tomoskin.files.session.scanned import first_scan, scanned_touches
 from tomoskin.files.session.session_reader import (

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from tomoskin.board.source import ClockFitter
 from tomoskin.board.wire import Info
 from tomoskin.core import DataError, Event, Image, PixelMap, StrPath, Touch
-from tomoskin.files.session.clock import ClockFitter
 from tomoskin.files.session.layout import Mark, MarkedFrame, Truth
 from tomoskin.files.session.session_writer import SessionWriter
 from tomoskin.pipeline import FrameResult

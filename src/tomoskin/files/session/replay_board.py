@@ -30,6 +30,7 @@ from tomoskin.board.wire import (
     is_command,
     type_byte,
 )
+from tomoskin.files.session.session_reader import stated_rate
 from tomoskin.twin import Board, HeldScanning
 
 if TYPE_CHECKING:
@@ -91,7 +92,7 @@ def _board(skin: Skin, device: dict[str, Any]) -> Board:
         channels=max(channels if isinstance(channels, int) else 0, skin.n_electrodes),
         adc_bits=skin.readout.adc_bits,
         current=skin.current,
-        tick_rate=round(device.get("tick_rate", skin.readout.tick_rate)),
+        tick_rate=round(stated_rate(device, skin)),
         max_drives=_MOST,
         max_samples=_MOST,
         firmware=_version(device.get("firmware")),

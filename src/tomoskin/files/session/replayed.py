@@ -11,10 +11,11 @@ import numpy as np
 from tomoskin.core import DataError, Frame
 from tomoskin.files.session.blocks import Advance, no_report
 from tomoskin.files.session.layout import Mark
-from tomoskin.files.session.scanned import ScannedFrame, timed
+from tomoskin.files.session.scanned import ScannedFrame, scanned_touches, timed
 from tomoskin.files.session.session_reader import (
     SessionReader,
     indexed_frames,
+    message_counts,
     reference_frames,
     tick_rate,
     touches_before,
@@ -30,6 +31,7 @@ from tomoskin.pipeline import (
     Setting,
     prepare,
 )
+from tomoskin.sensing.track import TouchedFrame
 
 
 def as_recorded(session: SessionReader) -> Prepared:
@@ -99,6 +101,18 @@ def replayed(prepared: Prepared, session: SessionReader) -> Iterator[FrameResult
     for _, result in gathered(replaying(prepared, session), session, prepared.scan):
         if result is not None:
             yield result
+
+
+def told_touches(session: SessionReader) -> Iterator[TouchedFrame]:
+    """(frame, time, touches) as they were recorded; as a replay tells them where none were."""
+    counts = message_counts(session)
+    if counts["/touches"] or counts["/image"]:
+        yield from scanned_touches(session)
+        return
+    prepared = as_recorded(session)
+    for frame, result in gathered(replaying(prepared, session), session, prepared.scan):
+        if result is not None and result.touches:
+            yield frame.number, frame.time, result.touches
 
 
 def reconstruct_session(

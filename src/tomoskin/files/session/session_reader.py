@@ -11,6 +11,7 @@ from typing import Any
 
 import msgspec
 
+from tomoskin.board.source import TICK_RATES
 from tomoskin.core import DataError, Event, SkinError, StrPath
 from tomoskin.files.session import channels
 from tomoskin.files.session.container_reader import MEND, ContainerReader
@@ -128,11 +129,16 @@ class SessionReader(AbstractContextManager["SessionReader"]):
 
 
 def tick_rate(session: SessionReader) -> float:
-    """Of the device's clock, Hz, as the board said; the skin's where it did not."""
-    rate = session.device().get("tick_rate")
-    if isinstance(rate, int | float) and 0 < rate < math.inf:
+    """Of the device's clock, Hz; see :func:`stated_rate`."""
+    return stated_rate(session.device(), session.skin)
+
+
+def stated_rate(device: Mapping[str, Any], skin: Skin) -> float:
+    """The tick rate that a board states of itself, Hz; the skin's where that cannot be."""
+    rate = device.get("tick_rate")
+    if isinstance(rate, int | float) and TICK_RATES[0] <= rate <= TICK_RATES[1]:
         return float(rate)
-    return session.skin.readout.tick_rate
+    return skin.readout.tick_rate
 
 
 def touches_before(session: SessionReader) -> int:

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from tomoskin.files.session.clock import ClockFitter
+from tomoskin.board.source.clock import ClockFitter, ClockWatch
+from tomoskin.core import Frame
 
 RATE, FAST, OFFSET = 250e3, 37e-6, 1234.5
 PERIOD = 5e-3
@@ -70,3 +71,24 @@ def test_memory_is_bounded():
 
 def test_frames_of_one_tick_are_no_clock():
     assert fitted([(5, 1.0)] * 50).fit is None
+
+
+def said(seconds, factor):
+    """What is said of a clock that runs ``factor`` times as fast as its board states."""
+    watch = ClockWatch()
+    frames = (
+        Frame(0, ticks, host_time, 1, 0, 0, np.zeros(1, np.uint16))
+        for ticks, host_time in arrivals(seconds, batch=0.016, stalls=0.05)
+    )
+    return [event for frame in frames if (event := watch.push(frame, RATE / factor))]
+
+
+@pytest.mark.parametrize("factor", [0.9, 1.1, 4])
+def test_a_clock_that_is_not_as_stated_is_said_once(factor):
+    (event,) = said(20, factor)
+    assert event.kind == "clock"
+    assert f"states a clock of {RATE / factor:,.0f} Hz" in event.text
+
+
+def test_a_clock_as_stated_is_no_event():
+    assert said(20, 1.02) == said(3, 2) == []

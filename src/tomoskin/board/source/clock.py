@@ -5,10 +5,21 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+from tomoskin.core import Event, Frame
+
+TICK_RATES = (100.0, 100e6)
+"""Hz, between which the clock of a board can run. Any other rate is a mistake of its firmware."""
+
 _FEWEST = 20
 """Fewer frames say more of the line's jitter than of the clock."""
 
 _MOST_CORNERS = 256
+
+_WATCHED = 5.0
+"""s after which the rate of a clock is known well enough to be doubted."""
+
+_MOST_DRIFT = 0.05
+"""Crystals and resonators are off by less than 1 %."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,6 +110,29 @@ class ClockFitter:
             return None
         late = run.sums.misfit(a, b)
         return ClockFit(1 / b, run.first_time + a - b * run.first, late, run.sums.n)
+
+
+class ClockWatch:
+    """Says once that a board's clock runs at another rate than the board states."""
+
+    def __init__(self) -> None:
+        self._fitter, self._begun, self._said = ClockFitter(), math.inf, False
+
+    def push(self, frame: Frame, stated: float) -> Event | None:
+        """Take a frame of a board that states a tick rate of ``stated`` Hz."""
+        self._fitter.add(frame.ticks, frame.host_time)
+        self._begun = min(self._begun, frame.host_time)
+        if self._said or frame.host_time - self._begun < _WATCHED:
+            return None
+        fit = self._fitter.fit
+        if fit is None or abs(fit.drift(stated)) < _MOST_DRIFT:
+            return None
+        self._said = True
+        text = (
+            f"the board states a clock of {stated:,.0f} Hz, but it runs at {fit.tick_rate:,.0f} Hz "
+            "by this computer: times and speeds of touches are wrong by as much"
+        )
+        return Event(frame.host_time, "clock", text)
 
 
 def _extend(corners: list[tuple[float, float]], point: tuple[float, float]) -> None:
