@@ -25,6 +25,7 @@ from websockets.exceptions import InvalidState
 from tomoskin.core import DataError, StrPath, TomoskinError
 from tomoskin.server import page_messages
 from tomoskin.server.access import AccessControl, AccessPolicy
+from tomoskin.server.door import Door
 from tomoskin.server.folder import Folder
 from tomoskin.server.hub import Hub
 from tomoskin.server.overview import Overview, states
@@ -170,6 +171,7 @@ class Server(uvicorn.Server):
         return cls(
             uvicorn.Config(
                 app,
+                http=Door,
                 lifespan="on",
                 log_config=None,
                 log_level="critical",
