@@ -1,6 +1,7 @@
 """``tomoskin live`` as a program: its address, its end, and what it says when it cannot start."""
 
 import json
+import os
 import re
 import signal
 import socket
@@ -120,6 +121,24 @@ def test_what_cannot_start_is_one_sentence(refused, arguments, said):
 )
 def test_wrong_usage(refused, arguments):
     assert refused(*arguments)[0] == 2
+
+
+def test_a_recording_that_ends_by_itself_is_said_at_once_and_at_the_end(start, tmp_path):
+    """Its file is cut by another program."""
+    path = tmp_path / "run.mcap"
+    process = start("--port", "0", "--source", "twin:fast", "--record", str(path), "--json")
+    assert json.loads(process.stdout.readline())["type"] == "listening"
+    while not path.exists() or path.stat().st_size < 1000:
+        assert process.poll() is None, process.communicate()
+        threading.Event().wait(0.05)
+    os.truncate(path, 100)
+    line = process.stderr.readline()
+    assert "the recording has ended" in line
+    assert "another program has changed the file" in line
+    code, out, errors = end(process, signal.SIGINT)
+    assert (code, errors) == (1, "")
+    (ended,) = json.loads(out)["recordings_ended"]
+    assert ended in line
 
 
 def test_it_records_from_the_first_byte_to_the_end(start, tmp_path):

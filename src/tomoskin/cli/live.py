@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import webbrowser
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -101,14 +102,16 @@ def live(
             runner = Runner(
                 prepared, lambda: open_source(origin, chosen), sinks=sinks, memory=board_memory()
             )
-            with recording_to(runner, record):
+            with recording_to(runner, record) as stopped:
                 server = Server.of(application(hub_of(runner, origin, folder), policy))
                 with server.stopped_by_signals():
                     announce(policy, f"{runner.status().source} is live", json=json)
                     if open_browser:
                         webbrowser.open(policy.address)
                     server.run_on(listener)
-        _farewell(runner, json=json)
+        _farewell(runner, stopped, json=json)
+        if record is not None and stopped:
+            raise typer.Exit(1)
 
 
 def _prepared(skin: str | None, source: str) -> Prepared:
@@ -136,7 +139,7 @@ def _warn(host: str) -> None:
     )
 
 
-def _farewell(runner: Runner, *, json: bool) -> None:
+def _farewell(runner: Runner, stopped: Sequence[str], *, json: bool) -> None:
     from tomoskin.server import readings, stages
 
     status = runner.status()
@@ -149,5 +152,6 @@ def _farewell(runner: Runner, *, json: bool) -> None:
                 "p99_ms": 1e3 * status.p99,
                 "stages": stages(status),
                 **readings(status),
+                "recordings_ended": list(stopped),
             }
         )

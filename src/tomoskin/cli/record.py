@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 _OFTEN = 0.1
 _TROUBLES = frozenset({"no-answer", "source-lost", "silent", "fault", "internal"})
 """Events after which no frames come."""
+_STOPPED = "recording-stopped"
 
 
 def record(
@@ -59,18 +60,23 @@ def record(
         prepared = prepare(chosen)
     say_headroom(prepared.headroom)
     runner = Runner(prepared, lambda: open_source(source, chosen), sinks=sinks)
-    with ended_by_signals(), recording_to(runner, file):
+    with ended_by_signals(), recording_to(runner, file) as stopped:
         if seconds is None and frames is None and not json:
             typer.echo(f"{runner.status().source} is recorded to {file} until Ctrl-C", err=True)
         _wait(runner, seconds, frames)
-        if (problem := _problem(runner)) is not None:
-            raise DataError(problem)
         if (doubt := runner.status().problem) is not None:
             remark(doubt)
+    if stopped:
+        raise typer.Exit(1)
     status = runner.status()
     if not status.frames:
         raise DataError("no frame arrived, so the recording holds none", where=str(file))
-    size = file.stat().st_size
+    try:
+        size = file.stat().st_size
+    except OSError:
+        raise DataError(
+            "was moved while it was recorded; it is complete where it is now", where=str(file)
+        ) from None
     document = {"file": str(file), "bytes": size, "frames": status.frames, "lost": status.gaps,
                 "dropped": status.dropped, "corrupt": status.corrupt}  # fmt: skip
     lines = [f"{file}: {status.frames} frames, {size / 1e6:.1f} MB, {status.gaps} lost"]
@@ -92,8 +98,11 @@ def ended_by_signals() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def recording_to(runner: Runner, file: Path | None) -> Iterator[None]:
-    """The runner runs while the block lasts, and records from its first byte to ``file``."""
+def recording_to(runner: Runner, file: Path | None) -> Iterator[list[str]]:
+    """The runner runs while the block lasts, and records from its first byte to ``file``.
+
+    The list says why recordings have ended by themselves; it is whole after the block.
+    """
     from tomoskin.run import commands
 
     if file is not None:
@@ -105,31 +114,36 @@ def recording_to(runner: Runner, file: Path | None) -> Iterator[None]:
         if file is not None:
             file.unlink(missing_ok=True)
         raise
-    try:
-        with _troubles_told(runner):
-            yield
-    finally:
-        runner.stop()
+    with troubles_told(runner) as stopped:
+        try:
+            yield stopped
+        finally:
+            runner.stop()
 
 
 @contextlib.contextmanager
-def _troubles_told(runner: Runner) -> Iterator[None]:
-    """While the block lasts, say on stderr why no frames come, and when they come again."""
-    ended = threading.Event()
+def troubles_told(runner: Runner, name: str = "") -> Iterator[list[str]]:
+    """While the block lasts, say on stderr why no frames come, when they come again, and why a
+    recording has ended; the list holds the last. ``name`` is of one skin among several."""
+    ended, stopped = threading.Event(), list[str]()
 
     def tell() -> None:
-        number, troubled = 0, False
-        while not ended.wait(_OFTEN):
+        number, troubled, last = 0, False, False
+        while not last:
+            last = ended.wait(_OFTEN)
             number, happened = runner.events.since(number)
             for event in happened:
-                if event.kind in _TROUBLES or (troubled and event.kind == "connected"):
-                    remark(event.text)
+                if event.kind == _STOPPED:
+                    stopped.append(event.text)
+                    remark(name + event.text)
+                elif event.kind in _TROUBLES or (troubled and event.kind == "connected"):
+                    remark(name + event.text)
                     troubled = event.kind in _TROUBLES
 
     thread = threading.Thread(target=tell, name="troubles", daemon=True)
     thread.start()
     try:
-        yield
+        yield stopped
     finally:
         ended.set()
         thread.join()
@@ -159,12 +173,3 @@ def _played(status: Status) -> list[tuple[float, float | None]]:
         return []
     reached = replay.end_s if replay.ended else min(replay.now_s, 0.99 * replay.end_s)
     return [(reached, replay.end_s)]
-
-
-def _problem(runner: Runner) -> str | None:
-    """Why the recording has ended by itself, or None."""
-    if runner.status().recording is not None:
-        return None
-    _, events = runner.events.since(0)
-    texts = [event.text for event in events if event.kind == "recording-stopped"]
-    return texts[-1] if texts else "the recording has ended"

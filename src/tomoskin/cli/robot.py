@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import itertools
 import re
 import webbrowser
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from os import path
@@ -16,7 +18,7 @@ import typer
 from tomoskin.cli.choices import board_memory, chosen_sinks, skin_for_source, with_calibrations
 from tomoskin.cli.named_files import Otherwise, Reads
 from tomoskin.cli.output import Bar, emit, remark
-from tomoskin.cli.record import ended_by_signals
+from tomoskin.cli.record import ended_by_signals, troubles_told
 from tomoskin.cli.serving import announce, hub_of
 
 if TYPE_CHECKING:
@@ -94,8 +96,10 @@ def run_robot(robot: Robot, sinks: list[str] | None, served: Served) -> None:
         with Bar("preparing"):
             members = [_member(skin, sinks) for skin in robot.skins]
         run = RobotRun(members, board_memory())
-        _serve(robot, run, served)
-        _farewell(run, json=served.json)
+        stopped = _serve(robot, run, served)
+        _farewell(run, stopped, json=served.json)
+        if served.record is not None and stopped:
+            raise typer.Exit(1)
 
 
 def _member(skin: PlacedSkin, sinks: list[str] | None) -> Member:
@@ -117,12 +121,17 @@ def _prepared(skin: PlacedSkin) -> Prepared:
     return with_calibrations(prepare(chosen), skin.calibrations, chosen)
 
 
-def _serve(robot: Robot, run: RobotRun, served: Served) -> None:
+def _serve(robot: Robot, run: RobotRun, served: Served) -> list[str]:
+    """Until a signal comes; why recordings have ended by themselves."""
     from tomoskin.server import AccessPolicy, Overview, Server, listen, robot_application
 
+    ended: list[list[str]] = []
     with listen(served.host, served.port) as listener:
         policy = AccessPolicy(listener.getsockname()[1], served.host, **served.token)
-        try:
+        with contextlib.ExitStack() as stack:
+            for skin, runner in run.runners.items():
+                ended.append(stack.enter_context(troubles_told(runner, f"{skin}: ")))
+            stack.callback(run.stop)
             run.start()
             if served.record is not None:
                 run.record(served.record)
@@ -137,17 +146,16 @@ def _serve(robot: Robot, run: RobotRun, served: Served) -> None:
                 if served.open_browser:
                     webbrowser.open(policy.address)
                 server.run_on(listener)
-        finally:
-            run.stop()
+    return list(itertools.chain(*ended))
 
 
-def _farewell(run: RobotRun, *, json: bool) -> None:
+def _farewell(run: RobotRun, stopped: Sequence[str], *, json: bool) -> None:
     if json:
         skins = {
             name: {"frames": s.frames, "p50_ms": 1e3 * s.p50, "p99_ms": 1e3 * s.p99}
             for name, s in run.statuses().items()
         }
-        emit({"type": "stopped", "skins": skins})
+        emit({"type": "stopped", "skins": skins, "recordings_ended": list(stopped)})
 
 
 def place(

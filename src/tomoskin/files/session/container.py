@@ -192,6 +192,9 @@ class ContainerWriter:
         if self._broken:
             raise OSError("an earlier write failed")
         place = self.size
+        if os.fstat(self._file.fileno()).st_size != place:
+            self._broken = True  # what it holds is no longer what was written: nothing is cut off
+            raise OSError("another program has changed the file")
         try:
             rest = memoryview(data)
             while rest:
