@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from tomoskin.board.source import Link, ScanSettings, Transport
 from tomoskin.board.wire import Info
-from tomoskin.core import DataError, Event, Frame
+from tomoskin.core import Event, Frame, TomoskinError
 from tomoskin.files.session import BoardInfo, Mark, MarkedFrame, RawRead, Truth, advance
 from tomoskin.pipeline import FrameResult, Pipeline, Prepared, ReferenceState
 from tomoskin.run.backlog import Backlog
@@ -18,6 +18,7 @@ from tomoskin.run.frame_cost import CostMeter
 from tomoskin.run.marker import Marker, replay_status
 from tomoskin.run.publisher import Audience, Publisher
 from tomoskin.run.recall import Recall
+from tomoskin.run.repeats import Repeats
 from tomoskin.run.status import Status
 from tomoskin.run.twin_control import TwinControl, described
 from tomoskin.twin import Contact
@@ -72,6 +73,7 @@ class Flow:
         self._drops, self._polled, self._waited = 0, 0.0, 0.0
         self._standstill: str | None = None
         self._saturated: str | None = None
+        self._repeats = Repeats()
         self._ended = False
 
     def now(self) -> float:
@@ -129,17 +131,19 @@ class Flow:
                 if why not in before:
                     self.out.say("press-refused", f"a press is left out: {why}")
 
-    def take(self, link: Link, items: Sequence[object]) -> None:
+    def take(self, link: Link, items: Sequence[Frame | Event]) -> None:
         """What one read of the link brought: frames and events."""
         self._polled, self._waited = self._clock(), link.waited
         self._note_board(link.info, link.board_name)
         frames = [item for item in items if isinstance(item, Frame)]
         self._drops = frames[-1].drops if frames else self._drops
         self._losses = Losses.of(link, self._drops)
-        for event in (item for item in items if isinstance(item, Event)):
-            self.out.put(event)
+        events = [item for item in items if isinstance(item, Event)]
+        for event in events:
             if event.kind in _STANDSTILL:
                 self._standstill = event.text
+        if items:
+            self._say(items[-1].host_time, events)
         self._take_frames(frames)
         self._end()
 
@@ -210,6 +214,11 @@ class Flow:
             self._ended = ended
             self.out.wake()
 
+    def _say(self, now: float, events: Sequence[Event]) -> None:
+        """Publish what happens, and what happens again and again once a second."""
+        for event in self._repeats.push(now, events):
+            self.out.put(event)
+
     def _take_frames(self, frames: Sequence[Frame]) -> None:
         late = self._backlog.late(len(frames), self._waited) if frames else 0
         for number, frame in enumerate(frames):
@@ -233,9 +242,10 @@ class Flow:
         try:
             with self.costs.of(frame):
                 result = advance(self.pipeline, frame, mark)
-        except DataError as error:
+        except TomoskinError as error:  # of this frame: the source is well
             self._skipped += 1
-            self.out.say("refused", f"a frame was left out: {error}")
+            refused = Event(frame.host_time, "refused", f"a frame was left out: {error}")
+            self._say(frame.host_time, [refused])
             return
         if result is None:
             return

@@ -254,7 +254,7 @@ def decode_request(data: str | bytes) -> Request:
         raise WireError(f"expected a message of at most {MAX_REQUEST} bytes, got {len(data)}")
     try:
         return _DECODER.decode(data)
-    except (msgspec.DecodeError, UnicodeError) as error:
+    except (msgspec.DecodeError, UnicodeError, RecursionError) as error:
         raise WireError(
             f"the message of the page is not understood (reload the page): {error}"
         ) from None
