@@ -59,7 +59,7 @@ def test_requests():
         json.dumps({"type": "presses", "presses": [PRESS | {"x": float("nan")}]}),
         '{"type":"presses","presses":[{"x":1e999,"y":0,"force":1,"radius":0.01}]}',
         "[" * 3000,
-        '{"type":"settings","changes":{"skin":{"name":' + "[" * 8000 + "]" * 8000 + "}}}",
+        '{"type":"settings","changes":{"skin":{"name":' + "[" * 400 + "]" * 400 + "}}}",
         "\ud800",
         '{"type":"reference"' + " " * MAX_REQUEST + "}",
     ],

@@ -26,7 +26,6 @@ from tomoskin.server import (
     ServerError,
     application,
     check_page,
-    door,
     listen,
     page_connection,
 )
@@ -384,44 +383,6 @@ def test_a_page_that_does_not_read_leaves_no_connection_behind(runner, static, m
             warnings.simplefilter("always")
             gc.collect()
     assert [str(one.message) for one in said] == []
-
-
-HALF = b"GET /status HTTP/1.1\r\nHost: 127"
-
-
-def half_open(site, stack):
-    """A connection that begins to ask, and asks no further."""
-    connection = socket.create_connection(("127.0.0.1", site.port), timeout=PATIENCE)
-    stack.enter_context(connection).sendall(HALF)
-    return connection
-
-
-def closed(connection):
-    """Whether the other side ends the connection, within the tests' patience."""
-    try:
-        return connection.recv(1) == b""
-    except ConnectionResetError:
-        return True
-
-
-def test_half_a_request_has_an_end(site, monkeypatch, caplog):
-    monkeypatch.setattr(door, "PATIENCE", 0.1)
-    monkeypatch.setattr(door.Door, "_quiet_until", 0.0)
-    with ExitStack() as stack:
-        connections = [half_open(site, stack) for _ in range(3)]
-        assert all(map(closed, connections))
-    said = [record.message for record in caplog.records if "ask for nothing" in record.message]
-    assert said == ["page: connections from 127.0.0.1 that ask for nothing are closed"]
-
-
-def test_half_requests_keep_nobody_out(site):
-    with ExitStack() as stack:
-        connections = [half_open(site, stack) for _ in range(door.MOST_WAITING + 20)]
-        assert all(map(closed, connections[:20]))
-        with site.client() as client:
-            assert client.get("/status").status_code == 200
-        page = stack.enter_context(site.connect())
-        assert json.loads(page.recv(PATIENCE))
 
 
 def test_stopping_with_a_page_open_is_quick(runner, static):

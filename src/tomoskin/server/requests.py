@@ -5,7 +5,7 @@ Requests that are commands to the run stand in ``run/commands.py`` and ``run/twi
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import msgspec
 from msgspec import Meta
@@ -30,7 +30,8 @@ FlowKind = Literal["touch", "mapping", "force", "rub"]
 Calibrated = Literal["touch", "force"]
 """What a calibration that a page can choose is of."""
 
-Value = str | int | float | list[Any] | None
+Plain = str | int | float
+Value = Plain | list[Plain | list[Plain | list[Plain]]] | None
 """A value as a skin file writes it; null takes the key out."""
 
 
