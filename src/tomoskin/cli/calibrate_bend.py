@@ -63,7 +63,7 @@ def calibrate_bend(
         raise DataError("expected voltages with untouched frames, got none", where=str(recording))
     straight = Reference.of(np.asarray(idle, dtype=np.float64))
     frames, angle, axis = _from_options(bend, len(data)) if bend else _from_truth(recording, data)
-    examples = BendExamples.of(data.voltages[frames] - straight.mean, angle, axis,
+    examples = BendExamples.checked(data.voltages[frames] - straight.mean, angle, axis,
                                data.time[frames])  # fmt: skip
     with Bar("learning"):
         model = BendModel.learn(examples, voltage_covariance(prepared, straight))

@@ -10,9 +10,9 @@ from tomoskin.learning.bend.kind import BENDS
 from tomoskin.learning.bend.model import BendModel
 from tomoskin.learning.bend.reader import BendReader, BendReading
 from tomoskin.learning.classes.alignment import Alignment
-from tomoskin.learning.classes.classifier import Answers, Classifier
+from tomoskin.learning.classes.classifier import Answers, Classifier, ClassReading
 from tomoskin.learning.classes.examples import Codes, Examples, against_rest
-from tomoskin.learning.classes.kind import CLASSES, ClassReading, FrameClassifier
+from tomoskin.learning.classes.kind import CLASSES
 from tomoskin.learning.force.identify import MaterialFit, identify
 from tomoskin.learning.force.kind import FORCE
 from tomoskin.learning.force.measured import ForceProcess
@@ -56,7 +56,7 @@ def load_calibration(path: StrPath, progress: Progress = silent) -> Calibration[
         raise DataError(
             "is not a calibration", where=str(path), hint="make one: tomoskin calibrate --help"
         )
-    return kind.learn(arrays, str(path), progress)
+    return kind.unpack(arrays, str(path), progress)
 
 
 __all__ = [
@@ -85,7 +85,6 @@ __all__ = [
     "ForceModel",
     "ForceProcess",
     "ForceReport",
-    "FrameClassifier",
     "FrameView",
     "JointReference",
     "Kind",

@@ -38,8 +38,8 @@ class BendExamples:
     time: FloatArray
 
     @classmethod
-    def of(cls, dv: ArrayLike, angle: ArrayLike, axis: ArrayLike, time: ArrayLike) -> Self:
-        """Checked.
+    def checked(cls, dv: ArrayLike, angle: ArrayLike, axis: ArrayLike, time: ArrayLike) -> Self:
+        """Check the frames and their labels.
 
         Raises
         ------

@@ -138,8 +138,11 @@ class BendModel:
         Raises
         ------
         DataError
-            When the bends do not show above the noise.
+            When the bends do not show above the noise, or the covariance is of other rows.
         """
+        n_meas = examples.dv.shape[1]
+        if covariance.shape != (n_meas, n_meas):
+            raise DataError(f"expected {n_meas} rows of covariance, got shape {covariance.shape}")
         whiten = Whitener.of(covariance)
         whitened = whiten(examples.dv)
         _, singular, rows = np.linalg.svd(whitened, full_matrices=False)

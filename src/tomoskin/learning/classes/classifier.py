@@ -41,6 +41,32 @@ class Answers:
     rejected: NDArray[np.bool_]
 
 
+@dataclass(frozen=True, slots=True)
+class ClassReading:
+    """What one frame shows.
+
+    Attributes
+    ----------
+    name
+        The class, or the flags that are set; the nearest where it is ``unknown``.
+    probability
+        Of that class among those that were learnt.
+    unknown
+        Whether the frame looks like none of them.
+    """
+
+    name: str
+    probability: float
+    unknown: bool
+
+    @property
+    def text(self) -> str:
+        """For people."""
+        if self.unknown:
+            return f"unknown class (nearest: {self.name})"
+        return f"{self.name} {100 * self.probability:.0f} %"
+
+
 @dataclass(frozen=True, eq=False)
 class Classifier:
     """States or flags of frames, learnt from examples; made by :meth:`fit`.
@@ -49,17 +75,19 @@ class Classifier:
     ----------
     examples
         What it was learnt from, session by session; answers are for the newest.
-    pattern_id, skin_id
-        Identity of the pattern and the skin, "" where they are not known.
+    skin_id
+        Identity of the skin, "" where it is not known.
     right
         Part of the labelled frames of the newest session that has them all whose state is told
         when they are left out of the learning.
     alignment
         How the newest session was taken over; None where it has all its labels.
+    rows
+        (n_meas,) of the examples' measurements, each one's number in a frame, where frames lack
+        some; None where they have all.
     """
 
     examples: Examples
-    pattern_id: str
     skin_id: str
     subspace: Subspace
     mixture: Mixture
@@ -67,6 +95,7 @@ class Classifier:
     limit: float
     right: float
     alignment: Alignment | None = None
+    rows: IntArray | None = None
 
     @classmethod
     def fit(
@@ -104,19 +133,18 @@ class Classifier:
             flags = given.astype(np.float64)
         if pattern is not None:
             frames(dv, pattern.n_meas)
-        identity = pattern.identity if pattern else ""
-        return cls.learn(Examples.of(codes, dv, flags), (identity, skin_id))
+        return cls.learn(Examples.checked(codes, dv, flags), skin_id)
 
     @classmethod
-    def learn(cls, examples: Examples, identities: tuple[str, str] = ("", "")) -> Self:
-        """Learn from checked examples; ``identities`` of pattern and skin."""
-        taught = examples.taught().checked()
+    def learn(cls, examples: Examples, skin_id: str = "") -> Self:
+        """Learn from checked examples of the skin of that identity."""
+        taught = examples.taught().enough()
         distances, strange = _left_out(taught)
         truth = examples.codes.numbers(taught.flags[taught.newest])
         subspace = Subspace.of(examples)
         made = cls(
             examples,
-            *identities,
+            skin_id,
             subspace,
             _mixture(subspace, taught, examples),
             sharpness=_sharpness(distances, truth),
@@ -138,7 +166,7 @@ class Classifier:
         if alignment.holds:
             sharpness = min(self.sharpness, _tempered(fitted.distances(x), alignment.reliability))
             return replace(made, sharpness=sharpness, alignment=alignment)
-        before = type(self).learn(older, (self.pattern_id, self.skin_id))
+        before = type(self).learn(older, self.skin_id)
         better = max((before, made), key=lambda known: known._flags_right(newest))
         return replace(better, examples=self.examples, alignment=alignment)
 
@@ -201,20 +229,24 @@ class Classifier:
         codes = self.examples.codes
         data = frames(dv, self.examples.dv.shape[1])
         unknown = np.full((len(data), len(codes.names)), np.nan)
-        more = Examples.of(codes, data, unknown if flags is None else flags)
+        more = Examples.checked(codes, data, unknown if flags is None else flags)
         if not more.labelled.any() and len(more) < _ENOUGH:
             raise DataError(f"expected at least {_ENOUGH} frames of the session, got {len(more)}")
-        return self.learn(self.examples.and_then(more), (self.pattern_id, self.skin_id))
+        return self.learn(self.examples.and_then(more), self.skin_id)
 
-    def check(self, pattern_id: str = "", skin_id: str = "") -> None:
-        """Refuse data of another pattern or skin. Raises DataError."""
-        pairs = (("pattern", self.pattern_id, pattern_id), ("skin", self.skin_id, skin_id))
-        for name, mine, other in pairs:
-            if mine and other and mine != other:
-                raise DataError(
-                    f"the calibration is for {name} {mine}, but the data are of {name} {other}",
-                    hint=f"calibrate this {name}: tomoskin calibrate class",
-                )
+    def without(self, measurements: IntArray) -> Self:
+        """The same for frames that lack ``measurements``."""
+        rows = np.arange(self.examples.dv.shape[1]) if self.rows is None else self.rows
+        return replace(self, rows=np.delete(rows, measurements))
+
+    def read(self, change: FloatArray) -> ClassReading:
+        """The class of a frame minus the reference, (n_meas,) V, NaN where one is excluded."""
+        complete = np.full(self.examples.dv.shape[1], np.nan)
+        complete[slice(None) if self.rows is None else self.rows] = change
+        answers = self.predict(complete[None])
+        return ClassReading(
+            answers.label[0], float(answers.probability[0]), bool(answers.rejected[0])
+        )
 
 
 def _mixture(subspace: Subspace, taught: Examples, complete: Examples) -> Mixture:

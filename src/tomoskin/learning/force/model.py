@@ -119,6 +119,10 @@ class ForceModel:
         DataError
             When the weights contradict, or a labelled touch makes the sheet conduct better.
         """
+        if not (conductivity > 0 and unit > 0):
+            raise DataError(
+                f"expected a conductivity and a unit above 0, got {conductivity} and {unit}"
+            )
         rows = presses.labelled
         radius = float(np.exp(np.log(_radius(presses.area[rows])).mean()))
         depth = depth_of(presses.peak, presses.area, conductivity, radius)

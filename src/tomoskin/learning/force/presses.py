@@ -54,13 +54,9 @@ class WeighedPresses:
 
     @classmethod
     def of(
-        cls,
-        detections: Sequence[Detection],
-        force: ArrayLike,
-        press: ArrayLike,
-        time: ArrayLike,
+        cls, detections: Sequence[Detection], force: ArrayLike, press: ArrayLike, time: ArrayLike
     ) -> Self:
-        """Check touches and their labels: ``force`` (n,) N, ``press`` (n,), ``time`` (n,) s.
+        """Of touches with their labels: ``force`` (n,) N, ``press`` (n,), ``time`` (n,) s.
 
         Raises
         ------
@@ -68,32 +64,40 @@ class WeighedPresses:
             For labels that do not belong together or to a press, times that go back within one,
             fewer than five forces, forces that are no newtons, or weights that contradict.
         """
+        n = len(detections)
+        rows = np.array([(d.x, d.y, d.area, d.peak, d.snr) for d in detections]).reshape(n, 5)
         newtons, times = (np.asarray(values, dtype=np.float64) for values in (force, time))
         number = np.asarray(press)
-        n = len(detections)
-        if not newtons.shape == number.shape == times.shape == (n,):
+        return cls.checked(rows[:, :2], *rows[:, 2:].T, newtons, number, times)
+
+    @classmethod
+    def checked(
+        cls,
+        xy: FloatArray,
+        area: FloatArray,
+        peak: FloatArray,
+        snr: FloatArray,
+        force: FloatArray,
+        press: IntArray,
+        time: FloatArray,
+    ) -> Self:
+        """The same of the columns; raises as :meth:`of` does."""
+        n = len(xy)
+        if not force.shape == press.shape == time.shape == (n,):
             raise DataError(
                 f"expected a force, a press and a time for each of {n} touches, got shapes "
-                f"{newtons.shape}, {number.shape}, {times.shape}",
+                f"{force.shape}, {press.shape}, {time.shape}",
                 where=_WHERE,
             )
-        if not np.isfinite(times).all() or np.isinf(newtons).any():
-            raise DataError(
-                "expected finite times and forces, got values that are not finite", where=_WHERE
-            )
-        order = np.lexsort((np.arange(n), number))
-        back = (np.diff(times[order]) < 0) & (np.diff(number[order]) == 0)
-        if back.any():
-            raise DataError(
-                f"the time decreases within press {number[order][int(np.argmax(back))]}",
-                where=_WHERE,
-                hint="give the touches of each press in the order of their times",
-            )
-        _check_newtons(newtons[np.isfinite(newtons)])
-        rows = np.array([(d.x, d.y, d.area, d.peak, d.snr) for d in detections]).reshape(n, 5)
-        return cls(
-            rows[:, :2], rows[:, 2], rows[:, 3], rows[:, 4], newtons, number.astype(int), times
-        )
+        about = (xy, area, peak)
+        if xy.shape != (n, 2) or not area.shape == peak.shape == snr.shape == (n,):
+            shapes = ", ".join(str(column.shape) for column in (*about, snr))
+            raise DataError(f"expected xy, area, peak and snr of each touch, got shapes {shapes}")
+        if not all(np.isfinite(column).all() for column in about):
+            raise DataError("expected finite xy, area and peak of every touch, got others")
+        _check_order(force, press, time)
+        _check_newtons(force[np.isfinite(force)])
+        return cls(xy, area, peak, snr, force, press.astype(int), time)
 
     def __len__(self) -> int:
         """Number of touches."""
@@ -104,13 +108,20 @@ class WeighedPresses:
         """Touches under a known force."""
         return np.flatnonzero(np.isfinite(self.force))
 
-    def without(self, press: int) -> Self:
-        """The same without one press."""
-        keep = self.press != press
-        return type(self)(
-            self.xy[keep], self.area[keep], self.peak[keep], self.snr[keep],
-            self.force[keep], self.press[keep], self.time[keep],
-        )  # fmt: skip
+
+def _check_order(force: FloatArray, press: IntArray, time: FloatArray) -> None:
+    if not np.isfinite(time).all() or np.isinf(force).any():
+        raise DataError(
+            "expected finite times and forces, got values that are not finite", where=_WHERE
+        )
+    order = np.lexsort((np.arange(len(press)), press))
+    back = (np.diff(time[order]) < 0) & (np.diff(press[order]) == 0)
+    if back.any():
+        raise DataError(
+            f"the time decreases within press {press[order][int(np.argmax(back))]}",
+            where=_WHERE,
+            hint="give the touches of each press in the order of their times",
+        )
 
 
 def _check_newtons(force: FloatArray) -> None:

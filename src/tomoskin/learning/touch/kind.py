@@ -1,11 +1,4 @@
-"""The kind of calibration that tells where a touch is, from labelled presses.
-
-Keys of the .npz: ``kind``, ``version``; ``dv`` (n, n_meas), ``xy_m`` (n, 2), optional ``strength``
-(n,) and, of labels that were estimated, ``spread_m2`` (n, 2, 2); ``outline_m`` (k, 2); ``drive``,
-``measure`` (n_meas, 2), ``n_electrodes``; ``pattern``,
-``skin`` identities, ``skin_name``. What was learnt is learnt again when the file is read, which
-gives the same locator: a file outlives the method.
-"""
+"""The kind of calibration that tells where a touch is, from labelled presses."""
 
 from __future__ import annotations
 
@@ -14,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import Arrays, DataError, Detection, FloatArray, IntArray, real_numbers
+from tomoskin.core import Detection, FloatArray, IntArray
 from tomoskin.learning.kind import (
     Applied,
     Calibration,
@@ -22,7 +15,6 @@ from tomoskin.learning.kind import (
     FrameView,
     Kind,
     Progress,
-    located,
 )
 from tomoskin.learning.touch.correction import FitCorrection
 from tomoskin.learning.touch.health import CalibrationHealth
@@ -124,32 +116,10 @@ def _at(detection: Detection, position: FloatArray, covariance: FloatArray) -> D
     return replace(detection, x=x, y=y, sd_x=sd_x, sd_y=sd_y, cov_xy=cov_xy, bias=0.0)
 
 
-def _pack(locator: Locator) -> Arrays:
-    arrays: Arrays = {
-        "dv": locator.presses.dv,
-        "xy_m": locator.presses.xy,
-        "outline_m": locator.region.outline,
-        "pattern": np.array(locator.pattern_id),
-        "skin": np.array(locator.skin_id),
-    }
-    presses = locator.presses
-    optional = {"strength": presses.strength, "spread_m2": presses.spread}
-    return {**arrays, **{key: v for key, v in optional.items() if v is not None}}
-
-
-def _unpack(arrays: Arrays, pattern: Pattern, where: str, progress: Progress) -> Locator:
-    strength, spread = (
-        real_numbers(arrays, key, where) if key in arrays else None
-        for key in ("strength", "spread_m2")
-    )
-    dv = real_numbers(arrays, "dv", where)
-    if dv.shape[1:] != (pattern.n_meas,):
-        raise DataError(f"expected {pattern.n_meas} rows of dv, got shape {dv.shape}", where=where)
-    with located(where):
-        presses = Presses.of(dv, real_numbers(arrays, "xy_m", where), strength, spread)
-        region = Region.checked(real_numbers(arrays, "outline_m", where))
-        skin_id = str(arrays.get("skin", ""))
-        return Locator.learn(presses.within(region), region, pattern, skin_id, progress)
+def _learn(
+    presses: Presses, region: Region, pattern: Pattern, progress: Progress, skin_id: str = ""
+) -> Locator:
+    return Locator.learn(presses.within(region), region, pattern, skin_id, progress)
 
 
 def _check(calibration: Calibration[Locator], skin: Skin) -> None:
@@ -193,17 +163,12 @@ def _excluded(nuisance: FloatArray) -> NDArray[np.bool_]:
 TOUCH = Kind(
     name="touch",
     title="tomoskin touch calibration",
-    version=1,
     subject="touch",
-    command="touch",
     attachment="calibration.npz",
-    keys=frozenset({"dv", "xy_m", "outline_m"}),
-    pack=_pack,
-    unpack=_unpack,
+    learn=_learn,
     check=_check,
     exclude=_exclude,
     apply=_apply,
-    skin_id=lambda locator: locator.skin_id,
     locates=True,
 )
 """Touch positions from labelled presses; its model is a :class:`Locator`."""

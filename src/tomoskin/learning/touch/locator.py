@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from threadpoolctl import threadpool_limits
 
-from tomoskin.core import DataError, FloatArray
+from tomoskin.core import FloatArray
 from tomoskin.learning.kind import Progress, silent
 from tomoskin.learning.touch.posterior import FEW, Estimates, widening
 from tomoskin.learning.touch.presses import Features, Presses, Strength, frames, mean_about
@@ -121,7 +121,7 @@ class Locator:
             skin, presses on one line, data that never change.
         """
         table = pattern or (skin.pattern() if skin else None)
-        presses = Presses.of(dv, xy, strength)
+        presses = Presses.checked(dv, xy, strength)
         if table is not None:
             frames(presses.dv, table.n_meas)
         region = Region.of(skin) if skin else Region.around(presses.xy)
@@ -261,11 +261,6 @@ class Locator:
         return self.learn(presses.within(region), region, self.pattern, self.skin_id, progress)
 
     @property
-    def pattern_id(self) -> str:
-        """Identity of the pattern, "" where it is not known."""
-        return self.pattern.identity if self.pattern else ""
-
-    @property
     def errors(self) -> FloatArray:
         """(n,) m by which each press is missed when it is left out."""
         return np.asarray(
@@ -276,16 +271,3 @@ class Locator:
     def next_place(self) -> FloatArray:
         """(2,) m where the next labelled press tells most: the maps are least certain there."""
         return self.region.metres(self.estimates.least_known)
-
-    def check(self, pattern: Pattern | None = None, skin: Skin | None = None) -> None:
-        """Refuse data of another pattern or skin. Raises DataError."""
-        pairs = (
-            ("pattern", self.pattern_id, pattern and pattern.identity),
-            ("skin", self.skin_id, skin and skin.identity),
-        )
-        for name, mine, other in pairs:
-            if mine and other and mine != other:
-                raise DataError(
-                    f"the calibration is for {name} {mine}, but the data are of {name} {other}",
-                    hint=f"calibrate this {name}: tomoskin calibrate touch",
-                )

@@ -42,7 +42,7 @@ class Presses:
     spread: FloatArray | None = None
 
     @classmethod
-    def of(
+    def checked(
         cls,
         dv: ArrayLike,
         xy: ArrayLike,

@@ -159,7 +159,7 @@ class Rubbing:
         found = cls(
             skin,
             pattern,
-            Presses.of(dv, region.metres(alone.positions), spread=_spread(alone, region)),
+            Presses.checked(dv, region.metres(alone.positions), spread=_spread(alone, region)),
             region.unit * alone.disagreement,
             region.unit * alone.moved,
             alone.alike,
@@ -262,7 +262,7 @@ def _presses(dv: FloatArray, xy: FloatArray, positions: FloatArray, spread: Floa
     """Frames at labels ``xy`` (n, 2) m, without spread; at ``positions`` where these are NaN."""
     known: BoolArray = np.asarray(np.isfinite(xy).all(axis=1))
     spread = np.where(known[:, None, None], 0.0, spread)
-    return Presses.of(dv, np.where(known[:, None], xy, positions), spread=spread)
+    return Presses.checked(dv, np.where(known[:, None], xy, positions), spread=spread)
 
 
 def _spread(fit: UnlabelledFit, region: Region) -> FloatArray:

@@ -278,7 +278,7 @@ def _mapped(
     spread = _spread(fit.tempered(grown).posterior(white), mean, grid)
     spread[known] = 0.0
     label = np.where(known[:, None], session.xy, region.metres(mean))
-    estimated = Presses.of(session.dv, label, spread=region.unit**2 * spread)
+    estimated = Presses.checked(session.dv, label, spread=region.unit**2 * spread)
     presses = like.presses.and_then(estimated)
     return _Found(presses, found, _way(found, start), grown, covered)
 

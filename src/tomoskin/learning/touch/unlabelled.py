@@ -102,7 +102,7 @@ def from_labels(dv: FloatArray, labels: FloatArray, region: Region, pattern: Pat
     It begins where a calibration from the labels puts the frames, and asks the model nothing.
     """
     known = np.isfinite(labels).all(axis=1)
-    presses = Presses.of(dv[known], region.metres(labels[known]))
+    presses = Presses.checked(dv[known], region.metres(labels[known]))
     start = region.scaled(Locator.learn(presses, region, pattern).predict(dv)[0])
     grid = region.lattice(_POSITIONS)
     return np.asarray(refined(signed_features(dv), start, labels, grid) @ grid)
