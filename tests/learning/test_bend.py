@@ -92,7 +92,9 @@ def test_what_lags_behind_by_a_play_is_undone():
         lagging.append(0.7 * value + 0.3 * play)
     dv = frames(np.array(lagging), np.full(400, np.pi / 2), random)
     time = np.arange(400) * 0.1
-    model = BendModel.learn(BendExamples.checked(dv, course, np.full(400, np.pi / 2), time), COVARIANCE)
+    model = BendModel.learn(
+        BendExamples.checked(dv, course, np.full(400, np.pi / 2), time), COVARIANCE
+    )
     assert model.remembers
     assert np.degrees(model.error) < 0.5
 

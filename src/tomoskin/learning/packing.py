@@ -55,7 +55,10 @@ def unpack(make: Callable[..., T], arrays: Arrays, **given: Any) -> T:
         elif key in arrays:
             values[name] = _value(hints[name], arrays, key)
         elif parameter.default is Parameter.empty:
-            raise DataError(f"expected {key} in the file, got {', '.join(arrays)}")
+            raise DataError(
+                f"is not a calibration that is complete: expected {key} in the file, got "
+                f"{', '.join(arrays)}"
+            )
     return make(**values)
 
 

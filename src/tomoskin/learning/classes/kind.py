@@ -24,7 +24,7 @@ def _apply(classifier: Classifier, _conditions: Conditions) -> Applied:
     return ClassesApplied(classifier)
 
 
-CLASSES = Kind(
+CLASSES: Kind[Classifier] = Kind(
     name="class",
     title="tomoskin states calibration",
     subject="classes",

@@ -66,13 +66,17 @@ class WeighedPresses:
         """
         n = len(detections)
         rows = np.array([(d.x, d.y, d.area, d.peak, d.snr) for d in detections]).reshape(n, 5)
+        area, peak, snr = rows[:, 2:].T
         newtons, times = (np.asarray(values, dtype=np.float64) for values in (force, time))
         number = np.asarray(press)
-        return cls.checked(rows[:, :2], *rows[:, 2:].T, newtons, number, times)
+        return cls.checked(
+            xy=rows[:, :2], area=area, peak=peak, snr=snr, force=newtons, press=number, time=times
+        )
 
     @classmethod
     def checked(
         cls,
+        *,
         xy: FloatArray,
         area: FloatArray,
         peak: FloatArray,

@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits
 
 from tomoskin.core import FloatArray
 from tomoskin.learning.kind import Progress, silent
-from tomoskin.learning.touch.posterior import FEW, Estimates, widening
+from tomoskin.learning.touch.posterior import Estimates, widening
 from tomoskin.learning.touch.presses import Features, Presses, Strength, frames, mean_about
 from tomoskin.learning.touch.rotations import Rotations
 from tomoskin.learning.touch.session_alignment import SessionAlignment
@@ -31,8 +31,8 @@ from tomoskin.sensing.segment import Region
 
 _STEPS = 4
 
-_COARSE = 600
-"""Places in the grid of few presses: what they know is less than that."""
+_PLACES = 600
+"""Positions in the grid; what is between them is their mean."""
 
 _MISSING = 2.0
 """Power of the part of the rows that a frame has, by which its covariance is divided: filled in,
@@ -154,7 +154,7 @@ class Locator:
         data = features(presses.dv)
         progress(0, _STEPS)
         rotations = Rotations.of(origin[0]) if origin[0] else Rotations.none(presses.dv.shape[1])
-        grid = region.lattice(_COARSE) if len(presses) < FEW else region.grid
+        grid = region.lattice(_PLACES)
         estimates = Estimates.of(data, positions, grid, rotations.of_rows(features.rows))
         progress(1, _STEPS)
         stacking = Stacking.of(data, estimates.left_out, positions)

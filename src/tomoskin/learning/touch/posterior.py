@@ -11,7 +11,7 @@ from typing import Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import FloatArray
+from tomoskin.core import FloatArray, IntArray
 from tomoskin.learning.touch.maps import ResponseMaps, principal
 from tomoskin.learning.touch.per_channel import ChannelLikelihood, ChannelMaps
 from tomoskin.learning.touch.process import LENGTHS, Likeness, squared_distances
@@ -104,8 +104,8 @@ def moments(probability: FloatArray, grid: FloatArray) -> tuple[FloatArray, Floa
     return mean, second - mean[:, :, None] * mean[:, None, :]
 
 
-FEW = 80
-"""So few presses are asked row by row too; with more, all rows together know better."""
+_MOST = 300
+"""Presses that maps of single rows are learnt from: more tell a row no more of its noise."""
 
 _SCARCE = 20
 _FOLDS = (8, 5)
@@ -163,18 +163,18 @@ class Estimates:
         of_others = _without(joint, folds, positions, features)
         misfit = _read(folds, [part.misfit(x) for part, x in of_others])
         parts = [of_others[0][0].of_misfit(misfit)]
-        alone = None
-        if len(positions) < FEW:
-            alone = channels = ChannelMaps.of(positions, features, rotations)
+        few = _spread(len(positions))
+        channels = ChannelMaps.of(positions[few], features[few], rotations)
 
-            def single(some: FloatArray, theirs: FloatArray) -> ChannelLikelihood:
-                return ChannelLikelihood.of(channels.again(some, theirs), grid)
+        def single(some: FloatArray, theirs: FloatArray) -> ChannelLikelihood:
+            few = _spread(len(some))
+            return ChannelLikelihood.of(channels.again(some[few], theirs[few]), grid)
 
-            alone_of_others = _without(single, folds, positions, features)
-            parts.append(_read(folds, [part(x) for part, x in alone_of_others]))
+        alone_of_others = _without(single, folds, positions, features)
+        parts.append(_read(folds, [part(x) for part, x in alone_of_others]))
         powers = powers_of(parts, grid, positions)
         left_out = moments(pooled(parts, powers), grid)
-        per_channel = ChannelLikelihood.of(alone, grid) if alone and powers[1] else None
+        per_channel = ChannelLikelihood.of(channels, grid) if powers[1] else None
         usual = float(np.median(misfit.min(axis=1)))
         return cls(grid, GridLikelihood.of(maps, grid), per_channel, powers, usual, *left_out)
 
@@ -235,6 +235,11 @@ def _folds(positions: FloatArray) -> list[BoolArray]:
     order = np.arange(n)
     fold = order * folds // n if _in_any_order(positions) else order % folds
     return [fold == k for k in range(folds)]
+
+
+def _spread(n: int) -> IntArray:
+    """At most so many presses of n, spread over the time in which they were made."""
+    return np.unique(np.linspace(0, n - 1, min(n, _MOST)).astype(int))
 
 
 def _without(
