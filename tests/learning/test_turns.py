@@ -7,8 +7,7 @@ import pytest
 
 from learning.labelled import RADIUS, Floats, places
 from tomoskin import Locator, Pattern
-from tomoskin.learning.touch.per_channel import ChannelMaps
-from tomoskin.learning.touch.rotations import Rotations, turned
+from tomoskin.learning.touch.per_channel import ChannelMaps, Rotations, turned
 
 PATTERN = Pattern.adjacent(8)
 

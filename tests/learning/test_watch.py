@@ -10,7 +10,7 @@ from tomoskin import Locator
 from tomoskin.core import DataError
 from tomoskin.learning import Watch
 from tomoskin.learning.touch.health import STRANGE
-from tomoskin.learning.touch.lost_rows import LIVE, LostRows, without
+from tomoskin.learning.touch.watch import LIVE, LostRows, without
 
 JUMPED = [3, 8, 21, 30, 35, 38]
 

@@ -1,6 +1,6 @@
 """Where a touch is, learnt from labelled presses."""
 
-from tomoskin.learning.touch.left_out import LeftOut
+from tomoskin.learning.touch.health import LeftOut
 from tomoskin.learning.touch.locator import Locator
 from tomoskin.learning.touch.presses import Presses
 from tomoskin.learning.touch.stacking import Remark

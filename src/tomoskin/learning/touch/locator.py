@@ -11,9 +11,9 @@ from threadpoolctl import threadpool_limits
 
 from tomoskin.core import FloatArray
 from tomoskin.learning.kind import Progress, silent
+from tomoskin.learning.touch.per_channel import Rotations
 from tomoskin.learning.touch.posterior import Estimates, widening
 from tomoskin.learning.touch.presses import Features, Presses, Strength, frames, mean_about
-from tomoskin.learning.touch.rotations import Rotations
 from tomoskin.learning.touch.session_alignment import SessionAlignment
 from tomoskin.learning.touch.stacking import (
     NINE_IN_TEN,

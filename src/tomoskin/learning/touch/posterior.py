@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, IntArray
 from tomoskin.learning.touch.maps import ResponseMaps, principal
-from tomoskin.learning.touch.per_channel import ChannelLikelihood, ChannelMaps
+from tomoskin.learning.touch.per_channel import ChannelLikelihood, ChannelMaps, Rotations
 from tomoskin.learning.touch.process import LENGTHS, Likeness, squared_distances
-from tomoskin.learning.touch.rotations import Rotations
 
 BoolArray = NDArray[np.bool_]
 

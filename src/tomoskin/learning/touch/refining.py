@@ -7,7 +7,7 @@ import numpy as np
 from tomoskin.core import FloatArray, IntArray, reach
 from tomoskin.learning.touch.presses import Features
 from tomoskin.learning.touch.process import Basis, Likeness, squared_distances
-from tomoskin.learning.touch.ranks import levels
+from tomoskin.learning.touch.rough import levels
 from tomoskin.learning.touch.topographic import TopographicMap, balanced
 
 _MOST = 256

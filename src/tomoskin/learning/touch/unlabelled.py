@@ -9,12 +9,18 @@ import numpy as np
 
 from tomoskin.core import FloatArray
 from tomoskin.learning.touch.locator import Locator
-from tomoskin.learning.touch.modelled import ModelFit, model_responses
 from tomoskin.learning.touch.presses import Presses
-from tomoskin.learning.touch.ranks import Ranked, expected_sizes, inside
 from tomoskin.learning.touch.refining import refined, signed_features
+from tomoskin.learning.touch.rough import (
+    ModelFit,
+    Ranked,
+    expected_sizes,
+    inside,
+    laid_over,
+    model_responses,
+    unfolded,
+)
 from tomoskin.learning.touch.topographic import covariances
-from tomoskin.learning.touch.unfolding import laid_over, unfolded
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.pattern import Pattern
 from tomoskin.model.skin import Skin
