@@ -7,13 +7,12 @@ from tomoskin.core import DataError, StrPath, load_arrays
 from tomoskin.learning.bend.examples import BendExamples, JointReference
 from tomoskin.learning.bend.kind import BENDS, BendReader, BendReading
 from tomoskin.learning.bend.model import BendModel
-from tomoskin.learning.classes.alignment import Alignment
 from tomoskin.learning.classes.examples import Codes, Examples, against_rest
 from tomoskin.learning.classes.kind import CLASSES, Answers, Classifier, ClassReading
-from tomoskin.learning.force.identify import MaterialFit, identify
+from tomoskin.learning.force.identify import identify
 from tomoskin.learning.force.kind import FORCE, ForceReport, least_known
 from tomoskin.learning.force.measured import ForceProcess
-from tomoskin.learning.force.model import ForceModel, LabelRemark, PressedSpots
+from tomoskin.learning.force.model import ForceModel
 from tomoskin.learning.force.presses import NEWTONS, WeighedPresses, Weight
 from tomoskin.learning.kind import (
     Applied,
@@ -30,7 +29,7 @@ from tomoskin.learning.mapping.mapping import ChannelMapping, ring_of
 from tomoskin.learning.mapping.solve import MappingAnswer, solve_channel_mapping
 from tomoskin.learning.touch.health import CalibrationHealth, LeftOut
 from tomoskin.learning.touch.kind import TOUCH
-from tomoskin.learning.touch.locator import Locator
+from tomoskin.learning.touch.locator import Locator, detection_at
 from tomoskin.learning.touch.presses import Presses
 from tomoskin.learning.touch.rubbing import Rubbing, quiet_electrodes
 from tomoskin.learning.touch.session_alignment import SessionAlignment
@@ -60,7 +59,6 @@ __all__ = [
     "KINDS",
     "NEWTONS",
     "TOUCH",
-    "Alignment",
     "Answers",
     "Applied",
     "BendExamples",
@@ -82,12 +80,9 @@ __all__ = [
     "FrameView",
     "JointReference",
     "Kind",
-    "LabelRemark",
     "LeftOut",
     "Locator",
     "MappingAnswer",
-    "MaterialFit",
-    "PressedSpots",
     "Presses",
     "Rubbing",
     "SessionAlignment",
@@ -97,6 +92,7 @@ __all__ = [
     "WeighedPresses",
     "Weight",
     "against_rest",
+    "detection_at",
     "identify",
     "least_known",
     "load_calibration",

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from threadpoolctl import threadpool_limits
 
-from tomoskin.core import FloatArray
+from tomoskin.core import Detection, FloatArray
 from tomoskin.learning.kind import Progress, silent
 from tomoskin.learning.touch.per_channel import Rotations
 from tomoskin.learning.touch.posterior import Estimates, widening
@@ -271,3 +271,10 @@ class Locator:
     def next_place(self) -> FloatArray:
         """(2,) m where the next labelled press tells most: the maps are least certain there."""
         return self.region.metres(self.estimates.least_known)
+
+
+def detection_at(position: FloatArray, covariance: FloatArray, strength: float) -> Detection:
+    """A touch at a position (2,) m with a covariance (2, 2) m², as presses tell it."""
+    (x, y), (sd_x, sd_y) = position.tolist(), np.sqrt(np.diag(covariance)).tolist()
+    nothing = np.empty(0, dtype=np.int64)
+    return Detection(x, y, sd_x, sd_y, np.nan, strength, nothing, cov_xy=float(covariance[0, 1]))

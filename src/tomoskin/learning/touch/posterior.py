@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from tomoskin.core import FloatArray, IntArray
 from tomoskin.learning.touch.maps import ResponseMaps, principal
 from tomoskin.learning.touch.per_channel import ChannelLikelihood, ChannelMaps, Rotations
-from tomoskin.learning.touch.process import LENGTHS, Likeness, squared_distances
+from tomoskin.learning.touch.process import LENGTHS, Likeness, moments, squared_distances
 
 BoolArray = NDArray[np.bool_]
 
@@ -93,14 +93,6 @@ def powers_of(
         np.log(pooled(log_likelihoods, powers)[rows, nearest] + _LEAST).sum() for powers in choices
     ]
     return choices[int(np.argmax(score))]
-
-
-def moments(probability: FloatArray, grid: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Mean (n, 2) and covariance (n, 2, 2) of ``probability`` (n, g) on ``grid`` (g, 2)."""
-    mean = probability @ grid
-    pairs = (grid[:, :, None] * grid[:, None, :]).reshape(-1, 4)
-    second = (probability @ pairs).reshape(-1, 2, 2)
-    return mean, second - mean[:, :, None] * mean[:, None, :]
 
 
 _MOST = 300

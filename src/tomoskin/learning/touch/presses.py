@@ -131,6 +131,17 @@ def frames(dv: ArrayLike, n_meas: int | None = None) -> FloatArray:
     return np.where(np.abs(data) <= _MOST, data, np.nan)
 
 
+def labelled_touches(
+    dv: ArrayLike, xy: ArrayLike | None, n_meas: int
+) -> tuple[FloatArray, FloatArray]:
+    """Frames (n, n_meas) and their labels (n, 2) m, rows of NaN where there is none."""
+    data = frames(dv, n_meas)
+    labels = np.full((len(data), 2), np.nan) if xy is None else np.asarray(xy, dtype=np.float64)
+    if labels.shape != (len(data), 2):
+        raise DataError(f"expected xy of shape ({len(data)}, 2), got {labels.shape}")
+    return data, labels
+
+
 def _name(rows: ArrayLike, what: str, hint: str = "") -> None:
     bad = np.asarray(rows)
     if len(bad):

@@ -15,7 +15,7 @@ from scipy.special import ndtri
 
 from tomoskin.core import FloatArray
 from tomoskin.learning.touch.process import Basis, Likeness, squared_distances
-from tomoskin.learning.touch.topographic import TopographicMap, balanced
+from tomoskin.learning.touch.topographic import TopographicMap, balanced, coefficients_of
 from tomoskin.model.forward import ForwardModel
 
 _SMALL = 0.05
@@ -105,8 +105,7 @@ class Ranked:
         """``positions`` (n, 2) moved by the affine map that makes the scores fit them best."""
         basis = Basis.of(Likeness(_LENGTH), self.grid)
         values = basis(self.grid)
-        normal = values.T @ values + _RIDGE * np.eye(values.shape[1])
-        coefficients = np.linalg.solve(normal, values.T @ self.expected)
+        coefficients = coefficients_of(values, self.expected, _RIDGE)
         measured = self.scores - self.scores.mean(axis=0)
         measured = measured / max(float(np.linalg.norm(measured)), _LEAST)
         affine = affine_terms(positions)
