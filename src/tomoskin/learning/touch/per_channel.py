@@ -189,6 +189,10 @@ class OrbitMaps:
         return self.mean + np.sqrt(self.size) * mean, self.size * np.maximum(variance, _FLOOR)
 
 
+_SHARED = 64_000
+"""Rows times presses from which turned copies share nothing: it takes long, and tells most where
+presses are few."""
+
 _SHARES = (0.0, 0.3, 0.6, 0.85)
 """Part of a row's variance that its turned copies have in common, as tried."""
 
@@ -222,6 +226,8 @@ class ChannelMaps:
         Of each group of rows the length scale and the share, and the way round of all, are those
         of the largest marginal likelihood.
         """
+        if features.size > _SHARED:
+            rotations = Rotations.none(features.shape[1])
         ways = (rotations, rotations.reversed()) if rotations.any else (rotations,)
         angles = np.concatenate([way.angle for way in ways])
         modes = [LikenessModes.of(Likeness(length), positions, angles) for length in LENGTHS]
