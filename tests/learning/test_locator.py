@@ -66,7 +66,8 @@ def test_the_posterior_of_maps_of_known_noise_holds_what_it_says() -> None:
     side = np.linspace(-1.1, 1.1, 45)
     grid = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
     grid = grid[np.linalg.norm(grid, axis=1) < 1.0]
-    log_likelihood = GridLikelihood.of(maps, grid)(features[300:])
+    likelihood = GridLikelihood.of(maps, grid)
+    log_likelihood = likelihood.of_misfit(likelihood.misfit(features[300:]))
     mean, covariance = moments(pooled([log_likelihood], np.ones(1)), grid)
     assert held(mean - xy[300:], covariance) > 0.8
 

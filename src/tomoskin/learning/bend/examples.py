@@ -149,9 +149,9 @@ class JointReference:
                 hint="move the joint and record again",
             )
         means = np.array([v[g].mean(axis=0) for g in groups])
-        left = np.concatenate([v[g] - v[g].mean(axis=0) for g in groups])
+        residual = np.concatenate([v[g] - v[g].mean(axis=0) for g in groups])
         degrees = max(len(v) - len(groups), 1)
-        noise = np.sqrt(np.sum(left**2, axis=0) / degrees)
+        noise = np.sqrt(np.sum(residual**2, axis=0) / degrees)
         if len(v) == len(groups):
             noise = np.full(v.shape[1], np.nan)
         return cls(

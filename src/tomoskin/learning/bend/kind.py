@@ -84,13 +84,13 @@ class BendReader:
         model = self._model
         change, free = self._touches(detections)
         data = model.whiten(dv) - change
-        beside = np.hstack([model.whiten(common.T).T, free])
-        columns = np.hstack([self._modes, beside / (np.linalg.norm(beside, axis=0) + 1e-300)])
+        nuisance = np.hstack([model.whiten(common.T).T, free])
+        columns = np.hstack([self._modes, nuisance / (np.linalg.norm(nuisance, axis=0) + 1e-300)])
         fitted, _, rank, _ = np.linalg.lstsq(columns, data, rcond=1e-9)
         z = fitted[: model.n_modes]
-        left = data - columns @ fitted
+        residual = data - columns @ fitted
         explained = np.linalg.norm(model.whiten(dv)) * _ROUGH
-        strange = left @ left > (_LIKE**2) * max(len(data) - rank, 1) + explained**2
+        strange = residual @ residual > (_LIKE**2) * max(len(data) - rank, 1) + explained**2
         target = self._memory.push(z, time) @ model.weights
         angle, axis = (float(part[0]) for part in model.predict(target[None]))
         sd = self._deviation(columns)

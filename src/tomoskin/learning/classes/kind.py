@@ -274,7 +274,7 @@ def _compared(
     x = white @ subspace.axes
     distances = mixture.distances(x)
     inside = distances.min(axis=1) / x.shape[1]
-    return distances, inside + subspace.beside(white, x)
+    return distances, inside + subspace.outside(white, x)
 
 
 def _left_out(taught: Examples) -> tuple[FloatArray, FloatArray]:

@@ -189,12 +189,12 @@ class FitCorrection:
             return cls(np.eye(2), np.zeros(2), _NOTHING)
         fitted, positions, said = fitted[found], positions[found], float(np.median(variance[found]))
         plain = np.linalg.norm(fitted - positions, axis=1)
-        linear, offset, left = _affine(fitted, positions)
-        near = left <= _ASTRAY * np.median(left)
-        linear, offset, left = _affine(fitted[near], positions[near])
-        if (left @ left) > _WORTH * (plain[near] @ plain[near]):
-            linear, offset, left = np.eye(2), np.zeros(2), plain
-        beyond = float(np.median(left)) ** 2 / _MEDIAN - said
+        linear, offset, missed = _affine(fitted, positions)
+        near = missed <= _ASTRAY * np.median(missed)
+        linear, offset, missed = _affine(fitted[near], positions[near])
+        if (missed @ missed) > _WORTH * (plain[near] @ plain[near]):
+            linear, offset, missed = np.eye(2), np.zeros(2), plain
+        beyond = float(np.median(missed)) ** 2 / _MEDIAN - said
         return cls(linear, offset, max(beyond, 0.0))
 
     def __call__(self, fitted: Detection) -> tuple[FloatArray, FloatArray]:
@@ -211,5 +211,5 @@ def _affine(fitted: FloatArray, positions: FloatArray) -> tuple[FloatArray, Floa
     inverse = np.linalg.pinv(rows)
     solution = inverse @ positions
     leverage = np.clip((rows * inverse.T).sum(axis=1), 0.0, 1 - 1e-9)
-    left = np.linalg.norm(positions - rows @ solution, axis=1) / (1 - leverage)
-    return solution[:2].T, solution[2], left
+    missed = np.linalg.norm(positions - rows @ solution, axis=1) / (1 - leverage)
+    return solution[:2].T, solution[2], missed

@@ -194,9 +194,9 @@ class Locator:
         that are not finite are left out. Raises DataError for another number of rows, and for a
         frame without any value that is used.
         """
-        return self.told(dv)[:2]
+        return self.posterior(dv)[:2]
 
-    def told(self, dv: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def posterior(self, dv: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
         """What :meth:`predict` and :meth:`strangeness` say of frames (n, n_meas)."""
         given = frames(dv, self.presses.dv.shape[1])
         data = self.features(given)

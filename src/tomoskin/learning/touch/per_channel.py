@@ -133,8 +133,8 @@ class OrbitMaps:
 
     g is the same for all, h is each row's own with the rest of the variance: two Gaussian processes
     of one likeness. Without a ``share`` each row stands for itself. ``angles`` (r,) of the rows;
-    ``left`` (n, r), ``spread`` (n, r): what g leaves over its variance, and that; ``pull`` (m,) and
-    ``root`` (m, m): mean of g's coefficients and a root of their covariance.
+    ``residual`` (n, r), ``spread`` (n, r): what g leaves over its variance, and that; ``pull``
+    (m,) and ``root`` (m, m): mean of g's coefficients and a root of their covariance.
     """
 
     modes: LikenessModes
@@ -143,7 +143,7 @@ class OrbitMaps:
     mean: FloatArray
     size: FloatArray
     noise: FloatArray
-    left: FloatArray
+    residual: FloatArray
     spread: FloatArray
     pull: FloatArray
     root: FloatArray
@@ -163,14 +163,14 @@ class OrbitMaps:
         root = np.linalg.inv(np.linalg.cholesky(precision))
         weighted = root @ (weighed.T @ (rows / np.sqrt(spread)).T.ravel())
         pull = root.T @ weighted
-        left = (rows - (values @ pull).T) / spread
+        residual = (rows - (values @ pull).T) / spread
         evidence = (
             0.5 * float(weighted @ weighted)
             + float(np.log(np.diag(root)).sum())
             - 0.5 * functions * float(np.log(share or 1.0))
             - 0.5 * float((rows**2 / spread + np.log(spread) + np.log(alone.size)).sum())
         )
-        numbers = alone.mean, alone.size, alone.noise, left, spread, pull, root, evidence
+        numbers = alone.mean, alone.size, alone.noise, residual, spread, pull, root, evidence
         return cls(modes, angles, share, *numbers)
 
     def at(
@@ -178,7 +178,7 @@ class OrbitMaps:
     ) -> tuple[FloatArray, FloatArray]:
         """Mean and variance, both (g, r); ``near`` and ``common`` of :meth:`LikenessModes.at`."""
         own = 1 - self.share
-        mean = own * near @ self.left
+        mean = own * near @ self.residual
         variance = own * self.modes.likeness.variance + self.noise
         variance = variance - own**2 * near**2 @ (1 / self.spread)
         for row, angle in enumerate(self.angles.tolist() if self.share else ()):

@@ -89,19 +89,19 @@ class Basis:
 
 def _pivots(likeness: Likeness, positions: FloatArray) -> list[int]:
     """Rows whose likeness to all others explains the rest."""
-    left = np.full(len(positions), likeness.variance)
+    unexplained = np.full(len(positions), likeness.variance)
     factor = np.zeros((len(positions), min(_MOST, len(positions))))
     chosen: list[int] = []
     while len(chosen) < factor.shape[1]:
-        pivot = int(left.argmax())
-        if left[pivot] < _TOLERANCE * likeness.variance:
+        pivot = int(unexplained.argmax())
+        if unexplained[pivot] < _TOLERANCE * likeness.variance:
             break
         k = len(chosen)
         column = likeness(positions, positions[pivot : pivot + 1])[:, 0]
         column -= factor[:, :k] @ factor[pivot, :k]
-        factor[:, k] = column / np.sqrt(left[pivot])
-        left = np.maximum(left - factor[:, k] ** 2, 0.0)
-        left[pivot] = 0.0
+        factor[:, k] = column / np.sqrt(unexplained[pivot])
+        unexplained = np.maximum(unexplained - factor[:, k] ** 2, 0.0)
+        unexplained[pivot] = 0.0
         chosen.append(pivot)
     return chosen
 

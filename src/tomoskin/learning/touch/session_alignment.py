@@ -143,7 +143,7 @@ class SessionAlignment:
     @classmethod
     def _of(cls, locator: Locator, dv: FloatArray, xy: FloatArray) -> Self:
         region, before = locator.region, locator.presses
-        positions, _, strangeness = locator.told(dv)
+        positions, _, strangeness = locator.posterior(dv)
         strange = float(np.median(strangeness))
         fits = strange <= _AS_BEFORE
         touches = region.scaled(positions)
@@ -247,7 +247,7 @@ class _Session:
             like = matched(locator.presses.dv, dv, even if weight is None else weight)
             presses = replace(locator.presses, dv=like)
             locator = locator.learn(presses, locator.region, locator.pattern, locator.skin_id)
-            positions, _, strangeness = locator.told(dv)
+            positions, _, strangeness = locator.posterior(dv)
             if float(np.median(strangeness)) <= _AS_BEFORE:
                 given = Presses.of_more(dv[known], self.xy[known])
                 both = presses.and_then(given) if known.any() else presses
@@ -318,8 +318,8 @@ class _SessionMaps:
         features = SessionFeatures.of(dv)(dv)
         there = basis(positions)
         coefficients = coefficients_of(there, features, _RIDGE)
-        left = features - there @ coefficients
-        whiten = whitening(left.T @ left / len(left), _DIAGONAL)
+        residual = features - there @ coefficients
+        whiten = whitening(residual.T @ residual / len(residual), _DIAGONAL)
         coefficients = coefficients @ whiten
         values = basis(grid)
         surface = TopographicMap(values, coefficients, np.ones(whiten.shape[1]), 1.0)

@@ -156,9 +156,9 @@ class Several:
         """(g · gains,) log-likelihood of one touch; index place · gains + gain."""
         return self._likely(frame, self._alone)
 
-    def _log_likelihood(self, frame: FloatArray, beside: int) -> FloatArray:
+    def _log_likelihood(self, frame: FloatArray, other: int) -> FloatArray:
         """The same of a touch beside another of that index."""
-        changes: NDArray[np.float32] = np.arcsinh(self._stronger + self._stronger[beside])
+        changes: NDArray[np.float32] = np.arcsinh(self._stronger + self._stronger[other])
         return self._likely(frame, changes @ self._whiten)
 
     def _likely(self, frame: FloatArray, expected: NDArray[np.float32]) -> FloatArray:

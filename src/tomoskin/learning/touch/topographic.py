@@ -108,8 +108,8 @@ class TopographicMap:
         normal = (self.values * count).T @ self.values + _KEPT * np.eye(self.values.shape[1])
         coefficients = np.linalg.solve(normal, self.values.T @ pull + _KEPT * kept)
         answers = self.values @ coefficients
-        left = frames @ features**2 - 2 * (pull * answers).sum(axis=0)
-        variance = (left + (count * answers**2).sum(axis=0)) / frames.sum()
+        residual = frames @ features**2 - 2 * (pull * answers).sum(axis=0)
+        variance = (residual + (count * answers**2).sum(axis=0)) / frames.sum()
         return replace(self, coefficients=coefficients, variance=np.maximum(variance, _LEAST))
 
     def tempered(self, grown: float) -> Self:
@@ -187,8 +187,8 @@ def _responses(
     coefficients = coefficients_of(values, features, _REFINED_RIDGE, counted)
     answers = values @ coefficients
     mean = weights @ answers
-    left = features - mean
+    residual = features - mean
     within = (answers * weights.sum(axis=0)[:, None]).T @ answers - mean.T @ mean
-    whiten = whitening((left.T @ left + within) / len(features), _REFINED_DIAGONAL)
+    whiten = whitening((residual.T @ residual + within) / len(features), _REFINED_DIAGONAL)
     ones = np.ones(whiten.shape[1])
     return TopographicMap(values, coefficients @ whiten, ones, _POWER), features @ whiten

@@ -106,7 +106,7 @@ class UnlabelledFit:
         cls,
         fits: list[FloatArray],
         grid: FloatArray,
-        found: tuple[float, float, bool],
+        about: tuple[float, float, bool],
     ) -> Self:
         means = np.stack([weights @ grid for weights in fits])
         middle = means.mean(axis=0)
@@ -114,7 +114,7 @@ class UnlabelledFit:
         between = np.einsum("fna,fnb->nab", off, off) / len(fits)
         within = np.mean([moments(weights, grid)[1] for weights in fits], axis=0)
         apart = float(np.sqrt(np.trace(between, axis1=1, axis2=2).mean()))
-        return cls(middle, within + between, apart, *found)
+        return cls(middle, within + between, apart, *about)
 
 
 def from_labels(dv: FloatArray, labels: FloatArray, region: Region, pattern: Pattern) -> FloatArray:

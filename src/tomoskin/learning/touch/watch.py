@@ -184,7 +184,7 @@ class Watch:
         return np.concatenate(positions), np.concatenate(covariances)
 
     def _next(self, frame: FloatArray, *, settled: bool) -> tuple[FloatArray, FloatArray]:
-        answer = self._told(frame)
+        answer = self._answer(frame)
         if not settled:
             return answer[:2]
         place = self._locator.region.scaled(answer[0])
@@ -202,7 +202,7 @@ class Watch:
         if jumped.mean() > _MOST or (jumped == self._jumped).all():
             return answer[:2]
         self._jumped = jumped
-        return self._told(frame)[:2]
+        return self._answer(frame)[:2]
 
     def _changed(self) -> NDArray[np.bool_]:
         """(k,) whether each row has changed, by any of the looks back."""
@@ -217,12 +217,12 @@ class Watch:
             if apart > _STRANGE:
                 return self._jumped
             least = _LEAST * float(np.sqrt(_PRESSES / n))
-            beside = max(least, min(_BESIDE * apart, _SURELY))
-            changed |= np.abs(by) > np.maximum(beside, _CHANCE / np.sqrt(n) * self._usual)
+            limit = max(least, min(_BESIDE * apart, _SURELY))
+            changed |= np.abs(by) > np.maximum(limit, _CHANCE / np.sqrt(n) * self._usual)
         return changed
 
-    def _told(self, frame: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        return self._reduced(frame).told(self._kept(frame))
+    def _answer(self, frame: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        return self._reduced(frame).posterior(self._kept(frame))
 
     def _fit(self) -> float:
         """How strange the last presses are: medians of each, and over them."""
