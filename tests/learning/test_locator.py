@@ -12,8 +12,8 @@ from tomoskin import Locator, Pattern, Skin
 from tomoskin.core import DataError
 from tomoskin.learning import LeftOut, Presses
 from tomoskin.learning.touch.maps import ResponseMaps
-from tomoskin.learning.touch.posterior import GridLikelihood, moments, pooled
-from tomoskin.learning.touch.process import Basis, Likeness
+from tomoskin.learning.touch.posterior import GridLikelihood, pooled
+from tomoskin.learning.touch.process import Basis, Likeness, moments
 from tomoskin.sensing.segment import Region
 
 
