@@ -123,7 +123,7 @@ class Labelled:
 
 
 @dataclass(frozen=True)
-class Learnt:
+class LearningOutcome:
     """What came of it: ``write`` makes the file, ``facts`` and ``lines`` say it to programs and to
     people; a ``problem`` is raised at the end."""
 
@@ -133,7 +133,7 @@ class Learnt:
     problem: DataError | None = None
 
 
-Learn = Callable[..., Learnt]
+Learn = Callable[..., LearningOutcome]
 
 
 def _kind(
@@ -219,7 +219,7 @@ def touch(
             "align the old calibration to today, and labels are optional.",
         ),
     ] = False,
-) -> Learnt:
+) -> LearningOutcome:
     """Learn where a touch is from presses at known positions."""
     from tomoskin.learning import TOUCH, Locator
 
@@ -250,7 +250,7 @@ def touch(
             f"error of {facts['mean_mm']:.0f} mm, and of {facts['guessed_mm']:.0f} mm if the "
             "answer is always their middle. Check --reference and the labels, or press harder"
         )
-    return Learnt(calibration.write, facts, touch_lines(facts))
+    return LearningOutcome(calibration.write, facts, touch_lines(facts))
 
 
 def _positions(data: Recording, *, optional: bool) -> FloatArray:
@@ -283,7 +283,7 @@ def _added(locator: Locator, frames: IntArray, dv: FloatArray, xy: FloatArray) -
 
 
 @_kind("rub", _TOUCHED)
-def rub(labelled: Labelled) -> Learnt:
+def rub(labelled: Labelled) -> LearningOutcome:
     """Learn where a touch is from one finger that rubs the whole skin, without labels.
 
     The skin file says where the electrodes are. Five frames with a label improve the result.
@@ -310,7 +310,9 @@ def rub(labelled: Labelled) -> Learnt:
         "alike": rubbing.alike,
     }
     made = TOUCH.of(locator, labelled.pattern, skin)
-    return Learnt(made.write, facts, [f"{len(frames)} frames with a touch, {rubbing.text}"])
+    return LearningOutcome(
+        made.write, facts, [f"{len(frames)} frames with a touch, {rubbing.text}"]
+    )
 
 
 class Unit(StrEnum):
@@ -333,7 +335,7 @@ def force(
         ),
     ] = None,
     unit: Annotated[Unit, typer.Option(help="Unit of the forces.")] = Unit.N,
-) -> Learnt:
+) -> LearningOutcome:
     """Learn the force of touches from presses with known weights, all by the same tip."""
     from tomoskin.learning import FORCE, NEWTONS, ForceModel, ForceReport
     from tomoskin.pipeline import prepare
@@ -358,7 +360,7 @@ def force(
     for doubtful in report.remarks:
         who = "" if doubtful.press is None else f"press {doubtful.press:>4}  uncertain: "
         lines.append(f"{who}{doubtful.reason}")
-    return Learnt(FORCE.of(model, labelled.pattern, skin).write, facts, lines)
+    return LearningOutcome(FORCE.of(model, labelled.pattern, skin).write, facts, lines)
 
 
 @_kind("class", "Frames; some have a label with their class.", KnownSkinOption)
@@ -382,7 +384,7 @@ def classes(
         ),
         Reads(),
     ] = None,
-) -> Learnt:
+) -> LearningOutcome:
     """Learn the class of a frame, or flags, from a few examples of each."""
     from tomoskin.learning import CLASSES, Classifier
 
@@ -398,7 +400,9 @@ def classes(
         else:
             made = old.with_model(old.model.in_session(examples.dv, examples.flags))
     facts = class_facts(made.model, len(given.dv))
-    return Learnt(made.write, facts, class_lines(made.model, facts, is_aligned=old is not None))
+    return LearningOutcome(
+        made.write, facts, class_lines(made.model, facts, is_aligned=old is not None)
+    )
 
 
 @_kind("bend", "Frames of known bends, without touches.")
@@ -413,7 +417,7 @@ def bend(
             "truth.",
         ),
     ] = None,
-) -> Learnt:
+) -> LearningOutcome:
     """Learn the bends of a skin: touches are then separated from them, and angles estimated."""
     from tomoskin.learning import BENDS, BendExamples, BendModel
     from tomoskin.pipeline import prepare, voltage_covariance
@@ -448,7 +452,7 @@ def bend(
         lines.append(
             "the axis of a bend is estimated from three directions on; here the given axis is used"
         )
-    return Learnt(BENDS.of(model, labelled.pattern, skin).write, facts, lines)
+    return LearningOutcome(BENDS.of(model, labelled.pattern, skin).write, facts, lines)
 
 
 _MappedOut = Annotated[
@@ -461,7 +465,7 @@ _MappedOut = Annotated[
 
 
 @_kind("mapping", _TOUCHED, out=_MappedOut)
-def mapping(labelled: Labelled) -> Learnt:
+def mapping(labelled: Labelled) -> LearningOutcome:
     """Find rotation, mirroring, swapped wires and polarity from some presses.
 
     The result is a skin file whose electrodes are where the wires end. Give it as --skin to any
@@ -480,9 +484,9 @@ def mapping(labelled: Labelled) -> Learnt:
     lines = mapping_lines(facts)
     if answer.sure:
         document = answer.mapping.applied(skin).to_toml()
-        return Learnt(lambda out, overwrite: write_text(out, document, overwrite=overwrite),
+        return LearningOutcome(lambda out, overwrite: write_text(out, document, overwrite=overwrite),
                       facts, lines)  # fmt: skip
     x, y = facts["next_press_mm"]
     hint = f"a further press is most useful at x {x:+.0f} mm, y {y:+.0f} mm"
     problem = DataError(answer.reason, where=str(labelled.path), hint=hint)
-    return Learnt(None, facts, lines, problem)
+    return LearningOutcome(None, facts, lines, problem)

@@ -37,7 +37,7 @@ from tomoskin.core import (
     unpack_arrays,
     whole_number,
 )
-from tomoskin.learning.packing import kept_names, pack, unpack
+from tomoskin.learning.record_arrays import kept_names, pack, unpack
 from tomoskin.model.pattern import Pattern
 from tomoskin.model.skin import Skin
 from tomoskin.sensing.fit import Response
@@ -218,7 +218,7 @@ class Kind(Generic[M]):
     learn
         What its file holds → model, learnt again; raises DataError. Its parameters name the
         attributes of the model that the file holds, beside a ``pattern`` and a ``progress`` where
-        it asks for them; their annotations say how they are read (:mod:`.packing`).
+        it asks for them; their annotations say how they are read (:mod:`.record_arrays`).
     exclude
         Model without some measurements; None where it cannot do without.
     apply
