@@ -484,8 +484,11 @@ def mapping(labelled: Labelled) -> LearningOutcome:
     lines = mapping_lines(facts)
     if answer.sure:
         document = answer.mapping.applied(skin).to_toml()
-        return LearningOutcome(lambda out, overwrite: write_text(out, document, overwrite=overwrite),
-                      facts, lines)  # fmt: skip
+
+        def write(out: Path, *, overwrite: bool) -> None:
+            write_text(out, document, overwrite=overwrite)
+
+        return LearningOutcome(write, facts, lines)
     x, y = facts["next_press_mm"]
     hint = f"a further press is most useful at x {x:+.0f} mm, y {y:+.0f} mm"
     problem = DataError(answer.reason, where=str(labelled.path), hint=hint)
