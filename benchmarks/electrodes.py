@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import time
-from pathlib import Path
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
-from report import Report, progress
+from report import Report, progress, table
+from rig import evenly, gap
 from tomoskin.board.source import Link, ScanSettings
 from tomoskin.core import FloatArray, Frame, Touch
 from tomoskin.model.skin import Skin
@@ -19,39 +21,23 @@ SEEDS, PRESSES = (101, 102), 30
 FORCES, RADIUS, MARGIN = (1.0, 2.0, 5.0), 0.01, 0.012
 IDLE, PRESSED, FREE = 60, 6, 4
 NEAR = 0.0225
-COLUMNS = (
-    *(
-        "electrodes",
-        "measurements",
-        "set-up, s",
-        "reference, s",
-        "frame at rest, ms",
-        "pressed, ms",
-    ),
-    *("found", "median error, mm", "p90, mm", "1 N: found", "median, mm"),
-)
 
 
-def run(data: Path | None) -> tuple[Report, ...]:
-    """Presses one at a time on the twin; ``data`` is not needed."""
-    del data
-    return (
-        Report(
-            "presses found by the fit", COLUMNS, tuple(row(name) for name in SKINS),
-            (
-                f"200 mm textile twin, {PRESSES} places a seed, seeds {SEEDS}, {FORCES} N in turn, "
-                "50 mA, four conversions of 12 bits, as the Pico's front end reads",
-                f"found: the touch of the {PRESSED}th frame nearest to the press is within "
-                f"{1e3 * NEAR:g} mm",
-                "processor time; set-up without what is kept on disk between runs, reference: the "
-                "frame in which it is taken",
-            ),
-        ),
-    )  # fmt: skip
+def run() -> Iterator[Report]:
+    yield table(
+        "presses found by the fit",
+        map(row, SKINS),
+        f"200 mm textile twin, {PRESSES} places a seed, seeds {SEEDS}, {FORCES} N in turn, "
+        "50 mA, four conversions of 12 bits, as the Pico's front end reads",
+        f"found: the touch of the {PRESSED}th frame nearest to the press is within "
+        f"{1e3 * NEAR:g} mm",
+        "processor time; set-up without what is kept on disk between runs, reference: the "
+        "frame in which it is taken",
+    )
 
 
-def row(name: str) -> tuple[object, ...]:
-    """Values under ``COLUMNS``."""
+def row(name: str) -> dict[str, Any]:
+    """Values of one skin."""
     began = time.process_time()
     pico = Skin.load("textile-disc-32").readout
     skin = Skin.load(name).altered(
@@ -75,22 +61,21 @@ def row(name: str) -> tuple[object, ...]:
         parts.append(measured(prepared, seed))
     errors, forces = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
     rest, pressed = (np.concatenate([part[k] for part in parts]) for k in (2, 3))
-    light = errors[forces == FORCES[0]]
-    return (
-        prepared.pattern.n_electrodes, prepared.pattern.n_meas, f"{set_up:.1f}",
-        f"{max(rest.max(), pressed.max()):.1f}", f"{1e3 * np.median(rest):.1f}",
-        f"{1e3 * np.median(pressed):.1f}", *_figures(errors),
-        f"{np.percentile(_of(errors), 90):.1f}",
-        *_figures(light),
-    )  # fmt: skip
-
-
-def _of(errors: FloatArray) -> FloatArray:
-    return 1e3 * errors[errors < NEAR]
-
-
-def _figures(errors: FloatArray) -> tuple[str, str]:
-    return f"{len(_of(errors))} of {len(errors)}", f"{np.median(_of(errors)):.1f}"
+    near, light = errors < NEAR, forces == FORCES[0]
+    found = 1e3 * errors[near]
+    return {
+        "electrodes": prepared.pattern.n_electrodes,
+        "measurements": prepared.pattern.n_meas,
+        "set-up, s": f"{set_up:.1f}",
+        "reference, s": f"{max(rest.max(), pressed.max()):.1f}",
+        "frame at rest, ms": f"{1e3 * np.median(rest):.1f}",
+        "pressed, ms": f"{1e3 * np.median(pressed):.1f}",
+        "found": f"{near.sum()} of {len(errors)}",
+        "median error, mm": f"{np.median(found):.1f}",
+        "p90, mm": f"{np.percentile(found, 90):.1f}",
+        "1 N: found": f"{(near & light).sum()} of {light.sum()}",
+        "1 N: median, mm": f"{1e3 * np.median(errors[near & light]):.1f}",
+    }
 
 
 def measured(prepared: Prepared, seed: int) -> tuple[FloatArray, ...]:
@@ -102,20 +87,13 @@ def measured(prepared: Prepared, seed: int) -> tuple[FloatArray, ...]:
     with Link(transport, prepared.scan, ScanSettings.of(prepared.skin)) as link:
         _pushed(link, pipeline, IDLE, rest)
         for force in forces:
-            x, y = _place(random)
+            ((x, y),) = evenly(random, 1, 0.1 - MARGIN).tolist()
             transport.set_presses((Press(x, y, force, RADIUS),))
             touches = _pushed(link, pipeline, PRESSED, pressed)
-            apart = [np.hypot(t.detection.x - x, t.detection.y - y) for t in touches]
-            errors.append(min(apart, default=np.inf))
+            errors.append(min((gap(t, (x, y)) for t in touches), default=np.inf))
             transport.set_presses(())
             _pushed(link, pipeline, FREE, rest)
     return np.array(errors), forces, np.array(rest), np.array(pressed)
-
-
-def _place(random: np.random.Generator) -> tuple[float, float]:
-    radius = (0.1 - MARGIN) * np.sqrt(random.random())
-    angle = 2 * np.pi * random.random()
-    return float(radius * np.cos(angle)), float(radius * np.sin(angle))
 
 
 def _pushed(link: Link, pipeline: Pipeline, count: int, spent: list[float]) -> tuple[Touch, ...]:

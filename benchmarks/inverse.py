@@ -1,53 +1,77 @@
-"""Inverse engine: set-up of one-step operators, applying them, rows that leave."""
+"""Inverse engine: set-up of one-step operators, applying them, rows that leave; choice of alpha."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from pathlib import Path
+import contextlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+from typing import Any
 
 import numpy as np
 
-from forward_cases import PATTERN, Case, clock, disc, medians
-from forward_tables import Promise, cell, promises
-from report import Report
-from tomoskin.core import FloatArray
-from tomoskin.imaging import PRIORS, OneStep
+from forward_measure import PATTERN, disc
+from report import Floats, Promise, Report, cell, clock, medians, promises, table
+from rig import evenly
+from tomoskin.core import ModelError
+from tomoskin.imaging import PRIORS, RULES, Evidence, LightTouch, OneStep, Spectrum, choose
 from tomoskin.model.forward import ForwardModel
+from tomoskin.model.skin import Skin
+from tomoskin.pipeline import Prepared, prepare
+from tomoskin.pipeline.tune import tune
+from tomoskin.sensing.signal import Reference
 
-ALPHA = 0.1
-SECONDS = 3.0
+SIZES = {"660": 660, "3k": 3000, "12k": 12_000}
+ALPHA, SECONDS = 0.1, 3.0
 DEAD = 3
 """The electrode whose rows leave."""
 
 APPLIED = 100
 """Frames in one timed turn: one would be too short to time."""
 
-DENSE = {"gaussian", "exponential", "matern"}
-"""Priors that relate every cell to every other one."""
+DENSE, MOST_DENSE = {"gaussian", "exponential", "matern"}, 5000
+"""Priors that relate every cell to every other one, and the most cells with which they are made."""
 
-MOST_DENSE = 5000
-"""Cells, above which these are left out."""
+CHOSEN_CELLS, CHOSEN_SECONDS, CHOSEN, FRAMES = (660, 3000), 2.0, 0.05, 50
+"""Of the choice of alpha: triangles, s to time, an alpha, and frames that criteria look at."""
+
+LOUD = 3.0
+"""Noise of the reference, in parts of what the read-out predicts: the operator is made anew."""
 
 Times = Mapping[str, float]
 
 
-def run(data: Path | None) -> tuple[Report, ...]:
-    """Time every case; ``data`` is not needed."""
-    del data
-    models = [_model(case) for case in (disc("660", 660), disc("3k", 3000), disc("12k", 12_000))]
-    set_up = [_set_up(model) for model in models]
-    applied = [_applied(model) for model in models]
-    rows_out = [_rows_out(model) for model in models]
-    return (
-        _set_up_table(models, set_up),
-        _applied_table(models, applied),
-        _rows_out_table(models, rows_out),
-        promises(_promises(set_up[1], applied, rows_out[1])),
+def run() -> Iterator[Report]:
+    cases = [disc(name, cells) for name, cells in SIZES.items()]
+    models = [ForwardModel(case.mesh, PATTERN, case.contact_impedance) for case in cases]
+    set_up, applied, out = ([time(m) for m in models] for time in (_set_up, _applied, _rows_out))
+    yield table(
+        "set-up: a conductivity → the one-step operator, ms",
+        _in_ms(models, set_up, ("products", "symmetric", "jacobian", *PRIORS)),
+        f"medians of {clock()[1]}",
+        "priors: with the forward solution and Jacobian; mesh and model are there",
+        "products: JP and PK of this size; symmetric: the first as JJᵀ, half the work",
     )
+    yield table(
+        "applying: difference data → image, ms",
+        _in_ms(models, applied, ("double", "read double", "single", "read single")),
+        "read: every byte of the matrix once, a dot product with itself",
+    )
+    yield table(
+        f"rows that leave, {len(PATTERN.rows_of(DEAD))} of an electrode, ms",
+        _in_ms(models, out, ("without", "anew", "5 rows filled")),
+    )
+    yield promises(_promises(set_up[1], applied, out[1]))
 
 
-def _model(case: Case) -> ForwardModel:
-    return ForwardModel(case.mesh, PATTERN, case.contact_impedance)
+def _in_ms(
+    models: Sequence[ForwardModel], measured: Sequence[Times], names: Sequence[str]
+) -> list[dict[str, str]]:
+    sizes = (f"{len(model.mesh.cells):,} triangles" for model in models)
+    return [
+        {"cells": size}
+        | {name: cell(1e3 * times[name] if name in times else None) for name in names}
+        for size, times in zip(sizes, measured, strict=True)
+    ]
 
 
 def _set_up(model: ForwardModel) -> Times:
@@ -66,133 +90,121 @@ def _set_up(model: ForwardModel) -> Times:
 
 
 def _applied(model: ForwardModel) -> Times:
-    """Pictures, in turn with reading the bytes of the matrix once."""
+    """Images, in turn with reading the bytes of the matrix once."""
     operator = OneStep(model, alpha=ALPHA)
     dv = np.random.default_rng(1).standard_normal(PATTERN.n_meas)
     double = np.ravel(operator.matrix, order="K")
     single = double.astype(np.float32)
     operator.quick(dv)
-    return medians(
-        {
-            "call": _many(lambda: operator(dv)),
-            "quick": _many(lambda: operator.quick(dv)),
-            "read double": _many(lambda: _read(double)),
-            "read single": _many(lambda: _read(single)),
-        },
-        SECONDS,
-    )
+    calls: dict[str, Callable[[], object]] = {
+        "double": lambda: operator(dv),
+        "single": lambda: operator.quick(dv),
+        "read double": lambda: float(double @ double),
+        "read single": lambda: float(single @ single),
+    }
+    times = medians({name: partial(_many, call) for name, call in calls.items()}, SECONDS)
+    return {name: seconds / APPLIED for name, seconds in times.items()}
 
 
-def _read(values: FloatArray) -> float:
-    """Read every number once, as fast as one core can: BLAS' dot product with itself."""
-    return float(values @ values)
-
-
-def _many(call: Callable[[], object]) -> Callable[[], None]:
-    def turn() -> None:
-        for _ in range(APPLIED):
-            call()
-
-    return turn
+def _many(call: Callable[[], object]) -> None:
+    for _ in range(APPLIED):
+        call()
 
 
 def _rows_out(model: ForwardModel) -> Times:
-    operator = OneStep(model, alpha=ALPHA)
-    rows = PATTERN.rows_of(DEAD)
+    operator, rows = OneStep(model, alpha=ALPHA), PATTERN.rows_of(DEAD)
     missing = np.zeros(PATTERN.n_meas, bool)
     missing[rows[:5]] = True
     dv = np.random.default_rng(1).standard_normal(PATTERN.n_meas)
-    return medians(
-        {
-            "without": lambda: operator.without(rows),
-            "anew": lambda: OneStep(model, alpha=ALPHA),
-            "filled": _many(lambda: operator.filled(dv, missing)),
-        },
-        SECONDS,
-    )
-
-
-def _size(model: ForwardModel) -> tuple[str, int]:
-    return f"{len(model.mesh.cells):,} triangles", PATTERN.n_meas
-
-
-def _set_up_table(models: list[ForwardModel], measured: list[Times]) -> Report:
-    rows = [
-        (
-            *_size(model),
-            cell(1e3 * times["products"]),
-            cell(1e3 * times["symmetric"]),
-            cell(1e3 * times["jacobian"]),
-            *(cell(1e3 * times[prior] if prior in times else None) for prior in PRIORS),
-        )
-        for model, times in zip(models, measured, strict=True)
-    ]
-    return Report(
-        "set-up: a conductivity → the one-step operator, ms",
-        ("cells", "rows", "two products", "one symmetric", "Jacobian", *PRIORS),
-        tuple(rows),
-        (
-            f"medians of {clock()[1]}",
-            "priors: with the forward solution and Jacobian; mesh and model are there",
-            "two products: JP and PK of this size; one symmetric: the first as JJᵀ, half the work",
-        ),
-    )
-
-
-def _applied_table(models: list[ForwardModel], measured: list[Times]) -> Report:
-    rows = [
-        (
-            *_size(model),
-            *(
-                text
-                for own, read in (("call", "read double"), ("quick", "read single"))
-                for text in (
-                    cell(1e3 * times[own] / APPLIED),
-                    cell(1e3 * times[read] / APPLIED),
-                    cell(times[own] / times[read]),
-                )
-            ),
-        )
-        for model, times in zip(models, measured, strict=True)
-    ]
-    return Report(
-        "applying: difference data → image",
-        ("cells", "rows", "ms", "read ms", "ms/read", "single ms", "read ms", "ms/read"),
-        tuple(rows),
-        ("read: every byte of the matrix once, a dot product with itself",),
-    )
-
-
-def _rows_out_table(models: list[ForwardModel], measured: list[Times]) -> Report:
-    rows = [
-        (
-            *_size(model),
-            len(PATTERN.rows_of(DEAD)),
-            cell(1e3 * times["without"]),
-            cell(1e3 * times["anew"]),
-            cell(1e3 * times["filled"] / APPLIED),
-        )
-        for model, times in zip(models, measured, strict=True)
-    ]
-    return Report(
-        "rows that leave",
-        ("cells", "rows", "of an electrode", "without ms", "anew ms", "5 rows filled ms"),
-        tuple(rows),
-    )
-
-
-def _promises(set_up: Times, applied: list[Times], rows_out: Times) -> list[Promise]:
-    whole = set_up["noser"]
-    inner = whole - set_up["jacobian"]
-    worst = {
-        own: max(times[own] / times[read] for times in applied)
-        for own, read in (("call", "read double"), ("quick", "read single"))
+    calls: dict[str, Callable[[], object]] = {
+        "without": lambda: operator.without(rows),
+        "anew": lambda: OneStep(model, alpha=ALPHA),
+        "5 rows filled": partial(_many, lambda: operator.filled(dv, missing)),
     }
+    times = medians(calls, SECONDS)
+    return times | {"5 rows filled": times["5 rows filled"] / APPLIED}
+
+
+def _promises(set_up: Times, applied: Sequence[Times], rows_out: Times) -> list[Promise]:
+    noser, products = set_up["noser"], set_up["products"]
+    inner = noser - set_up["jacobian"]
+    worst, single = (
+        max(times[name] / times[f"read {name}"] for times in applied)
+        for name in ("double", "single")
+    )
     return [
-        ("set-up at 3k / two products", whole / set_up["products"], 1.5, False),
-        ("the same without its Jacobian", inner / set_up["products"], 1.5, False),
+        ("set-up at 3k / two products", noser / products, 1.5, False),
+        ("the same without its Jacobian", inner / products, 1.5, False),
         ("… / the products, one symmetric", inner / set_up["symmetric"], 1.5, False),
-        ("applying / reading the matrix, worst", worst["call"], 2.0, False),
-        ("the same in single precision, worst", worst["quick"], 2.0, False),
+        ("applying / reading the matrix, worst", worst, 2.0, False),
+        ("the same in single precision, worst", single, 2.0, False),
         ("an electrode's rows leave at 3k, ms", 1e3 * rows_out["without"], 10.0, False),
     ]
+
+
+def run_alpha() -> Iterator[Report]:
+    """Choice of alpha: another operator, each criterion, and a frame that waits for it."""
+    skin = Skin.load("textile-disc-16").altered({"inverse": {"alpha": "auto"}})
+    prepared = [prepare(skin.altered({"mesh": {"cells": n}})) for n in CHOSEN_CELLS]
+    times = [medians(_calls(p), CHOSEN_SECONDS, least=3) for p in prepared]
+    wait = "longest wait of a frame while the operator changes"
+    times = [t | {wait: max(_waits(p))} for t, p in zip(times, prepared, strict=True)]
+    sizes = [f"{len(p.mesh.cells):,} triangles" for p in prepared]
+    rows: list[dict[str, Any]] = [
+        {"ms": name, **{size: cell(1e3 * t[name]) for size, t in zip(sizes, times, strict=True)}}
+        for name in times[0]
+    ]
+    another: Promise = ("another alpha at 3k, ms", 1e3 * times[1]["operator"], 150.0, False)
+    yield table(
+        "alpha: 16 electrodes, 208 rows",
+        rows,
+        f"medians of {clock()[1]}; criteria look at {FRAMES} frames of a touched model",
+        "longest wait: the most that any one frame of the swap does, noise of the image included",
+    )
+    yield promises([another])
+
+
+def _calls(prepared: Prepared) -> dict[str, Callable[[], object]]:
+    spectrum = Spectrum.of(prepared.problem)
+    touch, evidence = LightTouch.of(spectrum), _evidence(prepared)
+    noise = prepared.predicted_noise()
+
+    def tried(criterion: str) -> None:
+        with contextlib.suppress(ModelError):  # the L-curve of such frames may have no corner
+            choose(spectrum, criterion, evidence)
+
+    return {
+        "spectrum": lambda: Spectrum.of(prepared.problem),
+        "light touches": lambda: LightTouch.of(spectrum),
+        "operator": lambda: spectrum.operator(CHOSEN),
+        "operator without a spectrum": lambda: prepared.problem.operator(CHOSEN),
+        "choice for another noise": lambda: touch(noise),
+        **{f"criterion {name}": partial(tried, name) for name in RULES},
+    }
+
+
+def _evidence(prepared: Prepared) -> Evidence:
+    """Round touches all over the sheet, on the linear model, with the predicted noise."""
+    rng, centroids = np.random.default_rng(0), prepared.mesh.centroids
+    places = evenly(rng, FRAMES, 0.07)
+    near = np.linalg.norm(centroids[:, None] - places, axis=2) < 0.015
+    change = np.where(near, -0.2 * prepared.skin.conductivity, 0.0)
+    noise = prepared.predicted_noise()
+    frames: Floats = (prepared.problem.jacobian @ change).T
+    frames += noise * rng.standard_normal(frames.shape)
+    return Evidence(noise, frames, places, lambda image: centroids[[np.argmin(image)]])
+
+
+def _waits(prepared: Prepared) -> list[float]:
+    """Seconds of each step of a change of operator, and of the noise of its image after it."""
+    rng, now = np.random.default_rng(1), clock()[0]
+    mean = prepared.operator.reference
+    noise = LOUD * prepared.readout.noise * rng.standard_normal((20, len(mean)))
+    reference = Reference.of(mean + noise)
+    steps, taken, better = tune(prepared, reference), [], None
+    while better is None:
+        began = now()
+        if (better := next(steps)) is not None:
+            better.image_noise(reference)
+        taken.append(now() - began)
+    return taken

@@ -5,15 +5,17 @@ from __future__ import annotations
 import gzip
 import statistics
 import time
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
-from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
+import numpy as np
 from threadpoolctl import threadpool_limits
 
+import tomoskin.server.page_connection
 from page_stream import chromium, heap, opened, streaming
-from report import Report
+from report import Report, resident, table
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, colour_limit, prepare
 from tomoskin.server import STATIC
@@ -25,11 +27,8 @@ CELLS = {3000: 2, 50_000: 6}
 """Triangles, and what scripting may cost a displayed frame, ms."""
 
 RATE = 1000.0
-OPENINGS = 7
-SECONDS = 6.0
-PAGES = 5
+OPENINGS, SECONDS, PAGES, REPEATS = 7, 6.0, 5, 7
 FILLED, WATCHED = 10.0, 40.0
-REPEATS = 7
 BUSY = "() => { const end = performance.now() + 3000; while (performance.now() < end); }"
 COUNT = "window.tomoskin.frames"
 LOOK = "[window.tomoskin.frames, window.tomoskin.scripting, performance.now()]"
@@ -42,28 +41,19 @@ CHANGES: dict[str, dict[str, dict[str, Any]]] = {
     "electrode width": {"electrodes": {"width": "12 mm"}},
     "mesh, 2500 triangles": {"mesh": {"cells": 2500}},
 }
-Rows = list[tuple[Any, ...]]
+MINUTES, EVERY, SETTLED = 10.0, 30.0, 60.0
+"""Of the long run, s between two looks, and s in which code is compiled and buffers fill."""
+
+PERIOD = 1 / 240
+"""Seconds between frames to the page in it: four times as many as it may get as a rule."""
+
+HOUR = 3600 * 60
+"""Frames that a page shows in an hour at most."""
+
+Measurements = Iterator[tuple[str, Any, str]]
 
 
-def run(data: Path | None) -> tuple[Report, ...]:
-    """Measure on the loopback; ``data`` is not needed."""
-    del data
-    return _page(), _settings()
-
-
-def _page() -> Report:
-    rows: Rows = [("bundle, kB gzipped", _bundle(), "≤ 120")]
-    with chromium() as browser:
-        for cells, most in CELLS.items():
-            begun = time.process_time()
-            prepared = prepare(_skin(cells))
-            rows += [
-                (f"prepared, s of processor, {cells}", round(time.process_time() - begun, 1), "")
-            ]
-            rows += _ready(browser, prepared, cells)
-            rows += _watched(browser, prepared, cells, most)
-            if cells == min(CELLS):
-                rows += _several(browser, prepared)
+def run() -> Iterator[Report]:
     notes = (
         f"Results made by no source, {RATE:.0f}/s (for the first picture 100/s); Chromium draws in "
         "software (SwiftShader).",
@@ -74,61 +64,72 @@ def _page() -> Report:
         f"Memory: used heap after collection over {WATCHED:.0f} s, once all that the page keeps "
         "for ten seconds is there; an hour: tomoskin bench page_hour.",
     )
-    return Report("page", ("what", "measured", "promised"), tuple(rows), notes)
+    settings = table(
+        "page: settings made ready, ms, textile-disc-8 at 3,000 triangles",
+        _changed(),
+        "The picture goes on meanwhile; the source is opened anew after the last two.",
+    )
+    page = Report("page", ("what", "measured", "promised"), tuple(_measured()), notes)
+    yield page
+    yield settings
+
+
+def _measured() -> Measurements:
+    parts = (p for p in STATIC.rglob("*") if p.suffix in {".js", ".css", ".html", ".svg"})
+    bundle = sum(len(gzip.compress(part.read_bytes())) for part in parts)
+    yield "bundle, kB gzipped", round(bundle / 1e3, 1), "≤ 120"
+    with chromium() as browser:
+        for cells, most in CELLS.items():
+            begun = time.process_time()
+            prepared = prepare(_skin(cells))
+            took = round(time.process_time() - begun, 1)
+            yield f"prepared, s of processor, {cells}", took, ""
+            yield from _ready(browser, prepared, cells)
+            yield from _watched(browser, prepared, cells, most)
+            if cells == min(CELLS):
+                yield from _several(browser, prepared)
 
 
 def _skin(cells: int) -> Skin:
     return Skin.load("textile-disc-8").altered({"mesh": {"cells": cells}})
 
 
-def _bundle() -> float:
-    parts = (p for p in STATIC.rglob("*") if p.suffix in {".js", ".css", ".html", ".svg"})
-    return round(sum(len(gzip.compress(part.read_bytes())) for part in parts) / 1e3, 1)
-
-
-def _ready(browser: Any, prepared: Prepared, cells: int) -> Rows:
+def _ready(browser: Any, prepared: Prepared, cells: int) -> Measurements:
     """The first picture, and the first sign of a page with nothing but text."""
-    found, floors = [], []
+    ready, floors = [], []
     with streaming(prepared, 100.0) as (_, address):
         for _ in range(OPENINGS):
             with opened(browser, address) as page:
-                found.append(page.evaluate("window.tomoskin.ready") / 1e3)
+                ready.append(page.evaluate("window.tomoskin.ready") / 1e3)
                 page.goto(f"{urlsplit(address)._replace(path='/status').geturl()}")
                 page.wait_for_function(f"() => {FLOOR}")
                 floors.append(page.evaluate(FLOOR) / 1e3)
     promised = "< 1" if cells == min(CELLS) else ""
-    return [
-        (f"ready, s, {cells} triangles: median", round(statistics.median(found), 2), promised),
-        (f"ready, s, {cells} triangles: worst", round(max(found), 2), promised),
-        (f"a page of text instead, s, {cells}: median", round(statistics.median(floors), 2), ""),
-    ]
+    yield f"ready, s, {cells} triangles: median", round(statistics.median(ready), 2), promised
+    yield f"ready, s, {cells} triangles: worst", round(max(ready), 2), promised
+    yield f"a page of text instead, s, {cells}: median", round(statistics.median(floors), 2), ""
 
 
-def _watched(browser: Any, prepared: Prepared, cells: int, most: int) -> Rows:
+def _watched(browser: Any, prepared: Prepared, cells: int, most: int) -> Measurements:
     with streaming(prepared, RATE) as (stream, address), opened(browser, address) as page:
         page.wait_for_timeout(3e3)
         frames, cost, then = page.evaluate(LOOK)
         page.wait_for_timeout(1e3 * SECONDS)
         frames2, cost2, now = page.evaluate(LOOK)
-        seen = frames2 - frames
+        shown = frames2 - frames
         page.wait_for_timeout(1e3 * FILLED)
         before, first = heap(page), page.evaluate(COUNT)
         page.wait_for_timeout(1e3 * WATCHED)
         grown, streamed = heap(page) - before, page.evaluate(COUNT) - first
         painted = {s.name: s for s in stream.latency.stages()}["paint"]
-    return [
-        (f"scripting per frame, ms, {cells}", round(1e3 * (cost2 - cost) / seen, 2), f"≤ {most}"),
-        (f"arrival to drawn, ms, {cells}: median, p99", _pair(painted), ""),
-        (f"frames/s shown, {cells}", round(1e3 * seen / (now - then), 1), "≤ 60"),
-        (f"memory gained over {streamed} frames, kB, {cells}", round(grown / 1e3), "none"),
-    ]
+    yield f"scripting per frame, ms, {cells}", round(1e3 * (cost2 - cost) / shown, 2), f"≤ {most}"
+    pair = f"{1e3 * painted.p50:.1f}, {1e3 * painted.p99:.1f}"
+    yield f"arrival to drawn, ms, {cells}: median, p99", pair, ""
+    yield f"frames/s shown, {cells}", round(1e3 * shown / (now - then), 1), "≤ 60"
+    yield f"memory gained over {streamed} frames, kB, {cells}", round(grown / 1e3), "none"
 
 
-def _pair(stage: Any) -> str:
-    return f"{1e3 * stage.p50:.1f}, {1e3 * stage.p99:.1f}"
-
-
-def _several(browser: Any, prepared: Prepared) -> Rows:
+def _several(browser: Any, prepared: Prepared) -> Measurements:
     """Five pages, one of them stalled for three seconds; and a client that stops reading."""
     from websockets.sync.client import connect
 
@@ -141,13 +142,11 @@ def _several(browser: Any, prepared: Prepared) -> Rows:
         asleep = at._replace(scheme="ws", path="/ws").geturl()
         stack.enter_context(connect(asleep, origin=f"http://{at.netloc}", max_queue=1))
         beside, still = _shown(pages, stream)
-    return [
-        (f"results/s in, {PAGES} pages", round(results), f"{RATE:.0f}"),
-        (f"frames/s on the slowest of {PAGES}", round(min(shown), 1), ""),
-        ("the same after one was stalled for 3 s", round(min(stalled), 1), ""),
-        ("results/s in beside a client that stops reading", round(still), f"{RATE:.0f}"),
-        ("frames/s on the slowest page beside it", round(min(beside), 1), ""),
-    ]
+    yield f"results/s in, {PAGES} pages", round(results), f"{RATE:.0f}"
+    yield f"frames/s on the slowest of {PAGES}", round(min(shown), 1), ""
+    yield "the same after one was stalled for 3 s", round(min(stalled), 1), ""
+    yield "results/s in beside a client that stops reading", round(still), f"{RATE:.0f}"
+    yield "frames/s on the slowest page beside it", round(min(beside), 1), ""
 
 
 def _shown(pages: list[Any], stream: Any) -> tuple[list[float], float]:
@@ -160,28 +159,59 @@ def _shown(pages: list[Any], stream: Any) -> tuple[list[float], float]:
     return [count / seconds for count in shown], (stream.made - made) / seconds
 
 
-def _settings() -> Report:
-    with threadpool_limits(1):  # as while a source runs
-        rows = _changed(prepare(_skin(3000)))
-    return Report(
-        "page: settings made ready, ms, textile-disc-8 at 3,000 triangles",
-        ("change", "median", "worst", "promised"),
-        tuple(rows),
-        ("The picture goes on meanwhile; the source is opened anew after the last two.",),
-    )
-
-
-def _changed(prepared: Prepared) -> Rows:
-    rows: Rows = []
+def _changed() -> Iterator[Mapping[str, Any]]:
+    prepared = prepare(_skin(3000))
     for name, change in CHANGES.items():
-        skin = prepared.skin.altered(change)
-        times = []
+        skin, times = prepared.skin.altered(change), []
         for _ in range(REPEATS):
             fresh = skin.altered({})
             start = time.perf_counter()
-            made = prepare(fresh, prepared)
-            colour_limit(made)
+            with threadpool_limits(1):  # as while a source runs
+                colour_limit(prepare(fresh, prepared))
             times.append(1e3 * (time.perf_counter() - start))
-        promised = "< 150" if name in ("alpha by hand", "threshold", "prior") else ""
-        rows.append((name, round(statistics.median(times), 1), round(max(times), 1), promised))
-    return rows
+        yield {
+            "change": name,
+            "median": round(statistics.median(times), 1),
+            "worst": round(max(times), 1),
+            "promised": "< 150" if name in ("alpha by hand", "threshold", "prior") else "",
+        }
+
+
+def run_hour() -> Iterator[Report]:
+    """An hour of streaming to one page, compressed: heap of the page and memory of the server."""
+    tomoskin.server.page_connection.FRAME_PERIOD = PERIOD
+    with (
+        chromium() as browser,
+        streaming(prepare(_skin(3000)), RATE) as (stream, address),
+        opened(browser, address) as page,
+    ):
+        page.wait_for_timeout(1e3 * SETTLED)
+        looks = [_look(page, stream)]
+        end = time.monotonic() + 60 * MINUTES - SETTLED
+        while time.monotonic() < end:
+            page.wait_for_timeout(1e3 * EVERY)
+            looks.append(_look(page, stream))
+    notes = (
+        f"{MINUTES:g} minutes, {RATE:.0f} results/s in, up to {1 / PERIOD:.0f} frames/s to the "
+        f"page; looked at every {EVERY:.0f} s, the heap after collection; the first "
+        f"{SETTLED:.0f} s are left out.",
+        "Growth: slope of a straight line over all looks, per 216,000 frames: an hour at 60/s.",
+    )
+    columns = ("what", "measured", "")
+    yield Report("page, an hour", columns, tuple(_grown(np.array(looks))), notes)
+
+
+def _look(page: Any, stream: Any) -> tuple[float, float, float, float]:
+    """Frames at the page, results made, heap and resident memory of the server, MB."""
+    return page.evaluate(COUNT), stream.made, heap(page) / 1e6, resident()
+
+
+def _grown(looks: np.ndarray) -> Measurements:
+    frames, made = (looks[:, :2] - looks[0, :2]).T
+    yield "frames to the page", f"{frames[-1]:.0f}", f"{100 * frames[-1] / HOUR:.0f} % of an hour"
+    yield "results made", f"{made[-1]:.0f}", ""
+    for what, size in zip(("heap of the page", "memory of the server"), looks.T[2:], strict=True):
+        slope, _ = np.polyfit(frames, size, 1)
+        ends, spread = f"{size[0]:.2f}, {size[-1]:.2f}", f"between looks ± {np.ptp(size):.2f}"
+        yield f"{what}, MB: first, last", ends, spread
+        yield f"{what}, MB grown in an hour", f"{slope * HOUR:.2f}", ""

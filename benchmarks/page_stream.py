@@ -1,4 +1,4 @@
-"""Results of no source at any rate, the page's server before them, and Chromium: for page*.py."""
+"""Results of no source at any rate, the page's server before them, and Chromium: for page.py."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
+from rig import served
 from tomoskin.core import Detection, Image, Touch
-from tomoskin.pipeline import FrameResult, Prepared, colour_limit
+from tomoskin.pipeline import FrameResult, Prepared
 from tomoskin.run import Runner, Snapshot
-from tomoskin.server import AccessPolicy, Hub, Server, SettingsHandlers, application, listen
 
 _FLAGS = Path(__file__).resolve().parents[1] / "scripts" / "chromium.flags"
 ARGUMENTS = tuple(_FLAGS.read_text(encoding="utf-8").split())
@@ -102,19 +102,11 @@ def _no_source() -> Any:
 def streaming(prepared: Prepared, rate: float) -> Iterator[tuple[Stream, str]]:
     """A stream and its page's address while the block lasts."""
     stream = Stream(prepared, rate)
-    hub = Hub(stream, limit=colour_limit(prepared))
-    SettingsHandlers(hub)
-    with listen("127.0.0.1", 0) as listener:
-        policy = AccessPolicy(listener.getsockname()[1])
-        server = Server.of(application(hub, policy))
-        thread = threading.Thread(target=server.run_on, args=(listener,))
-        thread.start()
-        try:
+    try:
+        with served(stream) as policy:
             yield stream, policy.address
-        finally:
-            server.stop()
-            thread.join()
-            stream.end()
+    finally:
+        stream.end()
 
 
 @contextmanager

@@ -1,59 +1,264 @@
-"""What a careful stranger breaks: damaged files and requests, kill −9, a full disk, no broker."""
+"""What a careful stranger breaks: damaged files and requests, kill −9."""
 
 from __future__ import annotations
 
+import contextlib
+import io
+import os
+import random
+import signal
 import tempfile
-from collections.abc import Iterator
+import threading
+import time
+from collections.abc import Callable, Iterator
+from multiprocessing import get_context
 from pathlib import Path
 
-from reliability_files import judges, make_bases
+import numpy as np
+
 from reliability_page import ask
-from reliability_run import brokers, full_disk, killed, prepared_skin
-from report import Report, progress
-from trials import HANG, MEMORY, Tally, attempt
+from report import Report, progress, table
+from tomoskin.board.source import open_source
+from tomoskin.cli import main
+from tomoskin.core import DataError, Frame
+from tomoskin.files.imports import read_recording
+from tomoskin.files.session import SessionReader, repair
+from tomoskin.learning import TOUCH
+from tomoskin.model.skin import Skin
+from tomoskin.pipeline import Prepared, prepare
+from tomoskin.run import Runner, commands
+from tomoskin.sensing.signal import Recording
+from tomoskin.twin import Script
+from trials import HANG, MEMORY, Judge, Tally, attempt, mutated, remade
 
-REQUESTS, FILES, KILLS, DISKS, BROKERS = 20_000, 2_000, 200, 50, 30
-COLUMNS = ("kind", "attempts", "refused", "accepted", "tracebacks", "hangs", "memory", "wrong")
+REQUESTS, FILES, KILLS = 20_000, 2_000, 200
+LONGEST, SAVED = 4.0, 2.5
+"""Seconds of a recording after which it is killed at the latest, and after which something must be
+in the file: it is written once a second."""
+
+SKIN = "textile-disc-8"
+PRESSES = 20
+SCRIPT = """format = 1
+
+[script]
+duration = "3 s"
+
+[[press]]
+id = "finger"
+radius = "15 mm"
+at = ["30 mm", "20 mm"]
+start = "500 ms"
+force = "4 N"
+hold = "1 s"
+"""
+_ARRAYS = ("voltages", "drive", "measure", "time", "reference", "labels")
 
 
-def run(data: Path | None) -> tuple[Report, ...]:
-    """All of it, a quarter of an hour; ``data`` is not needed."""
-    del data
-    tallies = list(_tallies())
-    rows = tuple(_row(tally) for tally in tallies)
-    notes = (
-        "refused: with a TomoskinError, one sentence; accepted: what was read is right, or nothing "
-        "in the file can tell that it is not",
+def run() -> Iterator[Report]:
+    tallies = list(_tallies(FILES, KILLS, REQUESTS))
+    yield table(
+        "reliability",
+        (tally.row for tally in tallies),
+        "refused: with a TomoskinError, one sentence; accepted: what was read is right, or "
+        "nothing in the file can tell that it is not",
         f"hangs: over {HANG:g} s; memory: over {MEMORY >> 20} MB in the process",
         "wrong: a frame that was never written, other arrays or positions, a repair that loses "
-        "frames, a run that stands still",
+        "frames",
         "a kill before the first second leaves a file that is refused",
         *(f"{fault}: {text}" for tally in tallies for fault, text in tally.examples.items()),
     )
-    return (Report("reliability", COLUMNS, rows, notes),)
 
 
-def _tallies() -> Iterator[Tally]:
+def _tallies(files: int, kills: int, requests: int) -> Iterator[Tally]:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         for kind, judge in judges(make_bases(folder), folder).items():
             progress(kind)
-            yield attempt(kind, FILES, judge)
-        prepared = prepared_skin()
-        for kind, count, judge in (
-            ("kill −9", KILLS, killed(prepared, folder)),
-            ("full disk", DISKS, full_disk(prepared, folder)),
-            ("broker", BROKERS, brokers(prepared)),
-        ):
-            progress(kind)
-            yield attempt(kind, count, judge)
+            yield attempt(kind, files, judge)
+        progress("kill −9")
+        yield attempt("kill −9", kills, killed(prepare(Skin.load(SKIN)), folder))
         progress("requests")
         (folder / "page").mkdir()
-        yield ask(REQUESTS, folder / "page")
+        yield ask(requests, folder / "page")
 
 
-def _row(tally: Tally) -> tuple[str | int, ...]:
-    faults = (tally.counts[name] for name in ("traceback", "hang", "memory", "wrong"))
-    refused, accepted = tally.counts["refused"], tally.counts["accepted"]
-    return (tally.kind, sum(tally.counts.values()) - tally.counts["memory"], refused, accepted,
-            *faults)  # fmt: skip
+def command(*arguments: object) -> None:
+    """A command as a person would give it, without its output; DataError where it fails."""
+    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()) as e:
+        try:
+            main([str(argument) for argument in arguments])
+        except SystemExit as end:
+            if end.code:
+                raise DataError(e.getvalue(), where=str(arguments[0])) from None
+
+
+def make_bases(folder: Path) -> dict[str, Path]:
+    """An undamaged file of each kind."""
+    names = {"session": "run.mcap", ".npz": "run.npz", ".mat": "run.mat", ".csv": "run.csv",
+             "skin": "skin.toml", "script": "script.toml", "calibration": "touch.npz"}  # fmt: skip
+    files = {kind: folder / name for kind, name in names.items()}
+    files["script"].write_text(SCRIPT, encoding="utf-8")
+    files["skin"].write_text(Skin.load(SKIN).to_toml(), encoding="utf-8")
+    command("simulate", "--skin", SKIN, "--script", files["script"], "--out", files["session"])
+    for kind in (".npz", ".mat", ".csv"):
+        command("session", "export", files["session"], files[kind])
+    presses = folder / "presses.npz"
+    command("simulate", "--skin", SKIN, "--presses", PRESSES, "--processes", 1,
+                "--out", presses)  # fmt: skip
+    command("calibrate", "touch", presses, "--skin", SKIN, "--out", files["calibration"])
+    return files
+
+
+def judges(files: dict[str, Path], folder: Path) -> dict[str, Judge]:
+    """How a damaged file of each kind is judged."""
+    return {
+        "session": _session(files["session"], folder),
+        **{kind: _recording(files[kind], folder) for kind in (".npz", ".mat", ".csv")},
+        "skin": _text(files["skin"], Skin.from_toml),
+        "script": _text(files["script"], Script.from_toml),
+        "calibration": _calibration(files["calibration"], folder),
+    }
+
+
+def _session(base: Path, folder: Path) -> Judge:
+    """Every frame that is read was written; what repair writes opens and holds all of them."""
+    data, damaged, mended = base.read_bytes(), folder / "x.mcap", folder / "mended.mcap"
+    written = {_key(frame) for frame in _frames(base)[0]}
+
+    def judge(number: int) -> str:
+        damaged.write_bytes(mutated(data, number))
+        mended.unlink(missing_ok=True)
+        frames, refusal = _frames(damaged)
+        if not {_key(frame) for frame in frames} <= written:
+            return "a frame that was never written"
+        with contextlib.suppress(DataError):
+            read_recording(damaged)
+        try:
+            repair(damaged, mended)
+        except DataError:
+            if frames:
+                return f"repair gives nothing, {len(frames)} frames can be read"
+        else:
+            again, fault = _frames(mended)
+            if fault or len(again) < len(frames):
+                return f"repair gives {len(again)} of {len(frames)} frames; {fault}"
+        if refusal:
+            raise refusal
+        return ""
+
+    return judge
+
+
+def _frames(path: Path) -> tuple[list[Frame], DataError | None]:
+    frames: list[Frame] = []
+    try:
+        with SessionReader(path) as session:
+            frames.extend(item.frame for item in session.frames())
+    except DataError as error:
+        return frames, error
+    return frames, None
+
+
+def _key(frame: Frame) -> tuple[int, int, bytes]:
+    return frame.sequence, frame.ticks, frame.samples.tobytes()
+
+
+def _recording(base: Path, folder: Path) -> Judge:
+    """Arrays that have a checksum are those that were written; the others fit together."""
+    data, damaged, original = base.read_bytes(), folder / f"x{base.suffix}", read_recording(base)
+    arrays = dict(np.load(base)) if base.suffix == ".npz" else None
+
+    def judge(number: int) -> str:
+        inside = arrays is not None and number % 2
+        damaged.write_bytes(
+            remade(arrays, number)
+            if arrays is not None and inside
+            else mutated(data, number, text=base.suffix == ".csv")
+        )
+        recording = read_recording(damaged)
+        if arrays is not None and not inside:
+            return _other(recording, original)
+        shape = (len(recording.time), len(recording.drive))
+        return "" if recording.voltages.shape == shape else f"voltages {recording.voltages.shape}"
+
+    return judge
+
+
+def _other(recording: Recording, original: Recording) -> str:
+    for name in _ARRAYS:
+        ours, theirs = getattr(recording, name), getattr(original, name)
+        if (ours is None) != (theirs is None):
+            return f"{name} is lost"
+        if ours is not None and not np.array_equal(ours, theirs, equal_nan=True):
+            return f"other {name}"
+    return ""
+
+
+def _text(base: Path, read: Callable[[str], object]) -> Judge:
+    """A text has no checksum: whatever is read was meant."""
+    data = base.read_bytes()
+
+    def judge(number: int) -> str:
+        read(mutated(data, number, text=True).decode("utf-8", "replace"))
+        return ""
+
+    return judge
+
+
+def _calibration(base: Path, folder: Path) -> Judge:
+    data, damaged = base.read_bytes(), folder / "x.npz"
+    original = TOUCH.read(base).model
+    frames = original.presses.dv[:5]
+    expected = original.predict(frames)[0]
+
+    arrays = dict(np.load(base))
+
+    def judge(number: int) -> str:
+        inside = number % 2
+        damaged.write_bytes(remade(arrays, number) if inside else mutated(data, number))
+        positions = TOUCH.read(damaged).model.predict(frames)[0]
+        if not np.isfinite(positions).all():
+            return "a position that is none"
+        same = inside or np.allclose(positions, expected, atol=1e-9)
+        return "" if same else "other positions"
+
+    return judge
+
+
+def killed(prepared: Prepared, folder: Path) -> Judge:
+    """kill −9 at some moment of a recording: what is in the file is read in order, and repaired."""
+    path, mended = folder / "killed.mcap", folder / "mended.mcap"
+
+    def judge(number: int) -> str:
+        path.unlink(missing_ok=True)
+        mended.unlink(missing_ok=True)
+        moment = random.Random(number).random()
+        process = get_context("fork").Process(target=_record, args=(prepared, path))
+        process.start()
+        deadline = time.monotonic() + 0.8 * HANG
+        while not path.exists() and time.monotonic() < deadline:
+            time.sleep(0.02)
+        time.sleep(LONGEST * moment)
+        os.kill(process.pid or 0, signal.SIGKILL)
+        process.join()
+        try:
+            with SessionReader(path) as session:
+                sequences = [item.frame.sequence for item in session.frames()]
+        except DataError as error:
+            if LONGEST * moment > SAVED:
+                return f"nothing after {LONGEST * moment:.1f} s: {error}"
+            raise
+        if sequences != list(range(len(sequences))):
+            return f"{len(sequences)} frames, not in order"
+        if repair(path, mended).messages.get("/frames", 0) != len(sequences):
+            return "repair loses frames"
+        return ""
+
+    return judge
+
+
+def _record(prepared: Prepared, path: Path) -> None:
+    runner = Runner(prepared, lambda: open_source("twin:fast", prepared.skin))
+    runner.ask(commands.Record(path))
+    runner.start()
+    threading.Event().wait()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import random
+import re
 import subprocess
 import sys
 import threading
@@ -133,9 +134,8 @@ def _live(folder: Path) -> Iterator[tuple[subprocess.Popen[str], str, Path]]:
 
 
 def _peak(process: int) -> int:
-    status = Path(f"/proc/{process}/status").read_text()
-    (line,) = [line for line in status.splitlines() if line.startswith("VmHWM")]
-    return int(line.split()[1]) << 10
+    (line,) = re.findall(r"VmHWM:\s+(\d+)", Path(f"/proc/{process}/status").read_text())
+    return int(line) << 10
 
 
 def _request(schema: inspect.Type, number: int) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,13 +11,11 @@ from typing import Any
 import numpy as np
 from scipy.stats import rankdata
 
-from from_examples import load_example
-from report import Report
+from report import Report, recordings, table
+from rig import load_example
 from simulated_tanks import simulated
-from tomoskin.core import DataError, FloatArray
+from tomoskin.core import FloatArray
 
-ROOT = Path(__file__).resolve().parents[1]
-SHARED = ROOT.parent / "shared" / "data"
 LEVELS = range(1, 8)
 METHODS = ("shapes", "linear and Otsu", "water only")
 TANKS = 8
@@ -54,56 +52,39 @@ class Judged:
     constant: float
 
 
-def run(data: Path | None) -> tuple[Report, ...]:
+def run(data: Path | None) -> Iterator[Report]:
     """Segment tanks at every level; ``data`` is the folder of public recordings."""
-    file = (data or SHARED) / "ktc2023_tank32" / "train.npz"
-    if not file.exists():
-        raise DataError("expected the challenge's training data", where=str(file), hint="--data")
+    file = Path("ktc2023_tank32") / "train.npz"
     example = load_example("ktc2023")
-    measured = list(example.samples(file))
+    measured = list(example.samples(recordings(data, str(file)) / file))
     inj, mpat = measured[0].inj, measured[0].mpat
-    groups: list[tuple[str, list[list[Judged]]]] = [
-        ("4 measured", [[judged(example, tank, level) for tank in measured] for level in LEVELS]),
-        (f"{TANKS} simulated", [_simulated(example, level, inj, mpat) for level in LEVELS]),
-    ]
-    columns = ("tanks", "method", *(f"level {n}" for n in LEVELS), "mean", "times 21")
-    scores = [row for name, group in groups for row in _scores(name, group)]
-    certain = [row for name, group in groups for row in _certainty(name, group)]
-    return (
-        Report(
-            "score, 1 is best",
-            columns,
-            tuple(scores),
-            (
-                "times 21: the challenge's sum over three samples at each of seven levels",
-                "±: standard error of the mean over tanks; simulated ones are others at each level",
-                "seconds: mean processor time of one segmentation",
-            ),
-        ),
-        Report(
-            "where it is sure",
-            columns[:-1],
-            tuple(certain),
-            (
-                "ranked: how often a wrong pixel is less sure than a right one; 0.5 is chance",
-                "loss: mean of −log₂ of the probability given to the true label",
-                "constant: the same if every label counted as wrong as often as labels are",
-            ),
-        ),
+    groups: dict[str, list[list[Judged]]] = {
+        "4 measured": [[judged(example, tank, level) for tank in measured] for level in LEVELS],
+        f"{TANKS} simulated": [_simulated(example, level, inj, mpat) for level in LEVELS],
+    }
+    yield table(
+        "score, 1 is best",
+        (row for name, group in groups.items() for row in _scores(name, group)),
+        "times 21: the challenge's sum over three samples at each of seven levels",
+        "±: standard error of the mean over tanks; simulated ones are others at each level",
+        "seconds: mean processor time of one segmentation",
+    )
+    yield table(
+        "where it is sure",
+        (row for name, group in groups.items() for row in _certainty(name, group)),
+        "ranked: how often a wrong pixel is less sure than a right one; 0.5 is chance",
+        "loss: mean of −log₂ of the probability given to the true label",
+        "constant: the same if every label counted as wrong as often as labels are",
     )
 
 
 def _simulated(example: Any, level: int, inj: FloatArray, mpat: FloatArray) -> list[Judged]:
-    tanks = ((seed, simulated(seed, inj, mpat)) for seed in seeds(level))
+    seeds = range(6000 + 100 * level, 6000 + 100 * level + TANKS)
+    tanks = ((seed, simulated(seed, inj, mpat)) for seed in seeds)
     return [
         judged(example, example.Sample(str(seed), t.u, t.u_ref, inj, mpat, t.truth), level)
         for seed, t in tanks
     ]
-
-
-def seeds(level: int) -> range:
-    """Seeds of a level's simulated tanks."""
-    return range(6000 + 100 * level, 6000 + 100 * level + TANKS)
 
 
 def judged(example: Any, tank: Any, level: int) -> Judged:
@@ -134,29 +115,25 @@ def certainty(found: Any, points: FloatArray, truth: Any) -> tuple[float, float,
     return float(wrong.mean()), float(ranked), float(-np.log2(given + 1e-3).mean()), float(constant)
 
 
-def _scores(name: str, group: Sequence[Sequence[Judged]]) -> list[tuple[Any, ...]]:
-    scores = np.array([[tank.scores for tank in tanks] for tanks in group])
-    rows = [
-        (name, method, *_spread(scores[..., k]), f"{21 * scores[..., k].mean():.2f}")
-        for k, method in enumerate(METHODS)
-    ]
-    taken = np.array([[tank.seconds for tank in tanks] for tanks in group]).mean(axis=1)
-    means = (*taken, taken.mean())
-    return [*rows, (name, "seconds", *(f"{second:.1f}" for second in means), "")]
+def _scores(name: str, group: Sequence[Sequence[Judged]]) -> Iterator[dict[str, Any]]:
+    """Mean and its standard error at each level, and over all."""
+    for k, method in enumerate(METHODS):
+        scores = np.array([[tank.scores[k] for tank in tanks] for tanks in group])
+        error = scores.std(axis=1, ddof=1) / np.sqrt(scores.shape[1])
+        means = [*scores.mean(axis=1), scores.mean()]
+        errors = [*error, np.sqrt((error**2).sum()) / len(error)]
+        values = [f"{m:.3f} ± {e:.3f}" for m, e in zip(means, errors, strict=True)]
+        yield _by_level(name, method, values) | {"times 21": f"{21 * scores.mean():.2f}"}
+    taken = np.array([np.mean([tank.seconds for tank in tanks]) for tanks in group])
+    yield _by_level(name, "seconds", [f"{s:.1f}" for s in (*taken, taken.mean())])
 
 
-def _certainty(name: str, group: Sequence[Sequence[Judged]]) -> list[tuple[Any, ...]]:
-    rows = []
+def _certainty(name: str, group: Sequence[Sequence[Judged]]) -> Iterator[dict[str, Any]]:
     for what in ("wrong", "ranked", "loss", "constant"):
-        values = np.array([[getattr(tank, what) for tank in tanks] for tanks in group])
-        means = values.mean(axis=1)
-        rows.append((name, what, *(f"{m:.3f}" for m in means), f"{means.mean():.3f}"))
-    return rows
+        means = np.array([np.mean([getattr(tank, what) for tank in tanks]) for tanks in group])
+        yield _by_level(name, what, [f"{m:.3f}" for m in (*means, means.mean())])
 
 
-def _spread(scores: FloatArray) -> list[str]:
-    """Mean and its standard error of (levels, tanks): each level, and all."""
-    error = scores.std(axis=1, ddof=1) / np.sqrt(scores.shape[1])
-    means = [*scores.mean(axis=1), scores.mean()]
-    errors = [*error, np.sqrt((error**2).sum()) / len(error)]
-    return [f"{m:.3f} ± {e:.3f}" for m, e in zip(means, errors, strict=True)]
+def _by_level(name: str, method: str, values: Sequence[str]) -> dict[str, Any]:
+    columns = (*(f"level {n}" for n in LEVELS), "mean")
+    return {"tanks": name, "method": method, **dict(zip(columns, values, strict=True))}

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from moving_plant import RAMP, Sheet, Shown, Slide
 from plant import Finger
-from report import Report, progress
-from tomoskin.core import Touch
-from tracking_scenes import moving, past, quick, together
+from report import Report, percent, progress, table
+from rig import gap
+from tracking_scenes import RAMP, Sheet, Shown, Slide, moving, past, quick, together
 
 SEEDS = (11, 12, 13)
 """What was chosen was chosen on seeds 1 to 3."""
@@ -22,7 +21,7 @@ SEEDS = (11, 12, 13)
 SCENES = 5
 """Of each kind on each sheet."""
 
-OVERSAMPLING = {8: 16, 16: 8}
+ELECTRODES = (8, 16)
 """Of the built-in skins: 18 and 10 frames a second."""
 
 KINDS: dict[str, Callable[[np.random.Generator], tuple[list[Slide], float]]] = {
@@ -71,58 +70,44 @@ class Scores:
             self.who[kind][identity(slides, shown)] += 1
 
 
-def run(data: Path | None) -> tuple[Report, ...]:
-    """No recordings are needed: the plant is the truth."""
-    del data
-    return (table(SEEDS, SCENES),)
-
-
-def table(seeds: Sequence[int], scenes: int) -> Report:
-    """By electrodes."""
-    rows = []
-    for electrodes in OVERSAMPLING:
-        scores = Scores()
-        for seed in seeds:
-            _measure(scores, electrodes, seed, scenes)
-        onsets, releases = np.array(scores.onsets), np.array(scores.releases)
-        rows.append(
-            (
-                electrodes,
-                scores.frames,
-                *(round(1000 * n / scores.frames, 1) for n in (scores.ghosts, scores.surplus)),
-                *(_percent(v) for v in (onsets <= 1, onsets <= 2, onsets < LATE, releases <= 3)),
-                f"{scores.ids} for {scores.fingers}",
-                *(", ".join(f"{n} {w}" for w, n in scores.who[k].most_common()) for k in MEETINGS),
-            )
-        )
-    return Report(
+def run() -> Iterator[Report]:
+    yield table(
         "fingers that move, on uneven sheets",
-        (
-            *("electrodes", "frames", "with a ghost, of 1,000", "with one too many"),
-            *(
-                "reported in their first frame",
-                "in two",
-                "at all",
-                "gone in three",
-                "identities",
-                "past each other",
-            ),
-            "together and apart",
-        ),
-        tuple(rows),
-        (
-            f"seeds {tuple(seeds)}, {scenes} scenes of each kind; radii 12 to 20 mm, conductivity "
-            f"down by 15 to 35 %, up and down in {1e3 * RAMP:.0f} ms, sheet uneven by 10 %",
-            f"ghost: a touch farther than {1e3 * NEAR:.1f} mm from every finger of its own that "
-            "presses or has been lifted two frames ago, and not said to be several",
-            "first frame: from that in whose middle half of the finger is down; gone: from the "
-            "first frame without it; meetings: at the end, both ids as at first",
-        ),
+        (_row(electrodes, SEEDS, SCENES) for electrodes in ELECTRODES),
+        f"seeds {SEEDS}, {SCENES} scenes of each kind; radii 12 to 20 mm, conductivity "
+        f"down by 15 to 35 %, up and down in {1e3 * RAMP:.0f} ms, sheet uneven by 10 %",
+        f"ghost: a touch farther than {1e3 * NEAR:.1f} mm from every finger of its own that "
+        "presses or has been lifted two frames ago, and not said to be several",
+        "first frame: from that in whose middle half of the finger is down; gone: from the "
+        "first frame without it; meetings: at the end, both ids as at first",
     )
 
 
+def _row(electrodes: int, seeds: Sequence[int], scenes: int) -> dict[str, Any]:
+    scores = Scores()
+    for seed in seeds:
+        _measure(scores, electrodes, seed, scenes)
+    onsets, releases = np.array(scores.onsets), np.array(scores.releases)
+    past, parted = (
+        ", ".join(f"{n} {w}" for w, n in scores.who[kind].most_common()) for kind in MEETINGS
+    )
+    return {
+        "electrodes": electrodes,
+        "frames": scores.frames,
+        "with a ghost, of 1,000": round(1000 * scores.ghosts / scores.frames, 1),
+        "with one too many": round(1000 * scores.surplus / scores.frames, 1),
+        "reported in their first frame": percent(onsets <= 1),
+        "in two": percent(onsets <= 2),
+        "at all": percent(onsets < LATE),
+        "gone in three": percent(releases <= 3),
+        "identities": f"{scores.ids} for {scores.fingers}",
+        "past each other": past,
+        "together and apart": parted,
+    }
+
+
 def _measure(scores: Scores, electrodes: int, seed: int, scenes: int) -> None:
-    sheet = Sheet(electrodes, seed, OVERSAMPLING[electrodes])
+    sheet = Sheet(electrodes, seed)
     for index, (kind, drawn) in enumerate(KINDS.items()):
         for number in range(scenes):
             progress(f"{electrodes} electrodes, seed {seed}, {kind} {number}")
@@ -136,7 +121,7 @@ def has_ghost(frame: Shown, slides: Sequence[Slide]) -> bool:
     alone = {k for k, t in enumerate(touches) if not t.merged and not t.detection.close}
     if not touches or not here:
         return bool(alone)
-    away = np.array([[_away(t, _held(s, frame)) for t in touches] for s in here])
+    away = np.array([[gap(t, _held(s, frame)) for t in touches] for s in here])
     pairs = zip(*linear_sum_assignment(away), strict=True)
     return bool(alone - {int(k) for finger, k in pairs if away[finger, k] < NEAR})
 
@@ -175,7 +160,7 @@ def identity(slides: Sequence[Slide], shown: Sequence[Shown]) -> str:
         if len(down) < 2 or len(touches) != 2 or any(t.merged for t in touches):
             continue
         fingers = [_held(s, frame) for s in down]
-        away = np.array([[_away(t, f) for f in fingers] for t in touches])
+        away = np.array([[gap(t, f) for f in fingers] for t in touches])
         swapped = int(away[0, 0] + away[1, 1] > away[0, 1] + away[1, 0])
         if max(away[0, swapped], away[1, 1 - swapped]) > ALMOST:
             continue
@@ -192,7 +177,7 @@ def identity(slides: Sequence[Slide], shown: Sequence[Shown]) -> str:
 
 def _is_seen(slide: Slide, frame: Shown) -> bool:
     finger = _held(slide, frame)
-    return any(_away(touch, finger) < ALMOST for touch in frame.result.touches)
+    return any(gap(touch, finger) < ALMOST for touch in frame.result.touches)
 
 
 def _held(slide: Slide, frame: Shown) -> Finger:
@@ -201,11 +186,3 @@ def _held(slide: Slide, frame: Shown) -> Finger:
     finger = slide.at(min(max(middle, slide.start + 1e-3), slide.end - 1e-3))
     assert finger is not None
     return finger
-
-
-def _away(touch: Touch, finger: Finger) -> float:
-    return float(np.hypot(touch.detection.x - finger.x, touch.detection.y - finger.y))
-
-
-def _percent(which: np.ndarray) -> str:
-    return f"{100 * which.mean():.0f} %"

@@ -1,19 +1,93 @@
-"""Scenes of fingers on the moving plant, drawn by a seed."""
+"""Scenes of fingers that come, move, meet, part and go on a plant, drawn by a seed."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+
 import numpy as np
 
-from moving_plant import Slide
-from plant import Finger
+from plant import Finger, Plant, plant_mesh
+from rig import scan_time, stage
+from tomoskin.model.mesh import Mesh
+from tomoskin.pipeline import FrameResult, Pipeline
+from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
 
-RADIUS = 0.100
-"""Of the textile discs, m."""
+UNEVEN = 0.1
+RAMP = 0.05
+"""Seconds in which a finger comes down, and in which it is lifted."""
+
+SETTLED = 260
+"""Idle frames before a scene: the reference, and those in which the sheet is learnt from it."""
 
 SPEED, APART, INSIDE = 0.06, 0.045, 0.075
 RADII, FALLS = (0.012, 0.020), (0.15, 0.35)
 STRAYS = 0.015
 """Two that meet pass each other, or stop, at up to so many metres: closer than is told apart."""
+
+
+@dataclass(frozen=True)
+class Slide:
+    """A finger from ``start`` to ``end`` s along ``path``, rows of s, x and y m."""
+
+    finger: Finger
+    start: float
+    end: float
+    path: tuple[tuple[float, float, float], ...]
+
+    def at(self, time: float) -> Finger | None:
+        """It at a moment; None where it does not touch."""
+        depth = min((time - self.start) / RAMP, (self.end - time) / RAMP, 1.0)
+        if depth <= 0:
+            return None
+        times, x, y = np.array(self.path).T
+        here = {"x": float(np.interp(time, times, x)), "y": float(np.interp(time, times, y))}
+        return replace(self.finger, **here, fall=self.finger.fall * depth)
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What the pipeline makes of a frame, and its number, begin and end in s of the scene."""
+
+    result: FrameResult
+    number: int
+    begin: float
+    end: float
+
+
+@cache
+def _mesh(electrodes: int) -> Mesh:
+    return plant_mesh(stage(electrodes).skin)
+
+
+class Sheet:
+    """A plant with a pipeline that has its reference: one scene after the other."""
+
+    def __init__(self, electrodes: int, seed: int) -> None:
+        prepared = stage(electrodes)
+        self.plant = Plant(prepared.skin, _mesh(electrodes), UNEVEN, seed)
+        self.pipeline = Pipeline(prepared)
+        self._interval, self._number = scan_time(prepared), 0
+        for _ in range(REFERENCE_FRAMES + SETTLED):
+            self._push((), 0.0)
+
+    def scene(self, slides: Sequence[Slide], seconds: float) -> Iterator[Shown]:
+        """Frames of a scene, and of half a second without anything after it."""
+        for number in range(round((seconds + 0.5) / self._interval)):
+            begin = number * self._interval
+            result = self._push(slides, begin)
+            assert result is not None
+            yield Shown(result, number, begin, begin + self._interval)
+
+    def _push(self, slides: Sequence[Slide], begin: float) -> FrameResult | None:
+        moments = (begin, begin + self._interval / 2, begin + self._interval)
+        pressed = [[f for slide in slides if (f := slide.at(time))] for time in moments]
+        frame = self.plant.scan_of(*pressed)
+        now = self._number * self._interval
+        ticks = round(now * self.pipeline.tick_rate)
+        self._number += 1
+        return self.pipeline.push(replace(frame, sequence=self._number, ticks=ticks, host_time=now))
 
 
 def moving(random: np.random.Generator, count: int) -> tuple[list[Slide], float]:

@@ -1,8 +1,7 @@
-"""Many attempts in a process of their own: what was refused, accepted, raised, or never ended."""
+"""Many attempts in a process of their own, and what damages files: refused, accepted, or worse."""
 
 from __future__ import annotations
 
-import contextlib
 import io
 import multiprocessing
 import os
@@ -13,8 +12,9 @@ import signal
 import traceback
 from collections import Counter
 from collections.abc import Callable, Mapping
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
-from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
@@ -23,17 +23,14 @@ from numpy.typing import NDArray
 
 from tomoskin.core import TomoskinError
 
-HANG = 10.0
-"""Seconds after which an attempt has failed."""
-
-MEMORY = 1 << 30
-"""Bytes that an attempt may make a process hold."""
+HANG, MEMORY = 10.0, 1 << 30
+"""Seconds after which an attempt has failed, and bytes that it may make a process hold."""
 
 _BLOCK = 64
 _NUMBERS = (b"nan", b"-1", b"0", b"1e999", b"1e-300", b"1e300", b'"x"', b"[]", b"99999999999")
 
 Judge = Callable[[int], str]
-"""Number of an attempt → "" where it was accepted, "wrong: …" where it ought not to have been.
+"""Number of an attempt → "" where it was accepted, else what ought not to have been accepted.
 
 What is refused raises TomoskinError.
 """
@@ -53,59 +50,65 @@ class Tally:
         if text:
             self.examples.setdefault(verdict, f"{self.kind} {number}: {text}")
 
+    @property
+    def row(self) -> dict[str, Any]:
+        """As the table has it."""
+        attempts = sum(self.counts.values()) - self.counts["memory"]
+        faults = {"traceback": "tracebacks", "hang": "hangs", "memory": "memory", "wrong": "wrong"}
+        return {
+            "kind": self.kind,
+            "attempts": attempts,
+            "refused": self.counts["refused"],
+            "accepted": self.counts["accepted"],
+            **{column: self.counts[verdict] for verdict, column in faults.items()},
+        }
+
+
+_judge: Judge | None = None
+"""What a forked process judges by."""
+
 
 def attempt(kind: str, count: int, judge: Judge) -> Tally:
     """Judge attempts 0 … ``count`` − 1 in a process that may hang, grow and die."""
-    tally, following = Tally(kind), 0
-    context = multiprocessing.get_context("fork")
-    while following < count:
-        ours, theirs = context.Pipe()
-        process = context.Process(target=_work, args=(theirs, judge, following, count))
-        process.start()
-        theirs.close()
-        following = _watch(ours, tally, following, count)
-        if process.is_alive():
-            os.kill(process.pid or 0, signal.SIGKILL)
-        process.join()
+    global _judge
+    tally, number, _judge = Tally(kind), 0, judge
+    while number < count:
+        context = multiprocessing.get_context("fork")
+        with ProcessPoolExecutor(1, mp_context=context, initializer=_silence) as pool:
+            peak = 0
+            while number < count and peak <= MEMORY:
+                try:
+                    verdict, text, peak = pool.submit(_verdict, number).result(HANG)
+                except (TimeoutError, BrokenProcessPool) as error:
+                    hangs = isinstance(error, TimeoutError)
+                    tally.add("hang" if hangs else "traceback", number, "no answer, or it has died")
+                    for process in list((pool._processes or {}).values()):
+                        os.kill(process.pid or 0, signal.SIGKILL)
+                    number += 1
+                    break
+                tally.add(verdict, number, text)
+                number += 1
+            if peak > MEMORY:
+                tally.add("memory", number - 1, f"{peak / 2**20:.0f} MB")
     return tally
 
 
-def _watch(news: Connection, tally: Tally, following: int, count: int) -> int:
-    """Count what the process says until it is to be given up; the attempt to go on with."""
-    while following < count:
-        if not news.poll(HANG):
-            tally.add("hang", following, f"no answer in {HANG:g} s")
-            return following + 1
-        try:
-            verdict, text, peak = news.recv()
-        except EOFError:
-            tally.add("traceback", following, "the process has died")
-            return following + 1
-        tally.add(verdict, following, text)
-        following += 1
-        if peak > MEMORY:
-            tally.add("memory", following - 1, f"{peak / 2**20:.0f} MB")
-            return following
-    return following
+def _silence() -> None:
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
 
 
-def _work(news: Connection, judge: Judge, following: int, count: int) -> None:
-    with Path(os.devnull).open("w") as nothing, contextlib.redirect_stderr(nothing):
-        for number in range(following, count):
-            verdict, text = _verdict(judge, number)
-            news.send((verdict, text, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss << 10))
-
-
-def _verdict(judge: Judge, number: int) -> tuple[str, str]:
+def _verdict(number: int) -> tuple[str, str, int]:
+    assert _judge is not None
     try:
-        wrong = judge(number)
+        wrong = _judge(number)
+        verdict, text = ("wrong", wrong) if wrong else ("accepted", "")
     except TomoskinError:
-        return "refused", ""
+        verdict, text = "refused", ""
     except Exception as error:
         frame = traceback.extract_tb(error.__traceback__)[-1]
         place = f"{Path(frame.filename).name}:{frame.lineno}"
-        return "traceback", f"{type(error).__name__}: {error} ({place})"
-    return ("wrong", wrong) if wrong else ("accepted", "")
+        verdict, text = "traceback", f"{type(error).__name__}: {error} ({place})"
+    return verdict, text, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss << 10
 
 
 def mutated(data: bytes, number: int, *, text: bool = False) -> bytes:
@@ -114,7 +117,7 @@ def mutated(data: bytes, number: int, *, text: bool = False) -> bytes:
     faults = _TEXT_FAULTS if text and number % 2 else _FAULTS
     for _ in range(rng.choice((1, 1, 2, 3))):
         if data:
-            data = rng.choice(faults)(data, rng)
+            data = rng.choice(faults)(data, rng.randrange(len(data)), rng)
     return data
 
 
@@ -123,21 +126,17 @@ def remade(arrays: Mapping[str, NDArray[Any]], number: int) -> bytes:
     rng = random.Random(number)
     changed = dict(arrays)
     name = rng.choice(sorted(changed))
-    value = rng.choice(_ARRAY_FAULTS)(np.asarray(changed.pop(name)))
-    if value is not None:
-        changed[name] = value
     file = io.BytesIO()
     with np.errstate(all="ignore"):
+        value = rng.choice(_ARRAY_FAULTS)(np.asarray(changed.pop(name)))
+        if value is not None:
+            changed[name] = value
         np.savez(file, **changed)  # type: ignore[arg-type]
     return file.getvalue()
 
 
 def _times(factor: float) -> Callable[[NDArray[Any]], NDArray[Any]]:
-    def scaled(value: NDArray[Any]) -> NDArray[Any]:
-        with np.errstate(all="ignore"):
-            return value * factor if value.dtype.kind in "fiu" else value[..., None]
-
-    return scaled
+    return lambda value: value * factor if value.dtype.kind in "fiu" else value[..., None]
 
 
 _ARRAY_FAULTS: tuple[Callable[[NDArray[Any]], NDArray[Any] | None], ...] = (
@@ -149,70 +148,34 @@ _ARRAY_FAULTS: tuple[Callable[[NDArray[Any]], NDArray[Any] | None], ...] = (
     lambda value: np.repeat(np.atleast_1d(value), 2, axis=0),
     lambda value: value[None],
     lambda value: value.astype(str),
-    lambda value: np.full(value.shape, np.nan),
-    lambda value: np.zeros(value.shape),
-    lambda value: np.full(value.shape, 1 + 1j),
-    lambda value: np.full(value.shape, True),
-    _times(1e300),
-    _times(1e-300),
-    _times(-1.0),
-    _times(0.5),
+    *(lambda value, c=c: np.full(value.shape, c) for c in (np.nan, 0.0, 1 + 1j, True)),
+    *map(_times, (1e300, 1e-300, -1.0, 0.5)),
 )
 
 
-def _flipped(data: bytes, rng: random.Random) -> bytes:
-    at = rng.randrange(len(data))
-    return data[:at] + bytes([data[at] ^ 1 << rng.randrange(8)]) + data[at + 1 :]
-
-
-def _cut(data: bytes, rng: random.Random) -> bytes:
-    return data[: rng.randrange(len(data))]
-
-
-def _removed(data: bytes, rng: random.Random) -> bytes:
-    at = rng.randrange(len(data))
-    return data[:at] + data[at + rng.randint(1, _BLOCK) :]
-
-
-def _inserted(data: bytes, rng: random.Random) -> bytes:
-    at = rng.randrange(len(data))
-    return data[:at] + rng.randbytes(rng.randint(1, _BLOCK)) + data[at:]
-
-
-def _repeated(data: bytes, rng: random.Random) -> bytes:
-    at = rng.randrange(len(data))
-    return data[:at] + data[at : at + rng.randint(1, 4 * _BLOCK)] + data[at:]
-
-
-def _filled(data: bytes, rng: random.Random) -> bytes:
-    at, size = rng.randrange(len(data)), rng.choice((1, 2, 4, 8))
-    return data[:at] + bytes([rng.choice((0, 0x7F, 0xFF))]) * size + data[at + size :]
-
-
-def _at_the_head(data: bytes, rng: random.Random) -> bytes:
-    at = rng.randrange(min(len(data), 400))
-    return data[:at] + rng.randbytes(1) + data[at + 1 :]
-
-
-def _other_number(data: bytes, rng: random.Random) -> bytes:
+def _other_number(data: bytes, at: int, rng: random.Random) -> bytes:
     spans = [match.span() for match in re.finditer(rb"\d[\d.e+-]*", data)]
-    if not spans:
-        return _flipped(data, rng)
-    start, end = rng.choice(spans)
+    start, end = rng.choice(spans or [(at, at + 1)])
     return data[:start] + rng.choice(_NUMBERS) + data[end:]
 
 
-def _without_a_line(data: bytes, rng: random.Random) -> bytes:
+def _other_lines(data: bytes, _: int, rng: random.Random) -> bytes:
+    """Without one of its lines, or with one of them twice."""
     lines = data.splitlines(keepends=True)
-    del lines[rng.randrange(len(lines))]
-    return b"".join(lines)
+    k = rng.randrange(len(lines))
+    return b"".join([*lines[:k], *rng.choice(([], 2 * [lines[k]])), *lines[k + 1 :]])
 
 
-def _twice_a_line(data: bytes, rng: random.Random) -> bytes:
-    lines = data.splitlines(keepends=True)
-    at = rng.randrange(len(lines))
-    return b"".join([*lines[:at], lines[at], *lines[at:]])
+Fault = Callable[[bytes, int, random.Random], bytes]
+_FAULTS: tuple[Fault, ...] = (
+    lambda d, at, r: d[:at] + bytes([d[at] ^ 1 << r.randrange(8)]) + d[at + 1 :],
+    lambda d, at, _: d[:at],
+    lambda d, at, r: d[:at] + d[at + r.randint(1, _BLOCK) :],
+    lambda d, at, r: d[:at] + r.randbytes(r.randint(1, _BLOCK)) + d[at:],
+    lambda d, at, r: d[:at] + d[at : at + r.randint(1, 4 * _BLOCK)] + d[at:],
+    lambda d, at, r: d[:at] + r.choice((b"\0", b"\x7f", b"\xff")) * 4 + d[at + 4 :],
+    lambda d, at, r: d[: at % 400] + r.randbytes(1) + d[at % 400 + 1 :],
+)
+"""A bit turned, an end lost, a piece lost, put in or repeated, bytes filled, one at the head."""
 
-
-_FAULTS = (_flipped, _cut, _removed, _inserted, _repeated, _filled, _at_the_head)
-_TEXT_FAULTS = (_other_number, _other_number, _without_a_line, _twice_a_line)
+_TEXT_FAULTS: tuple[Fault, ...] = (_other_number, _other_lines)
