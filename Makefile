@@ -53,7 +53,6 @@ bench-docs: native page  ## measure the table of all and the forward engine agai
 	@$(PY) scripts/native.py reference
 	@$(VENV)/bin/tomoskin bench --into docs/benchmarks.md
 	@$(VENV)/bin/tomoskin bench forward --into docs/benchmarks.md
-	@$(VENV)/bin/tomoskin bench forward_large --into docs/benchmarks.md
 
 docs: dev $(VENV)/.docs  ## the documentation, in build/docs; a warning is an error
 	@$(PY) -m sphinx --quiet --fail-on-warning --keep-going docs build/docs

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from itertools import pairwise
+from collections.abc import Iterator, Sequence
 from typing import Any
-
-import numpy as np
 
 from forward_measure import (
     ELECTRODES,
@@ -21,9 +18,7 @@ from forward_measure import (
     tank,
 )
 from forward_others import peer_name
-from report import Promise, Report, cell, clock, promises, table
-
-Value = float | None
+from report import Report, cell, clock, table
 
 
 def run() -> Iterator[Report]:
@@ -40,18 +35,13 @@ def run() -> Iterator[Report]:
     ]
     yield from _tables(measured)
     yield _touch_table(touch)
-    yield promises(_promises(measured, touch))
 
 
 def run_large() -> Iterator[Report]:
     """Forward engine on a quarter of a million triangles and a million: minutes."""
     quarter = refined(disc("62k", 62_500).mesh)
     cases = Case("250k", quarter), Case("1M", refined(quarter))
-    measured = [measure(case, script=False) for case in cases]
-    peak = measured[-1].peak.get("forward", 0) / 1e3 or None
-    exponent: Promise = ("exponent of the forward time", _growth(measured), 1.5, False)
-    yield from _tables(measured)
-    yield promises([("peak of a solve at 1M, GB", peak, 8.0, False), exponent])
+    yield from _tables([measure(case, script=False) for case in cases])
 
 
 def _tables(measured: Sequence[Measured]) -> Iterator[Report]:
@@ -60,11 +50,9 @@ def _tables(measured: Sequence[Measured]) -> Iterator[Report]:
         f"forward: {ELECTRODES} electrodes, adjacent, all drives",
         map(_forward, measured),
         f"medians of {clock()[1]}; × is how many times longer the other takes",
-        "faer: factor and solve of the same matrix by that library as it comes, ready arrays, "
-        "its analysis (minimum degree) made before, one thread; its fields agree to 1e-9",
-        "own: the same by our engine",
-        "script: COO assembly, splu as it comes; its voltages agree to 1e-9",
-        f"{peer_name()}: point electrodes; larger meshes are left out",
+        "faer: factor and solve of the same matrix by that library as it comes, its analysis made "
+        "before; own: the same by our engine; script: COO assembly, splu as it comes",
+        f"{peer_name()}: point electrodes; larger meshes are left out; all others agree to 1e-9",
         "peak: resident memory above that of the process with its mesh, in its own process",
     )
     yield table(
@@ -148,57 +136,3 @@ def _touch_table(m: Measured) -> Report:
         "× is how many times longer a fresh one takes",
         "faer and own: factor and solve alone, as in the table of forward solves",
     )
-
-
-def _growth(measured: Sequence[Measured]) -> Value:
-    """Largest exponent of the forward time between two sizes, each four times the last or so."""
-    sheets = [m for m in measured if m.case.mesh.dimension == 2 and m.unknowns > 1000]
-    steps = [
-        np.log(b.times["forward"] / a.times["forward"])
-        / np.log(len(b.case.mesh.cells) / len(a.case.mesh.cells))
-        for a, b in pairwise(sheets)
-    ]
-    return float(max(steps)) if steps else None
-
-
-def _worst(measured: Sequence[Measured], name: str, own: str) -> Value:
-    """Largest ratio over all cases."""
-    ratios = [r for m in measured if (r := m.ratio(name, own)) is not None]
-    return max(ratios, default=None)
-
-
-def _ratios(measured: Sequence[Measured]) -> Callable[[str, str, str], Value]:
-    """Return a look-up of ratios by the case's name."""
-    known = {m.case.name: m for m in measured}
-    return lambda case, name, own: known[case].ratio(name, own) if case in known else None
-
-
-def _promises(measured: Sequence[Measured], touch: Measured) -> list[Promise]:
-    ratio = _ratios(measured)
-    peer = [("3k", 20), ("12k", 40), ("50k", 80)]
-    script = [("3k", 9), ("12k", 3), ("50k", 3), ("200k", 8)]
-    rows: list[Promise] = [
-        (f"pyEIT: forward at {n}, ×", ratio(n, "peer forward", "forward"), least, True)
-        for n, least in peer
-    ]
-    for what, wanted in (("jacobian", (60, 300)), ("set-up", (60, 500))):
-        for n, least in zip(("3k", "12k"), wanted, strict=True):
-            rows.append((f"pyEIT: {what} at {n}, ×", ratio(n, f"peer {what}", what), least, True))
-    for n, least in script:
-        found = ratio(n, "script forward", "forward, script run")
-        rows.append((f"script: forward at {n}, ×", found, least, True))
-    for n, least in (("3k", 12), ("50k", 5)):
-        found = ratio(n, "script jacobian", "jacobian, script run")
-        rows.append((f"script: Jacobian at {n}, ×", found, least, True))
-    return [
-        *rows,
-        ("forward / faer alone, worst", _worst(measured, "forward", "faer"), 1.3, False),
-        ("Jacobian after solves / copy, worst", _worst(measured, "rows", "new copy"), 2.0, False),
-        ("local update at 3k, ms", 1e3 * touch.times["update"], 0.5, False),
-        ("faer alone / local update, ×", touch.ratio("faer", "update"), 20, True),
-        ("the same, each of many touches, ×", touch.ratio("faer", "many"), 20, True),
-        ("own factor and solve / local update, ×", touch.ratio("own", "update"), 20, True),
-        ("the same, each of many touches, ×", touch.ratio("own", "many"), 20, True),
-        ("script's forward / local update, ×", touch.ratio("script forward", "update"), 20, True),
-        ("exponent of the forward time, worst step", _growth(measured), 1.5, False),
-    ]

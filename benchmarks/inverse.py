@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from forward_measure import PATTERN, disc
-from report import Floats, Promise, Report, cell, clock, medians, promises, table
+from report import Floats, Report, cell, clock, medians, table
 from rig import evenly
 from tomoskin.core import ModelError
 from tomoskin.imaging import PRIORS, RULES, Evidence, LightTouch, OneStep, Spectrum, choose
@@ -60,7 +60,6 @@ def run() -> Iterator[Report]:
         f"rows that leave, {len(PATTERN.rows_of(DEAD))} of an electrode, ms",
         _in_ms(models, out, ("without", "anew", "5 rows filled")),
     )
-    yield promises(_promises(set_up[1], applied, out[1]))
 
 
 def _in_ms(
@@ -125,23 +124,6 @@ def _rows_out(model: ForwardModel) -> Times:
     return times | {"5 rows filled": times["5 rows filled"] / APPLIED}
 
 
-def _promises(set_up: Times, applied: Sequence[Times], rows_out: Times) -> list[Promise]:
-    noser, products = set_up["noser"], set_up["products"]
-    inner = noser - set_up["jacobian"]
-    worst, single = (
-        max(times[name] / times[f"read {name}"] for times in applied)
-        for name in ("double", "single")
-    )
-    return [
-        ("set-up at 3k / two products", noser / products, 1.5, False),
-        ("the same without its Jacobian", inner / products, 1.5, False),
-        ("… / the products, one symmetric", inner / set_up["symmetric"], 1.5, False),
-        ("applying / reading the matrix, worst", worst, 2.0, False),
-        ("the same in single precision, worst", single, 2.0, False),
-        ("an electrode's rows leave at 3k, ms", 1e3 * rows_out["without"], 10.0, False),
-    ]
-
-
 def run_alpha() -> Iterator[Report]:
     """Choice of alpha: another operator, each criterion, and a frame that waits for it."""
     skin = Skin.load("textile-disc-16").altered({"inverse": {"alpha": "auto"}})
@@ -154,14 +136,12 @@ def run_alpha() -> Iterator[Report]:
         {"ms": name, **{size: cell(1e3 * t[name]) for size, t in zip(sizes, times, strict=True)}}
         for name in times[0]
     ]
-    another: Promise = ("another alpha at 3k, ms", 1e3 * times[1]["operator"], 150.0, False)
     yield table(
         "alpha: 16 electrodes, 208 rows",
         rows,
         f"medians of {clock()[1]}; criteria look at {FRAMES} frames of a touched model",
         "longest wait: the most that any one frame of the swap does, noise of the image included",
     )
-    yield promises([another])
 
 
 def _calls(prepared: Prepared) -> dict[str, Callable[[], object]]:

@@ -29,7 +29,7 @@ from tomoskin.pipeline import Prepared, prepare
 from tomoskin.run import Runner, commands
 from tomoskin.sensing.signal import Recording
 from tomoskin.twin import Script
-from trials import HANG, MEMORY, Judge, Tally, attempt, mutated, remade
+from trials import HANG, Judge, Tally, attempt, mutated, remade
 
 REQUESTS, FILES, KILLS = 20_000, 2_000, 200
 LONGEST, SAVED = 4.0, 2.5
@@ -61,10 +61,8 @@ def run() -> Iterator[Report]:
         (tally.row for tally in tallies),
         "refused: with a TomoskinError, one sentence; accepted: what was read is right, or "
         "nothing in the file can tell that it is not",
-        f"hangs: over {HANG:g} s; memory: over {MEMORY >> 20} MB in the process",
         "wrong: a frame that was never written, other arrays or positions, a repair that loses "
         "frames",
-        "a kill before the first second leaves a file that is refused",
         *(f"{fault}: {text}" for tally in tallies for fault, text in tally.examples.items()),
     )
 

@@ -69,22 +69,6 @@ def table(title: str, rows: Iterable[Row], *notes: str) -> Report:
     )
 
 
-Promise = tuple[str, float | None, float, bool]
-"""What, reached, promised, and whether more is better."""
-
-
-def promises(rows: Iterable[Promise]) -> Report:
-    """Say which are met."""
-    found = []
-    for what, reached, promised, more in rows:
-        met = "not measured"
-        if reached is not None:
-            met = "yes" if (reached >= promised if more else reached <= promised) else "no"
-        limit = f"{'≥' if more else '≤'} {promised:g}"
-        found.append({"what": what, "promised": limit, "reached": cell(reached), "met": met})
-    return table("promised and reached", found)
-
-
 def cell(value: float | None) -> str:
     """Three figures, or a dash for what was not measured."""
     if not value:

@@ -25,7 +25,7 @@ import session
 import twin
 import wire
 from forward_measure import ALPHA, PATTERN, disc, measure_touch, set_up
-from forward_others import INSTALLED, Peer, Script, peer_name
+from forward_others import INSTALLED, Peer, Script
 from report import Report, cell, clock, medians, progress
 from rig import labelled_presses
 from tomoskin import ForwardModel, Locator, Skin
@@ -88,8 +88,6 @@ def run() -> Iterator[Report]:
         "× is how many times longer, or further off, the other is, in this run",
         "plain scipy: benchmarks/forward_others.py; a dense solve for the operator; "
         "RBFInterpolator for places; its import alone at the start",
-        f"{peer_name()}: point electrodes, its own interface",
-        "frame: two moving presses on the twin; touch: presses on the twin, preset textile",
     )
     yield Report("all parts in one run", columns, tuple(rows), notes)
 
