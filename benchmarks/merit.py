@@ -14,11 +14,8 @@ from tomoskin.imaging import (
     Greit,
     LinearProblem,
     Merit,
-    OneStep,
-    Smoother,
     Spectrum,
     Targets,
-    Temporal,
     along,
     figures,
     noise_figure,
@@ -29,7 +26,6 @@ from tomoskin.model.skin import Skin
 SKINS = ("textile-disc-8", "textile-disc-16", "textile-square-16", "tank-16")
 FIGURES = (1.0, 1.5)  # below 1.2 no NOSER of the tank has one
 CELLS, TRAINED_ON, TESTED_ON = 900, 3600, 6000
-LAG = 5
 
 
 def run() -> Iterator[Report]:
@@ -41,7 +37,6 @@ def run() -> Iterator[Report]:
         f"image {CELLS} cells, training {TRAINED_ON}, test {TESTED_ON}: three meshes",
         "deformation and resolution: Adler et al. 2009; off: distance from the target",
     )
-    yield _filters()
 
 
 def _model(name: str, cells: int) -> ForwardModel:
@@ -106,36 +101,3 @@ def _row(name: str, operator: str, m: Merit, seconds: float) -> dict[str, Any]:
         "ringing": round(float(m.ringing.mean()), 3),
         "made in s": round(seconds, 2),
     }
-
-
-def _filters() -> Report:
-    skin = Skin.load("textile-disc-16").altered({"mesh": {"cells": 3000}})
-    model = ForwardModel(skin.mesh(), skin.pattern(), skin.contact_impedance, skin.current)
-    operator = OneStep(model, alpha=0.1, conductivity=skin.conductivity)
-    data = np.random.default_rng(0).normal(0.0, 1e-5, (500, model.pattern.n_meas))
-    start = time.perf_counter()
-    temporal = Temporal(operator, 0.2)
-    made = 1e3 * (time.perf_counter() - start)
-    smoother = Smoother(temporal.modes, 0.2, LAG)
-    cases = {
-        "operator, double": lambda dv, _: operator(dv),
-        "operator, single": lambda dv, _: operator.quick(dv),
-        "Kalman filter": temporal.push,
-        f"smoother, lag {LAG}": smoother.push,
-    }
-    rows = ({"step": name} | _times(step, data) for name, step in cases.items())
-    return table(
-        f"one frame, {len(model.mesh.cells)} triangles, {model.pattern.n_meas} rows",
-        rows,
-        f"{len(data)} frames; the filter's modes were made in {made:.0f} ms, once",
-    )
-
-
-def _times(step: Callable[[np.ndarray, float], object], data: np.ndarray) -> dict[str, float]:
-    taken = []
-    for number, dv in enumerate(data):
-        start = time.perf_counter()
-        step(dv, 0.01 * number)
-        taken.append(1e3 * (time.perf_counter() - start))
-    p50, p99 = np.percentile(taken, (50, 99))
-    return {"p50 ms": round(float(p50), 3), "p99 ms": round(float(p99), 3)}

@@ -1,41 +1,27 @@
-"""What a careful stranger breaks: damaged files and requests, kill −9."""
+"""What a careful stranger breaks: damaged files and requests; sessions are a test's."""
 
 from __future__ import annotations
 
 import contextlib
 import io
-import os
-import random
-import signal
 import tempfile
-import threading
-import time
 from collections.abc import Callable, Iterator
-from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
 
 from reliability_page import ask
 from report import Report, progress, table
-from tomoskin.board.source import open_source
 from tomoskin.cli import main
-from tomoskin.core import DataError, Frame
+from tomoskin.core import DataError
 from tomoskin.files.imports import read_recording
-from tomoskin.files.session import SessionReader, repair
 from tomoskin.learning import TOUCH
 from tomoskin.model.skin import Skin
-from tomoskin.pipeline import Prepared, prepare
-from tomoskin.run import Runner, commands
 from tomoskin.sensing.signal import Recording
 from tomoskin.twin import Script
-from trials import HANG, Judge, Tally, attempt, mutated, remade
+from trials import Judge, Tally, attempt, mutated, remade
 
-REQUESTS, FILES, KILLS = 20_000, 2_000, 200
-LONGEST, SAVED = 4.0, 2.5
-"""Seconds of a recording after which it is killed at the latest, and after which something must be
-in the file: it is written once a second."""
-
+REQUESTS, FILES = 20_000, 2_000
 SKIN = "textile-disc-8"
 PRESSES = 20
 SCRIPT = """format = 1
@@ -55,26 +41,22 @@ _ARRAYS = ("voltages", "drive", "measure", "time", "reference", "labels")
 
 
 def run() -> Iterator[Report]:
-    tallies = list(_tallies(FILES, KILLS, REQUESTS))
+    tallies = list(_tallies(FILES, REQUESTS))
     yield table(
         "reliability",
         (tally.row for tally in tallies),
         "refused: with a TomoskinError, one sentence; accepted: what was read is right, or "
         "nothing in the file can tell that it is not",
-        "wrong: a frame that was never written, other arrays or positions, a repair that loses "
-        "frames",
         *(f"{fault}: {text}" for tally in tallies for fault, text in tally.examples.items()),
     )
 
 
-def _tallies(files: int, kills: int, requests: int) -> Iterator[Tally]:
+def _tallies(files: int, requests: int) -> Iterator[Tally]:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         for kind, judge in judges(make_bases(folder), folder).items():
             progress(kind)
             yield attempt(kind, files, judge)
-        progress("kill −9")
-        yield attempt("kill −9", kills, killed(prepare(Skin.load(SKIN)), folder))
         progress("requests")
         (folder / "page").mkdir()
         yield ask(requests, folder / "page")
@@ -110,55 +92,11 @@ def make_bases(folder: Path) -> dict[str, Path]:
 def judges(files: dict[str, Path], folder: Path) -> dict[str, Judge]:
     """How a damaged file of each kind is judged."""
     return {
-        "session": _session(files["session"], folder),
         **{kind: _recording(files[kind], folder) for kind in (".npz", ".mat", ".csv")},
         "skin": _text(files["skin"], Skin.from_toml),
         "script": _text(files["script"], Script.from_toml),
         "calibration": _calibration(files["calibration"], folder),
     }
-
-
-def _session(base: Path, folder: Path) -> Judge:
-    """Every frame that is read was written; what repair writes opens and holds all of them."""
-    data, damaged, mended = base.read_bytes(), folder / "x.mcap", folder / "mended.mcap"
-    written = {_key(frame) for frame in _frames(base)[0]}
-
-    def judge(number: int) -> str:
-        damaged.write_bytes(mutated(data, number))
-        mended.unlink(missing_ok=True)
-        frames, refusal = _frames(damaged)
-        if not {_key(frame) for frame in frames} <= written:
-            return "a frame that was never written"
-        with contextlib.suppress(DataError):
-            read_recording(damaged)
-        try:
-            repair(damaged, mended)
-        except DataError:
-            if frames:
-                return f"repair gives nothing, {len(frames)} frames can be read"
-        else:
-            again, fault = _frames(mended)
-            if fault or len(again) < len(frames):
-                return f"repair gives {len(again)} of {len(frames)} frames; {fault}"
-        if refusal:
-            raise refusal
-        return ""
-
-    return judge
-
-
-def _frames(path: Path) -> tuple[list[Frame], DataError | None]:
-    frames: list[Frame] = []
-    try:
-        with SessionReader(path) as session:
-            frames.extend(item.frame for item in session.frames())
-    except DataError as error:
-        return frames, error
-    return frames, None
-
-
-def _key(frame: Frame) -> tuple[int, int, bytes]:
-    return frame.sequence, frame.ticks, frame.samples.tobytes()
 
 
 def _recording(base: Path, folder: Path) -> Judge:
@@ -221,42 +159,3 @@ def _calibration(base: Path, folder: Path) -> Judge:
         return "" if same else "other positions"
 
     return judge
-
-
-def killed(prepared: Prepared, folder: Path) -> Judge:
-    """kill −9 at some moment of a recording: what is in the file is read in order, and repaired."""
-    path, mended = folder / "killed.mcap", folder / "mended.mcap"
-
-    def judge(number: int) -> str:
-        path.unlink(missing_ok=True)
-        mended.unlink(missing_ok=True)
-        moment = random.Random(number).random()
-        process = get_context("fork").Process(target=_record, args=(prepared, path))
-        process.start()
-        deadline = time.monotonic() + 0.8 * HANG
-        while not path.exists() and time.monotonic() < deadline:
-            time.sleep(0.02)
-        time.sleep(LONGEST * moment)
-        os.kill(process.pid or 0, signal.SIGKILL)
-        process.join()
-        try:
-            with SessionReader(path) as session:
-                sequences = [item.frame.sequence for item in session.frames()]
-        except DataError as error:
-            if LONGEST * moment > SAVED:
-                return f"nothing after {LONGEST * moment:.1f} s: {error}"
-            raise
-        if sequences != list(range(len(sequences))):
-            return f"{len(sequences)} frames, not in order"
-        if repair(path, mended).messages.get("/frames", 0) != len(sequences):
-            return "repair loses frames"
-        return ""
-
-    return judge
-
-
-def _record(prepared: Prepared, path: Path) -> None:
-    runner = Runner(prepared, lambda: open_source("twin:fast", prepared.skin))
-    runner.ask(commands.Record(path))
-    runner.start()
-    threading.Event().wait()

@@ -9,13 +9,13 @@ import re
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import msgspec
-from msgspec import inspect
+import numpy as np
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
@@ -35,7 +35,7 @@ _SEED = 1
 def ask(count: int, folder: Path) -> Tally:
     """What becomes of ``count`` requests; even ones follow the schema, odd ones are damaged."""
     tally = Tally("requests")
-    schema = inspect.type_info(Request)
+    schema = msgspec.json.schema(Request)
     with _live(folder) as (process, address, errors):
         page = Page(address)
         for first in range(0, count, BATCH):
@@ -138,57 +138,45 @@ def _peak(process: int) -> int:
     return int(line) << 10
 
 
-def _request(schema: inspect.Type, number: int) -> str:
+def _request(schema: Mapping[str, Any], number: int) -> str:
     rng = random.Random(_SEED << 32 | number)
-    text = json.dumps(_drawn(schema, rng))
+    text = json.dumps(_drawn(schema, schema["$defs"], rng))
     if number % 2:
         text = mutated(text.encode(), number, text=True).decode("utf-8", "replace")
     return text
 
 
-def _drawn(kind: inspect.Type, rng: random.Random) -> Any:  # noqa: PLR0911, PLR0912 - a type each
-    """A value that the type allows; at its bounds more often than between them."""
-    match kind:
-        case inspect.UnionType():
-            return _drawn(rng.choice(kind.types), rng)
-        case inspect.StructType():
-            drawn = {f.encode_name: _drawn(f.type, rng) for f in kind.fields
-                     if f.required or rng.random() < 0.5}  # fmt: skip
-            if "changes" in drawn:
-                drawn["changes"] = _changes(rng)
-            return {kind.tag_field: kind.tag, **drawn} if kind.tag_field else drawn
-        case inspect.BoolType():
-            return rng.random() < 0.5
-        case inspect.LiteralType():
-            return rng.choice(kind.values)
-        case inspect.StrType():
-            return rng.choice(_NAMES)
-        case inspect.IntType() | inspect.FloatType():
-            return _number(kind, rng)
-        case inspect.ListType() | inspect.VarTupleType():
-            count = rng.randint(kind.min_length or 0, min(kind.max_length or 4, 4))
-            return [_drawn(kind.item_type, rng) for _ in range(count)]
-        case inspect.TupleType():
-            return [_drawn(item, rng) for item in kind.item_types]
-        case inspect.DictType():
-            return {rng.choice(_NAMES): _drawn(kind.value_type, rng)}
-        case inspect.NoneType():
-            return None
-        case inspect.Metadata():
-            return _drawn(kind.type, rng)
-        case _:
-            return rng.choice(_EXTREMES)
-
-
-def _number(kind: inspect.IntType | inspect.FloatType, rng: random.Random) -> float | int:
-    low, high = (bound for bound in (kind.ge if kind.ge is not None else kind.gt,
-                                     kind.le if kind.le is not None else kind.lt))  # fmt: skip
-    inside = [x for x in (*_EXTREMES, low, high) if x is not None
-              and (low is None or x >= low) and (high is None or x <= high)]  # fmt: skip
-    if low is not None and high is not None:
-        inside += [rng.uniform(low, high)] * 3
-    value = rng.choice(inside or [0.0])
-    return round(value) if isinstance(kind, inspect.IntType) else value
+def _drawn(kind: Mapping[str, Any], named: Mapping[str, Any], rng: random.Random) -> Any:
+    """A value that a JSON schema allows; at its bounds more often than between them."""
+    if "$ref" in kind:
+        return _drawn(named[kind["$ref"].rpartition("/")[2]], named, rng)
+    if options := kind.get("anyOf") or kind.get("oneOf"):
+        return _drawn(rng.choice(options), named, rng)
+    if "enum" in kind:
+        return rng.choice(kind["enum"])
+    match kind.get("type"):
+        case "object":
+            fields, other = kind.get("properties", {}), kind.get("additionalProperties")
+            drawn = {
+                name: _changes(rng) if name == "changes" else _drawn(value, named, rng)
+                for name, value in fields.items()
+                if name in kind.get("required", ()) or rng.random() < 0.5
+            }
+            values = other if isinstance(other, dict) else {}
+            return drawn or {rng.choice(_NAMES): _drawn(values, named, rng)}
+        case "array":
+            count = rng.randint(kind.get("minItems", 0), min(kind.get("maxItems", 4), 4))
+            items = kind.get("prefixItems") or [kind.get("items") or {}] * count
+            return [_drawn(item, named, rng) for item in items]
+        case "integer" | "number":
+            low = kind.get("minimum", kind.get("exclusiveMinimum", -np.inf))
+            high = kind.get("maximum", kind.get("exclusiveMaximum", np.inf))
+            inside = [x for x in (*_EXTREMES, low, high) if low <= x <= high and np.isfinite(x)]
+            between = [rng.uniform(low, high)] * 3 if np.isfinite([low, high]).all() else []
+            value = rng.choice([*inside, *between] or [0.0])
+            return round(value) if kind["type"] == "integer" else value
+    choices = {"boolean": (False, True), "string": _NAMES, "null": (None,)}
+    return rng.choice(choices.get(str(kind.get("type")), _EXTREMES))
 
 
 def _changes(rng: random.Random) -> dict[str, dict[str, Any]]:
