@@ -146,7 +146,7 @@ def _request(schema: Mapping[str, Any], number: int) -> str:
     return text
 
 
-def _drawn(kind: Mapping[str, Any], named: Mapping[str, Any], rng: random.Random) -> Any:
+def _drawn(kind: Mapping[str, Any], named: Mapping[str, Any], rng: random.Random) -> Any:  # noqa: PLR0911 - a kind each
     """A value that a JSON schema allows; at its bounds more often than between them."""
     if "$ref" in kind:
         return _drawn(named[kind["$ref"].rpartition("/")[2]], named, rng)

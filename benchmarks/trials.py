@@ -1,10 +1,9 @@
-"""Many attempts in a process of their own, and what damages files: refused, accepted, or worse."""
+"""Many attempts, refused, accepted or worse; and what damages files and texts."""
 
 from __future__ import annotations
 
+import contextlib
 import io
-import multiprocessing
-import os
 import random
 import re
 import resource
@@ -12,8 +11,6 @@ import signal
 import traceback
 from collections import Counter
 from collections.abc import Callable, Mapping
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -24,7 +21,7 @@ from numpy.typing import NDArray
 from tomoskin.core import TomoskinError
 
 HANG, MEMORY = 10.0, 1 << 30
-"""Seconds after which an attempt has failed, and bytes that it may make a process hold."""
+"""Seconds after which an attempt has failed, and bytes by which it may make the process grow."""
 
 _BLOCK = 64
 _NUMBERS = (b"nan", b"-1", b"0", b"1e999", b"1e-300", b"1e300", b'"x"', b"[]", b"99999999999")
@@ -64,51 +61,41 @@ class Tally:
         }
 
 
-_judge: Judge | None = None
-"""What a forked process judges by."""
-
-
 def attempt(kind: str, count: int, judge: Judge) -> Tally:
-    """Judge attempts 0 … ``count`` − 1 in a process that may hang, grow and die."""
-    global _judge
-    tally, number, _judge = Tally(kind), 0, judge
-    while number < count:
-        context = multiprocessing.get_context("fork")
-        with ProcessPoolExecutor(1, mp_context=context, initializer=_silence) as pool:
-            peak = 0
-            while number < count and peak <= MEMORY:
-                try:
-                    verdict, text, peak = pool.submit(_verdict, number).result(HANG)
-                except (TimeoutError, BrokenProcessPool) as error:
-                    hangs = isinstance(error, TimeoutError)
-                    tally.add("hang" if hangs else "traceback", number, "no answer, or it has died")
-                    for process in list((pool._processes or {}).values()):
-                        os.kill(process.pid or 0, signal.SIGKILL)
-                    number += 1
-                    break
-                tally.add(verdict, number, text)
-                number += 1
-            if peak > MEMORY:
-                tally.add("memory", number - 1, f"{peak / 2**20:.0f} MB")
+    """Judge attempts 0 … ``count`` − 1, each within HANG seconds."""
+    tally, before = Tally(kind), _peak()
+    signal.signal(signal.SIGALRM, _hangs)
+    for number in range(count):
+        signal.setitimer(signal.ITIMER_REAL, HANG)
+        with contextlib.redirect_stderr(io.StringIO()):
+            tally.add(*_verdict(judge, number))
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        if (peak := _peak()) - before > MEMORY:
+            tally.add("memory", number, f"{peak / 2**20:.0f} MB")
+            before = peak
     return tally
 
 
-def _silence() -> None:
-    os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
+def _peak() -> int:
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss << 10
 
 
-def _verdict(number: int) -> tuple[str, str, int]:
-    assert _judge is not None
+def _hangs(*_: object) -> None:
+    raise TimeoutError
+
+
+def _verdict(judge: Judge, number: int) -> tuple[str, int, str]:
     try:
-        wrong = _judge(number)
-        verdict, text = ("wrong", wrong) if wrong else ("accepted", "")
+        wrong = judge(number)
     except TomoskinError:
-        verdict, text = "refused", ""
+        return "refused", number, ""
+    except TimeoutError:
+        return "hang", number, f"no answer in {HANG:g} s"
     except Exception as error:
         frame = traceback.extract_tb(error.__traceback__)[-1]
         place = f"{Path(frame.filename).name}:{frame.lineno}"
-        verdict, text = "traceback", f"{type(error).__name__}: {error} ({place})"
-    return verdict, text, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss << 10
+        return "traceback", number, f"{type(error).__name__}: {error} ({place})"
+    return ("wrong", number, wrong) if wrong else ("accepted", number, "")
 
 
 def mutated(data: bytes, number: int, *, text: bool = False) -> bytes:
