@@ -77,10 +77,7 @@ def measured(seconds: float) -> Report:
         "the portable firmware as a process with the timing of a Pico, on a pty; presses that "
         f"go round, one, two and none in turn; {SKIN}, seed {SEED}",
         "read → touches: from a frame's bytes to the call of a function of the same program; "
-        "by the board's clock: the way through the pty and all waiting too; promised: 99 of 100 "
-        f"within {PROMISED:g} ms",
-        "of one core: processor time of the program, which also serves a page; the board and "
-        "the page's reader run on another",
+        f"promised: 99 of 100 within {PROMISED:g} ms",
         f"{touches:,} touches; load of the machine {os.getloadavg()[0]:.0f}",
     )
 
@@ -112,7 +109,7 @@ def _ran(prepared: Prepared, folder: Path, seconds: float) -> tuple[dict[str, An
             for item in SessionReader(file).frames()
         ]
     )
-    read, by_board = _ages(frames, rows, before)
+    read = (rows[:, 2] - rows[:, 1])[rows[:, 1] > before]
     without = int((frames[:, 1] > before).sum()) - int((rows[:, 1] > before).sum())
     return {
         "electrodes": prepared.pattern.n_electrodes,
@@ -125,19 +122,8 @@ def _ran(prepared: Prepared, folder: Path, seconds: float) -> tuple[dict[str, An
         "read → touches: p50, ms": f"{1e3 * np.median(read):.2f}",
         "p99": f"{1e3 * np.percentile(read, 99):.2f}",
         "longest": f"{1e3 * read.max():.2f}",
-        "by the board's clock: p50": f"{1e3 * np.median(by_board):.2f}",
-        "by the board's clock: p99": f"{1e3 * np.percentile(by_board, 99):.2f}",
         "of one core": f"{100 * used:.0f} %",
     }, int(rows[:, 3].sum())
-
-
-def _ages(frames: FloatArray, rows: FloatArray, since: float) -> tuple[FloatArray, FloatArray]:
-    """s from reading to the call, and from the moment by the board's clock."""
-    rows = rows[rows[:, 1] > since]
-    sent = dict(zip(frames[:, 0].astype(int).tolist(), frames[:, 2], strict=True))
-    offset = float((frames[:, 1] - frames[:, 2])[frames[:, 1] > since].min())
-    by_board = rows[:, 2] - offset - np.array([sent[int(number)] for number in rows[:, 0]])
-    return rows[:, 2] - rows[:, 1], by_board
 
 
 @contextmanager

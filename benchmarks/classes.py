@@ -275,43 +275,33 @@ def _real(data: Path) -> Iterator[dict[str, Any]]:
             yield {"set": name, "presses": count, **_tally(solved)}
 
 
-_DISC = """format = 1
-[skin]
-name = "{name}"
-[outline]
-shape = "disc"
-diameter = "{diameter} mm"
-[electrodes]
-count = {count}
-width = "{width} mm"
-first = "{first} deg"
-order = "{order}"
-contact_impedance = "1 ohm*m"
-[material]
-sheet_resistance = "1000 ohm/sq"
-[drive]
-pattern = "opposite"
-current = "1 mA"
-[mesh]
-cells = 1200
-[touch]
-sign = "both"
-"""
-
-
 def _skins(data: Path) -> Iterator[tuple[str, Skin, Floats, Floats]]:
     for name in VARSENS:
         with np.load(data / "eskin_varsens16" / f"{name}.npz") as kept:
             first = (float(kept["ring_offset_deg"]) + 180) % 360 - 180
             order = "counter-clockwise" if kept["ring_handedness"] > 0 else "clockwise"
-            place = {"diameter": 88, "width": 3, "count": 16, "first": first, "order": order}
-            skin = Skin.from_toml(_DISC.format(name=name, **place))
+            skin = _disc(
+                88, {"count": 16, "width": "3 mm", "first": f"{first} deg", "order": order}
+            )
             yield name, skin, *_in_order(skin, kept["dv"].astype(float), kept)
     for name, count in ROUND.items():
         with np.load(data / "eskin_hydrogel_round" / f"{name}.npz") as kept:
-            place = {"diameter": 170, "width": 5, "count": count, "first": -99}
-            skin = Skin.from_toml(_DISC.format(name=name, order="counter-clockwise", **place))
+            skin = _disc(170, {"count": count, "width": "5 mm", "first": "-99 deg"})
             yield name, skin, *_in_order(skin, kept["v_down"].astype(float) - kept["v_up"], kept)
+
+
+def _disc(diameter: int, electrodes: dict[str, Any]) -> Skin:
+    return Skin.load("textile-disc-16").altered(
+        {
+            "outline": {"diameter": f"{diameter} mm"},
+            "electrodes": {"order": "counter-clockwise", "contact_impedance": "1 ohm*m"}
+            | electrodes,
+            "material": {"sheet_resistance": "1000 ohm/sq"},
+            "drive": {"pattern": "opposite", "current": "1 mA"},
+            "mesh": {"cells": 1200},
+            "touch": {"sign": "both"},
+        }
+    )
 
 
 def _in_order(skin: Skin, dv: Floats, kept: np.lib.npyio.NpzFile) -> tuple[Floats, Floats]:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any
+
+import numpy as np
 
 from forward_measure import (
     ELECTRODES,
     MANY,
+    PATTERN,
     TOUCH,
     Case,
     Measured,
@@ -18,7 +22,9 @@ from forward_measure import (
     tank,
 )
 from forward_others import peer_name
-from report import Report, cell, clock, table
+from report import Report, cell, clock, medians, table
+from tomoskin.imaging import PRIORS, OneStep
+from tomoskin.model.forward import ForwardModel
 
 
 def run() -> Iterator[Report]:
@@ -136,3 +142,102 @@ def _touch_table(m: Measured) -> Report:
         "× is how many times longer a fresh one takes",
         "faer and own: factor and solve alone, as in the table of forward solves",
     )
+
+
+SIZES = {"660": 660, "3k": 3000, "12k": 12_000}
+ALPHA, SECONDS = 0.1, 3.0
+DEAD = 3
+"""The electrode whose rows leave."""
+
+APPLIED = 100
+"""Frames in one timed turn: one would be too short to time."""
+
+DENSE, MOST_DENSE = {"gaussian", "exponential", "matern"}, 5000
+"""Priors that relate every cell to every other one, and the most cells with which they are made."""
+
+Times = Mapping[str, float]
+
+
+def run_inverse() -> Iterator[Report]:
+    """Inverse engine: set-up of one-step operators, applying them, rows that leave."""
+    cases = [disc(name, cells) for name, cells in SIZES.items()]
+    models = [ForwardModel(case.mesh, PATTERN, case.contact_impedance) for case in cases]
+    set_up, applied, out = ([time(m) for m in models] for time in (_priors, _applied, _rows_out))
+    yield table(
+        "set-up: a conductivity → the one-step operator, ms",
+        _in_ms(models, set_up, ("products", "symmetric", "jacobian", *PRIORS)),
+        f"medians of {clock()[1]}",
+        "priors: with the forward solution and Jacobian; mesh and model are there",
+        "products: JP and PK of this size; symmetric: the first as JJᵀ, half the work",
+    )
+    yield table(
+        "applying: difference data → image, ms",
+        _in_ms(models, applied, ("double", "read double", "single", "read single")),
+        "read: every byte of the matrix once, a dot product with itself",
+    )
+    yield table(
+        f"rows that leave, {len(PATTERN.rows_of(DEAD))} of an electrode, ms",
+        _in_ms(models, out, ("without", "anew", "5 rows filled")),
+    )
+
+
+def _in_ms(
+    models: Sequence[ForwardModel], measured: Sequence[Times], names: Sequence[str]
+) -> list[dict[str, str]]:
+    sizes = (f"{len(model.mesh.cells):,} triangles" for model in models)
+    return [
+        {"cells": size}
+        | {name: cell(1e3 * times[name] if name in times else None) for name in names}
+        for size, times in zip(sizes, measured, strict=True)
+    ]
+
+
+def _priors(model: ForwardModel) -> Times:
+    """Every prior, in turn with the two products that no operator can do without."""
+    jacobian, small = model.jacobian(1.0), np.eye(PATTERN.n_meas)
+    columns = np.random.default_rng(0).random(jacobian.shape).T
+    calls: dict[str, Callable[[], object]] = {
+        "products": lambda: (jacobian @ columns, columns @ small),
+        "symmetric": lambda: (jacobian @ jacobian.T, columns @ small),
+        "jacobian": lambda: model.jacobian(1.0),
+    }
+    for prior in PRIORS:
+        if prior not in DENSE or len(model.mesh.cells) <= MOST_DENSE:
+            calls[prior] = lambda prior=prior: OneStep(model, prior, alpha=ALPHA)
+    return medians(calls, SECONDS, least=3)
+
+
+def _applied(model: ForwardModel) -> Times:
+    """Images, in turn with reading the bytes of the matrix once."""
+    operator = OneStep(model, alpha=ALPHA)
+    dv = np.random.default_rng(1).standard_normal(PATTERN.n_meas)
+    double = np.ravel(operator.matrix, order="K")
+    single = double.astype(np.float32)
+    operator.quick(dv)
+    calls: dict[str, Callable[[], object]] = {
+        "double": lambda: operator(dv),
+        "single": lambda: operator.quick(dv),
+        "read double": lambda: float(double @ double),
+        "read single": lambda: float(single @ single),
+    }
+    times = medians({name: partial(_many, call) for name, call in calls.items()}, SECONDS)
+    return {name: seconds / APPLIED for name, seconds in times.items()}
+
+
+def _many(call: Callable[[], object]) -> None:
+    for _ in range(APPLIED):
+        call()
+
+
+def _rows_out(model: ForwardModel) -> Times:
+    operator, rows = OneStep(model, alpha=ALPHA), PATTERN.rows_of(DEAD)
+    missing = np.zeros(PATTERN.n_meas, bool)
+    missing[rows[:5]] = True
+    dv = np.random.default_rng(1).standard_normal(PATTERN.n_meas)
+    calls: dict[str, Callable[[], object]] = {
+        "without": lambda: operator.without(rows),
+        "anew": lambda: OneStep(model, alpha=ALPHA),
+        "5 rows filled": partial(_many, lambda: operator.filled(dv, missing)),
+    }
+    times = medians(calls, SECONDS)
+    return times | {"5 rows filled": times["5 rows filled"] / APPLIED}

@@ -73,7 +73,6 @@ def run(data: Path | None) -> Iterator[Report]:
         "reference, each later frame is predicted from those before it",
         "change: of the mean of the last twentieth against the first; modes: the gain and "
         "the directions learnt until then, taken out by plain projection",
-        "one frame a second is assumed; the robot lifted its probe before each of these frames",
     )
     yield table(
         "electrode health on recordings",

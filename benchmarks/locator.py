@@ -174,9 +174,8 @@ def run_fingers(data: Path | None) -> Iterator[Report]:
     yield table(
         "two fingers on a hydrogel skin, learnt from single presses",
         rows,
-        "eskin_hydrogel_round, 16 electrodes, learnt from single550; the method was shaped "
-        "with these rows in view, so they are no held-out test; "
-        "rows 4 to 7 of the 108 mm file hold the same numbers as rows 0 to 3",
+        "eskin_hydrogel_round, 16 electrodes, learnt from single550; no held-out test: the method "
+        "was shaped with these rows in view, and four of the 108 mm file stand twice",
         f"of 200 single presses of another session (single500_ohmc) {wrong} are taken for two",
     )
 
@@ -221,9 +220,7 @@ def _five_skins(folder: Path) -> Iterator[Report]:
         rows,
         f"eskin_varsens16, radius 40 mm; presses drawn at random (seed {SEEDS[0]}, to 200 also "
         f"{SEEDS[1]}), {TESTED} others tested, mean error unless said otherwise",
-        "known beside the presses: the table of rows, and that the skin is a disc of that "
-        "size; where its electrodes are and which way round they go is not",
-        "learnt in s: the slowest, by the processor",
+        "known: the table of rows, and the disc's size; learnt in s: the slowest, by the processor",
         "plain process: two squared exponentials on arsinh(dv / median |dv|), marginal likelihood",
     )
     yield table("mean error by skin, mm", [*skins, {"presses": "network, 2000", **SKINS}])

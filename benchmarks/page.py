@@ -17,8 +17,7 @@ from urllib.parse import urlsplit
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-import tomoskin.server.page_connection
-from report import Report, resident, table
+from report import Report, table
 from rig import served
 from tomoskin.core import Detection, Image, Touch
 from tomoskin.model.skin import Skin
@@ -37,7 +36,7 @@ class Stream(Runner):
 
     def __init__(self, prepared: Prepared, rate: float) -> None:
         """``rate`` in results per second; nothing is opened."""
-        super().__init__(prepared, _no_source)
+        super().__init__(prepared, lambda: None)  # type: ignore[arg-type, return-value]
         self._ending, self.made = threading.Event(), 0
         self._shown: Snapshot | None = None
         self._announces: list[Callable[[], None]] = []
@@ -100,10 +99,6 @@ def _touch(places: np.ndarray, number: int, step: int) -> Touch:
     near = np.flatnonzero(np.hypot(*(places - (x, y)).T) < 0.02)
     reading = Detection(x, y, 1e-3, 2e-3, 1e-3, -0.1, near, cov_xy=1e-6)
     return Touch(id=number + 1, since=0.0, detection=reading, kind="decrease")
-
-
-def _no_source() -> Any:
-    raise RuntimeError("a stream opens nothing")
 
 
 @contextmanager
@@ -170,15 +165,6 @@ CHANGES: dict[str, dict[str, dict[str, Any]]] = {
     "electrode width": {"electrodes": {"width": "12 mm"}},
     "mesh, 2500 triangles": {"mesh": {"cells": 2500}},
 }
-MINUTES, EVERY, SETTLED = 10.0, 30.0, 60.0
-"""Of the long run, s between two looks, and s in which code is compiled and buffers fill."""
-
-PERIOD = 1 / 240
-"""Seconds between frames to the page in it: four times as many as it may get as a rule."""
-
-HOUR = 3600 * 60
-"""Frames that a page shows in an hour at most."""
-
 Measurements = Iterator[tuple[str, Any, str]]
 
 
@@ -191,7 +177,7 @@ def run() -> Iterator[Report]:
         "server in the same browser.",
         "Scripting: arrival, decoding, marks, numbers and calls to WebGL, per displayed frame.",
         f"Memory: used heap after collection over {WATCHED:.0f} s, once all that the page keeps "
-        "for ten seconds is there; an hour: tomoskin bench page_hour.",
+        "for ten seconds is there.",
     )
     settings = table(
         "page: settings made ready, ms, textile-disc-8 at 3,000 triangles",
@@ -304,43 +290,3 @@ def _changed() -> Iterator[Mapping[str, Any]]:
             "worst": round(max(times), 1),
             "promised": "< 150" if name in ("alpha by hand", "threshold", "prior") else "",
         }
-
-
-def run_hour() -> Iterator[Report]:
-    """An hour of streaming to one page, compressed: heap of the page and memory of the server."""
-    tomoskin.server.page_connection.FRAME_PERIOD = PERIOD
-    with (
-        chromium() as browser,
-        streaming(prepare(_skin(3000)), RATE) as (stream, address),
-        opened(browser, address) as page,
-    ):
-        page.wait_for_timeout(1e3 * SETTLED)
-        looks = [_look(page, stream)]
-        end = time.monotonic() + 60 * MINUTES - SETTLED
-        while time.monotonic() < end:
-            page.wait_for_timeout(1e3 * EVERY)
-            looks.append(_look(page, stream))
-    notes = (
-        f"{MINUTES:g} minutes, {RATE:.0f} results/s in, up to {1 / PERIOD:.0f} frames/s to the "
-        f"page; looked at every {EVERY:.0f} s, the heap after collection; the first "
-        f"{SETTLED:.0f} s are left out.",
-        "Growth: slope of a straight line over all looks, per 216,000 frames: an hour at 60/s.",
-    )
-    columns = ("what", "measured", "")
-    yield Report("page, an hour", columns, tuple(_grown(np.array(looks))), notes)
-
-
-def _look(page: Any, stream: Any) -> tuple[float, float, float, float]:
-    """Frames at the page, results made, heap and resident memory of the server, MB."""
-    return page.evaluate(COUNT), stream.made, heap(page) / 1e6, resident()
-
-
-def _grown(looks: np.ndarray) -> Measurements:
-    frames, made = (looks[:, :2] - looks[0, :2]).T
-    yield "frames to the page", f"{frames[-1]:.0f}", f"{100 * frames[-1] / HOUR:.0f} % of an hour"
-    yield "results made", f"{made[-1]:.0f}", ""
-    for what, size in zip(("heap of the page", "memory of the server"), looks.T[2:], strict=True):
-        slope, _ = np.polyfit(frames, size, 1)
-        ends, spread = f"{size[0]:.2f}, {size[-1]:.2f}", f"between looks ± {np.ptp(size):.2f}"
-        yield f"{what}, MB: first, last", ends, spread
-        yield f"{what}, MB grown in an hour", f"{slope * HOUR:.2f}", ""

@@ -91,8 +91,7 @@ def _slid() -> Report:
     return table(
         f"a finger that slides on {SLID} of the twin",
         rows,
-        "mean error in mm, part in the 90 % ellipses; friction drags the sheet behind a finger "
-        "that slides, and the positions are the sheet's",
+        "mean error in mm, part in the 90 % ellipses",
         f"{SECONDS:g} s at {1e3 * SPEED:g} mm/s from corner to corner, one force of "
         f"{FORCES[0]:g} to {FORCES[1]:g} N; {PRESSES} presses of 2 to 6 N; preset textile; "
         "settings chosen on seeds 1 to 3",

@@ -62,14 +62,6 @@ def run() -> Iterator[Report]:
     )
 
 
-def run_paced() -> Iterator[Report]:
-    """Recording at 1,000 frames/s for ten minutes at their own pace."""
-    skin = Skin.load(SKIN)
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "paced.mcap"
-        yield _recorded(recorded(file, skin, frames_of(skin), LONG, paced=True))
-
-
 def _recorded(*rows: dict[str, Any]) -> Report:
     return table(
         "recording raw bytes and frames beside a pipeline",

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import cache, partial
+from functools import cache
 from typing import Any
 
 import numpy as np
 
-from report import Report, mm, percent, progress, rms, spent, table
+from report import Report, mm, percent, progress, rms, table
 from rig import INSIDE_90, distance, drawn, matched
 from tomoskin.core import Detection
-from tomoskin.learning import FrameView
-from tomoskin.pipeline.finding import Finder
-from tomoskin.twin import Press
 from touch_lab import APART, FALLS, INSIDE, RADII, PlantLab, TwinLab, drawn_fingers
 
 SEEDS = (11, 12, 13)
@@ -22,8 +19,8 @@ SHEETS, PLACEMENTS, IDLE = 3, 9, 30
 """Sheets of each seed, frames of each sheet: 81 frames a case; frames of a reference."""
 
 TWIN_SKINS, PRESETS = ("textile-disc-8", "textile-disc-16"), ("ideal", "textile")
-PLACES, TRIPLES, QUIET = 40, 35, 200
-"""Of the twin: single presses and several, of each seed; untouched frames."""
+PLACES, TRIPLES = 40, 35
+"""Of the twin: single presses and several, of each seed."""
 
 
 @dataclass(frozen=True)
@@ -70,9 +67,8 @@ def run_quick() -> Iterator[Report]:
 
 
 def run_twin() -> Iterator[Report]:
-    """The same on the twin, whose probes are rigid, and what a frame costs."""
+    """The same on the twin, whose probes are rigid."""
     yield _on_twin(TWIN, PLACES, TRIPLES)
-    yield _cost()
 
 
 def on_plant(cases: Sequence[Case], sheets: int) -> Report:
@@ -96,8 +92,8 @@ def _on_twin(cases: Sequence[Case], places: int, triples: int) -> Report:
         (_row(case, _twin_frames(case, places if case.anywhere else triples)) for case in cases),
         f"seeds {SEEDS}, {places} places of one press and then {triples} of one, two and three; "
         "probes of 8 to 15 mm radius, 2 to 4 N; each frame alone, from a cold start",
-        "ideal: read-out noise alone; textile: all of the preset; bound: Cramér–Rao of the twin "
-        "itself; first rows: wherever the nearest touch is, else as above",
+        "ideal: read-out noise alone; bound: Cramér–Rao of the twin itself; first rows: wherever "
+        "the nearest touch is",
     )
 
 
@@ -182,51 +178,3 @@ def _twin_frames(case: Case, count: int) -> Iterator[Frame]:
             presses = drawn(random, case.presses)
             touches = lab.found(presses)
             yield presses, lab.least(presses).tolist(), touches
-
-
-def _cost() -> Report:
-    """Frames of the twin by the fit alone: untouched, first ones, and others that move on."""
-    rows = []
-    for name in TWIN_SKINS:
-        lab, random = TwinLab(name, "ideal", SEEDS[0]), np.random.default_rng(7)
-        quiet, finder = [lab.view(()) for _ in range(QUIET)], lab.by_fit()
-        times = _timed(finder, quiet)
-        rows.append(_times(name, 0, [times], []))
-        for count in (1, 2, 3):
-            firsts, others = [], []
-            for _ in range(10):
-                presses, finder = drawn(random, count), lab.by_fit()
-                finder.push(lab.view(()))
-                views = [lab.view(_moved(presses, 1e-3 * step)) for step in range(11)]
-                first, *moving = _timed(finder, views)
-                firsts.append(first)
-                others.append(moving)
-            rows.append(_times(name, count, others, firsts))
-    return table(
-        "processor time of a frame off-line, ms",
-        rows,
-        "median and longest: 10 frames after the first, the presses moving 1 mm a frame",
-    )
-
-
-def _timed(finder: Finder, views: Sequence[FrameView]) -> list[float]:
-    return [spent(partial(finder.push, view)) for view in views]
-
-
-def _times(name: str, presses: int, runs: list[list[float]], firsts: list[float]) -> dict[str, Any]:
-    return {
-        "skin": name,
-        "presses": presses,
-        "median": round(1e3 * float(np.median([np.median(times) for times in runs])), 1),
-        "longest": round(1e3 * max(map(max, runs)), 1),
-        "first frame, median": round(1e3 * float(np.median(firsts)), 1) if firsts else "–",
-    }
-
-
-def _moved(presses: Sequence[Press], by: float) -> tuple[Press, ...]:
-    """Towards the middle."""
-    parts = [1 - by / max(np.hypot(p.x, p.y), by, 1e-9) for p in presses]
-    return tuple(
-        Press(p.x * part, p.y * part, p.force, p.radius)
-        for p, part in zip(presses, parts, strict=True)
-    )

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from plant import Finger, Plant, plant_mesh
 from report import Report, percent, progress, table
 from rig import gap, scan_time, stage
 from tomoskin.model.mesh import Mesh
 from tomoskin.pipeline import FrameResult, Pipeline
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
+from touch_lab import Finger, Plant, plant_mesh
 
 UNEVEN = 0.1
 RAMP = 0.05

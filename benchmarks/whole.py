@@ -23,7 +23,6 @@ import frame
 import page
 import session
 import twin
-import wire
 from forward_measure import ALPHA, PATTERN, disc, measure_touch, set_up
 from forward_others import INSTALLED, Peer, Script
 from report import Report, cell, clock, medians, progress
@@ -59,8 +58,6 @@ class Line:
     what: str
     unit: str
     value: float | str | None
-    """In words where it is more than one number."""
-
     promised: str = ""
     scipy: float | None = None
     peer: float | None = None
@@ -222,7 +219,7 @@ def _twin() -> Iterator[Line]:
 
 def _wire() -> Iterator[Line]:
     for electrodes in (8, 16):
-        row = wire.row(electrodes, packed=False)
+        row = frame.wire_row(electrodes, packed=False)
         what = f"decoded, {electrodes} electrodes"
         yield Line(what, "frames/s", row["decoded frames/s"])
         yield Line(f"{what}, by what 1 Mbaud carries", "×", row["times"], "≥ 20")

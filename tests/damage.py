@@ -1,101 +1,18 @@
-"""Many attempts, refused, accepted or worse; and what damages files and texts."""
+"""What happens to files and texts on their way: the same damage for the same number."""
 
 from __future__ import annotations
 
-import contextlib
 import io
 import random
 import re
-import resource
-import signal
-import traceback
-from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import TomoskinError
-
-HANG, MEMORY = 10.0, 1 << 30
-"""Seconds after which an attempt has failed, and bytes by which it may make the process grow."""
-
 _BLOCK = 64
 _NUMBERS = (b"nan", b"-1", b"0", b"1e999", b"1e-300", b"1e300", b'"x"', b"[]", b"99999999999")
-
-Judge = Callable[[int], str]
-"""Number of an attempt → "" where it was accepted, else what ought not to have been accepted.
-
-What is refused raises TomoskinError.
-"""
-
-
-@dataclass
-class Tally:
-    """What became of the attempts of one kind, and one example of each fault."""
-
-    kind: str
-    counts: Counter[str] = field(default_factory=Counter)
-    examples: dict[str, str] = field(default_factory=dict)
-
-    def add(self, verdict: str, number: int, text: str = "") -> None:
-        """One attempt more."""
-        self.counts[verdict] += 1
-        if text:
-            self.examples.setdefault(verdict, f"{self.kind} {number}: {text}")
-
-    @property
-    def row(self) -> dict[str, Any]:
-        """As the table has it."""
-        attempts = sum(self.counts.values()) - self.counts["memory"]
-        faults = {"traceback": "tracebacks", "hang": "hangs", "memory": "memory", "wrong": "wrong"}
-        return {
-            "kind": self.kind,
-            "attempts": attempts,
-            "refused": self.counts["refused"],
-            "accepted": self.counts["accepted"],
-            **{column: self.counts[verdict] for verdict, column in faults.items()},
-        }
-
-
-def attempt(kind: str, count: int, judge: Judge) -> Tally:
-    """Judge attempts 0 … ``count`` − 1, each within HANG seconds."""
-    tally, before = Tally(kind), _peak()
-    signal.signal(signal.SIGALRM, _hangs)
-    for number in range(count):
-        signal.setitimer(signal.ITIMER_REAL, HANG)
-        with contextlib.redirect_stderr(io.StringIO()):
-            tally.add(*_verdict(judge, number))
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        if (peak := _peak()) - before > MEMORY:
-            tally.add("memory", number, f"{peak / 2**20:.0f} MB")
-            before = peak
-    return tally
-
-
-def _peak() -> int:
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss << 10
-
-
-def _hangs(*_: object) -> None:
-    raise TimeoutError
-
-
-def _verdict(judge: Judge, number: int) -> tuple[str, int, str]:
-    try:
-        wrong = judge(number)
-    except TomoskinError:
-        return "refused", number, ""
-    except TimeoutError:
-        return "hang", number, f"no answer in {HANG:g} s"
-    except Exception as error:
-        frame = traceback.extract_tb(error.__traceback__)[-1]
-        place = f"{Path(frame.filename).name}:{frame.lineno}"
-        return "traceback", number, f"{type(error).__name__}: {error} ({place})"
-    return ("wrong", number, wrong) if wrong else ("accepted", number, "")
 
 
 def mutated(data: bytes, number: int, *, text: bool = False) -> bytes:
