@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from bench_rig import drawn, gap
 from report import Floats, Report, mm, progress, rms, table
-from rig import drawn, gap
 from tomoskin.core import Detection, Frame
 from tomoskin.learning import BENDS, BendExamples, BendModel, Differences, FrameView, JointReference
 from tomoskin.model.mesh import Cylinder, Hinge
@@ -69,8 +69,7 @@ def run() -> Iterator[Report]:
         f"learnt from one recording of three bends and back, {LEARNT} frames, after one "
         f"bend and a rest; then {MOVING * STEP:.0f} s of frames, {1 / STEP:.0f}/s, through "
         f"the live pipeline, touched for {ON * STEP:g} of every {EVERY * STEP:g} s",
-        "states: idle, bend, touch and both, a bend from 3° on; these and places "
-        f"{SETTLED * STEP:g} s after a touch began or ended; a radius where none is found",
+        "states: idle, bend, touch and both, a bend from 3° on; a radius where none is found",
     )
 
 

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from bench_rig import Rig
 from report import Floats, Report, rms, table
-from rig import Rig
 from tomoskin.board.source import Link, ScanSettings, SerialTransport, Timing
 from tomoskin.core import Frame
 from tomoskin.model.pattern import Pattern, Scan
@@ -56,8 +56,7 @@ def run() -> Iterator[Report]:
         (_ran("mega", n, SETTLING["mega"], times, FRAMES) for n, times in CASES),
         f"settling {SETTLING['mega'] * 1e6:g} us, prescaler 64, 1 Mbaud, adjacent; a star of "
         "resistors, so that each sample is known to the last bit",
-        "wrong: frames with any sample or flag other than expected; resets: the host was "
-        "too slow for the heartbeat of a board several times faster than real time",
+        "wrong: any sample or flag other than expected; resets: the host was too slow",
     )
     yield _on_pico(PICO_CASES, PICO_FRAMES)
 
@@ -73,8 +72,7 @@ def _on_pico(cases: Sequence[tuple[int, float]], frames: int) -> Report:
         (_ran("pico", n, settling, 4, frames) for n, settling in cases),
         "adjacent, four conversions of 12 bits a sample, dead time 5 us; frames/s by the "
         "board's own clock",
-        "jitter: by which the instant of one and the same conversion moves against the "
-        "beginning of its drive, at most; processor: share of the time that it is awake",
+        "jitter: of a conversion's instant in its drive, at most; processor: time awake",
     )
 
 
@@ -192,8 +190,7 @@ def run_chopped() -> Iterator[Report]:
         (_drifted(m, kind) for m in ("direct", "chopped") for kind in ("ideal", "polarising")),
         "200 mm disc, 200 ohm/sq, 1 mA, adjacent; preset hydrogel, whose temperature "
         f"drifts by itself; seed {SEED}",
-        "noise: of a row, from frame to frame; drift: of the mean of a second from the "
-        "first to the last, root mean square over the rows; signal: of the rows",
+        "noise: from frame to frame; drift: of the mean of a second, first to last; rms of rows",
     )
 
 

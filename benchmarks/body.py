@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from bench_rig import load_example
 from report import Report, mm, table
-from rig import load_example
 
 SEEDS = (11, 12, 13)
 PLACEMENTS = 100

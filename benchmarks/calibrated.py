@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from bench_rig import far_apart, held, labelled_presses, matched
 from report import Floats, Report, mm, progress, rms, table
-from rig import far_apart, held, labelled_presses, matched
 from tomoskin import Locator, Skin
 from tomoskin.learning import TOUCH
 from tomoskin.pipeline import Prepared, prepare

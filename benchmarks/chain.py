@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
+from bench_rig import served
 from report import Report, progress, table
-from rig import served
 from tomoskin.board.source import SerialTransport
 from tomoskin.core import FloatArray
 from tomoskin.files.session import SessionReader
@@ -74,8 +74,7 @@ def measured(seconds: float) -> Report:
     return table(
         f"{seconds:.0f} s of frames to touches, page and recording",
         [row],
-        "the portable firmware as a process with the timing of a Pico, on a pty; presses that "
-        f"go round, one, two and none in turn; {SKIN}, seed {SEED}",
+        f"firmware with a Pico's timing on a pty; presses that go round; {SKIN}, seed {SEED}",
         "read → touches: from a frame's bytes to the call of a function of the same program; "
         f"promised: 99 of 100 within {PROMISED:g} ms",
         f"{touches:,} touches; load of the machine {os.getloadavg()[0]:.0f}",

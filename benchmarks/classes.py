@@ -84,7 +84,6 @@ def run(data: Path | None) -> Iterator[Report]:
         _real(data),
         f"presses drawn at random (seeds 0 to {REAL_TRIALS - 1}); right: within one electrode "
         "of the orientation that the sets' notes state, itself fitted to a few degrees",
-        "a uniform disc is the model, also of the four patterned skins; polarity is not known",
     )
 
 

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from bench_rig import evenly, far_apart, gap
 from report import Floats, Report, available, rms, table
-from rig import evenly, far_apart, gap
 from tomoskin.core import Detection
 from tomoskin.learning import ForceModel, ForceProcess, WeighedPresses, identify
 from tomoskin.twin import Press
@@ -51,8 +51,7 @@ def run(data: Path | None) -> Iterator[Report]:
         f"presses, seven forces each on the way up and down, from {LIGHT:.0f} N to a top of 4 "
         f"to {HEAVY:.0f} N; each stage is the mean of {FRAMES} frames",
         "one tip: 8, 10 and 12 mm radius in the three seeds, given to nobody",
-        "variation: deviation over presses of the mean of force over true force; cost: of a "
-        "frame beyond the fit",
+        "variation: of force over true force, over presses; cost: of a frame beyond the fit",
     )
     folder = available(data, "eskin_fingertip8", "strip_stretch")
     if folder is None:

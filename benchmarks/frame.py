@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from bench_rig import Rig
 from report import Report, clock, progress, table
-from rig import Rig
 from tomoskin.board.source import Link, ScanSettings
 from tomoskin.board.wire import Decoder, PackedFrame, encode
 from tomoskin.core import FloatArray, Frame
@@ -55,7 +55,6 @@ def run() -> Iterator[Report]:
         rows,
         f"{PRESSED * REPEATS} frames, {PRESSED * FIT_REPEATS} by fit, with presses of a twin "
         f"that go round by 5 mm a frame, seed {SEED}",
-        f"{clock()[1]} of each",
         "filter: the time constant of the Kalman filter over frames; growth: memory that stays",
     )
 

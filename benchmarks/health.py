@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bench_rig import Rig, evenly, gap, nearest
 from report import Floats, Report, available, mm, rms, table
-from rig import Rig, evenly, gap, nearest
 from tomoskin.model.pattern import Pattern
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Pipeline, Prepared, prepare
@@ -71,8 +71,7 @@ def run(data: Path | None) -> Iterator[Report]:
         "rms over rows and frames of the difference from the reference, in deviations of one "
         "frame (from successive differences); median over frames; the first 20 make the "
         "reference, each later frame is predicted from those before it",
-        "change: of the mean of the last twentieth against the first; modes: the gain and "
-        "the directions learnt until then, taken out by plain projection",
+        "change: last twentieth against the first; modes: gain and directions learnt until then",
     )
     yield table(
         "electrode health on recordings",

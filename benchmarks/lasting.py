@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 import force as weighing
+from bench_rig import Rig, gap, nearest
 from report import Floats, Report, progress, table
-from rig import Rig, gap, nearest
 from tomoskin.board.source import Link, ScanSettings, Transport
 from tomoskin.core import Frame, Touch, VirtualClock
 from tomoskin.learning import FORCE

@@ -13,8 +13,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from bench_rig import INSIDE_90, evenly
 from report import Floats, Report, progress, table
-from rig import INSIDE_90, evenly
 from tomoskin import Locator, Skin
 from tomoskin.board.source import ScanSettings
 from tomoskin.core import Frame
@@ -207,8 +207,7 @@ def run() -> Iterator[Report]:
         f"(deviation over {UNSURE:g} radii), part of the months in which the page "
         "says that the calibration fits badly",
         f"{LEARNT} presses learnt on the first day, {ASKED} others asked a month, "
-        f"{FORCES[0]:g} to {FORCES[1]:g} N; seeds {' and '.join(map(str, SEEDS))}; preset "
-        "textile",
+        f"{FORCES[0]:g} to {FORCES[1]:g} N; seeds {SEEDS}; preset textile",
     )
 
 

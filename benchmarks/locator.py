@@ -11,8 +11,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from bench_rig import INSIDE_90
 from report import Floats, Report, percent, recordings, table
-from rig import INSIDE_90
 from tomoskin import Locator, Pattern, Skin
 from tomoskin.learning import SessionAlignment, Several, Watch
 from tomoskin.learning.touch.process import Process, squared_distances
@@ -132,7 +132,6 @@ def run(data: Path | None) -> Iterator[Report]:
     yield table(
         "a drifting rectangle: the next 300 presses",
         _drift(folder),
-        "eskin_hydrogel_rect8, 130 × 60 mm",
         "near row 7920 nine of the 32 channels change at once, some up to a hundredfold: the "
         "last tested stretch is mostly after it, what is learnt from is before",
         "rows watched: frame by frame, without labels; what has jumped is left out (Watch)",

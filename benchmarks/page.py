@@ -17,8 +17,8 @@ from urllib.parse import urlsplit
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from bench_rig import served
 from report import Report, table
-from rig import served
 from tomoskin.core import Detection, Image, Touch
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import FrameResult, Prepared, colour_limit, prepare
@@ -175,7 +175,6 @@ def run() -> Iterator[Report]:
         "Ready: from the navigation to the end of drawing the first picture, by the page's clock; "
         f"median and worst of {OPENINGS} with empty caches. Beside it a page of text of the same "
         "server in the same browser.",
-        "Scripting: arrival, decoding, marks, numbers and calls to WebGL, per displayed frame.",
         f"Memory: used heap after collection over {WATCHED:.0f} s, once all that the page keeps "
         "for ten seconds is there.",
     )

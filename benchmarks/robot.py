@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from bench_rig import load_example
 from report import Report, progress, table
-from rig import load_example
 from tomoskin.model.skin import Skin
 
 SKINS = ("textile-disc-8", "textile-disc-16")

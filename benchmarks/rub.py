@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
+from bench_rig import scan_time, stage
 from life import Condition, Worn, touches
 from locator import Set, held, mean_error, plain
 from report import Report, progress, recordings, table
-from rig import scan_time, stage
 from sliding import LEAD, SPEED, START, Way, recorded
 from tomoskin import Skin
 from tomoskin.learning import Rubbing

@@ -68,7 +68,6 @@ def _recorded(*rows: dict[str, Any]) -> Report:
         rows,
         f"{SKIN}, seed {SEED}; processor time of the whole process, which also makes the frames, "
         "by the seconds recorded; growth of the process",
-        "a row that is not paced: what is written in one batch waits for the disk",
     )
 
 

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from bench_rig import evenly, scan_time, stage
 from report import Floats, Report, mm, progress, table
-from rig import evenly, scan_time, stage
 from tomoskin.core import Frame, Touch
 from tomoskin.files.session import SessionReader, tick_rate
 from tomoskin.pipeline import Pipeline, Prepared
@@ -103,8 +103,7 @@ def run() -> Iterator[Report]:
         f"middle, from corner to corner; seeds {SEEDS}, {RUNS} runs each",
         "errors against the middle of the scan; straight on: from "
         f"{STRAIGHT:g} s after a corner on; behind: along the way, median, straight on",
-        "sheet: textile, or ideal without memory, drift and vices of the board; rolls: "
-        "friction of 0.02 in place of 0.3",
+        "ideal: without memory, drift and vices; rolls: friction of 0.02 in place of 0.3",
     )
 
 

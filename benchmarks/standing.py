@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
+from bench_rig import evenly, gap, held
 from report import Floats, Report, mm, progress, table
-from rig import evenly, gap, held
 from tomoskin.board.source import Link, ScanSettings
 from tomoskin.core import FloatArray, Frame, Touch
 from tomoskin.model.skin import Skin

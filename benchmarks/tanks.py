@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 from scipy.stats import rankdata
 
+from bench_rig import load_example
 from report import Report, recordings, table
-from rig import load_example
 from tomoskin.core import FloatArray
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Disc, ElectrodeArc, triangulate
@@ -213,7 +213,6 @@ def run(data: Path | None) -> Iterator[Report]:
         (row for name, group in groups.items() for row in _scores(name, group)),
         "times 21: the challenge's sum over three samples at each of seven levels",
         "±: standard error of the mean over tanks; simulated ones are others at each level",
-        "seconds: mean processor time of one segmentation",
     )
     yield table(
         "where it is sure",

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bench_rig import Rig, far_apart
 from report import Floats
-from rig import Rig, far_apart
 from tomoskin.core import Detection, Frame
 from tomoskin.learning import Differences, FrameView
 from tomoskin.model.forward import ForwardModel

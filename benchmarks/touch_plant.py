@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from bench_rig import INSIDE_90, distance, drawn, matched
 from report import Report, mm, percent, progress, rms, table
-from rig import INSIDE_90, distance, drawn, matched
 from tomoskin.core import Detection
 from touch_lab import APART, FALLS, INSIDE, RADII, PlantLab, TwinLab, drawn_fingers
 
@@ -81,8 +81,7 @@ def on_plant(cases: Sequence[Case], sheets: int) -> Report:
         f"frames; radii {1e3 * RADII[0]:.0f} to {1e3 * RADII[1]:.0f} mm, conductivity down by "
         f"{100 * FALLS[0]:.0f} to {100 * FALLS[1]:.0f} %, over {100 * INSIDE:.0f} % of the "
         f"breadth, {1e3 * APART:.0f} mm apart at least",
-        "all found: each press within half of that; ghosts: frames with another touch; bound: "
-        "Cramér–Rao of the plant itself, places, radii and strengths unknown",
+        "all found: each press within half of that; bound: Cramér–Rao of the plant itself",
     )
 
 

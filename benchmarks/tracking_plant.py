@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from bench_rig import gap, scan_time, stage
 from report import Report, percent, progress, table
-from rig import gap, scan_time, stage
 from tomoskin.model.mesh import Mesh
 from tomoskin.pipeline import FrameResult, Pipeline
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
@@ -235,8 +235,7 @@ def run() -> Iterator[Report]:
         f"down by 15 to 35 %, up and down in {1e3 * RAMP:.0f} ms, sheet uneven by 10 %",
         f"ghost: a touch farther than {1e3 * NEAR:.1f} mm from every finger of its own that "
         "presses or has been lifted two frames ago, and not said to be several",
-        "first frame: from that in whose middle half of the finger is down; gone: from the "
-        "first frame without it; meetings: at the end, both ids as at first",
+        "first frame: in whose middle half of the finger is down; meetings: ids at the end",
     )
 
 

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from bench_rig import Rig
 from report import Report, progress, spent, table
-from rig import Rig
 from tomoskin.model.forward import State
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import prepare

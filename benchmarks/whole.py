@@ -23,10 +23,10 @@ import frame
 import page
 import session
 import twin
+from bench_rig import labelled_presses
 from forward_measure import ALPHA, PATTERN, disc, measure_touch, set_up
 from forward_others import INSTALLED, Peer, Script
 from report import Report, cell, clock, medians, progress
-from rig import labelled_presses
 from tomoskin import ForwardModel, Locator, Skin
 from tomoskin.core import FloatArray
 from tomoskin.pipeline import prepare
