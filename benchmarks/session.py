@@ -14,7 +14,7 @@ import numpy as np
 
 from report import Report
 from tomoskin.board.wire import encode
-from tomoskin.core import Frame
+from tomoskin.core import Capacity, Frame, Worker
 from tomoskin.files.exports import write_parquet
 from tomoskin.files.session import (
     Mark,
@@ -26,7 +26,6 @@ from tomoskin.files.session import (
 )
 from tomoskin.model.pattern import Scan
 from tomoskin.model.skin import Skin
-from tomoskin.run.sinks import Capacity, Worker
 
 SKIN = "textile-disc-16"
 RATE = 1000.0

@@ -21,7 +21,7 @@ from tomoskin.model.robot import Place
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Pipeline, Prepared, prepare
 from tomoskin.run import Member, RobotRun
-from tomoskin.run.sinks import ContactListener, Moment, Stream, contacts_of
+from tomoskin.run.sinks import ContactListener, Contacts, Stream
 from tomoskin.twin import Press, TwinSettings
 from tomoskin.twin.scanning import table_of
 from tomoskin.twin.source import make_electronics
@@ -122,7 +122,7 @@ def processor_times(prepared: Prepared, frames: Sequence[Frame]) -> FloatArray:
         result = pipeline.push(frame)
         marks.append(time.thread_time())
         if result is not None:
-            contacts_of(stream, Moment.of(result, with_image=False))
+            _ = Contacts.of(stream, result).touches
         marks.append(time.thread_time())
         times.append(np.diff(marks))
     return np.array(times[len(frames) :])

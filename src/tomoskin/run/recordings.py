@@ -8,7 +8,8 @@ from concurrent.futures import Future
 from dataclasses import replace
 from pathlib import Path
 
-from tomoskin.core import Frame
+from tomoskin.core import Capacity, Frame, Worker
+from tomoskin.files.messages import epoch, raster
 from tomoskin.files.session import (
     BoardInfo,
     Log,
@@ -22,7 +23,6 @@ from tomoskin.files.session import (
     Truth,
 )
 from tomoskin.pipeline import REFERENCE_FRAMES, FrameResult, Prepared
-from tomoskin.run.sinks import Capacity, Worker, epoch, raster
 
 _KEPT = 3 * REFERENCE_FRAMES
 """Frames that make a reference, and during which the operator follows its noise."""

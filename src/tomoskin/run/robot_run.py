@@ -11,6 +11,7 @@ from pathlib import Path
 from time import monotonic
 
 from tomoskin.core import SourceError, StrPath, TomoskinError
+from tomoskin.files.messages import epoch
 from tomoskin.files.session import RobotLog
 from tomoskin.model.robot import Place
 from tomoskin.pipeline import Prepared
@@ -18,7 +19,7 @@ from tomoskin.run import commands
 from tomoskin.run.board_memory import BoardMemory
 from tomoskin.run.commands import Opener
 from tomoskin.run.runner import Runner
-from tomoskin.run.sinks import Sink, epoch
+from tomoskin.run.sinks import Sink
 from tomoskin.run.status import Status
 from tomoskin.run.turns import Turns
 

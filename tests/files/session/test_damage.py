@@ -456,7 +456,6 @@ import sys, threading
 from pathlib import Path
 from files.session.runs import frame_of, SKIN
 from tomoskin.files.session import Mark, MarkedFrame, Recorder, SessionWriter
-from tomoskin.run.sinks import Capacity, Worker
 path = Path(sys.argv[1])
 recorder = Recorder(path, lambda: SessionWriter(path, SKIN), None, print)
 worker = Worker(recorder, Capacity(1 << 20, "oldest"), print)

@@ -7,7 +7,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from tomoskin.core import DataError, StrPath, install_hint, written
+from tomoskin.core import StrPath, needed, written
 from tomoskin.files.session import Advance, Block, Rows, SessionReader, all_blocks, told_touches
 from tomoskin.sensing.track import force_values
 
@@ -32,10 +32,7 @@ def write_hdf5(
     DataError
         When h5py is missing or the session is damaged, and as :func:`written` does.
     """
-    try:
-        import h5py
-    except ImportError as error:
-        raise DataError("HDF5 needs h5py", where=str(path), hint=install_hint("hdf5")) from error
+    h5py = needed("h5py", "hdf5", path)
     rows = Rows.of(session)
     with written(path, overwrite=overwrite) as part, h5py.File(part, "w") as file:
         file.attrs["skin"] = session.skin.to_toml()

@@ -9,7 +9,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import DataError, StrPath, install_hint, written
+from tomoskin.core import StrPath, needed, written
 from tomoskin.files.imports import column_names
 from tomoskin.files.session import (
     Advance,
@@ -75,13 +75,7 @@ def write_parquet(
     DataError
         When pyarrow is missing or the session is damaged, and as :func:`written` does.
     """
-    try:
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-    except ImportError as error:
-        raise DataError(
-            "Parquet needs pyarrow", where=str(path), hint=install_hint("parquet")
-        ) from error
+    pa, pq = (needed(name, "parquet", path) for name in ("pyarrow", "pyarrow.parquet"))
     rows = Rows.of(session)
     n = rows.pattern.n_meas
     beside = _Beside(session, rows)

@@ -1,6 +1,5 @@
 """Session files: write, read, repair, replay."""
 
-from tomoskin.core import encode_json
 from tomoskin.files.session.blocks import (
     Advance,
     Block,
@@ -12,21 +11,12 @@ from tomoskin.files.session.blocks import (
     recording_of,
 )
 from tomoskin.files.session.channels import schema_of
-from tomoskin.files.session.foxglove import (
-    grid_message,
-    log_message,
-    scene_message,
-    touch_colour,
-    touch_width,
-)
 from tomoskin.files.session.info import OWN_FILES, SessionInfo, session_info
 from tomoskin.files.session.layout import (
     Mark,
     MarkedFrame,
     RecordedTouches,
     Truth,
-    touch_row,
-    touches_message,
 )
 from tomoskin.files.session.message_log import errors_of
 from tomoskin.files.session.playback import Timeline, read_timeline
@@ -36,7 +26,6 @@ from tomoskin.files.session.recorder import (
     Recorder,
     RunMessage,
     RunSettings,
-    event_of,
 )
 from tomoskin.files.session.repair import Lost, Repaired, repair
 from tomoskin.files.session.replay import ReplayTransport, open_replay, parse_replay
@@ -93,15 +82,11 @@ __all__ = [
     "advance",
     "all_blocks",
     "as_recorded",
-    "encode_json",
     "end_time",
     "errors_of",
-    "event_of",
     "first_scan",
-    "grid_message",
     "idle_count",
     "indexed_frames",
-    "log_message",
     "message_counts",
     "no_report",
     "open_replay",
@@ -115,7 +100,6 @@ __all__ = [
     "repair",
     "replayed",
     "scanned_touches",
-    "scene_message",
     "schema_of",
     "session_info",
     "split",
@@ -124,9 +108,5 @@ __all__ = [
     "start_time",
     "tick_rate",
     "told_touches",
-    "touch_colour",
-    "touch_row",
-    "touch_width",
     "touches_before",
-    "touches_message",
 ]

@@ -9,6 +9,8 @@ from typing import Any
 
 from mcap.records import Channel, Schema
 
+from tomoskin.files.messages import UNUSED
+
 RAW, FRAMES, TOUCHES, SCENE, IMAGE, TRUTH, EVENTS, NOTES, DEVICE, CLOCK, SETTINGS = range(1, 12)
 """Numbers of the channels: the same in every file, so that a torn one can be read."""
 
@@ -91,9 +93,6 @@ _GRID = _object(
     host_time=_NUMBER,
     unit=_STRING,
 )
-UNUSED = ("arrows", "cubes", "cylinders", "lines", "triangles", "models")
-"""Kinds of primitives that an entity of a scene must have a list of, and ours leave empty."""
-
 _SCENE_UPDATE = _object(
     deletions=_list(_object(timestamp=_TIME, type=_INTEGER, id=_STRING)),
     entities=_list(

@@ -11,10 +11,10 @@ from typing import Any
 from tomoskin.board.source import ClockFitter
 from tomoskin.board.wire import Info
 from tomoskin.core import DataError, Event, Image, PixelMap, StrPath, Touch
+from tomoskin.files.messages import event_of
 from tomoskin.files.session.layout import Mark, MarkedFrame, Truth
 from tomoskin.files.session.session_writer import SessionWriter
 from tomoskin.pipeline import FrameResult
-from tomoskin.sensing.track import TouchEvent
 
 IMAGE_PERIOD = 0.2
 """Seconds between two images in the file, by host time."""
@@ -56,11 +56,6 @@ class RunSettings:
 RunMessage = RawRead | MarkedFrame | FrameResult | Event | Truth | BoardInfo | RunSettings
 """All that a run says, in the order of what happens: the bytes of a read, each frame of it with
 what becomes of it, then its result. A person's remark is an event of the kind "note"."""
-
-
-def event_of(happened: TouchEvent) -> Event:
-    """What happened to a touch as an event: "touch-onset", "touch-move", "touch-release", …"""
-    return Event(happened.host_time, f"touch-{happened.kind}", happened.text)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from tomoskin.core import Event, Frame, Image, PixelMap, StrPath, Touch, encode_json, plain_values
+from tomoskin.files.messages import Contact, grid_message, log_message, scene_message, touch_row
 from tomoskin.files.session import channels
-from tomoskin.files.session.foxglove import grid_message, log_message, scene_message
-from tomoskin.files.session.layout import Mark, encode_frame, encode_raw, touches_message
+from tomoskin.files.session.layout import Mark, encode_frame, encode_raw
 from tomoskin.files.session.message_log import MessageLog
+from tomoskin.model.mesh import Plane
 
 if TYPE_CHECKING:
     from tomoskin.board.wire import Info
@@ -29,6 +30,8 @@ SKINS = "skins"
 
 SKIN_FILE = "skin.toml"
 """Name of the attachment that holds the skin."""
+
+_FLAT = Plane()
 
 OLD_INDEX_FILE = "tomoskin.seek"
 """Name of an attachment in files of 0.1: offsets in the file, which a copy must not keep."""
@@ -141,19 +144,20 @@ class SessionWriter(AbstractContextManager["SessionWriter"]):
 
     def touches(self, host_time: float, sequence: int, touches: Sequence[Touch]) -> None:
         """Touches of the frame ``sequence``; none is worth saying when there were some before."""
-        _put_json(
-            self._log, channels.TOUCHES, host_time, touches_message(host_time, sequence, touches)
-        )
+        rows = [touch_row(touch) for touch in touches]
+        content = {"host_time": host_time, "sequence": sequence, "touches": rows}
+        _put_json(self._log, channels.TOUCHES, host_time, content)
 
     def image(
         self, host_time: float, image: Image, pixels: PixelMap, touches: Sequence[Touch] = ()
     ) -> None:
         """One image for tools that show it, with its touches; the frames give it exactly."""
         log_time = self._log.log_time(host_time)
+        shown = [Contact.of(touch, _FLAT) for touch in touches]
         _put_json(
             self._log, channels.IMAGE, host_time, grid_message(image, pixels, host_time, log_time)
         )
-        _put_json(self._log, channels.SCENE, host_time, scene_message(touches, log_time))
+        _put_json(self._log, channels.SCENE, host_time, scene_message(shown, log_time))
 
     def truth(self, host_time: float, presses: Sequence[Any], bends: Sequence[Any] = ()) -> None:
         """What presses on the twin, and how it is bent, from ``host_time`` on.

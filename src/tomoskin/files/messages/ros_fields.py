@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 
 from tomoskin.core import FloatArray, Image, PixelMap
-from tomoskin.files.session import touch_colour, touch_width
+from tomoskin.files.messages.contacts import UNKNOWN, Contact, Contacts
+from tomoskin.files.messages.foxglove_records import touch_colour, touch_width
 from tomoskin.model.robot import Place
-from tomoskin.run.sinks.contact import Contact, Contacts
-from tomoskin.run.sinks.space import UNKNOWN
 
 Value = dict[str, Any]
 
@@ -31,8 +30,7 @@ def header(stamp: int, frame: str) -> Value:
 
 def pose(contact: Contact) -> Value:
     """``geometry_msgs/PoseWithCovariance``: on the surface, z along the normal."""
-    covariance = contact.pose.covariance(contact.touch.detection)
-    return {"pose": _pose(contact), "covariance": covariance.ravel()}
+    return {"pose": _pose(contact), "covariance": contact.pose_covariance.ravel()}
 
 
 def track(head: Value, contact: Contact) -> Value:
@@ -41,8 +39,9 @@ def track(head: Value, contact: Contact) -> Value:
     return {"header": head, "child_frame_id": name, "pose": pose(contact), "twist": _AT_REST}
 
 
-def contacts(head: Value, found: Contacts) -> Value:
-    """``tactile_msgs/TactileContacts``; the wrench is NaN where force is not measured."""
+def contacts(head: Value, frame: Contacts) -> Value:
+    """``tactile_msgs/TactileContacts``; a wrench is about the origin of the frame of coordinates,
+    and NaN where force is not measured."""
     return {
         "contacts": [
             {
@@ -50,26 +49,28 @@ def contacts(head: Value, found: Contacts) -> Value:
                 "name": _name(head, contact),
                 "position": _named("xyz", contact.position),
                 "normal": _named("xyz", contact.normal),
-                "wrench": _wrench(_force(contact), np.zeros(3)),
+                "wrench": _wrench(contact.push, contact.torque),
             }
-            for contact in found.touches
+            for contact in frame.touches
         ]
     }
 
 
-def wrench(head: Value, found: Contacts) -> Value:
-    """``geometry_msgs/WrenchStamped``: of all touches, about the frame's origin."""
-    force, torque = np.zeros(3), np.zeros(3)
-    for contact in found.touches:
-        force += _force(contact)
-        torque += np.cross(contact.position, _force(contact))
+def wrench(head: Value, frame: Contacts) -> Value:
+    """``geometry_msgs/WrenchStamped``: of all touches, about the frame's origin.
+
+    It is NaN where touches are not valid, or the force of one is not measured.
+    """
+    nothing = np.full(3, 0.0 if frame.valid else np.nan)
+    force = sum((contact.push for contact in frame.touches), start=nothing)
+    torque = sum((contact.torque for contact in frame.touches), start=nothing)
     return {"header": head, "wrench": _wrench(force, torque)}
 
 
-def markers(head: Value, found: Contacts) -> Value:
+def markers(head: Value, frame: Contacts) -> Value:
     """``visualization_msgs/MarkerArray`` that shows these touches, and no others."""
     shown = [_NO_MARKER | {"header": head, "action": _DELETE_ALL}]
-    for contact in found.touches:
+    for contact in frame.touches:
         width, place = touch_width(contact.touch), _pose(contact)
         about = {"header": head, "id": contact.touch.id, "pose": place}
         sphere = {"ns": "touch", "type": _SPHERE, "color": touch_colour(contact.touch)}
@@ -80,20 +81,20 @@ def markers(head: Value, found: Contacts) -> Value:
     return {"markers": shown}
 
 
-def diagnostics(head: Value, found: Contacts, name: str) -> Value:
+def diagnostics(head: Value, frame: Contacts) -> Value:
     """``diagnostic_msgs/DiagnosticArray``: error where touches are not valid."""
-    level = _ERROR if not found.valid else _WARN if found.problem else _OK
+    level = _ERROR if not frame.valid else _WARN if frame.problem else _OK
     values = {
-        "sequence": found.sequence,
-        "latency_s": found.latency,
-        "touches": len(found.touches),
-        "valid": found.valid,
+        "sequence": frame.sequence,
+        "latency_s": frame.latency,
+        "touches": len(frame.touches),
+        "valid": frame.valid,
     }
     status = {
         "level": level,
-        "name": f"{name}: skin",
-        "message": found.problem or "OK",
-        "hardware_id": found.skin,
+        "name": f"{frame.stream.naming.namespace}: skin",
+        "message": frame.problem or "OK",
+        "hardware_id": frame.skin,
         "values": [{"key": key, "value": str(value)} for key, value in values.items()],
     }
     return {"header": head, "status": [status]}
@@ -153,12 +154,6 @@ def _pose(contact: Contact) -> Value:
 
 def _name(head: Value, contact: Contact) -> str:
     return f"{head['frame_id']}/touch_{contact.touch.id}"
-
-
-def _force(contact: Contact) -> FloatArray:
-    """(3,) N, into the body; NaN where it is not measured."""
-    strength = np.nan if contact.force is None else contact.force
-    return -strength * np.array(contact.normal)
 
 
 def _wrench(force: FloatArray, torque: FloatArray) -> Value:
