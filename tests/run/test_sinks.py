@@ -124,3 +124,18 @@ def test_a_replay_is_published_with_the_times_of_its_day():
     event = Event(0.5, "connected", "board 01")
     assert event_content(stream, event, of_frame=True)["utc_s"] == 1e9 + 0.5
     assert event_content(stream, event)["utc_s"] is None  # it is of today
+
+
+def test_a_board_that_is_lost_is_said_on_every_sink(prepared, board):
+    sink = Sink("good")
+    runner = Runner(prepared, board.open, sinks=(sink,))
+    runner.start()
+    until = Watch(runner).until
+    until(lambda: runner.status().reference.ready)
+    board.lose()
+    assert board.sought.acquire(timeout=PATIENCE)
+    runner.stop()
+    *_, before, event, last = sink.items
+    assert (before.valid, event.kind) == (True, "source-lost")
+    assert (last.valid, last.problem, last.touches) == (False, event.text, ())
+    assert last.host_time >= before.host_time

@@ -16,7 +16,7 @@ from paho.mqtt import client as paho
 from conftest import missing
 from files.session.runs import TOUCH
 from run.sinks.conftest import EPOCH, EVENT, PATIENCE, begin, free_port, result_at, touch_of
-from tomoskin.core import SinkError
+from tomoskin.core import Event, SinkError
 from tomoskin.files.messages import Reporter
 from tomoskin.run.sinks import make_sink
 from tomoskin.run.sinks.mqtt import PERIOD
@@ -127,6 +127,24 @@ def test_beginnings_and_ends_are_sent_at_once_the_rest_now_and_then(broker, hear
     sink.publish(reporter.of(result_at(1.0, one, sequence=7)))
     sink.publish(reporter.of(result_at(1.0 + 1.01 * PERIOD, one, sequence=8)))
     assert [json.loads(heard()[1])["sequence"] for _ in range(6)] == [0, 1, 3, 5, 7, 8]
+    sink.close()
+
+
+def test_a_lost_board_is_told_and_kept_until_frames_come_again(broker, heard, stream):
+    sink = make_sink(broker.url)
+    begin(sink, stream)
+    reporter = Reporter(stream.named(sink.naming), period=sink.period)
+    sink.publish(reporter.of(result_at(1.0, TOUCH)))
+    assert [heard()[0] for _ in range(2)] == ["robot/skin/status", "robot/skin/touches"]
+    sink.publish(reporter.lost(Event(1.2, "source-lost", "the cable is out")))
+    sink.publish(reporter.still_lost())
+    assert heard() == ("robot/skin/status", "offline")
+    topic, text = heard()
+    told = json.loads(text)
+    assert topic == "robot/skin/touches"
+    assert (told["valid"], told["problem"], told["touches"]) == (False, "the cable is out", [])
+    sink.publish(reporter.of(result_at(2.0)))
+    assert heard() == ("robot/skin/status", "online")
     sink.close()
 
 

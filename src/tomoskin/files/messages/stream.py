@@ -11,7 +11,7 @@ from typing import Self
 
 import numpy as np
 
-from tomoskin.core import FloatArray, GeometryError, PixelMap, SinkError, clock_ahead
+from tomoskin.core import FloatArray, GeometryError, PixelMap, SinkError, StrPath, clock_ahead
 from tomoskin.model.mesh import Mesh, Plane, Surface
 from tomoskin.model.pattern import Pattern
 from tomoskin.model.robot import Place, Pose, pose_numbers
@@ -162,8 +162,9 @@ class Stream:
         """The same, called as ``naming`` says, and each of a robot's skins below it."""
         return replace(self, naming=naming.of_skin(self.place))
 
-    def file(self, path: Path) -> Path:
+    def file(self, path: StrPath) -> Path:
         """The file of this skin: on a robot its name stands in that of the file."""
+        path = Path(path)
         return path if self.place is None else path.with_stem(f"{path.stem}-{self.place.name}")
 
     def log_time(self, host_time: float) -> int:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 from tomoskin.core import Output, SinkError, check_outputs, needed
@@ -37,7 +36,7 @@ class RerunSink(Sink):
         """Begin a recording; OutputError when its file is there already."""
         recording = rerun_recording(self._rerun, stream)
         if self._target.endswith(".rrd"):
-            path = stream.file(Path(self._target))
+            path = stream.file(self._target)
             check_outputs([Output(path)], overwrite=False)
             recording.save(path)
         else:
