@@ -12,9 +12,9 @@ from tomoskin.core import Capacity, Frame, Worker
 from tomoskin.files.messages import epoch, raster
 from tomoskin.files.session import (
     BoardInfo,
-    Log,
     Mark,
     MarkedFrame,
+    MessageLog,
     RawRead,
     Recorder,
     RunMessage,
@@ -153,7 +153,7 @@ class Recordings:
         """The newest frames in which nothing touched."""
         return self._pre_roll.untouched
 
-    def begin(self, path: Path, log: Log | None = None) -> Future[None]:
+    def begin(self, path: Path, log: MessageLog | None = None) -> Future[None]:
         """Record from the next bytes on, and end what was being recorded.
 
         ``log``: where it goes, instead of a file of its own. Done when the file has been made;
@@ -240,7 +240,7 @@ class Recordings:
 
 
 def _worker(
-    path: Path, prepared: Prepared, start: float, say: Say, log: Log | None
+    path: Path, prepared: Prepared, start: float, say: Say, log: MessageLog | None
 ) -> Worker[Recorder]:
     def make() -> SessionWriter:
         session = SessionWriter(path, prepared.skin, epoch=epoch(), start=start, log=log)

@@ -455,6 +455,7 @@ _RECORD = """
 import sys, threading
 from pathlib import Path
 from files.session.runs import frame_of, SKIN
+from tomoskin.core import Capacity, Worker
 from tomoskin.files.session import Mark, MarkedFrame, Recorder, SessionWriter
 path = Path(sys.argv[1])
 recorder = Recorder(path, lambda: SessionWriter(path, SKIN), None, print)

@@ -9,7 +9,6 @@ from tomoskin.files.messages.contacts import (
     touch_row,
 )
 from tomoskin.files.messages.foxglove_records import (
-    UNUSED,
     grid_message,
     log_message,
     scene_message,
@@ -33,7 +32,6 @@ __all__ = [
     "NAMES",
     "TOPICS",
     "TYPES",
-    "UNUSED",
     "Contact",
     "Contacts",
     "Every",

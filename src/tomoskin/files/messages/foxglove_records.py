@@ -30,7 +30,7 @@ _TEXT_HEIGHT = 8e-3
 _TEXT_COLOUR = {"r": 0.5, "g": 0.5, "b": 0.5, "a": 1.0}
 _UPRIGHT = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
 
-UNUSED = ("arrows", "cubes", "cylinders", "lines", "triangles", "models")
+_UNUSED = ("arrows", "cubes", "cylinders", "lines", "triangles", "models")
 """Kinds of primitives that an entity of a scene must have a list of, and ours leave empty."""
 
 Message = dict[str, Any]
@@ -117,7 +117,7 @@ def _entity(contact: Contact, now: dict[str, int]) -> Message:
             {"key": "kind", "value": touch.kind},
             {"key": "peak", "value": f"{touch.detection.peak:.4g}"},
         ],
-        **{kind: [] for kind in UNUSED},
+        **{kind: [] for kind in _UNUSED},
         "spheres": [
             {"pose": pose, "size": {"x": width, "y": width, "z": 0.2 * width},
              "color": touch_colour(touch)}

@@ -15,10 +15,9 @@ from tomoskin.files.session.info import OWN_FILES, SessionInfo, session_info
 from tomoskin.files.session.layout import (
     Mark,
     MarkedFrame,
-    RecordedTouches,
     Truth,
 )
-from tomoskin.files.session.message_log import errors_of
+from tomoskin.files.session.message_log import MessageLog, errors_of
 from tomoskin.files.session.playback import Timeline, read_timeline
 from tomoskin.files.session.recorder import (
     BoardInfo,
@@ -37,7 +36,6 @@ from tomoskin.files.session.replayed import (
     replayed,
     told_touches,
 )
-from tomoskin.files.session.robot_log import LogPart, RobotLog
 from tomoskin.files.session.scanned import first_scan, idle_count, scanned_touches
 from tomoskin.files.session.session import Session
 from tomoskin.files.session.session_reader import (
@@ -49,7 +47,7 @@ from tomoskin.files.session.session_reader import (
     tick_rate,
     touches_before,
 )
-from tomoskin.files.session.session_writer import Log, SessionWriter
+from tomoskin.files.session.session_writer import SessionWriter, robot_logs
 from tomoskin.files.session.split import split, split_names, split_targets
 from tomoskin.sensing.track import Span
 
@@ -58,17 +56,14 @@ __all__ = [
     "Advance",
     "Block",
     "BoardInfo",
-    "Log",
-    "LogPart",
     "Lost",
     "Mark",
     "MarkedFrame",
+    "MessageLog",
     "RawRead",
-    "RecordedTouches",
     "Recorder",
     "Repaired",
     "ReplayTransport",
-    "RobotLog",
     "Rows",
     "RunMessage",
     "RunSettings",
@@ -99,6 +94,7 @@ __all__ = [
     "recording_of",
     "repair",
     "replayed",
+    "robot_logs",
     "scanned_touches",
     "schema_of",
     "session_info",

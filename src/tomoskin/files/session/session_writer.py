@@ -6,11 +6,12 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from tomoskin.core import Event, Frame, Image, PixelMap, StrPath, Touch, encode_json, plain_values
 from tomoskin.files.messages import Contact, grid_message, log_message, scene_message, touch_row
 from tomoskin.files.session import channels
+from tomoskin.files.session.channels import robot_channels
 from tomoskin.files.session.layout import Mark, encode_frame, encode_raw
 from tomoskin.files.session.message_log import MessageLog
 from tomoskin.model.mesh import Plane
@@ -48,29 +49,18 @@ def about_session(skin: Skin, epoch: float) -> dict[str, str]:
     }
 
 
-class Log(Protocol):
-    """Where the messages of a session go: a file of its own, or a part of one."""
+def robot_logs(
+    path: StrPath, names: Sequence[str], *, epoch: float, start: float
+) -> dict[str, MessageLog]:
+    """One new file for the sessions of a robot's skins: a log for each, by its name.
 
-    path: Path
-    epoch: float
-
-    def describe(self, name: str, about: Mapping[str, str]) -> None:
-        """Add named strings to the file."""
-
-    def attach(self, name: str, media_type: str, data: bytes) -> None:
-        """Add a whole file."""
-
-    def put(self, channel: int, host_time: float, data: bytes) -> None:
-        """Add one message."""
-
-    def log_time(self, host_time: float) -> int:
-        """Time of a message, ns."""
-
-    def settle(self) -> None:
-        """Write what is buffered."""
-
-    def close(self) -> None:
-        """Close the log: no more messages come."""
+    The file ends when the last has. Raises OutputError when it exists or cannot be made.
+    """
+    channels = robot_channels(names)
+    whole = MessageLog(Path(path), epoch=epoch, start=start, channels=channels)
+    about = {"format": str(FORMAT), "epoch_s": repr(float(epoch)), SKINS: " ".join(names)}
+    whole.describe(ABOUT, about)
+    return whole.parts(names)
 
 
 class SessionWriter(AbstractContextManager["SessionWriter"]):
@@ -107,7 +97,7 @@ class SessionWriter(AbstractContextManager["SessionWriter"]):
         *,
         epoch: float = 0.0,
         start: float = 0.0,
-        log: Log | None = None,
+        log: MessageLog | None = None,
     ) -> None:
         self.path = path if isinstance(path, Path) else Path(path)
         self._start = start
@@ -207,5 +197,5 @@ class SessionWriter(AbstractContextManager["SessionWriter"]):
         )
 
 
-def _put_json(log: Log, channel: int, host_time: float, content: Mapping[str, Any]) -> None:
+def _put_json(log: MessageLog, channel: int, host_time: float, content: Mapping[str, Any]) -> None:
     log.put(channel, host_time, encode_json(content))
