@@ -15,7 +15,8 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from tomoskin.core import DataError, FloatArray, IntArray, check_fits, most_bytes
-from tomoskin.sensing.signal import Recording, frame_times
+from tomoskin.files.imports.tables import voltages_of
+from tomoskin.sensing.signal import Recording
 
 _COLUMN = re.compile(r"(dv|v)_(\d+)_(\d+)_(\d+)_(\d+)")
 _KNOWN = ("time_s", "idle", "x_m", "y_m")
@@ -63,17 +64,14 @@ def parse(lines: Iterable[str], source: str) -> Recording:
     electrodes = np.array([[int(part) for part in m.groups()[1:]] for m in matches if m])
     by_name = {name: table[:, number] for number, name in enumerate(header)}
     has_place = "x_m" in by_name and "y_m" in by_name
-    return Recording(
-        voltages=table[:, used],
-        drive=electrodes[:, :2],
-        measure=electrodes[:, 2:],
-        time=by_name.get("time_s", frame_times(len(table))),
-        reference=None,
+    return voltages_of(
+        source,
+        table[:, used],
+        (electrodes[:, :2], electrodes[:, 2:]),
+        time=by_name.get("time_s"),
         labels=np.column_stack([by_name["x_m"], by_name["y_m"]]) if has_place else None,
         is_change=kinds == {"dv"},
-        source=source,
         idle=_idle(by_name["idle"], source) if "idle" in by_name else 1,
-        timed="time_s" in by_name,
     )
 
 

@@ -20,6 +20,7 @@ _LABEL = 8e-3
 _GREY = {"r": 0.5, "g": 0.5, "b": 0.5, "a": 1.0}
 _OK, _WARN, _ERROR = 0, 1, 2
 _FLOAT32 = 7
+_NOT_MEASURED = {"covariance": (UNKNOWN * np.eye(6)).ravel()}
 
 
 def header(stamp: int, frame: str) -> Value:
@@ -36,7 +37,7 @@ def pose(contact: Contact) -> Value:
 def track(head: Value, contact: Contact) -> Value:
     """``nav_msgs/Odometry``: a pose with the touch's identity; velocities are not measured."""
     name = _name(head, contact)
-    return {"header": head, "child_frame_id": name, "pose": pose(contact), "twist": _AT_REST}
+    return {"header": head, "child_frame_id": name, "pose": pose(contact), "twist": _NOT_MEASURED}
 
 
 def contacts(head: Value, frame: Contacts) -> Value:
@@ -69,15 +70,15 @@ def wrench(head: Value, frame: Contacts) -> Value:
 
 def markers(head: Value, frame: Contacts) -> Value:
     """``visualization_msgs/MarkerArray`` that shows these touches, and no others."""
-    shown = [_NO_MARKER | {"header": head, "action": _DELETE_ALL}]
+    shown = [{"header": head, "action": _DELETE_ALL, "frame_locked": True}]
     for contact in frame.touches:
         width, place = touch_width(contact.touch), _pose(contact)
-        about = {"header": head, "id": contact.touch.id, "pose": place}
+        about = {"header": head, "id": contact.touch.id, "pose": place, "frame_locked": True}
         sphere = {"ns": "touch", "type": _SPHERE, "color": touch_colour(contact.touch)}
         scale = _named("xyz", (width, width, 0.2 * width))
-        shown.append(_NO_MARKER | about | sphere | {"scale": scale})
+        shown.append(about | sphere | {"scale": scale})
         label = {"ns": "label", "type": _TEXT, "color": _GREY, "text": str(contact.touch.id)}
-        shown.append(_NO_MARKER | about | label | {"scale": _named("xyz", (0.0, 0.0, _LABEL))})
+        shown.append(about | label | {"scale": {"z": _LABEL}})
     return {"markers": shown}
 
 
@@ -162,32 +163,3 @@ def _wrench(force: FloatArray, torque: FloatArray) -> Value:
 
 def _named(names: str, values: Sequence[float]) -> Value:
     return dict(zip(names, values, strict=True))
-
-
-_ZERO = _named("xyz", (0.0, 0.0, 0.0))
-_AT_REST = {
-    "twist": {"linear": _ZERO, "angular": _ZERO},
-    "covariance": (UNKNOWN * np.eye(6)).ravel(),
-}
-_NO_TIME = {"sec": 0, "nanosec": 0}
-_NO_MARKER: Value = {
-    "ns": "",
-    "id": 0,
-    "type": 0,
-    "action": 0,
-    "pose": {"position": _ZERO, "orientation": _named("xyzw", (0.0, 0.0, 0.0, 1.0))},
-    "scale": _ZERO,
-    "color": _GREY,
-    "lifetime": _NO_TIME,
-    "frame_locked": True,
-    "points": (),
-    "colors": (),
-    "texture_resource": "",
-    "texture": {"header": header(0, ""), "format": "", "data": b""},
-    "uv_coordinates": (),
-    "text": "",
-    "mesh_resource": "",
-    "mesh_file": {"filename": "", "data": b""},
-    "mesh_use_embedded_materials": False,
-}
-"""A marker without a header, and nothing in it."""

@@ -90,7 +90,7 @@ def definition(kind: str) -> list[str]:
 def encode_cdr(kind: str, value: Mapping[str, Any]) -> bytes:
     """The message ``kind`` with those fields as plain CDR, little-endian.
 
-    Arrays of numbers are numpy's or bytes.
+    Arrays of numbers are numpy's or bytes. A field that is not there is zero, or empty.
     """
     out = bytearray()
     _put_message(out, kind, value)
@@ -121,10 +121,18 @@ def _used_by(kind: str) -> set[str]:
 def _put_message(out: bytearray, kind: str, value: Mapping[str, Any]) -> None:
     for name, text in TYPES[kind].items():
         field = Field.of(text)
+        given = value.get(name, _absent(field))
         if field.length is None:
-            _put(out, field.kind, value[name])
+            _put(out, field.kind, given)
         else:
-            _put_array(out, field, value[name])
+            _put_array(out, field, given)
+
+
+def _absent(field: Field) -> Any:
+    """What stands for a field that is not given."""
+    if field.length is not None:
+        return field.length * (0,)
+    return {} if field.kind in TYPES else "" if field.kind == "string" else 0
 
 
 def _put(out: bytearray, kind: str, value: Any) -> None:

@@ -26,7 +26,14 @@ from tomoskin.files.session.recorder import (
     RunMessage,
     RunSettings,
 )
-from tomoskin.files.session.repair import Lost, Repaired, repair
+from tomoskin.files.session.repair import (
+    Lost,
+    Repaired,
+    repair,
+    split,
+    split_names,
+    split_targets,
+)
 from tomoskin.files.session.replay import ReplayTransport, open_replay, parse_replay
 from tomoskin.files.session.replayed import (
     advance,
@@ -48,7 +55,6 @@ from tomoskin.files.session.session_reader import (
     touches_before,
 )
 from tomoskin.files.session.session_writer import SessionWriter, robot_logs
-from tomoskin.files.session.split import split, split_names, split_targets
 from tomoskin.sensing.track import Span
 
 __all__ = [

@@ -10,8 +10,8 @@ from typing import Any
 
 from tomoskin.board.source import ClockFitter
 from tomoskin.board.wire import Info
-from tomoskin.core import DataError, Event, Image, PixelMap, StrPath, Touch
-from tomoskin.files.messages import event_of
+from tomoskin.core import Consumer, DataError, Event, Image, PixelMap, StrPath, Touch
+from tomoskin.files.messages import Every, event_of
 from tomoskin.files.session.layout import Mark, MarkedFrame, Truth
 from tomoskin.files.session.session_writer import SessionWriter
 from tomoskin.pipeline import FrameResult
@@ -70,7 +70,7 @@ class _Outcome:
     shown: tuple[Touch, ...]
 
 
-class Recorder:
+class Recorder(Consumer):
     """Takes the messages of a run into a session file; a consumer of a worker of its own.
 
     When the file cannot be written any further the recording ends, which is said; the file stays
@@ -89,8 +89,7 @@ class Recorder:
         Called with the kind and text of an event.
     """
 
-    kind = "recording"
-    slow, ready = "the disk is too slow, and messages are lost", ""
+    kind, slow = "recording", "the disk is too slow, and messages are lost"
 
     def __init__(
         self,
@@ -104,7 +103,7 @@ class Recorder:
         self._make, self._pixels, self._say = make, pixels, say
         self._session: SessionWriter
         self._made = self._broken = False
-        self._last_image = float("-inf")
+        self._image_is_due = Every(IMAGE_PERIOD)
         self._had_touches = False
         self._clock, self._next_fit = ClockFitter(), float("-inf")
 
@@ -116,7 +115,11 @@ class Recorder:
         if message.ready:
             touches = message.touches if message.touches or self._had_touches else None
             self._had_touches = bool(message.touches)
-            image = message.image if self._image_is_due(message.host_time) else None
+            image = (
+                message.image
+                if self._pixels is not None and self._image_is_due(message.host_time)
+                else None
+            )
         events = tuple(map(event_of, message.events))
         if touches is None and image is None and not events:
             return None
@@ -138,11 +141,6 @@ class Recorder:
                 return _OBJECT + 100 * (len(item.presses) + len(item.bends))
             case _:
                 return _OBJECT
-
-    def durable(self, item: object) -> bool:
-        """All is written, what came before the file was open too."""
-        del item
-        return True
 
     def open(self) -> None:
         """Make the file. Raises DataError."""
@@ -210,10 +208,3 @@ class Recorder:
         if frame.host_time >= self._next_fit and (fit := self._clock.fit) is not None:
             self._session.clock(frame.host_time, fit)
             self._next_fit = frame.host_time + CLOCK_PERIOD
-
-    def _image_is_due(self, host_time: float) -> bool:
-        """Whether a period has gone by, or the time has been set back."""
-        if self._pixels is None or 0 <= host_time - self._last_image < IMAGE_PERIOD:
-            return False
-        self._last_image = host_time
-        return True
