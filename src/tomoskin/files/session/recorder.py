@@ -157,8 +157,6 @@ class Recorder(Consumer):
                 session.frame(item.frame, item.mark)
             case _Outcome():
                 self._write_outcome(item)
-            case Event(kind="note"):
-                session.note(item.host_time, item.text)
             case Event():
                 session.event(item)
             case Truth():
