@@ -21,9 +21,9 @@ from tomoskin.core import Event, Force
 from tomoskin.files.messages import (
     TOPICS,
     TYPES,
+    Contact,
     Naming,
     Reporter,
-    SpacePose,
     encode_cdr,
     ros_messages,
     type_hash,
@@ -189,8 +189,9 @@ def test_on_a_curved_skin_a_touch_is_where_it_is_in_space(stream):
 @pytest.mark.parametrize("turn", [(0, 0, 3.1), (0, 3.1, 0), (-3, 0.1, 0), (1, 2, -1)])
 def test_an_orientation_is_that_of_its_axes(turn):
     wanted = Rotation.from_rotvec(turn)
-    pose = SpacePose((0.0, 0.0, 0.0), tuple(wanted.as_matrix().T.tolist()), np.empty((3, 2)))
-    found = Rotation.from_quat(pose.quaternion())
+    axes = tuple(wanted.as_matrix().T.tolist())
+    contact = Contact(TOUCH, (0.0, 0.0, 0.0), axes, np.empty((3, 2)))
+    found = Rotation.from_quat(contact.orientation)
     assert (found.inv() * wanted).magnitude() == pytest.approx(0, abs=1e-12)
 
 

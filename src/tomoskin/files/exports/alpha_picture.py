@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tomoskin.core import StrPath
-from tomoskin.files.exports.figure import new_figure, save_figure
+from tomoskin.files.exports.figure import dress, new_figure, save_figure
 from tomoskin.imaging import AlphaChoice, Curve, Picard
 
 if TYPE_CHECKING:
@@ -59,11 +59,8 @@ def _draw(ax: Axes, choice: AlphaChoice, curve: Curve) -> None:
     if curve.y.min() > 0:
         ax.set_yscale("log")
         ax.set_ylim(top=min(1.2 * curve.y.max(), _MOST * y))
-    ax.set_title(f"{choice.rule}: alpha = {choice.alpha:.3g}", fontsize=10)
-    ax.set_xlabel(curve.x_label, fontsize=8)
-    ax.set_ylabel(curve.y_label, fontsize=8)
-    ax.tick_params(labelsize=7, which="both")
-    ax.grid(alpha=0.25)
+    title = f"{choice.rule}: alpha = {choice.alpha:.3g}"
+    dress(ax, title, curve.x_label, curve.y_label)
 
 
 def _draw_picard(ax: Axes, picard: Picard) -> None:
@@ -73,13 +70,7 @@ def _draw_picard(ax: Axes, picard: Picard) -> None:
     ax.semilogy(index, picard.solution, ".", color="tab:orange", markersize=4, label="|uᴴW^½dv|/σ")
     if np.isfinite(picard.noise).any():
         ax.semilogy(index, picard.noise, color=_MARK, linestyle=":", label="noise")
-    ax.set_title(f"Picard plot: condition {_condition(picard):.2g}", fontsize=10)
-    ax.set_xlabel("mode", fontsize=8)
+    condition = picard.singular_values[0] / picard.singular_values[-1]
+    dress(ax, f"Picard plot: condition {condition:.2g}", "mode", "")
     ax.locator_params(axis="x", integer=True)
-    ax.tick_params(labelsize=7, which="both")
-    ax.grid(alpha=0.25)
     ax.legend(fontsize=7)
-
-
-def _condition(picard: Picard) -> float:
-    return float(picard.singular_values[0] / picard.singular_values[-1])

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from tomoskin.core import StrPath, written
-from tomoskin.files.exports.figure import new_figure, save_figure
+from tomoskin.files.exports.figure import dress, new_figure, save_figure
 from tomoskin.imaging import Merit
 
 _FIGURES = (
@@ -47,12 +47,9 @@ def write_merit(path: StrPath, found: Mapping[str, Merit], *, overwrite: bool = 
         for operator, merit in found.items():
             shown = f"{operator} (noise figure {merit.noise_figure:.2g})"
             ax.plot(1e3 * merit.distance, factor * getattr(merit, name), ".-", label=shown)
-        ax.set_ylabel(label, fontsize=8)
-        ax.set_xlabel("distance from the centre (mm)", fontsize=8)
+        dress(ax, "", "distance from the centre (mm)", label)
         low = min(0.0, *(float(np.nanmin(getattr(m, name), initial=0.0)) for m in found.values()))
         ax.set_ylim(bottom=1.1 * factor * low)
-        ax.tick_params(labelsize=7)
-        ax.grid(alpha=0.25)
     ax.legend(fontsize=7)
     save_figure(path, figure, overwrite=overwrite)
 

@@ -3,7 +3,6 @@
 from tomoskin.files.messages.contacts import (
     Contact,
     Contacts,
-    SpacePose,
     event_content,
     event_of,
     touch_row,
@@ -40,7 +39,6 @@ __all__ = [
     "Naming",
     "Reporter",
     "RosMessage",
-    "SpacePose",
     "Stream",
     "dds_name",
     "definition",

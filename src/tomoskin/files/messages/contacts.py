@@ -32,39 +32,6 @@ Vector = tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SpacePose:
-    """A touch in space.
-
-    Attributes
-    ----------
-    position
-        m, on the surface.
-    axes
-        Unit vectors: along the sheet's x, across it, and away from the body.
-    slope
-        (3, 2): derivative of the position by the sheet's x and y.
-    """
-
-    position: Vector
-    axes: tuple[Vector, Vector, Vector]
-    slope: FloatArray = field(repr=False)
-
-    @classmethod
-    def of(cls, detection: Detection, surface: Surface) -> Self:
-        """Where a detection of the sheet is on its ``surface``; plain numbers, which is faster."""
-        uv = [[detection.x, detection.y]]
-        slope = surface.jacobian(uv)[0]
-        along, up = map(_unit, slope.T.tolist())
-        normal = _unit(_cross(along, up))
-        x, y, z = surface.point(uv)[0].tolist()
-        return cls((x, y, z), (along, _cross(normal, along), normal), slope)
-
-    def quaternion(self) -> Vector:
-        """X, y, z, w of the rotation to the axes."""
-        return quaternion(self.axes)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class Contact:
     """One touch in space.
 
@@ -72,27 +39,38 @@ class Contact:
     ----------
     touch
         Its identity, and where it is on the sheet.
-    pose
-        Where it is in the frame of its :class:`Contacts`.
+    position
+        (3,) m, on the surface, in the frame of its :class:`Contacts`.
+    axes
+        Unit vectors: along the sheet's x, across it, and away from the body.
+    slope
+        (3, 2): derivative of the position by the sheet's x and y.
     """
 
     touch: Touch
-    pose: SpacePose = field(repr=False)
+    position: Vector
+    axes: tuple[Vector, Vector, Vector] = field(repr=False)
+    slope: FloatArray = field(repr=False)
 
     @classmethod
     def of(cls, touch: Touch, surface: Surface) -> Self:
-        """Of a touch of the sheet that lies on ``surface``."""
-        return cls(touch, SpacePose.of(touch.detection, surface))
-
-    @property
-    def position(self) -> Vector:
-        """(3,) m, on the surface."""
-        return self.pose.position
+        """Of a touch of the sheet that lies on ``surface``; plain numbers, which is faster."""
+        uv = [[touch.detection.x, touch.detection.y]]
+        slope = surface.jacobian(uv)[0]
+        along, up = map(_unit, slope.T.tolist())
+        normal = _unit(_cross(along, up))
+        x, y, z = surface.point(uv)[0].tolist()
+        return cls(touch, (x, y, z), (along, _cross(normal, along), normal), slope)
 
     @property
     def normal(self) -> Vector:
         """(3,) unit vector, away from the body."""
-        return self.pose.axes[2]
+        return self.axes[2]
+
+    @property
+    def orientation(self) -> Vector:
+        """X, y, z, w of the rotation to the axes."""
+        return quaternion(self.axes)
 
     @property
     def covariance(self) -> FloatArray | None:
@@ -144,7 +122,7 @@ class Contact:
 
     def _in_space(self, sheet: FloatArray) -> FloatArray:
         """(3, 3) of a covariance (2, 2) on the sheet."""
-        return np.asarray(self.pose.slope @ sheet @ self.pose.slope.T)
+        return np.asarray(self.slope @ sheet @ self.slope.T)
 
 
 @dataclass(frozen=True, eq=False)

@@ -149,7 +149,7 @@ def points(head: Value, change: Image, places: FloatArray) -> Value:
 def _pose(contact: Contact) -> Value:
     return {
         "position": _named("xyz", contact.position),
-        "orientation": _named("xyzw", contact.pose.quaternion()),
+        "orientation": _named("xyzw", contact.orientation),
     }
 
 
