@@ -11,6 +11,7 @@ import csv
 import re
 from array import array
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -64,15 +65,16 @@ def parse(lines: Iterable[str], source: str) -> Recording:
     electrodes = np.array([[int(part) for part in m.groups()[1:]] for m in matches if m])
     by_name = {name: table[:, number] for number, name in enumerate(header)}
     has_place = "x_m" in by_name and "y_m" in by_name
-    return voltages_of(
+    recording = voltages_of(
         source,
         table[:, used],
         (electrodes[:, :2], electrodes[:, 2:]),
         time=by_name.get("time_s"),
         labels=np.column_stack([by_name["x_m"], by_name["y_m"]]) if has_place else None,
         is_change=kinds == {"dv"},
-        idle=_idle(by_name["idle"], source) if "idle" in by_name else 1,
     )
+    idle = _idle(by_name["idle"], source) if "idle" in by_name else 1
+    return replace(recording, idle=idle)
 
 
 def column_names(drive: IntArray, measure: IntArray, kind: str = "v") -> list[str]:

@@ -7,6 +7,7 @@ Keys: ``voltages`` (n_frames, n_meas) V, or ``dv``; ``drive`` (n_meas, 2) source
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -45,7 +46,7 @@ def parse(arrays: Arrays, source: str) -> Recording:
         raise DataError("holds both voltages and dv", where=source, hint="keep one of them")
     key = "voltages" if "voltages" in arrays else "dv"
     drive, measure = (electrode_table(arrays, name, source) for name in ("drive", "measure"))
-    return voltages_of(
+    recording = voltages_of(
         source,
         np.atleast_2d(numbers(arrays, key, source)),
         (drive, measure),
@@ -53,8 +54,9 @@ def parse(arrays: Arrays, source: str) -> Recording:
         reference=numbers(arrays, "reference", source) if "reference" in arrays else None,
         labels=real_numbers(arrays, "xy_m", source) if "xy_m" in arrays else None,
         is_change=key == "dv",
-        idle=whole_number(arrays, "idle", source) if "idle" in arrays else 1,
     )
+    idle = whole_number(arrays, "idle", source) if "idle" in arrays else 1
+    return replace(recording, idle=idle)
 
 
 def write_interchange(path: StrPath, recording: Recording, *, overwrite: bool = False) -> None:

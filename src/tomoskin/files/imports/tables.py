@@ -22,7 +22,6 @@ def voltages_of(
     reference: NDArray[Any] | None = None,
     labels: FloatArray | None = None,
     is_change: bool = False,
-    idle: int = 1,
     notes: Sequence[str] = (),
 ) -> Recording:
     """A recording of voltages (n_frames, n_rows), or their change; ``rows``: drive and measure.
@@ -39,7 +38,6 @@ def voltages_of(
         labels=labels,
         is_change=is_change,
         source=source,
-        idle=idle,
         notes=tuple(notes),
         timed=time is not None,
     )

@@ -136,7 +136,7 @@ class SessionWriter(AbstractContextManager["SessionWriter"]):
         """Touches of the frame ``sequence``; none is worth saying when there were some before."""
         rows = [touch_row(touch) for touch in touches]
         content = {"host_time": host_time, "sequence": sequence, "touches": rows}
-        self._put(channels.TOUCHES, host_time, content)
+        _put(self._log, channels.TOUCHES, host_time, content)
 
     def image(
         self, host_time: float, image: Image, pixels: PixelMap, touches: Sequence[Touch] = ()
@@ -144,8 +144,8 @@ class SessionWriter(AbstractContextManager["SessionWriter"]):
         """One image for tools that show it, with its touches; the frames give it exactly."""
         log_time = self._log.log_time(host_time)
         shown = [Contact.of(touch, _FLAT) for touch in touches]
-        self._put(channels.IMAGE, host_time, grid_message(image, pixels, host_time, log_time))
-        self._put(channels.SCENE, host_time, scene_message(shown, log_time))
+        _put(self._log, channels.IMAGE, host_time, grid_message(image, pixels, host_time, log_time))
+        _put(self._log, channels.SCENE, host_time, scene_message(shown, log_time))
 
     def truth(self, host_time: float, presses: Sequence[Any], bends: Sequence[Any] = ()) -> None:
         """What presses on the twin, and how it is bent, from ``host_time`` on.
@@ -157,13 +157,13 @@ class SessionWriter(AbstractContextManager["SessionWriter"]):
         content = {"host_time": host_time, "presses": [plain_values(press) for press in presses]}
         if bends:
             content["bends"] = [plain_values(bend) for bend in bends]
-        self._put(channels.TRUTH, host_time, content)
+        _put(self._log, channels.TRUTH, host_time, content)
 
     def event(self, event: Event) -> None:
         """Write an event of the run; a person's remark is one of the kind "note"."""
         content = log_message(event, self._log.log_time(event.host_time))
         channel = channels.NOTES if event.kind == "note" else channels.EVENTS
-        self._put(channel, event.host_time, content)
+        _put(self._log, channel, event.host_time, content)
 
     def note(self, host_time: float, text: str) -> None:
         """A person's remark at ``host_time``."""
@@ -180,15 +180,16 @@ class SessionWriter(AbstractContextManager["SessionWriter"]):
         if name:
             content["name"] = name
         del content["request"]
-        self._put(channels.DEVICE, host_time, content)
+        _put(self._log, channels.DEVICE, host_time, content)
 
     def clock(self, host_time: float, fit: Any) -> None:
         """A fit of the device's clock to the host's: a mapping or record, see the schema."""
-        self._put(channels.CLOCK, host_time, {"host_time": host_time} | plain_values(fit))
+        _put(self._log, channels.CLOCK, host_time, {"host_time": host_time} | plain_values(fit))
 
     def settings(self, host_time: float, settings: Mapping[str, Any]) -> None:
         """How the run was set: plain values by name."""
-        self._put(channels.SETTINGS, host_time, {"host_time": host_time} | dict(settings))
+        _put(self._log, channels.SETTINGS, host_time, {"host_time": host_time} | dict(settings))
 
-    def _put(self, channel: int, host_time: float, content: Mapping[str, Any]) -> None:
-        self._log.put(channel, host_time, encode_json(content))
+
+def _put(log: MessageLog, channel: int, host_time: float, content: Mapping[str, Any]) -> None:
+    log.put(channel, host_time, encode_json(content))
