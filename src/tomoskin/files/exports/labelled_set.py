@@ -23,7 +23,7 @@ _FIXED = ("drive", "measure", "reference")
 
 
 def shard_path(folder: StrPath, shard: int) -> Path:
-    """File of a shard."""
+    """The file of one shard in the folder of a set."""
     return Path(folder) / f"part-{shard:05d}.npz"
 
 

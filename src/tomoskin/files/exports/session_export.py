@@ -63,11 +63,11 @@ class Export:
             yield result
 
     def npz(self, path: StrPath) -> None:
-        """Write the interchange file."""
+        """Write all frames as an interchange file."""
         write_interchange(path, recording_of(self.session), overwrite=self.overwrite)
 
     def matlab(self, path: StrPath) -> None:
-        """Write EIDORS' structures."""
+        """Write all frames as EIDORS' structures."""
         skin = self.session.skin
         recording = recording_of(self.session)
         write_matlab(path, recording, skin.current, skin.n_electrodes, overwrite=self.overwrite)
@@ -80,7 +80,7 @@ class Export:
         write_series(listing, prepared.mesh, moments, overwrite=self.overwrite)
 
     def film(self, path: StrPath) -> None:
-        """Write a film of the map."""
+        """Write a film of the images with their touches."""
         prepared = as_recorded(self.session)
         unit, limit = prepared.operator.unit, colour_limit(prepared)
         pictures = (

@@ -103,7 +103,7 @@ def _check_separator(header: list[str], source: str) -> None:
 
 
 def _rows(lines: Iterable[str], source: str) -> Iterator[list[str]]:
-    """The fields of each line."""
+    """The fields of each line, the header first."""
     rows = csv.reader(lines)
     try:
         yield from rows

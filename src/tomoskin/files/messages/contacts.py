@@ -190,7 +190,7 @@ class Contacts:
 
     @property
     def skin(self) -> str:
-        """Name of the skin."""
+        """Name of the skin that is touched."""
         return self.stream.skin
 
     @property
@@ -205,7 +205,7 @@ class Contacts:
 
     @cached_property
     def touches(self) -> tuple[Contact, ...]:
-        """The touches in space."""
+        """The touches in space, in the order of their identities."""
         return tuple(Contact.of(touch, self.stream.surface) for touch in self.tracked)
 
     @property
@@ -231,7 +231,7 @@ class Contacts:
         }
 
     def content(self) -> dict[str, Any]:
-        """As plain values by name."""
+        """Everything as plain values by name, the touches too."""
         return self.header() | {"touches": [touch.content() for touch in self.touches]}
 
     def happenings(self) -> list[dict[str, Any]]:
@@ -282,7 +282,7 @@ def _newtons(force: Force) -> dict[str, Any]:
 
 
 def _on_sheet(detection: Detection) -> FloatArray:
-    """(2, 2) m²."""
+    """(2, 2) m², the covariance of a position on the sheet."""
     variance = np.array([detection.sd_x**2, detection.sd_y**2])
     if np.isfinite(variance).all():
         return np.diag(variance) + detection.cov_xy * np.eye(2)[::-1]

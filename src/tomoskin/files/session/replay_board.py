@@ -32,7 +32,7 @@ class ReplayBoard:
         self.scanning = False
 
     def obey(self, data: bytes) -> None:
-        """Carry out the commands."""
+        """Carry out the commands that these bytes hold."""
         for payload in self._deframer.feed(data):
             command = wire.decode_payload(payload, 0.0)
             if command is not None and wire.is_command(command):

@@ -68,11 +68,11 @@ class SessionReader(AbstractContextManager["SessionReader"]):
             raise
 
     def __exit__(self, *_: object) -> None:
-        """Close the file."""
+        """Close the file; nothing can be read afterwards."""
         self.close()
 
     def close(self) -> None:
-        """Close the file."""
+        """Close the file; nothing can be read afterwards."""
         self.container.close()
 
     @property
@@ -109,7 +109,7 @@ class SessionReader(AbstractContextManager["SessionReader"]):
         return _documents(self, channels.TRUTH, truth_of)
 
     def events(self) -> Iterator[Event]:
-        """The events of the run."""
+        """The events of the run, in their order."""
         return _documents(self, channels.EVENTS, event_of)
 
     def notes(self) -> Iterator[Event]:
@@ -125,7 +125,7 @@ class SessionReader(AbstractContextManager["SessionReader"]):
         return _last(self, channels.CLOCK)
 
     def settings(self) -> dict[str, Any]:
-        """The settings of the run."""
+        """The settings of the run, as they were last."""
         return _last(self, channels.SETTINGS)
 
 

@@ -118,7 +118,7 @@ class SessionWriter(AbstractContextManager["SessionWriter"]):
         self._log.close()
 
     def __exit__(self, *_: object) -> None:
-        """Close the file."""
+        """End the session at the end of the block."""
         self.close()
 
     def raw(self, host_time: float, data: bytes) -> None:

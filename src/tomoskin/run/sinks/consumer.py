@@ -71,7 +71,7 @@ class SinkConsumer(Consumer):
         return isinstance(item, Event)
 
     def open(self) -> None:
-        """Open the sink."""
+        """Open the sink, which gets what comes next in full."""
         self._sink.open(self._stream)
         self.trouble = ""
         self._reporter.repeat()
@@ -115,7 +115,7 @@ def sink_worker(sink: Sink, stream: Stream, say: Say) -> Worker[SinkConsumer]:
 
 
 def sink_report(worker: Worker[SinkConsumer]) -> SinkReport:
-    """How a sink is doing now."""
+    """How a sink is doing at this moment."""
     consumer = worker.consumer
     text = consumer.trouble or f"{worker.taken} sent"
     if (silent := worker.silent) > _LONG:

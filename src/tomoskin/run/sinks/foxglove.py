@@ -54,7 +54,7 @@ class FoxgloveSink(Sink):
         self._channels: dict[str, Any] = {}
 
     def open(self, stream: Stream) -> None:
-        """Begin to serve."""
+        """Begin to serve the channels of one skin."""
         sdk, self._stream = self._sdk, stream
         self._server = self._joined(stream)
         for topic in _TOPICS:
@@ -87,7 +87,7 @@ class FoxgloveSink(Sink):
             self._send("/image", grid_message(image, pixels, contacts.host_time, now), now)
 
     def close(self) -> None:
-        """Serve no longer."""
+        """Close the channels, and with the last skin the server."""
         server, self._server = self._server, None
         for channel in self._channels.values():
             channel.close()

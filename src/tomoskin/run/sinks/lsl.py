@@ -29,7 +29,7 @@ class LslSink(Sink):
         self._outlets: dict[str, Any] = {}
 
     def open(self, stream: Stream) -> None:
-        """Announce the streams."""
+        """Announce the streams of one skin."""
         # both are the machine's monotonic clock, but LSL may count from elsewhere
         self._offset = clock_ahead(self._lsl.local_clock)
         rows = [(label, "V") for label in row_labels(stream.pattern)]
@@ -61,7 +61,7 @@ class LslSink(Sink):
             self._push("touches", _touch_row(item), item)
 
     def close(self) -> None:
-        """Withdraw the streams."""
+        """Withdraw the streams that were announced."""
         self._outlets = {}
 
     def _push(self, name: str, sample: FloatArray | list[str], item: Item) -> None:

@@ -67,7 +67,7 @@ class MqttSink(Sink):
             self._put("touches", encode_json(item.content()))
 
     def close(self) -> None:
-        """Say that we go, and go."""
+        """Say that we are offline, and disconnect."""
         client, self._client = self._client, None
         if client is None:
             return
@@ -103,7 +103,7 @@ class _Answer:
         self._came.set()
 
     def check(self, where: str) -> None:
-        """Wait for it."""
+        """Wait for the answer; SinkError where it is no."""
         if not self._came.wait(_PATIENCE):
             raise SinkError(f"the broker did not answer within {_PATIENCE:.0f} s", where=where)
         if self._refused:

@@ -45,11 +45,11 @@ class RerunSink(Sink):
         self._view = RerunView(self._rerun, recording, stream)
 
     def publish(self, item: Item) -> None:
-        """Log ``item``."""
+        """Log one frame or event at its time."""
         self._view.log(item)
 
     def close(self) -> None:
-        """End the recording."""
+        """End the recording once the viewer has it."""
         recording, self._recording = self._recording, None
         if recording is None:
             return
