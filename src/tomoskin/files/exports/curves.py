@@ -103,8 +103,8 @@ COLUMNS = (
 )
 
 
-def write_merit(path: StrPath, found: Mapping[str, Merit], *, overwrite: bool = False) -> None:
-    """Draw a panel per figure with a curve per operator, named by the keys of ``found``.
+def write_merit(path: StrPath, merits: Mapping[str, Merit], *, overwrite: bool = False) -> None:
+    """Draw a panel per figure with a curve per operator, named by the keys of ``merits``.
 
     Raises
     ------
@@ -113,18 +113,18 @@ def write_merit(path: StrPath, found: Mapping[str, Merit], *, overwrite: bool = 
     """
     figure = new_figure(path, 10.5, 6.0)
     for ax, (name, label, factor) in zip(figure.subplots(2, 3).ravel(), _FIGURES, strict=True):
-        for operator, merit in found.items():
+        for operator, merit in merits.items():
             shown = f"{operator} (noise figure {merit.noise_figure:.2g})"
             ax.plot(1e3 * merit.distance, factor * getattr(merit, name), ".-", label=shown)
         dress(ax, "", "distance from the centre (mm)", label)
-        low = min(0.0, *(float(np.nanmin(getattr(m, name), initial=0.0)) for m in found.values()))
+        low = min(0.0, *(float(np.nanmin(getattr(m, name), initial=0.0)) for m in merits.values()))
         ax.set_ylim(bottom=1.1 * factor * low)
     ax.legend(fontsize=7)
     save_figure(path, figure, overwrite=overwrite)
 
 
 def write_merit_table(
-    path: StrPath, found: Mapping[str, Merit], *, overwrite: bool = False
+    path: StrPath, merits: Mapping[str, Merit], *, overwrite: bool = False
 ) -> None:
     """Write a CSV file of :data:`COLUMNS`, a row for each operator and target.
 
@@ -136,7 +136,7 @@ def write_merit_table(
     ):
         writer = csv.writer(file)
         writer.writerow(COLUMNS)
-        for operator, merit in found.items():
+        for operator, merit in merits.items():
             table = (merit.distance, *(getattr(merit, name) for name, _, _ in _FIGURES))
             for row in zip(*table, strict=True):
                 numbers = (merit.noise_figure, *row)

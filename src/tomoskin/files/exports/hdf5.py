@@ -8,7 +8,7 @@ import msgspec
 import numpy as np
 
 from tomoskin.core import StrPath, needed, written
-from tomoskin.files.session import Advance, Block, Rows, SessionReader, all_blocks, told_touches
+from tomoskin.files.session import Advance, Block, Rows, SessionReader, all_blocks, session_touches
 from tomoskin.sensing.track import force_values
 
 _FRAMES = ("number", "time", "host_time", "sequence", "ticks", "mark", "samples", "voltages")
@@ -67,7 +67,7 @@ def _touches(session: SessionReader) -> Any:
     table = [
         (-1 if frame is None else frame, time, t.id, t.said.encode(), t.since,
          r.x, r.y, r.sd_x, r.sd_y, r.area, r.peak, *force_values(r.force))
-        for frame, time, touches in told_touches(session)
+        for frame, time, touches in session_touches(session)
         for t in touches
         for r in [t.detection]
     ]  # fmt: skip

@@ -144,10 +144,10 @@ def _features(pattern: Pattern, rows: Columns) -> dict[str, Any]:
 
 def _statistics(values: Any) -> dict[str, Any]:
     columns = values.reshape(len(values), -1)
-    found = {
+    extent = {
         name: getattr(np, name)(columns, axis=0).tolist() for name in ("min", "max", "mean", "std")
     }
-    return found | {"count": [len(values)]}
+    return extent | {"count": [len(values)]}
 
 
 def _arrays(pa: Any, rows: Columns) -> Columns:
@@ -188,9 +188,9 @@ def _episode(count: int, statistics: Mapping[str, Mapping[str, Any]]) -> dict[st
         "meta/episodes/chunk_index": 0,
         "meta/episodes/file_index": 0,
         **{
-            f"stats/{name}/{kind}": values
-            for name, found in statistics.items()
-            for kind, values in found.items()
+            f"stats/{name}/{kind}": numbers
+            for name, values in statistics.items()
+            for kind, numbers in values.items()
         },
     }
 

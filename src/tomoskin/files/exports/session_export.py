@@ -32,7 +32,7 @@ from tomoskin.files.session import (
     message_counts,
     recording_of,
     replayed,
-    told_touches,
+    session_touches,
 )
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, colour_limit
@@ -100,7 +100,7 @@ class Export:
 
     def touches(self, path: StrPath) -> None:
         """Write a table of the touches; of a session without any, those that a replay finds."""
-        rows, surface = list(told_touches(self.session)), self.session.skin.surface
+        rows, surface = list(session_touches(self.session)), self.session.skin.surface
         forces = has_forces(rows)
         begun = first_scan(self.session)
         write_touches(path, rows, surface, forces=forces, begun=begun, overwrite=self.overwrite)
@@ -151,7 +151,11 @@ WRITERS: dict[str, Callable[[Export, Path], None]] = {
 _TABLES = (".csv", ".parquet", ".npz", ".mat")
 """Files of voltages."""
 
-_BESIDE = {"/touches": "the touches (--touches X.csv)", "/events": "events", "/notes": "notes"}
+_SESSION_ONLY = {
+    "/touches": "the touches (--touches X.csv)",
+    "/events": "events",
+    "/notes": "notes",
+}
 """What only a session or a .h5 holds, by the topic of its messages."""
 
 
@@ -162,5 +166,5 @@ def omitted(session: SessionReader, ending: str) -> tuple[str, ...]:
     name = session.skin.name
     skin = f"the skin (--skin {name if name in Skin.names() else 'with its file'})"
     counts = message_counts(session)
-    beside = [words for topic, words in _BESIDE.items() if counts[topic]]
-    return skin, *beside, *(name for name in session.attachments() if name not in OWN_FILES)
+    extras = [words for topic, words in _SESSION_ONLY.items() if counts[topic]]
+    return skin, *extras, *(name for name in session.attachments() if name not in OWN_FILES)

@@ -42,8 +42,8 @@ def series_files(path: StrPath) -> list[Path]:
     """``path`` (.pvd), and the parts of a series of its name that are there."""
     path = Path(path)
     part = re.compile(rf"{re.escape(path.stem)}_\d{{6,}}\.vtu")
-    beside = path.parent.iterdir() if path.parent.is_dir() else ()
-    return [path, *sorted(file for file in beside if part.fullmatch(file.name))]
+    neighbours = path.parent.iterdir() if path.parent.is_dir() else ()
+    return [path, *sorted(file for file in neighbours if part.fullmatch(file.name))]
 
 
 def write_series(

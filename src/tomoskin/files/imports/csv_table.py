@@ -21,7 +21,7 @@ from tomoskin.sensing.signal import Recording
 
 _COLUMN = re.compile(r"(dv|v)_(\d+)_(\d+)_(\d+)_(\d+)")
 _KNOWN = ("time_s", "idle", "x_m", "y_m")
-_BESIDE = ("frame", "sequence", "ticks", "mark")
+_IGNORED = ("frame", "sequence", "ticks", "mark")
 """Columns that an export has beside them; not needed here."""
 
 
@@ -46,7 +46,7 @@ def parse(lines: Iterable[str], source: str) -> Recording:
     unknown = [
         name
         for name, match in zip(header, matches, strict=True)
-        if match is None and name not in (*_KNOWN, *_BESIDE)
+        if match is None and name not in (*_KNOWN, *_IGNORED)
     ]
     if unknown or len(set(header)) != len(header):
         raise DataError(

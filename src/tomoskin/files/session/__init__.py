@@ -41,7 +41,7 @@ from tomoskin.files.session.replayed import (
     reconstruct_session,
     recorded_calibrations,
     replayed,
-    told_touches,
+    session_touches,
 )
 from tomoskin.files.session.scanned import first_scan, idle_count, scanned_touches
 from tomoskin.files.session.session import Session
@@ -104,11 +104,11 @@ __all__ = [
     "scanned_touches",
     "schema_of",
     "session_info",
+    "session_touches",
     "split",
     "split_names",
     "split_targets",
     "start_time",
     "tick_rate",
-    "told_touches",
     "touches_before",
 ]

@@ -161,7 +161,7 @@ class _Frames:
         self._sequence, self._drops, self._last = frame.sequence, frame.drops, frame.host_time
         self.frames += 1
 
-    def told(self, epoch: float) -> dict[str, Any]:
+    def summary(self, epoch: float) -> dict[str, Any]:
         """The counts by name, with when the frames began, how long they took, and their rate."""
         span = self._last - self._first
         return {name: value for name, value in vars(self).items() if name[0] != "_"} | {
@@ -206,7 +206,7 @@ def session_info(path: StrPath, advance: Advance = no_report) -> SessionInfo:
             skin_identity=session.skin.identity,
             electrodes=session.skin.n_electrodes,
             rows=session.skin.pattern().n_meas,
-            **frames.told(session.epoch),
+            **frames.summary(session.epoch),
             touches=len(spans),
             presses=_begun([len(item.presses) for item in session.truth()]),
             events=dict(Counter(event.kind for event in session.events())),

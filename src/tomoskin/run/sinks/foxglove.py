@@ -58,8 +58,8 @@ class FoxgloveSink(Sink):
         sdk, self._stream = self._sdk, stream
         self._server = self._joined(stream)
         for topic in _TOPICS:
-            found = schema_of(topic)
-            schema = sdk.Schema(name=found.name, encoding=found.encoding, data=found.data)
+            ours = schema_of(topic)
+            schema = sdk.Schema(name=ours.name, encoding=ours.encoding, data=ours.data)
             self._channels[topic] = sdk.Channel(
                 stream.naming.namespace + topic,
                 schema=schema,
