@@ -57,12 +57,13 @@ class MessageLog:
 
     def __init__(
         self,
-        path: Path,
+        path: StrPath,
         *,
         epoch: float,
         start: float,
         channels: Sequence[Channel] = CHANNELS,
     ) -> None:
+        path = Path(path)
         self.path, self.epoch = path, epoch
         self._now, self._prefix, self._first, self._is_open = start, "", 0, True
         check_outputs([Output(path)])

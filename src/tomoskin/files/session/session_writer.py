@@ -57,7 +57,7 @@ def robot_logs(
     The file ends when the last has. Raises OutputError when it exists or cannot be made.
     """
     channels = robot_channels(names)
-    whole = MessageLog(Path(path), epoch=epoch, start=start, channels=channels)
+    whole = MessageLog(path, epoch=epoch, start=start, channels=channels)
     about = {"format": str(FORMAT), "epoch_s": repr(float(epoch)), SKINS: " ".join(names)}
     whole.describe(ABOUT, about)
     return whole.parts(names)
