@@ -20,7 +20,7 @@ from tomoskin.model.pattern import Pattern, Scan
 from tomoskin.model.robot import Place
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Pipeline, Prepared, prepare
-from tomoskin.run.sinks import Moment, Stream, contacts_of
+from tomoskin.run.sinks import Contacts, Stream
 from tomoskin.twin import Press, open_twin
 
 SKINS, CELLS, TIME_CONSTANTS = ("textile-disc-8", "textile-disc-16"), (660, 3000), ("0 s", "0.2 s")
@@ -206,7 +206,7 @@ def processor_times(prepared: Prepared, frames: Sequence[Frame]) -> FloatArray:
         result = pipeline.push(frame)
         marks.append(time.thread_time())
         if result is not None:
-            contacts_of(stream, Moment.of(result, with_image=False))
+            _ = Contacts.of(stream, result).touches
         marks.append(time.thread_time())
         times.append(np.diff(marks))
     return np.array(times[len(frames) :])

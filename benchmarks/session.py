@@ -15,7 +15,7 @@ import numpy as np
 
 from report import Report, resident, table
 from tomoskin.board.wire import encode
-from tomoskin.core import Frame
+from tomoskin.core import Capacity, Frame, Worker
 from tomoskin.files.exports import write_parquet
 from tomoskin.files.session import (
     Mark,
@@ -27,7 +27,6 @@ from tomoskin.files.session import (
 )
 from tomoskin.model.pattern import Scan
 from tomoskin.model.skin import Skin
-from tomoskin.run.sinks import Capacity, Worker
 
 SKIN, RATE = "textile-disc-16", 1000.0
 LONG, PACED = 600, 20

@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import CHANGE, Event, Image, PixelMap, Touch
-from tomoskin.files.session.channels import UNUSED
-from tomoskin.model.mesh import Plane, Surface
+from tomoskin.files.messages.contacts import Contact
 
 _INFO, _WARNING = 2, 3
 _QUIET = frozenset(
@@ -27,10 +26,12 @@ _QUIET = frozenset(
 
 _FLOAT32 = 7
 _FRAME = "skin"
-_FLAT = Plane()
 _TEXT_HEIGHT = 8e-3
 _TEXT_COLOUR = {"r": 0.5, "g": 0.5, "b": 0.5, "a": 1.0}
 _UPRIGHT = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
+
+_UNUSED = ("arrows", "cubes", "cylinders", "lines", "triangles", "models")
+"""Kinds of primitives that an entity of a scene must have a list of, and ours leave empty."""
 
 Message = dict[str, Any]
 
@@ -88,12 +89,12 @@ def grid_message(image: Image, pixels: PixelMap, host_time: float, log_time: int
     }
 
 
-def scene_message(touches: Sequence[Touch], log_time: int, surface: Surface = _FLAT) -> Message:
-    """A ``foxglove.SceneUpdate`` that shows these touches on ``surface``, and no others."""
+def scene_message(contacts: Sequence[Contact], log_time: int) -> Message:
+    """A ``foxglove.SceneUpdate`` that shows these touches in space, and no others."""
     now = _timestamp(log_time)
     return {
         "deletions": [{"timestamp": now, "type": 1, "id": ""}],
-        "entities": [_entity(touch, surface, now) for touch in touches],
+        "entities": [_entity(contact, now) for contact in contacts],
     }
 
 
@@ -103,10 +104,9 @@ def _size(pixels: PixelMap) -> float:
     return 1e-3 if several is None else abs(float(several[1] - several[0]))
 
 
-def _entity(touch: Touch, surface: Surface, now: dict[str, int]) -> Message:
-    detection = touch.detection
+def _entity(contact: Contact, now: dict[str, int]) -> Message:
+    touch, pose = contact.touch, _pose(*contact.position)
     width = touch_width(touch)
-    pose = _pose(*surface.point([[detection.x, detection.y]])[0].tolist())
     return {
         "timestamp": now,
         "frame_id": _FRAME,
@@ -114,9 +114,10 @@ def _entity(touch: Touch, surface: Surface, now: dict[str, int]) -> Message:
         "lifetime": {"sec": 0, "nsec": 0},
         "frame_locked": True,
         "metadata": [
-            {"key": "kind", "value": touch.kind}, {"key": "peak", "value": f"{detection.peak:.4g}"},
+            {"key": "kind", "value": touch.kind},
+            {"key": "peak", "value": f"{touch.detection.peak:.4g}"},
         ],
-        **{kind: [] for kind in UNUSED},
+        **{kind: [] for kind in _UNUSED},
         "spheres": [
             {"pose": pose, "size": {"x": width, "y": width, "z": 0.2 * width},
              "color": touch_colour(touch)}

@@ -13,7 +13,7 @@ from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import Any, Generic, Literal, Protocol, TypeVar
 
-from tomoskin.core import SinkError
+from tomoskin.core.errors import SinkError
 
 _PATIENCE = 2.0
 """Seconds beyond its grace in which a consumer must have ended."""

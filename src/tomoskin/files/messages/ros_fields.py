@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 
 from tomoskin.core import FloatArray, Image, PixelMap
-from tomoskin.files.session import touch_colour, touch_width
+from tomoskin.files.messages.contacts import UNKNOWN, Contact, Contacts
+from tomoskin.files.messages.foxglove_records import touch_colour, touch_width
 from tomoskin.model.robot import Place
-from tomoskin.run.sinks.contact import Contact, Contacts
-from tomoskin.run.sinks.space import UNKNOWN
 
 Value = dict[str, Any]
 
@@ -21,6 +20,7 @@ _LABEL = 8e-3
 _GREY = {"r": 0.5, "g": 0.5, "b": 0.5, "a": 1.0}
 _OK, _WARN, _ERROR = 0, 1, 2
 _FLOAT32 = 7
+_NOT_MEASURED = {"covariance": (UNKNOWN * np.eye(6)).ravel()}
 
 
 def header(stamp: int, frame: str) -> Value:
@@ -31,18 +31,18 @@ def header(stamp: int, frame: str) -> Value:
 
 def pose(contact: Contact) -> Value:
     """``geometry_msgs/PoseWithCovariance``: on the surface, z along the normal."""
-    covariance = contact.pose.covariance(contact.touch.detection)
-    return {"pose": _pose(contact), "covariance": covariance.ravel()}
+    return {"pose": _pose(contact), "covariance": contact.pose_covariance.ravel()}
 
 
 def track(head: Value, contact: Contact) -> Value:
     """``nav_msgs/Odometry``: a pose with the touch's identity; velocities are not measured."""
     name = _name(head, contact)
-    return {"header": head, "child_frame_id": name, "pose": pose(contact), "twist": _AT_REST}
+    return {"header": head, "child_frame_id": name, "pose": pose(contact), "twist": _NOT_MEASURED}
 
 
-def contacts(head: Value, found: Contacts) -> Value:
-    """``tactile_msgs/TactileContacts``; the wrench is NaN where force is not measured."""
+def contacts(head: Value, frame: Contacts) -> Value:
+    """``tactile_msgs/TactileContacts``; a wrench is about the origin of the frame of coordinates,
+    and NaN where force is not measured."""
     return {
         "contacts": [
             {
@@ -50,50 +50,52 @@ def contacts(head: Value, found: Contacts) -> Value:
                 "name": _name(head, contact),
                 "position": _named("xyz", contact.position),
                 "normal": _named("xyz", contact.normal),
-                "wrench": _wrench(_force(contact), np.zeros(3)),
+                "wrench": _wrench(contact.push, contact.torque),
             }
-            for contact in found.touches
+            for contact in frame.touches
         ]
     }
 
 
-def wrench(head: Value, found: Contacts) -> Value:
-    """``geometry_msgs/WrenchStamped``: of all touches, about the frame's origin."""
-    force, torque = np.zeros(3), np.zeros(3)
-    for contact in found.touches:
-        force += _force(contact)
-        torque += np.cross(contact.position, _force(contact))
+def wrench(head: Value, frame: Contacts) -> Value:
+    """``geometry_msgs/WrenchStamped``: of all touches, about the frame's origin.
+
+    It is NaN where touches are not valid, or the force of one is not measured.
+    """
+    nothing = np.full(3, 0.0 if frame.valid else np.nan)
+    force = sum((contact.push for contact in frame.touches), start=nothing)
+    torque = sum((contact.torque for contact in frame.touches), start=nothing)
     return {"header": head, "wrench": _wrench(force, torque)}
 
 
-def markers(head: Value, found: Contacts) -> Value:
+def markers(head: Value, frame: Contacts) -> Value:
     """``visualization_msgs/MarkerArray`` that shows these touches, and no others."""
-    shown = [_NO_MARKER | {"header": head, "action": _DELETE_ALL}]
-    for contact in found.touches:
+    shown = [{"header": head, "action": _DELETE_ALL, "frame_locked": True}]
+    for contact in frame.touches:
         width, place = touch_width(contact.touch), _pose(contact)
-        about = {"header": head, "id": contact.touch.id, "pose": place}
+        about = {"header": head, "id": contact.touch.id, "pose": place, "frame_locked": True}
         sphere = {"ns": "touch", "type": _SPHERE, "color": touch_colour(contact.touch)}
         scale = _named("xyz", (width, width, 0.2 * width))
-        shown.append(_NO_MARKER | about | sphere | {"scale": scale})
+        shown.append(about | sphere | {"scale": scale})
         label = {"ns": "label", "type": _TEXT, "color": _GREY, "text": str(contact.touch.id)}
-        shown.append(_NO_MARKER | about | label | {"scale": _named("xyz", (0.0, 0.0, _LABEL))})
+        shown.append(about | label | {"scale": {"z": _LABEL}})
     return {"markers": shown}
 
 
-def diagnostics(head: Value, found: Contacts, name: str) -> Value:
+def diagnostics(head: Value, frame: Contacts) -> Value:
     """``diagnostic_msgs/DiagnosticArray``: error where touches are not valid."""
-    level = _ERROR if not found.valid else _WARN if found.problem else _OK
+    level = _ERROR if not frame.valid else _WARN if frame.problem else _OK
     values = {
-        "sequence": found.sequence,
-        "latency_s": found.latency,
-        "touches": len(found.touches),
-        "valid": found.valid,
+        "sequence": frame.sequence,
+        "latency_s": frame.latency,
+        "touches": len(frame.touches),
+        "valid": frame.valid,
     }
     status = {
         "level": level,
-        "name": f"{name}: skin",
-        "message": found.problem or "OK",
-        "hardware_id": found.skin,
+        "name": f"{frame.stream.naming.namespace}: skin",
+        "message": frame.problem or "OK",
+        "hardware_id": frame.skin,
         "values": [{"key": key, "value": str(value)} for key, value in values.items()],
     }
     return {"header": head, "status": [status]}
@@ -147,18 +149,12 @@ def points(head: Value, change: Image, places: FloatArray) -> Value:
 def _pose(contact: Contact) -> Value:
     return {
         "position": _named("xyz", contact.position),
-        "orientation": _named("xyzw", contact.pose.quaternion()),
+        "orientation": _named("xyzw", contact.orientation),
     }
 
 
 def _name(head: Value, contact: Contact) -> str:
     return f"{head['frame_id']}/touch_{contact.touch.id}"
-
-
-def _force(contact: Contact) -> FloatArray:
-    """(3,) N, into the body; NaN where it is not measured."""
-    strength = np.nan if contact.force is None else contact.force
-    return -strength * np.array(contact.normal)
 
 
 def _wrench(force: FloatArray, torque: FloatArray) -> Value:
@@ -167,32 +163,3 @@ def _wrench(force: FloatArray, torque: FloatArray) -> Value:
 
 def _named(names: str, values: Sequence[float]) -> Value:
     return dict(zip(names, values, strict=True))
-
-
-_ZERO = _named("xyz", (0.0, 0.0, 0.0))
-_AT_REST = {
-    "twist": {"linear": _ZERO, "angular": _ZERO},
-    "covariance": (UNKNOWN * np.eye(6)).ravel(),
-}
-_NO_TIME = {"sec": 0, "nanosec": 0}
-_NO_MARKER: Value = {
-    "ns": "",
-    "id": 0,
-    "type": 0,
-    "action": 0,
-    "pose": {"position": _ZERO, "orientation": _named("xyzw", (0.0, 0.0, 0.0, 1.0))},
-    "scale": _ZERO,
-    "color": _GREY,
-    "lifetime": _NO_TIME,
-    "frame_locked": True,
-    "points": (),
-    "colors": (),
-    "texture_resource": "",
-    "texture": {"header": header(0, ""), "format": "", "data": b""},
-    "uv_coordinates": (),
-    "text": "",
-    "mesh_resource": "",
-    "mesh_file": {"filename": "", "data": b""},
-    "mesh_use_embedded_materials": False,
-}
-"""A marker without a header, and nothing in it."""
