@@ -8,7 +8,7 @@ import numpy as np
 
 from forward_cases import clock
 from report import Report
-from tomoskin.board.wire import Decoder, PackedFrame, encode
+from tomoskin.board.wire import Decoder, encode
 from tomoskin.core import Frame
 from tomoskin.model.pattern import Pattern, Scan
 
@@ -44,7 +44,7 @@ def row(electrodes: int, packed: bool) -> tuple[object, ...]:
     n = Scan.of(Pattern.adjacent(electrodes)).n_samples
     counts = random.integers(0, 1024, (FRAMES, n)).astype(np.uint16)
     frames = [Frame(k, 1000 * k, 0.0, 7, 0, 0, counts[k]) for k in range(FRAMES)]
-    blocks = [encode(PackedFrame.of(f) if packed else f) for f in frames]
+    blocks = [encode(f, packed=packed) for f in frames]
     stream = b"".join(blocks)
     reads = [stream[at : at + READ] for at in range(0, len(stream), READ)]
     rate = FRAMES / min(_seconds(reads) for _ in range(REPEATS))

@@ -10,7 +10,7 @@ from tomoskin.sensing.signal import FIGURES
 from tomoskin.twin.bend import BendSettings
 from tomoskin.twin.circuit import ElectronicsSettings
 from tomoskin.twin.contact import ContactSettings
-from tomoskin.twin.line import LineSettings
+from tomoskin.twin.faults import LineSettings
 from tomoskin.twin.material import MaterialSettings
 from tomoskin.twin.parameters import check_numbers
 

@@ -9,8 +9,7 @@ from tomoskin.core import Clock, SourceError
 from tomoskin.twin.bend import Pose
 from tomoskin.twin.device import TwinDevice
 from tomoskin.twin.electronics import TwinElectronics
-from tomoskin.twin.faults import Faults
-from tomoskin.twin.line import Line, LineSettings
+from tomoskin.twin.faults import Faults, Line, LineSettings
 from tomoskin.twin.probe import Contact
 from tomoskin.twin.sheet import TwinSkin
 

@@ -7,10 +7,9 @@ from enum import Enum, auto
 import numpy as np
 
 from tomoskin.board.source.agreement import BOARDS_SINCE, check_held, check_version, fit_board
-from tomoskin.board.source.chopping import choose_periods
 from tomoskin.board.source.command_queue import CommandQueue, SequenceFilter
 from tomoskin.board.source.configuration import Configuration
-from tomoskin.board.source.settings import ScanSettings, Timing
+from tomoskin.board.source.settings import ScanSettings, Timing, choose_periods
 from tomoskin.board.wire import (
     SCHEMA,
     Ack,
@@ -221,10 +220,8 @@ class ProtocolSession:
         if isinstance(pending, GetInfo) and info.request == pending.request:
             check_version(info, self._where)
             fitted = fit_board(info, self._scan, self._settings, self._where)
-            self.configuration = self.configuration.on_board(fitted)
             if info.minor < BOARDS_SINCE:  # that is all that it says of itself
-                self.info = info
-                self.commands.add(self.configuration.commands(info.minor))
+                self._fit(info, fitted)
             else:
                 self._met = info, fitted
                 self.commands.add((GetBoard(0),))
@@ -238,10 +235,20 @@ class ProtocolSession:
         info, fitted = self._met
         channels = int(np.bincount(self._scan.sample_drive).max())
         periods = choose_periods(board, fitted, channels, info.tick_rate, self._where)
-        self.configuration = self.configuration.with_periods(periods)
-        self.info, self.board = info, board
-        self.commands.add(self.configuration.commands(info.minor))
+        self._fit(info, fitted, board, periods)
         self._answered(now)
+
+    def _fit(
+        self,
+        info: Info,
+        fitted: ScanSettings,
+        board: BoardLimits | None = None,
+        periods: int = 0,
+    ) -> None:
+        """The board is known: send it the scan as it can do it."""
+        self.info, self.board = info, board
+        self.configuration = self.configuration.on_board(fitted, board, periods)
+        self.commands.add(self.configuration.commands(info.minor))
 
     def _held(self, held: HeldScan | HeldPattern | HeldMode, now: float) -> list[Frame | Event]:
         pending = self.commands.pending

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+import struct
 import tomllib
 from dataclasses import dataclass
 from functools import cached_property
@@ -40,15 +41,20 @@ class FieldSpec:
         """As the schema writes it: ``u16``, ``u8[8]`` or ``drive[]``."""
         return self.item + {0: "[]", 1: ""}.get(self.length, f"[{self.length}]")
 
+    @property
+    def size(self) -> int:
+        """Bytes that it takes; 0 where it fills the payload."""
+        return struct.calcsize("<" + SCALARS[self.item]) * self.length if self.length else 0
+
     @classmethod
     def read(cls, raw: dict[str, Any]) -> Self:
         """From a table of the file."""
-        found = _TYPE.match(raw["type"])
-        if found is None:
+        parts = _TYPE.match(raw["type"])
+        if parts is None:
             raise WireError(f'expected a type such as u16, u8[8] or u16[], got "{raw["type"]}"')
-        length = 1 if found["array"] is None else int(found["length"] or 0)
+        length = 1 if parts["array"] is None else int(parts["length"] or 0)
         return cls(
-            raw["name"], found["item"], length, raw.get("enum", ""), raw.get("unit", ""),
+            raw["name"], parts["item"], length, raw.get("enum", ""), raw.get("unit", ""),
             raw["text"],
         )  # fmt: skip
 
@@ -99,6 +105,7 @@ class Schema:
     structs: dict[str, StructSpec]
     messages: tuple[MessageSpec, ...]
     hash: int
+    """u32 over everything but the sentences; board and host compare it."""
 
     @classmethod
     def read(cls, text: str) -> Self:
@@ -172,8 +179,5 @@ SCHEMA = Schema.read(
 )
 """The schema that this host was made with."""
 
-SCHEMA_HASH = SCHEMA.hash
-"""u32 over everything in the schema but its sentences; board and host compare it."""
-
 OLDER = {(1, 0): 0x8B6ABBBD, (1, 1): 0xF17AB758}
-"""Hashes of the published versions, by major and minor, that this host speaks beside its own."""
+"""Hashes of the published versions, by major and minor, that this host speaks besides its own."""
