@@ -18,8 +18,7 @@ from tomoskin.twin.emulator import (
     BoardProcess,
     Front,
     SkinMemory,
-    build_pico_programs,
-    build_programs,
+    programs_of,
 )
 
 FRAMES = 100_000
@@ -94,7 +93,7 @@ def _ran_pico(electrodes: int, settling: float, frames: int) -> tuple[object, ..
         seen_at = Path(folder) / "watch"
         arms = np.diag(np.arange(1.0, electrodes + 1))
         memory = SkinMemory(Path(folder) / "skin", _PICO_STAR, arms)
-        programs = build_pico_programs()
+        programs = programs_of("pico")
         board = BoardProcess(programs, memory.path, _PICO_STAR.current, "-f", "-w", str(seen_at))
         patient = Timing(answer=5.0, silence=60.0)  # its time goes slower than the host's
         with Link(SerialTransport(board.port), scan, settings, timing=patient) as link:
@@ -129,7 +128,7 @@ def _ran(electrodes: int, oversampling: int) -> tuple[object, ...]:
     wanted = _expected(scan, _STAR, oversampling)
     with tempfile.TemporaryDirectory() as folder:
         memory = SkinMemory(Path(folder) / "skin", _STAR, np.diag(arms))
-        board = BoardProcess(build_programs(), memory.path, _STAR.current, "-f")
+        board = BoardProcess(programs_of("mega"), memory.path, _STAR.current, "-f")
         began = time.monotonic()
         # emulated time runs faster than the host's: so must the heartbeat
         with Link(SerialTransport(board.port), scan, settings, timing=Timing(ping=0.02)) as link:

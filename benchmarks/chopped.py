@@ -9,14 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from report import Report
-from tomoskin.board.source import Link, ScanSettings, SerialTransport, Timing
+from tomoskin.board.source import BOARDS, Link, ScanSettings, SerialTransport, Timing
 from tomoskin.core import FloatArray, Frame
 from tomoskin.model.pattern import Pattern, Scan
 from tomoskin.model.skin import Skin
 from tomoskin.sensing.signal import FIGURES, Readout
 from tomoskin.twin import TwinSettings, make_electronics, table_of
-from tomoskin.twin.emulator import BoardProcess, Front, OwnVoltages, SkinMemory
-from tomoskin.twin.emulator.source import BOARDS, programs_of
+from tomoskin.twin.emulator import BoardProcess, Front, OwnVoltages, SkinMemory, programs_of
 
 FRAMES = 100
 SECONDS, SEED = 60.0, 3

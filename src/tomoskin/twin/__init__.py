@@ -33,7 +33,13 @@ from tomoskin.twin.script import Script
 from tomoskin.twin.script_check import check_script, check_settling
 from tomoskin.twin.shape import FACES, Circle, Face, Finger, Shape, Square
 from tomoskin.twin.sheet import TwinSkin
-from tomoskin.twin.source import make_electronics, make_twin, open_twin, read_settings
+from tomoskin.twin.source import (
+    make_electronics,
+    make_twin,
+    on_converter,
+    open_twin,
+    read_settings,
+)
 from tomoskin.twin.stepped import Step, SteppedSkin
 from tomoskin.twin.transport import TwinTransport
 
@@ -97,6 +103,7 @@ __all__ = [
     "make_electronics",
     "make_shard",
     "make_twin",
+    "on_converter",
     "open_twin",
     "pressed",
     "read_settings",

@@ -7,6 +7,7 @@ from tomoskin.board.source.boards import (
     BoardFigures,
     BoardRecord,
     Converter,
+    FirmwareFiles,
     board_named,
     read_boards,
 )
@@ -45,6 +46,7 @@ __all__ = [
     "Configuration",
     "Converter",
     "Exchange",
+    "FirmwareFiles",
     "FrameCounters",
     "Link",
     "Port",

@@ -42,6 +42,7 @@ class Chop(_Record, frozen=True, kw_only=True):
 class FirmwareFiles(_Record, frozen=True, kw_only=True):
     """How a board's firmware is built, and what comes of it; ``{}`` is the number of channels."""
 
+    folder: str
     make: str
     program: str
     make_image: str
@@ -56,7 +57,7 @@ class BoardFigures(_Record, frozen=True, kw_only=True):
     Attributes
     ----------
     noise
-        Standard deviation of one conversion before it is rounded, LSB.
+        Standard deviation of one conversion before it is rounded, LSB of ten bits.
     input_noise, amplifier_noise
         The same at the amplifier's input, V; that of amplifier and current alone, V.
     compliance
@@ -100,12 +101,12 @@ class BoardRecord(_Record, frozen=True, kw_only=True):
     gain: float
     reference: float
     converter: Converter
+    electronics: BoardFigures
     chop: Chop = Chop()
     usb: tuple[tuple[int, int], ...] = ()
     flash: Literal["avrdude", "uf2", ""] = ""
     emulator: Literal["simavr", "rp2040js", ""] = ""
     firmware: FirmwareFiles | None = None
-    electronics: BoardFigures | None = None
 
     @property
     def limits(self) -> BoardLimits:
@@ -115,8 +116,15 @@ class BoardRecord(_Record, frozen=True, kw_only=True):
 
 
 def read_boards(text: str) -> dict[str, BoardRecord]:
-    """The records of a file, by the names that options and commands give them."""
-    return msgspec.convert(tomllib.loads(text), dict[str, BoardRecord])
+    """The records of a file, by the names that options and commands give them.
+
+    A board whose electronics were not simulated is taken to have those of the first.
+    """
+    tables = tomllib.loads(text)
+    first = next(iter(tables.values()))
+    for table in tables.values():
+        table.setdefault("electronics", first.get("electronics"))
+    return msgspec.convert(tables, dict[str, BoardRecord])
 
 
 BOARDS = read_boards(

@@ -14,7 +14,7 @@ from tomoskin.board.source.configuration import Configuration
 from tomoskin.board.source.protocol_session import ProtocolSession, Stage
 from tomoskin.board.source.settings import ScanSettings, Timing
 from tomoskin.board.source.transport import Diagnosable, Fetched, Played, Transport
-from tomoskin.board.wire import Ack, Counters, Decoder, Info
+from tomoskin.board.wire import Ack, BoardLimits, Counters, Decoder, Info
 from tomoskin.core import Event, Frame, SourceError
 from tomoskin.model.pattern import Scan
 
@@ -74,9 +74,9 @@ class Link(AbstractContextManager["Link"]):
         return self._session.info
 
     @property
-    def board_name(self) -> str:
-        """What the board calls itself; empty before protocol 1.2."""
-        return self._session.board.text if self._session.board else ""
+    def board(self) -> BoardLimits | None:
+        """The board's name and bounds, once it has said them; None before protocol 1.2."""
+        return self._session.board
 
     @property
     def configuration(self) -> Configuration:

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import mmap
+import secrets
 import struct
 import subprocess
 import tempfile
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import astuple, dataclass, field
+from dataclasses import astuple, dataclass, field, replace
 from pathlib import Path
-from typing import IO, Protocol
+from typing import IO, Protocol, Self
 
 import numpy as np
 
+from tomoskin.board.wire import Info
 from tomoskin.core import FloatArray, SourceError, StrPath
-from tomoskin.twin.emulator.flash import BoardIdentity
 
 MOST_ELECTRODES = 32
 _MAGIC = 0x31306E696B736F74
@@ -141,6 +142,41 @@ class SkinMemory:
     def close(self) -> None:
         """Free the shared memory."""
         self._map.close()
+
+
+_EEPROM = struct.Struct("<I8s")
+_NEVER_WRITTEN = b"\xff" * 8
+
+
+@dataclass(frozen=True, slots=True)
+class BoardIdentity:
+    """What only the one who built a board knows: the setting of its current limiter, and its id.
+
+    ``current`` A; ``unique_id``: eight bytes. They are the first bytes of its EEPROM. ``board``:
+    what its firmware calls it; empty before protocol 1.2.
+    """
+
+    current: float
+    unique_id: bytes
+    board: str = ""
+
+    @classmethod
+    def of(cls, info: Info, board: str) -> Self:
+        """The identity that the firmware reports."""
+        return cls(info.current / 1e6, info.unique_id, board)
+
+    def change(self, current: float | None, name: str | None) -> Self:
+        """With what is not None; a board that never had an id gets one."""
+        unique_id = self.unique_id if name is None else name.encode().ljust(8, b"\0")
+        if unique_id == _NEVER_WRITTEN:
+            unique_id = secrets.token_bytes(8)
+        return replace(
+            self, current=self.current if current is None else current, unique_id=unique_id
+        )
+
+    def pack(self) -> bytes:
+        """As the firmware reads it: µA, then the id."""
+        return _EEPROM.pack(round(self.current * 1e6), self.unique_id)
 
 
 class BoardPrograms(Protocol):

@@ -1,10 +1,13 @@
-"""UF2, the form in which a Pico takes its firmware: blocks of 256 bytes for its boot drive."""
+"""UF2, the form in which a Pico takes its firmware through its boot drive: blocks of 256 bytes."""
 
 from __future__ import annotations
 
+import os
 import struct
+from collections.abc import Iterable
+from pathlib import Path
 
-from tomoskin.core import SourceError
+from tomoskin.core import SourceError, StrPath
 
 RP2040 = 0xE48BFF56
 """The family that the RP2040's boot ROM asks for."""
@@ -20,6 +23,14 @@ _BLOCK = 512
 PAGE = 256
 """Bytes of flash in a block."""
 
+_SETTINGS = 0x1FF000
+"""Where the flash's last sector begins: ``firmware/pico/flash.c``."""
+
+_MOUNTS = ("/media", "/run/media", "/Volumes", "/mnt")
+_ABOUT, _WRITTEN = "INFO_UF2.TXT", "tomoskin.uf2"
+_DEPTHS = (_ABOUT, f"*/{_ABOUT}", f"*/*/{_ABOUT}")
+_HINT = "hold BOOTSEL while you plug the Pico in: it shows itself as a drive, RPI-RP2"
+
 _STAGE = 252
 """Bytes of the boot's second stage; its checksum follows."""
 
@@ -33,6 +44,19 @@ def pack_uf2(image: bytes, address: int = FLASH) -> bytes:
         + _END
         for k, page in enumerate(pages)
     )
+
+
+def uf2_of(image: Path) -> bytes:
+    """The UF2 of a Pico's firmware; SourceError where its boot ROM would not run that."""
+    data = image.read_bytes()
+    check_boot(data, str(image))
+    return pack_uf2(data)
+
+
+def settings_uf2(current: float) -> bytes:
+    """The UF2 that says what a Pico's current limiter is set to, A; its firmware stays."""
+    page = struct.pack("<I", round(current * 1e6)).ljust(PAGE, b"\xff")
+    return pack_uf2(page, FLASH + _SETTINGS)
 
 
 def unpack_uf2(data: bytes, where: str) -> dict[int, bytes]:
@@ -68,11 +92,11 @@ def unpack_uf2(data: bytes, where: str) -> dict[int, bytes]:
 def check_boot(image: bytes, where: str) -> None:
     """Raise SourceError unless the boot ROM would run ``image``: it checks the second stage."""
     expected = boot_checksum(image[:_STAGE])
-    (found,) = struct.unpack_from("<I", image, _STAGE)
-    if found != expected:
+    (held,) = struct.unpack_from("<I", image, _STAGE)
+    if held != expected:
         raise SourceError(
             f"expected the checksum 0x{expected:08X} of the boot's second stage, "
-            f"found 0x{found:08X}",
+            f"found 0x{held:08X}",
             where=where,
             hint="a Pico would not start: correct the last word of firmware/pico/boot2.S",
         )
@@ -86,6 +110,58 @@ def boot_checksum(stage: bytes) -> int:
         for _ in range(8):
             crc = (crc << 1 ^ (0x04C11DB7 if crc >> 31 else 0)) & 0xFFFFFFFF
     return crc
+
+
+def write_uf2(uf2: bytes, drive: StrPath) -> None:
+    """Write ``uf2`` to the boot ``drive`` of a Pico; SourceError when either is another's."""
+    drive = Path(drive)
+    unpack_uf2(uf2, "the file")
+    about = drive / _ABOUT
+    board = _board_of(about)
+    if "RP2" not in board:
+        raise SourceError(
+            f"expected the boot drive of a Pico (Board-ID RPI-RP2), found {board or 'none'}",
+            where=str(drive),
+            hint=_HINT,
+        )
+    try:
+        part = drive / _WRITTEN  # the board takes it as it comes, and nothing is there before
+        with part.open("wb") as file:
+            file.write(uf2)
+            file.flush()
+            os.fsync(file.fileno())
+    except OSError as error:
+        raise SourceError(f"could not write: {error}", where=str(drive), hint=_HINT) from None
+
+
+def find_boot_drive(roots: Iterable[StrPath] | None = None) -> Path:
+    """The boot drive of the only Pico that waits for its firmware.
+
+    Raises
+    ------
+    SourceError
+        When there is none, or more than one.
+    """
+    tops = [Path(root) for root in (_MOUNTS if roots is None else roots)]
+    folders = [about.parent for top in tops for depth in _DEPTHS for about in top.glob(depth)]
+    drives = [drive for drive in folders if "RP2" in _board_of(drive / _ABOUT)]
+    if len(drives) != 1:
+        names = ", ".join(map(str, drives)) or "none"
+        raise SourceError(
+            f"expected one boot drive of a Pico, found {names}",
+            where="firmware flash",
+            hint=f"{_HINT}; or name where it is mounted",
+        )
+    return drives[0]
+
+
+def _board_of(about: Path) -> str:
+    """What a boot drive calls its board; empty where it is none."""
+    try:
+        lines = about.read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        return ""
+    return next((line.partition(":")[2].strip() for line in lines if "Board-ID" in line), "")
 
 
 def _bad(where: str, what: str) -> SourceError:
