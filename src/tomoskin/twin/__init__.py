@@ -18,7 +18,6 @@ from tomoskin.twin.faults import (
     reboots,
 )
 from tomoskin.twin.labelled import COMMON_PRESSES, Population, SetPlan, make_shard
-from tomoskin.twin.layered import Inclusion, Layered, Plate
 from tomoskin.twin.material import MaterialSettings, MaterialState, advance, conductivity
 from tomoskin.twin.presets import PRESETS, TwinSettings
 from tomoskin.twin.probe import Contact, Press, Probe
@@ -61,15 +60,12 @@ __all__ = [
     "Finger",
     "Grid",
     "HeldScanning",
-    "Inclusion",
-    "Layered",
     "Line",
     "LineSettings",
     "Lines",
     "Load",
     "MaterialSettings",
     "MaterialState",
-    "Plate",
     "Population",
     "Pose",
     "Press",

@@ -59,36 +59,6 @@ def settings_uf2(current: float) -> bytes:
     return pack_uf2(page, FLASH + _SETTINGS)
 
 
-def unpack_uf2(data: bytes, where: str) -> dict[int, bytes]:
-    """Pages of 256 bytes by address. Raises SourceError for what a Pico would not take."""
-    if not data or len(data) % _BLOCK:
-        raise _bad(where, f"expected blocks of {_BLOCK} bytes, found {len(data)} bytes")
-    pages: dict[int, bytes] = {}
-    numbers, total = set(), 0
-    for at in range(0, len(data), _BLOCK):
-        first, second, flags, address, size, number, total, family = _HEAD.unpack_from(data, at)
-        if (first, second) != _MAGIC or data[at + _BLOCK - 4 : at + _BLOCK] != _END:
-            raise _bad(where, f"expected the marks of UF2 at byte {at}, found others")
-        if not flags & _HAS_FAMILY or family != RP2040:
-            found = f"{family:08x}" if flags & _HAS_FAMILY else "none"
-            raise SourceError(
-                f"expected firmware of the family {RP2040:08x} (RP2040), found {found}",
-                where=where,
-                hint="this UF2 is for another board: tomoskin firmware build --board pico",
-            )
-        if size != PAGE:
-            raise _bad(where, f"expected {PAGE} bytes in a block, found {size}")
-        if number in numbers or address in pages:
-            raise _bad(where, f"expected each block once, found block {number} again")
-        numbers.add(number)
-        pages[address] = data[at + _HEAD.size : at + _HEAD.size + PAGE]
-    missing = sorted(set(range(total)) - numbers)
-    if missing or len(numbers) > total:
-        what = f"block {missing[0]} is missing" if missing else "it says fewer"
-        raise _bad(where, f"expected {total} blocks, found {len(numbers)}: {what}")
-    return pages
-
-
 def check_boot(image: bytes, where: str) -> None:
     """Raise SourceError unless the boot ROM would run ``image``: it checks the second stage."""
     expected = boot_checksum(image[:_STAGE])
@@ -113,9 +83,8 @@ def boot_checksum(stage: bytes) -> int:
 
 
 def write_uf2(uf2: bytes, drive: StrPath) -> None:
-    """Write ``uf2`` to the boot ``drive`` of a Pico; SourceError when either is another's."""
+    """Write ``uf2`` to the boot ``drive`` of a Pico; SourceError when it is another's."""
     drive = Path(drive)
-    unpack_uf2(uf2, "the file")
     about = drive / _ABOUT
     board = _board_of(about)
     if "RP2" not in board:
@@ -162,7 +131,3 @@ def _board_of(about: Path) -> str:
     except OSError:
         return ""
     return next((line.partition(":")[2].strip() for line in lines if "Board-ID" in line), "")
-
-
-def _bad(where: str, what: str) -> SourceError:
-    return SourceError(f"no UF2: {what}", where=where, hint="build it again")
