@@ -9,7 +9,7 @@ from functools import lru_cache
 from typing import NamedTuple, Self
 
 import numpy as np
-from scipy.ndimage import gaussian_filter
+from scipy.ndimage import gaussian_filter, map_coordinates
 
 from tomoskin.core import FloatArray
 from tomoskin.model.forward import choose_engine
@@ -168,17 +168,16 @@ def _placed(probe: Contact, settings: ContactSettings, blur: float) -> _Placed:
 
 
 def _felt(placed: Sequence[_Placed], x: FloatArray, y: FloatArray) -> FloatArray:
-    """(4, n) strain and depth of all dents together at points (n,)."""
+    """(4, n) strain and depth of all dents together at points (n,), as the native engine has it."""
     total = np.zeros((4, len(x)))
     for table, (n, step, reach), (px, py, c, s) in placed:
         ax, ay = x - px, y - py
         near = np.flatnonzero(ax * ax + ay * ay < reach**2)
         ax, ay = ax[near] / step, ay[near] / step
-        values = _read(table, n, c * ax + s * ay, c * ay - s * ax)
-        if s:
-            values[:3] = _turn(math.atan2(s, c)) @ values[:3]
-        for row, felt in zip(total, values, strict=True):
-            row[near] += felt
+        at = np.stack([c * ax + s * ay, c * ay - s * ax]) + n // 2
+        values = np.stack([map_coordinates(one, at, order=1) for one in table.T.reshape(4, n, n)])
+        values[:3] = _turn(math.atan2(s, c)) @ values[:3]
+        total[:, near] += values
     return total
 
 
@@ -219,29 +218,6 @@ def _rungs(shape: Shape, force: float) -> list[tuple[float, float]]:
     below, above = (_LEAST_FORCE * _LADDER**k for k in (low, low + 1))
     part = (most - below) / (above - below)
     return [(below, 1 - part), (above, part)]
-
-
-def _read(table: FloatArray, n: int, x: FloatArray, y: FloatArray) -> FloatArray:
-    """Values (4, m) at points, in steps from the middle of the grid, linear between its nodes."""
-    x, y = x + n // 2, y + n // 2
-    i, j = x.astype(np.int64), y.astype(np.int64)
-    first, right, up = i * n + j, _by_four(x - i), _by_four(y - j)
-    at = [table.take(first + corner, axis=0) for corner in (0, 1, n, n + 1)]
-    between = _between(_between(at[0], at[1], up), _between(at[2], at[3], up), right)
-    return np.ascontiguousarray(between.T)
-
-
-def _by_four(part: FloatArray) -> FloatArray:
-    """(m, 4): alike in each row, which numpy multiplies faster than a broadcast column."""
-    return part.repeat(4).reshape(-1, 4)
-
-
-def _between(low: FloatArray, high: FloatArray, part: FloatArray) -> FloatArray:
-    """So far from ``low`` to ``high``, which is overwritten."""
-    high -= low
-    high *= part
-    high += low
-    return high
 
 
 def _fading(grid: Grid) -> FloatArray:
