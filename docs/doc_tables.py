@@ -64,13 +64,13 @@ def schema_tables() -> str:
                 head = [["0", "type", "u8", f"0x{message.type:02X}"]]
                 parts.append(_table(_BYTES, [*head, *_field_rows(message.fields, 1)]))
     parts.append("## Groups and values\n")
-    for struct in SCHEMA.structs.values():
+    for name, struct in SCHEMA.structs.items():
         table = _table(_BYTES, _field_rows(struct.fields, 0))
-        parts.append(f"### {struct.name}\n\n{struct.text}.\n\n{table}")
-    for enum in SCHEMA.enums.values():
-        rows = [[str(value), name, text] for name, value, text in enum.values]
+        parts.append(f"### {name}\n\n{struct.text}.\n\n{table}")
+    for name, enum in SCHEMA.enums.items():
+        rows = [[str(one.value), one.name, one.text] for one in enum.values]
         table = _table(["value", "name", "meaning"], rows)
-        parts.append(f"### {enum.name}\n\n{enum.text}.\n\n{table}")
+        parts.append(f"### {name}\n\n{enum.text}.\n\n{table}")
     return "\n".join(parts)
 
 

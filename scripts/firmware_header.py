@@ -38,13 +38,11 @@ def header(schema: Schema) -> str:
     ]
     for message in schema.messages:
         parts.append(_message(message.name, message.type, message.fields))
-    for struct in schema.structs.values():
-        lines, size = _places(struct.name.upper(), struct.fields, 0)
-        parts.append("\n".join([*lines, f"#define SIZE_{struct.name.upper()} {size}u"]))
-    for enum in schema.enums.values():
-        values = "\n".join(
-            f"#define {enum.name.upper()}_{name} {value}u" for name, value, _ in enum.values
-        )
+    for name, struct in schema.structs.items():
+        lines, size = _places(name.upper(), struct.fields, 0)
+        parts.append("\n".join([*lines, f"#define SIZE_{name.upper()} {size}u"]))
+    for name, enum in schema.enums.items():
+        values = "\n".join(f"#define {name.upper()}_{one.name} {one.value}u" for one in enum.values)
         parts.append(f"/* {enum.text}. */\n{values}")
     return "\n\n".join([*parts, "#endif"]) + "\n"
 
@@ -67,15 +65,16 @@ def _places(prefix: str, fields: tuple[FieldSpec, ...], start: int) -> tuple[lis
 def stub(schema: Schema) -> str:
     """Return the types of the records, for type checkers and for readers of the code."""
     parts = [_STUB_HEAD]
-    for enum in schema.enums.values():
-        base = "IntFlag" if enum.name == "flag" else "IntEnum"
-        values = "".join(f"    {name} = {value}\n" for name, value, _ in enum.values)
-        parts.append(f'class {class_name(enum.name)}({base}):\n    """{enum.text}."""\n\n{values}')
+    for name, enum in schema.enums.items():
+        base = "IntFlag" if name == "flag" else "IntEnum"
+        values = "".join(f"    {one.name} = {one.value}\n" for one in enum.values)
+        parts.append(f'class {class_name(name)}({base}):\n    """{enum.text}."""\n\n{values}')
     records = [message for message in schema.messages if message.name not in FRAMES]
-    for record in (*schema.structs.values(), *records):
+    named = [*schema.structs.items(), *((record.name, record) for record in records)]
+    for name, record in named:
         base = "(Named)" if any(field.name == "name" for field in record.fields) else ""
         fields = "".join(f"    {field.name}: {_annotation(field)}\n" for field in record.fields)
-        head = f'class {class_name(record.name)}{base}:\n    """{_short(record.text)}."""'
+        head = f'class {class_name(name)}{base}:\n    """{_short(record.text)}."""'
         parts.append(f"@dataclass(frozen=True, slots=True)\n{head}\n\n{fields}")
     for name, to_device in (("Command", True), ("_Report", False)):
         names = [class_name(record.name) for record in records if record.to_device == to_device]

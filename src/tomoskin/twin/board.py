@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import Self
 
 from tomoskin.board.source import (
@@ -216,10 +216,7 @@ class HeldScanning:
         if scan is None:
             return Ack(request, type_byte(type(command)), Result.WRONG_CONFIGURATION, 0)
         if isinstance(command, GetScan):
-            return HeldScan(
-                request, scan.configuration, scan.n_drives, scan.settling, scan.dead_time,
-                scan.oversampling, scan.prescaler, scan.current_limit, self.format,
-            )  # fmt: skip
+            return HeldScan(*(request, *astuple(scan)[1:], self.format))
         if isinstance(command, GetMode):
             mode = self.mode or SetMode(0, 0, DriveMode.DIRECT, 0, 0)
             return HeldMode(request, scan.configuration, mode.mode, mode.frequency, mode.periods)

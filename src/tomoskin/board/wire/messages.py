@@ -48,7 +48,7 @@ def class_name(name: str) -> str:
 
 
 def _enumeration(name: str) -> type[Enum]:
-    members = [(key, value) for key, value, _ in SCHEMA.enums[name].values]
+    members = [(one.name, one.value) for one in SCHEMA.enums[name].values]
     kind = IntFlag if name == "flag" else IntEnum
     made: type[Enum] = kind(class_name(name), members, module=__name__)  # type: ignore[arg-type]
     return made
@@ -73,8 +73,8 @@ def _type(field: FieldSpec) -> Any:
 
 
 STRUCTS: dict[str, type] = {}
-for _one in SCHEMA.structs.values():
-    STRUCTS[_one.name] = _record(_one.name, _one.text, _one.fields)
+for _name, _group in SCHEMA.structs.items():
+    STRUCTS[_name] = _record(_name, _group.text, _group.fields)
 
 RECORDS: dict[str, type] = {
     message.name: Frame
