@@ -2,7 +2,7 @@
 
 Each page is written by hand down to its mark. Below stand the keys of the skin file
 (skin-file.md), of a script (simulate.md) and of a robot (robot-file.md), the numbers of the
-twin (twin.md), and the messages between board and host (protocol.md).
+twin (twin.md), the messages between board and host (protocol.md), and the boards (firmware.md).
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+from tomoskin.board.source import BOARDS
 from tomoskin.board.wire import SCHEMA
 from tomoskin.board.wire.schema import FieldSpec
 from tomoskin.model.robot import SECTIONS as ROBOT_SECTIONS
@@ -74,6 +75,23 @@ def schema_tables() -> str:
     return "\n".join(parts)
 
 
+def board_table() -> str:
+    """What the records of the boards say, a row a board."""
+    head = ["name", "board", "channels", "converter", "values in a frame", "alternating drive"]
+    rows = (
+        [
+            f"`{name}`",
+            board.text,
+            ", ".join(map(str, board.channels)),
+            f"{board.adc_bits} bits, {1e6 * board.converter.conversion(64):g} µs",
+            str(board.max_samples),
+            f"{board.chop.min_chop} to {board.chop.max_chop} Hz" if board.chop.max_chop else "none",
+        ]
+        for name, board in BOARDS.items()
+    )
+    return f"### The boards\n\n{_table(head, rows)}"
+
+
 _BYTES = ["byte", "field", "type", "meaning"]
 
 
@@ -91,6 +109,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "robot-file.md": lambda: tables(ROBOT_SECTIONS.values()),
     "twin.md": parameter_tables,
     "protocol.md": schema_tables,
+    "firmware.md": board_table,
 }
 
 
