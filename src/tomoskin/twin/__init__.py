@@ -33,6 +33,7 @@ from tomoskin.twin.script_check import check_script, check_settling
 from tomoskin.twin.shape import FACES, Circle, Face, Finger, Shape, Square
 from tomoskin.twin.sheet import TwinSkin
 from tomoskin.twin.source import (
+    TwinTransport,
     make_electronics,
     make_twin,
     on_converter,
@@ -40,7 +41,6 @@ from tomoskin.twin.source import (
     read_settings,
 )
 from tomoskin.twin.stepped import Step, SteppedSkin
-from tomoskin.twin.transport import TwinTransport
 
 __all__ = [
     "COMMON_PRESSES",

@@ -1,7 +1,14 @@
 """Bytes ↔ messages, from one schema that the firmware shares. Sans-IO."""
 
-from tomoskin.board.wire.codec import decode_payload, encode, encode_payload, is_command, type_byte
-from tomoskin.board.wire.decoder import Counters, Decoder
+from tomoskin.board.wire.codec import (
+    Counters,
+    Decoder,
+    decode_payload,
+    encode,
+    encode_payload,
+    is_command,
+    type_byte,
+)
 from tomoskin.board.wire.framing import Deframer, cobs_decode, cobs_encode, crc16, enclose
 from tomoskin.board.wire.messages import (
     ENUMS,
