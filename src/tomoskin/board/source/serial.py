@@ -180,8 +180,8 @@ class SerialTransport:
         rate, answer, end = self.rate, b"", time.monotonic() + _ASKED
         self.use_rate(SIGN_ON_RATE)
         self.write(SIGN_ON)
-        while (left := end - time.monotonic()) > 0 and not is_bootloader(answer):
-            answer += self.read(left)
+        while (rest := end - time.monotonic()) > 0 and not is_bootloader(answer):
+            answer += self.read(rest)
         self.use_rate(rate)
         return answer
 

@@ -139,6 +139,6 @@ class Exchange:
     def listen(self, seconds: float) -> Iterator[Message]:
         """What comes within ``seconds``."""
         end = time.monotonic() + seconds
-        while (left := end - time.monotonic()) > 0:
-            data = self.transport.read(left)
+        while (rest := end - time.monotonic()) > 0:
+            data = self.transport.read(rest)
             yield from self._decoder.feed(data, time.monotonic())

@@ -159,9 +159,9 @@ def _avrdude(port: str, *words: str) -> None:
     except subprocess.TimeoutExpired:
         raise SourceError(f"nothing after {_LONGEST:.0f} s", where=where, hint=_HINT) from None
     if done.returncode:
-        said = "; ".join(line.strip() for line in done.stderr.splitlines() if line.strip())
+        complaint = "; ".join(line.strip() for line in done.stderr.splitlines() if line.strip())
         raise SourceError(
-            f"could not write: {said or 'it did not say why'}",
+            f"could not write: {complaint or 'it did not say why'}",
             where=where,
             hint=_HINT,
         )

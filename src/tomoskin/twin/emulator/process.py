@@ -183,9 +183,9 @@ class BoardPrograms(Protocol):
     """The firmware of a board, and the emulator that runs it."""
 
     def power_on(
-        self, options: Sequence[str | Path], said: IO[bytes]
+        self, options: Sequence[str | Path], stderr: IO[bytes]
     ) -> tuple[subprocess.Popen[bytes], str]:
-        """The emulator's process, whose stderr goes to ``said``, and the board's serial port.
+        """The emulator's process, whose stderr goes to ``stderr``, and the board's serial port.
 
         The port is empty when it does not start.
         """
@@ -204,9 +204,9 @@ class BoardProcess:
         memory = Path(memory)
         eeprom = memory.with_name("eeprom")
         eeprom.write_bytes(BoardIdentity(current, b"emulated").pack())
-        self._said = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as the process
+        self._stderr = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as the process
         own = ("-d", "-s", memory, "-e", eeprom)
-        self._process, self.port = programs.power_on((*own, *options), self._said)
+        self._process, self.port = programs.power_on((*own, *options), self._stderr)
         if not self.port:
             self.close()
             raise SourceError(f"the emulator does not start: {self.last_words}", where="emulator")
@@ -219,12 +219,12 @@ class BoardProcess:
     @property
     def complaints(self) -> str:
         """What the emulator has said of switches that were misused; empty when none were."""
-        self._said.seek(0)
-        return self._said.read().decode(errors="replace")
+        self._stderr.seek(0)
+        return self._stderr.read().decode(errors="replace")
 
     def close(self) -> None:
         """Switch the board off."""
-        if self._said.closed:
+        if self._stderr.closed:
             return
         self._process.kill()
         self._process.wait()
@@ -232,4 +232,4 @@ class BoardProcess:
             assert pipe is not None
             pipe.close()
         self.last_words = self.complaints.strip()
-        self._said.close()
+        self._stderr.close()

@@ -40,10 +40,10 @@ class Programs:
     emulator: Path
 
     def power_on(
-        self, options: Sequence[str | Path], said: IO[bytes]
+        self, options: Sequence[str | Path], stderr: IO[bytes]
     ) -> tuple[subprocess.Popen[bytes], str]:
         """See :class:`BoardPrograms`; options as in ``firmware/emulator/emulator.c``."""
-        process = _started([self.emulator, *options, self.elf], said)
+        process = _started([self.emulator, *options, self.elf], stderr)
         assert process.stdout is not None
         return process, process.stdout.readline().decode().strip()
 
@@ -56,7 +56,7 @@ class PicoPrograms:
     node: Path
 
     def power_on(
-        self, options: Sequence[str | Path], said: IO[bytes]
+        self, options: Sequence[str | Path], stderr: IO[bytes]
     ) -> tuple[subprocess.Popen[bytes], str]:
         """See :class:`BoardPrograms`; options as in ``firmware/pico/emulator/main.mjs``."""
         line, port = os.openpty()
@@ -64,16 +64,16 @@ class PicoPrograms:
         os.set_blocking(line, False)
         name = os.ttyname(port)
         words = [self.node, _NODE_EMULATOR, "-p", str(line), *options, self.image]
-        process = _started(words, said, line, port)  # with its port open the line stays up
+        process = _started(words, stderr, line, port)  # with its port open the line stays up
         os.close(line)
         os.close(port)
         assert process.stdout is not None
         return process, name if process.stdout.readline() else ""
 
 
-def _started(words: Sequence[str | Path], said: IO[bytes], *fds: int) -> subprocess.Popen[bytes]:
+def _started(words: Sequence[str | Path], stderr: IO[bytes], *fds: int) -> subprocess.Popen[bytes]:
     pipe = subprocess.PIPE
-    return subprocess.Popen(words, stdin=pipe, stdout=pipe, stderr=said, pass_fds=fds)
+    return subprocess.Popen(words, stdin=pipe, stdout=pipe, stderr=stderr, pass_fds=fds)
 
 
 def programs_of(board: str) -> BoardPrograms:
