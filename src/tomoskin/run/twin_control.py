@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import threading
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any, Protocol, runtime_checkable
 
 from tomoskin.core import TomoskinError, WireError
@@ -209,10 +209,13 @@ def _felt(
 
 def described(contact: Contact) -> dict[str, Any]:
     """A press as a recording describes it: by the circle with the area of its face."""
-    place = {key: getattr(contact, key) for key in ("x", "y", "force", "radius")}
     if isinstance(contact, Press):
-        return place
-    return place | {
+        return asdict(contact)
+    return {
+        "x": contact.x,
+        "y": contact.y,
+        "force": contact.force,
+        "radius": contact.radius,
         "angle": contact.angle,
         "shape": type(contact.shape).__name__.lower(),
     }

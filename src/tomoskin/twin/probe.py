@@ -49,16 +49,8 @@ class Probe:
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        if not (math.isfinite(self.x) and math.isfinite(self.y)):
-            raise GeometryError(
-                f"expected a finite position, got ({self.x}, {self.y})", where="press"
-            )
-        if not 0 <= self.force < math.inf:
-            raise ModelError(
-                f"expected a force of 0 N or more, got {self.force}",
-                where="press",
-                hint="a probe can only push",
-            )
+        _check_place(self.x, self.y)
+        _check_force(self.force)
         if not math.isfinite(self.angle):
             raise GeometryError(f"expected a finite angle, got {self.angle}", where="press")
         if not all(map(math.isfinite, self.drag)):
@@ -80,7 +72,8 @@ class Probe:
         return replace(self, drag=(drag * vx, drag * vy))
 
 
-class Press(Probe):
+@dataclass(frozen=True, slots=True)
+class Press:
     """A flat round probe, as a page sends it.
 
     ``x``, ``y`` and ``radius`` in m, ``force`` in N (0: it only rests there).
@@ -93,20 +86,38 @@ class Press(Probe):
         When the force is negative or not finite.
     """
 
-    def __init__(self, x: float, y: float, force: float, radius: float) -> None:
-        super().__init__(_circle(radius), x, y, force)
+    x: float
+    y: float
+    force: float
+    radius: float
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        _check_place(self.x, self.y)
+        _circle(self.radius)
+        _check_force(self.force)
 
     @property
-    def radius(self) -> float:
-        """Radius of the tip, m."""
-        return self.shape.extent
+    def shape(self) -> Circle:
+        """The face of the tip."""
+        return _circle(self.radius)
+
+    @property
+    def angle(self) -> float:
+        """The angle is zero, for the tip is round."""
+        return 0.0
+
+    @property
+    def drag(self) -> tuple[float, float]:
+        """The drag is zero, for the tip does not slide."""
+        return 0.0, 0.0
 
 
 _circle = lru_cache(maxsize=64)(Circle)
 """The same for the same radius, since a press that moves is another at each step."""
 
 
-Contact = Probe
+Contact = Press | Probe
 """What may press on a twin."""
 
 
@@ -120,4 +131,18 @@ def check_on_skin(contacts: Sequence[Contact], outline: Outline) -> None:
         x, y = contacts[number].x * 1e3, contacts[number].y * 1e3
         raise GeometryError(
             f"its centre ({x:.1f} mm, {y:.1f} mm) is off the skin", where=f"press {number}"
+        )
+
+
+def _check_place(x: float, y: float) -> None:
+    if not (math.isfinite(x) and math.isfinite(y)):
+        raise GeometryError(f"expected a finite position, got ({x}, {y})", where="press")
+
+
+def _check_force(force: float) -> None:
+    if not 0 <= force < math.inf:
+        raise ModelError(
+            f"expected a force of 0 N or more, got {force}",
+            where="press",
+            hint="a probe can only push",
         )

@@ -221,7 +221,8 @@ class ProtocolSession:
             check_version(info, self._where)
             fitted = fit_board(info, self._scan, self._settings, self._where)
             if info.minor < BOARDS_SINCE:  # that is all that it says of itself
-                self._fit(info, fitted)
+                self.info, self.configuration = info, self.configuration.on_board(fitted)
+                self.commands.add(self.configuration.commands(info.minor))
             else:
                 self._met = info, fitted
                 self.commands.add((GetBoard(0),))
@@ -235,20 +236,10 @@ class ProtocolSession:
         info, fitted = self._met
         channels = int(np.bincount(self._scan.sample_drive).max())
         periods = choose_periods(board, fitted, channels, info.tick_rate, self._where)
-        self._fit(info, fitted, board, periods)
-        self._answered(now)
-
-    def _fit(
-        self,
-        info: Info,
-        fitted: ScanSettings,
-        board: BoardLimits | None = None,
-        periods: int = 0,
-    ) -> None:
-        """The board is known: send it the scan as it can do it."""
         self.info, self.board = info, board
         self.configuration = self.configuration.on_board(fitted, board, periods)
         self.commands.add(self.configuration.commands(info.minor))
+        self._answered(now)
 
     def _held(self, held: HeldScan | HeldPattern | HeldMode, now: float) -> list[Frame | Event]:
         pending = self.commands.pending
