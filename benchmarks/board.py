@@ -16,13 +16,12 @@ import numpy as np
 
 from bench_rig import Rig
 from report import Floats, Report, rms, table
-from tomoskin.board.source import Link, ScanSettings, SerialTransport, Timing
+from tomoskin.board.source import BOARDS, Link, ScanSettings, SerialTransport, Timing
 from tomoskin.core import Frame
 from tomoskin.model.pattern import Pattern, Scan
 from tomoskin.model.skin import Skin
 from tomoskin.sensing.signal import FIGURES, Readout
-from tomoskin.twin.emulator import BoardProcess, Front, OwnVoltages, SkinMemory
-from tomoskin.twin.emulator.source import BOARDS, programs_of
+from tomoskin.twin.emulator import BoardProcess, Front, OwnVoltages, SkinMemory, programs_of
 
 FRAMES, PICO_FRAMES, CHOPPED_FRAMES = 100_000, 2_000, 100
 """Of a case of the Mega, of the Pico, and with alternating drive."""

@@ -14,7 +14,7 @@ import numpy as np
 from bench_rig import Rig
 from report import Report, clock, progress, table
 from tomoskin.board.source import Link, ScanSettings
-from tomoskin.board.wire import Decoder, PackedFrame, encode
+from tomoskin.board.wire import Decoder, encode
 from tomoskin.core import FloatArray, Frame
 from tomoskin.model.pattern import Pattern, Scan
 from tomoskin.model.robot import Place
@@ -269,7 +269,7 @@ def wire_row(electrodes: int, packed: bool) -> dict[str, Any]:
     n = Scan.of(Pattern.adjacent(electrodes)).n_samples
     counts = random.integers(0, 1024, (STREAMED, n)).astype(np.uint16)
     frames = [Frame(k, 1000 * k, 0.0, 7, 0, 0, counts[k]) for k in range(STREAMED)]
-    stream = b"".join(encode(PackedFrame.of(f) if packed else f) for f in frames)
+    stream = b"".join(encode(f, packed=packed) for f in frames)
     reads = [stream[at : at + READ] for at in range(0, len(stream), READ)]
     rate = STREAMED / min(_seconds(reads) for _ in range(DECODINGS))
     size = len(stream) / STREAMED

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import importlib
 import math
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +14,12 @@ import pytest
 from tomoskin.core import GeometryError, ModelError
 from tomoskin.model.mesh import Plane
 from tomoskin.model.skin import Skin
-from tomoskin.twin import ContactSettings, Inclusion, Layered, Plate, TwinSettings, TwinSkin
+from tomoskin.twin import ContactSettings, TwinSettings, TwinSkin
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "examples"))
+layered = importlib.import_module("layered")
+sys.path.pop(0)
+Inclusion, Layered, Plate = layered.Inclusion, layered.Layered, layered.Plate
 
 FOAM = ContactSettings(modulus=5e3, thickness=30e-3)
 BALL = Inclusion(5e-3, -10e-3, 10e-3, 4e-3)

@@ -20,9 +20,8 @@ from scipy.optimize import brentq
 
 from tomoskin.core import FloatArray, GeometryError, ModelError
 from tomoskin.model.mesh import Surface
-from tomoskin.twin.bend import Deformation
-from tomoskin.twin.contact import ContactSettings, Grid
-from tomoskin.twin.strain import bulge_strain
+from tomoskin.twin import ContactSettings, Deformation, Grid
+from tomoskin.twin.dent import bulge_strain
 
 _NODES = 144
 _AROUND = 1.5
