@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from tomoskin.model.robot import SECTIONS as ROBOT_SECTIONS
-from tomoskin.model.skin import SECTIONS, Key, Section, literal
+from tomoskin.model.section import Key, Section, literal
+from tomoskin.model.skin import SECTIONS
 from tomoskin.twin import (
     PRESETS,
     BendSettings,

@@ -22,10 +22,10 @@ from tomoskin.imaging import (
 from tomoskin.imaging.iterative.absolute import Quadratic
 from tomoskin.imaging.iterative.newton import Descent, Goal, descend, minimiser
 from tomoskin.imaging.iterative.unknowns import Cells, Joint, Unknowns, others
-from tomoskin.imaging.priors.penalty import Diagonal
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.pattern import Pattern
+from tomoskin.model.prior import Diagonal
 
 LESS, MORE = np.array([-0.04, -0.02]), np.array([0.04, 0.03])
 NOISE = 1e-3

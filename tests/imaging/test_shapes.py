@@ -14,10 +14,10 @@ from tomoskin.core import DataError, FloatArray, ModelError
 from tomoskin.imaging import Observation, RandomField, Segmented, ShapeImaging
 from tomoskin.imaging.iterative import shapes as shapes_module
 from tomoskin.imaging.iterative.shapes import BACKGROUND, LESS, MORE, Phases
-from tomoskin.imaging.priors.smooth import CORRELATIONS
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.pattern import Pattern
+from tomoskin.model.prior import CORRELATIONS
 
 LENGTH = 0.025
 

@@ -20,18 +20,6 @@ from tomoskin.imaging.linear.operator import Operator
 from tomoskin.imaging.linear.problem import LinearProblem, noise_weights
 from tomoskin.imaging.linear.spectrum import Assembly, Spectrum
 from tomoskin.imaging.linear.temporal import Smoothed, Smoother, Steady, Temporal
-from tomoskin.imaging.priors.named import (
-    PRIORS,
-    Identity,
-    Noser,
-    Prior,
-    SharpPrior,
-    Sparse,
-    TotalVariation,
-    named_prior,
-    prior_matrix,
-)
-from tomoskin.imaging.priors.smooth import GaussianHighPass, Laplace, Matern, Structural
 from tomoskin.imaging.resolution import (
     Picard,
     averaging,
@@ -48,6 +36,20 @@ from tomoskin.imaging.thesis_metrics import ThesisMetrics
 from tomoskin.imaging.trained.merit import Merit, figures, noise_figure
 from tomoskin.imaging.trained.targets import Targets, along
 from tomoskin.imaging.trained.trainer import Desired, Greit
+from tomoskin.model.prior import (
+    PRIORS,
+    GaussianHighPass,
+    Identity,
+    Laplace,
+    Matern,
+    Noser,
+    Prior,
+    SharpPrior,
+    Sparse,
+    Structural,
+    TotalVariation,
+    prior_matrix,
+)
 
 __all__ = [
     "MOST_EXCLUDED",
@@ -104,7 +106,6 @@ __all__ = [
     "figures",
     "homogeneous",
     "image_series",
-    "named_prior",
     "noise_figure",
     "noise_weights",
     "picard",

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from tomoskin.core import ComplexArray, DataError, Image, ModelError
 from tomoskin.imaging.linear.one_step import OneStep
-from tomoskin.imaging.priors.named import PriorLike
 from tomoskin.model.forward import ForwardModel
+from tomoskin.model.prior import PriorLike
 
 
 def simple_change(voltages: NDArray[Any], reference: NDArray[Any]) -> ComplexArray:

@@ -15,8 +15,8 @@ from tomoskin.core import FloatArray, ModelError
 from tomoskin.imaging.linear.operator import Operator
 from tomoskin.imaging.linear.problem import LinearProblem
 from tomoskin.imaging.linear.spectrum import Spectrum
-from tomoskin.imaging.priors.penalty import Diagonal
 from tomoskin.model.mesh import Mesh
+from tomoskin.model.prior import Diagonal
 
 _ROUNDING = 1e-14
 """An eigenvalue of RᴴR below this part of the largest is rounding."""

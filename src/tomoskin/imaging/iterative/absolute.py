@@ -20,10 +20,9 @@ from tomoskin.imaging.iterative.unknowns import (
     Unknowns,
     others,
 )
-from tomoskin.imaging.priors.named import PriorLike, penalty_of
-from tomoskin.imaging.priors.penalty import Diagonal, Penalty
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Mesh
+from tomoskin.model.prior import Diagonal, Penalty, PriorLike, penalty_of
 
 STEPS = 20
 """Most iterations."""

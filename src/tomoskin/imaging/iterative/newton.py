@@ -11,7 +11,7 @@ import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from tomoskin.core import FloatArray, ModelError
-from tomoskin.imaging.priors.penalty import Penalty
+from tomoskin.model.prior import Penalty
 
 _HALVINGS = 12
 """Shorter steps tried before a direction counts as leading nowhere."""

@@ -30,10 +30,9 @@ from tomoskin.imaging.iterative.unknowns import (
     ModelPoint,
     others,
 )
-from tomoskin.imaging.priors.penalty import Diagonal
-from tomoskin.imaging.priors.smooth import matern_correlation
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Mesh
+from tomoskin.model.prior import Diagonal, matern_correlation
 
 LEFT_OUT = 0.02
 """Part of the field's variance that the modes may lack, at the worst point."""

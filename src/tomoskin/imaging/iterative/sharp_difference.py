@@ -11,9 +11,8 @@ from tomoskin.core import FloatArray, Image, ModelError
 from tomoskin.imaging.iterative.absolute import STEPS, TOLERANCE, Sharp
 from tomoskin.imaging.iterative.newton import Descent, Goal, Iteration, descend, table
 from tomoskin.imaging.iterative.observation import Observation
-from tomoskin.imaging.priors.named import SharpPrior
-from tomoskin.imaging.priors.penalty import Diagonal
 from tomoskin.model.forward import ForwardModel
+from tomoskin.model.prior import Diagonal, SharpPrior
 
 
 @dataclass(frozen=True, eq=False)

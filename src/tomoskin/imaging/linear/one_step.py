@@ -6,8 +6,8 @@ from numpy.typing import ArrayLike
 
 from tomoskin.imaging.linear.operator import Operator
 from tomoskin.imaging.linear.problem import LinearProblem
-from tomoskin.imaging.priors.named import PriorLike
 from tomoskin.model.forward import ForwardModel
+from tomoskin.model.prior import PriorLike
 
 
 class OneStep(Operator):

@@ -12,10 +12,9 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from tomoskin.core import DataError, FloatArray, ModelError
 from tomoskin.imaging.linear.operator import Operator
-from tomoskin.imaging.priors.named import PriorLike, penalty_of
-from tomoskin.imaging.priors.penalty import Carried, Penalty
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.pattern import Pattern
+from tomoskin.model.prior import Carried, Penalty, PriorLike, penalty_of
 
 _QUIETEST = 0.1
 """No row is taken for quieter than this part of the median: a row that never moves is dead, not

@@ -13,7 +13,7 @@ import numpy as np
 from tomoskin.core import SkinError, StrPath
 from tomoskin.model.robot.pose import Place, Pose
 from tomoskin.model.robot.urdf import Urdf
-from tomoskin.model.skin import (
+from tomoskin.model.section import (
     OneOrMore,
     Quantity,
     Row,
@@ -22,10 +22,10 @@ from tomoskin.model.skin import (
     check_names,
     key,
     literal,
-    read_text,
     show,
 )
-from tomoskin.model.skin import toml_tables as tables_of
+from tomoskin.model.section import toml_tables as tables_of
+from tomoskin.model.skin import read_text
 
 FORMAT = 1
 """Version of the file that this code reads, the top-level key ``format``."""
