@@ -15,7 +15,6 @@ from tomoskin.imaging import (
     LinearProblem,
     Merit,
     OneStep,
-    Smoother,
     Spectrum,
     Targets,
     Temporal,
@@ -29,7 +28,6 @@ from tomoskin.model.skin import Skin
 SKINS = ("textile-disc-8", "textile-disc-16", "textile-square-16", "tank-16")
 FIGURES = (1.0, 1.5)  # below 1.2 no NOSER of the tank has one
 CELLS, TRAINED_ON, TESTED_ON = 900, 3600, 6000
-LAG = 5
 
 
 def run(data: Path | None) -> tuple[Report, ...]:
@@ -144,12 +142,10 @@ def _filters() -> Report:
     start = time.perf_counter()
     temporal = Temporal(operator, 0.2)
     made = 1e3 * (time.perf_counter() - start)
-    smoother = Smoother(temporal.modes, 0.2, LAG)
     cases = {
         "operator, double": lambda dv, _: operator(dv),
-        "operator, single": lambda dv, _: operator.quick(dv),
+        "operator, single": lambda dv, _: operator.deferred(dv).values,
         "Kalman filter": temporal.push,
-        f"smoother, lag {LAG}": smoother.push,
     }
     rows = tuple((name, *_times(step, data)) for name, step in cases.items())
     notes = (f"{len(data)} frames; the filter's modes were made in {made:.0f} ms, once",)

@@ -16,45 +16,11 @@ from tomoskin.model.forward import ForwardModel
 from tomoskin.model.pattern import Pattern
 from tomoskin.model.prior import Carried, Penalty, PriorLike, penalty_of
 
-_QUIETEST = 0.1
-"""No row is taken for quieter than this part of the median: a row that never moves is dead, not
-exact."""
-
 _ZERO = 1e-9
 """A voltage below this part of the largest is zero by symmetry, and its value is rounding."""
 
 _ILL_CONDITIONED = 1e12
 """Above this condition number a product with the inverse has lost digits worth getting back."""
-
-
-def noise_weights(noise: NDArray[np.floating], default: FloatArray) -> FloatArray:
-    """Diagonal of W from the standard deviation of each row, W ∝ 1/sd².
-
-    Scaled so that the weights have the geometric mean of the default ones: where the noise is as
-    those suppose, they stay as they are, and alpha keeps its meaning.
-
-    Parameters
-    ----------
-    noise
-        (n_meas,) standard deviation of the difference data, V or a ratio.
-    default
-        (n_meas,) weights of a problem without known noise; see :class:`LinearProblem`.
-
-    Raises
-    ------
-    DataError
-        When there are more or fewer values than rows, or one is negative or not finite.
-    """
-    if noise.shape != default.shape:
-        raise DataError(f"expected noise of shape {default.shape}, got {noise.shape}")
-    good = np.isfinite(noise) & (noise >= 0)
-    if not good.all():
-        row = int(np.argmin(good))
-        raise DataError(f"expected noise of at least 0, got {noise[row]}", where=f"row {row}")
-    if not noise.any():
-        return default
-    sd = np.maximum(noise, _QUIETEST * np.median(noise[noise > 0]))
-    return np.asarray(np.exp(np.mean(np.log(default * sd**2))) / sd**2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,10 +85,6 @@ class LinearProblem:
     def carried(self) -> Carried:
         """Q⁻¹Jᴴ (n_cells, n_meas) and JQ⁻¹Jᴴ (n_meas, n_meas), which hold for every alpha."""
         return self.prior.carry(self.jacobian)
-
-    def weighted(self, noise: NDArray[np.floating]) -> Self:
-        """The problem with weights from the noise of each row; see :func:`noise_weights`."""
-        return replace(self, weights=noise_weights(noise, self.weights))
 
     def without(self, rows: NDArray[Any]) -> Self:
         """The problem of a pattern that never had ``rows``; prior and linearisation stay.
