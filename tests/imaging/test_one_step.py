@@ -213,7 +213,7 @@ def test_complex_data_are_inverted_alike(prior: str, kind: str) -> None:
 def test_complex_data_through_a_real_operator_are_two_images() -> None:
     operator = OneStep(model(), alpha=ALPHA)
     real, imaginary = tuple(np.random.default_rng(6).standard_normal((2, 40)))
-    for image in (operator, operator.quick):
+    for image in (operator, operator.deferred):
         expected = image(real).values + 1j * image(imaginary).values
         assert mismatch(image(real + 1j * imaginary).values, expected) < 1e-6
 
