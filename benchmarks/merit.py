@@ -14,6 +14,7 @@ from tomoskin.imaging import (
     Greit,
     LinearProblem,
     Merit,
+    Modes,
     OneStep,
     Spectrum,
     Targets,
@@ -140,7 +141,7 @@ def _filters() -> Report:
     operator = OneStep(model, alpha=0.1, conductivity=skin.conductivity)
     data = np.random.default_rng(0).normal(0.0, 1e-5, (500, model.pattern.n_meas))
     start = time.perf_counter()
-    temporal = Temporal(operator, 0.2)
+    temporal = Temporal(Modes.of(Spectrum.of(operator.problem), operator.alpha), 0.2)
     made = 1e3 * (time.perf_counter() - start)
     cases = {
         "operator, double": lambda dv, _: operator(dv),

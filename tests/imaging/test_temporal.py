@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from golden import mismatch
 from shapes import disc
 from tomoskin.core import DataError, FloatArray, ModelError
-from tomoskin.imaging import Modes, OneStep, Operator, Spectrum, Temporal, prior_matrix
+from tomoskin.imaging import Modes, OneStep, Spectrum, Temporal, prior_matrix
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.pattern import Pattern
 
@@ -30,6 +30,10 @@ def model() -> ForwardModel:
 @cache
 def operator(**settings: Any) -> OneStep:
     return OneStep(model(), **{"alpha": ALPHA, **settings})
+
+
+def filtered(op: OneStep, tau: float) -> Temporal:
+    return Temporal(Modes.of(Spectrum.of(op.problem), ALPHA), tau)
 
 
 def frames(n: int = len(TIMES), seed: int = 0) -> FloatArray:
@@ -65,7 +69,7 @@ class Textbook:
 @pytest.mark.parametrize("tau", [0.05, 0.7])
 def test_the_filter_is_the_textbooks(tau: float, difference: str) -> None:
     op = operator(difference=difference)
-    temporal = Temporal(op, tau)
+    temporal = filtered(op, tau)
     got = np.array([temporal.push(dv, t).values for dv, t in zip(frames(), TIMES, strict=True)])
     assert mismatch(got, Textbook(op, tau).run(frames(), TIMES)) < 1e-5  # single precision
 
@@ -74,7 +78,7 @@ def test_the_filter_is_the_textbooks(tau: float, difference: str) -> None:
 @pytest.mark.parametrize("tau", [0.0, 1e-4])
 def test_without_memory_it_is_the_operator(prior: str, tau: float) -> None:
     op = operator(prior=prior)
-    temporal = Temporal(op, tau)
+    temporal = filtered(op, tau)
     for dv, t in zip(frames(), TIMES, strict=True):
         assert mismatch(temporal.push(dv, t).values, op(dv).values) < 1e-5
 
@@ -82,11 +86,11 @@ def test_without_memory_it_is_the_operator(prior: str, tau: float) -> None:
 def test_a_complex_operator_is_filtered_too() -> None:
     op = OneStep(model(), alpha=ALPHA, conductivity=1.0 + 0.5j)
     data = frames() * (1 - 0.3j)
-    assert mismatch(Temporal(op, 0.0).push(data[0], 0.0).values, op(data[0]).values) < 1e-5
+    assert mismatch(filtered(op, 0.0).push(data[0], 0.0).values, op(data[0]).values) < 1e-5
 
 
 def test_a_constant_input_converges() -> None:
-    temporal, dv = Temporal(operator(), 0.5), frames(1)[0]
+    temporal, dv = filtered(operator(), 0.5), frames(1)[0]
     images = [temporal.push(dv, 0.1 * k).values for k in range(120)]
     steps = [np.linalg.norm(b - a) for a, b in pairwise(images)]
     assert steps[-1] < 1e-5 * np.linalg.norm(images[-1])
@@ -99,7 +103,7 @@ def test_a_constant_input_converges() -> None:
 
 @given(interval=st.floats(1e-3, 3.0), tau=st.floats(1e-3, 30.0))
 def test_the_filter_settles_where_the_steady_one_stands(interval: float, tau: float) -> None:
-    temporal, dv = Temporal(operator(), tau), np.zeros(40)
+    temporal, dv = filtered(operator(), tau), np.zeros(40)
     for k in range(600):
         temporal.push(dv, k * interval)
     before = temporal.belief
@@ -121,7 +125,7 @@ def noise_left(temporal: Temporal) -> FloatArray:
 @pytest.mark.parametrize("tau", [0.05, 0.3, 2.0])
 def test_noise_is_reduced_as_theory_says(tau: float) -> None:
     """4000 frames of white noise; frames within τ are not independent, hence 10 %."""
-    temporal, rng = Temporal(operator(), tau), np.random.default_rng(3)
+    temporal, rng = filtered(operator(), tau), np.random.default_rng(3)
     noise = rng.standard_normal((4000, 40)) / np.sqrt(operator().problem.weights)
     images = np.array([temporal.push(dv, 0.1 * k).values for k, dv in enumerate(noise)])[200:]
     plain = np.array([operator()(dv).values for dv in noise])[200:]
@@ -134,7 +138,7 @@ def test_noise_is_reduced_as_theory_says(tau: float) -> None:
 
 def test_spread_of_uneven_noise_is_what_a_simulation_finds() -> None:
     """Noise that differs from row to row couples modes; with one mode alone it would not."""
-    temporal, rng = Temporal(operator(), 0.2), np.random.default_rng(5)
+    temporal, rng = filtered(operator(), 0.2), np.random.default_rng(5)
     noise = rng.uniform(0.2, 3.0, 40)
     data = noise * rng.standard_normal((6000, 40))
     images = np.array([temporal.push(dv, 0.1 * k).values for k, dv in enumerate(data)])[100:]
@@ -144,20 +148,8 @@ def test_spread_of_uneven_noise_is_what_a_simulation_finds() -> None:
     assert images.std(axis=0) == pytest.approx(sd, rel=0.08)
 
 
-@pytest.mark.parametrize("prior", ["noser", "laplace"])
-def test_modes_of_a_spectrum_are_those_of_its_operator(prior: str) -> None:
-    problem = operator(prior=prior).problem
-    spectrum = Spectrum.of(problem)
-    made = spectrum.operator(ALPHA)
-    known, found = Modes.of_spectrum(spectrum, ALPHA, made), Modes.of(problem, made)
-    a, b = Temporal(known, 0.3), Temporal(found, 0.3)
-    for dv, t in zip(frames(), TIMES, strict=True):
-        assert mismatch(a.push(dv, t).values, b.push(dv, t).values) < 1e-5  # single precision
-    assert known.trust.sum() == pytest.approx(found.trust.sum())
-
-
 def test_the_longer_it_remembers_the_quieter_it_is() -> None:
-    left = [noise_left(Temporal(operator(), tau)).mean() for tau in (0.0, 0.05, 0.5, 5.0)]
+    left = [noise_left(filtered(operator(), tau)).mean() for tau in (0.0, 0.05, 0.5, 5.0)]
     assert left[0] == pytest.approx(1.0)
     assert left[0] > left[1] > left[2] > left[3]
 
@@ -167,36 +159,15 @@ def test_a_touch_shows_at_once_and_noise_does_not() -> None:
     mesh, op = model().mesh, OneStep(model(), alpha=0.05)
     spot = (np.linalg.norm(mesh.centroids - (0.03, 0.0), axis=1) < 0.03).astype(float)
     touch = -0.3 * op.problem.jacobian @ spot
-    temporal = Temporal(op, 0.3)
+    temporal = Temporal(Modes.of(Spectrum.of(op.problem), op.alpha), 0.3)
     for k in range(30):
         temporal.push(np.zeros(40), 0.05 * k)
     first = temporal.push(touch, 1.5).values
     assert first.min() / op(touch).values.min() > 0.5
 
 
-def test_modes_may_be_shared() -> None:
-    modes = Modes.of(operator().problem, operator().problem.operator(ALPHA))
-    shared, own = (Temporal(source, 0.3).push(frames()[0], 0.0) for source in (modes, operator()))
-    assert mismatch(shared.values, own.values) < 1e-5
-
-
-@pytest.mark.parametrize("kind", ["rows", "trained", "mesh"])
-def test_an_operator_of_something_else_has_no_modes(kind: str) -> None:
-    problem, other = operator().problem, operator()
-    matrix = {"rows": other.without([3, 17]).matrix, "trained": np.roll(other.matrix, 1, axis=1)}
-    foreign = Operator(
-        model(),
-        matrix.get(kind, other.matrix[:-1]),
-        precision=other.precision,
-        reference=other.reference,
-        difference="plain",
-    )
-    with pytest.raises(ModelError, match="solves the linear problem with all of its rows"):
-        Modes.of(problem, foreign)
-
-
 def test_reset_forgets() -> None:
-    temporal = Temporal(operator(), 10.0)
+    temporal = filtered(operator(), 10.0)
     first = temporal.push(frames()[0], 0.0).values
     temporal.push(frames()[1], 1.0)
     temporal.reset()
@@ -205,7 +176,7 @@ def test_reset_forgets() -> None:
 
 @pytest.mark.parametrize("time", [0.0, -1.0, np.nan, np.inf])
 def test_time_must_go_on(time: float) -> None:
-    temporal = Temporal(operator(), 1.0)
+    temporal = filtered(operator(), 1.0)
     temporal.push(frames()[0], 0.0)
     before = temporal.belief
     with pytest.raises(DataError, match=r"expected (frames in order of time|a finite time), got"):
@@ -214,7 +185,7 @@ def test_time_must_go_on(time: float) -> None:
 
 
 def test_data_that_do_not_fit_leave_the_filter_alone() -> None:
-    temporal = Temporal(operator(), 1.0)
+    temporal = filtered(operator(), 1.0)
     temporal.push(frames()[0], 0.0)
     before = temporal.belief
     with pytest.raises(DataError, match=r"rows \[3\] are not"):
@@ -227,10 +198,10 @@ def test_data_that_do_not_fit_leave_the_filter_alone() -> None:
 @pytest.mark.parametrize("tau", [-1.0, np.nan, np.inf])
 def test_an_impossible_time_constant(tau: float) -> None:
     with pytest.raises(ModelError, match="time constant of 0 s or more"):
-        Temporal(operator(), tau)
+        filtered(operator(), tau)
 
 
 @pytest.mark.parametrize("interval", [0.0, -1.0, np.nan, np.inf])
 def test_an_impossible_interval(interval: float) -> None:
     with pytest.raises(DataError, match="interval above 0 s"):
-        Temporal(operator(), 1.0).steady(interval)
+        filtered(operator(), 1.0).steady(interval)

@@ -82,7 +82,7 @@ class Prepared:
         """The skin with the ``operator`` of ``choice``, made from the ``spectrum``."""
         modes = None
         if self.skin.inverse.time_constant:
-            modes = Modes.of_spectrum(spectrum, choice.alpha, operator)
+            modes = Modes.of(spectrum, choice.alpha, operator)
         return replace(self, operator=operator, modes=modes, choice=choice)
 
     def calibrated(self, calibration: Calibration[Any]) -> Prepared:
@@ -262,7 +262,7 @@ def _prepared(skin: Skin, problem: LinearProblem, previous: Prepared | None = No
         model=model,
         problem=problem,
         operator=operator,
-        modes=Modes.of(problem, operator) if skin.inverse.time_constant else None,
+        modes=_modes(skin, problem, light_touch, choice, operator),
         segmenter=segmenter or Segmenter(model.mesh, skin.touch),
         readout=readout,
         choice=choice,
@@ -270,6 +270,20 @@ def _prepared(skin: Skin, problem: LinearProblem, previous: Prepared | None = No
         spots=spots,
         calibrations=calibrations,
     )
+
+
+def _modes(
+    skin: Skin,
+    problem: LinearProblem,
+    light_touch: LightTouch | None,
+    choice: AlphaChoice,
+    operator: Operator,
+) -> Modes | None:
+    """Those of a filter over frames, where the skin has one."""
+    if not skin.inverse.time_constant:
+        return None
+    spectrum = light_touch.spectrum if light_touch else Spectrum.of(problem)
+    return Modes.of(spectrum, choice.alpha, operator)
 
 
 def _fits(skin: Skin, calibrations: Mapping[str, Calibration[Any]]) -> bool:

@@ -1,4 +1,4 @@
-"""The linear problem that every one-step operator, spectrum and choice of alpha starts from."""
+"""The linear problem that spectrum and choice of alpha start from, and its one-step operator."""
 
 from __future__ import annotations
 
@@ -143,6 +143,65 @@ class LinearProblem:
             reference=self.reference,
             difference=self.difference,
         )
+
+
+class OneStep(Operator):
+    """Linear difference imaging: x = (JᵀWJ + α²Q)⁻¹JᵀW dv, the thesis's (3.54) and (3.55).
+
+    Parameters
+    ----------
+    model
+        The forward model to linearise.
+    prior
+        A name from :data:`tomoskin.imaging.PRIORS`, a prior such as ``Noser(exponent=1.0)``, or
+        a symmetric (n_cells, n_cells) matrix Q, dense or sparse, or its diagonal.
+    alpha
+        Hyper-parameter; it enters squared.
+    conductivity
+        Where to linearise: (n_cells,) or one number, S or S/m; real or complex.
+    difference
+        "plain": dv in V. "normalised": dv is a ratio; the rows of J are divided by the model's
+        voltages |v₀| and W = diag(|v₀|²), so that a gain of the read-out cancels.
+    weights
+        (n_meas,) diagonal of W, instead of the default.
+
+    Attributes
+    ----------
+    alpha
+        As given.
+    problem
+        What the operator solves: Jacobian, weights and prior.
+
+    Raises
+    ------
+    ModelError
+        For an unknown prior or difference, alpha ≤ 0, weights that are not positive, or a
+        tensor conductivity.
+    """
+
+    def __init__(
+        self,
+        model: ForwardModel,
+        prior: PriorLike = "noser",
+        *,
+        alpha: float,
+        conductivity: ArrayLike = 1.0,
+        difference: str = "plain",
+        weights: ArrayLike | None = None,
+    ) -> None:
+        problem = LinearProblem.of(
+            model, prior, conductivity=conductivity, difference=difference, weights=weights
+        )
+        made = problem.operator(alpha)
+        super().__init__(
+            model,
+            made.matrix,
+            precision=made.precision,
+            reference=made.reference,
+            difference=difference,
+        )
+        self.problem = problem
+        self.alpha = alpha
 
 
 def _fitted(precision: NDArray[Any], response: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:

@@ -14,14 +14,63 @@ nothing is remembered, and the image is that of the operator.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import DataError, FloatArray, Image, ModelError
-from tomoskin.imaging.linear.modes import Modes
-from tomoskin.imaging.linear.one_step import OneStep
+from tomoskin.imaging.linear.operator import Operator
+from tomoskin.imaging.linear.spectrum import Spectrum
+
+_NOTHING = 1e-12
+"""A mode whose image is this far below the strongest one is none: half of them when every row
+has a reciprocal."""
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """Modes of a one-step operator B: neither noise nor prior couples two of them.
+
+    A mode of the spectrum with eigenvalue λ is trusted by e = λ/(λ + α²), where λ is its prior
+    variance in units of its noise, up to α².
+
+    Attributes
+    ----------
+    operator
+        B.
+    analysis
+        (k, n_meas) difference data → modes.
+    synthesis
+        (n_cells, k) modes → image, what B makes of each.
+    trust
+        (k,) e, from 0 (only noise) to 1 (no noise).
+    """
+
+    operator: Operator
+    analysis: NDArray[Any]
+    synthesis: NDArray[Any]
+    trust: FloatArray
+
+    @classmethod
+    def of(cls, spectrum: Spectrum, alpha: float, operator: Operator | None = None) -> Self:
+        """Those of ``spectrum.operator(alpha)``, which ``operator`` is where it is at hand."""
+        synthesis = spectrum.modes * spectrum.gains(alpha)
+        size = np.linalg.norm(synthesis, axis=0)
+        kept = size > _NOTHING * size.max()
+        return cls(
+            spectrum.operator(alpha) if operator is None else operator,
+            np.ascontiguousarray(spectrum.analysis[kept]),
+            np.ascontiguousarray(synthesis[:, kept]),
+            np.clip(spectrum.filters(alpha)[kept], 0.0, 1.0),
+        )
+
+    @cached_property
+    def quick_synthesis(self) -> NDArray[Any]:
+        """``synthesis`` in single precision: half the bytes per frame."""
+        kind = np.complex64 if np.iscomplexobj(self.synthesis) else np.float32
+        return self.synthesis.astype(kind)
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,9 +105,9 @@ class Temporal:
 
     Parameters
     ----------
-    operator
-        Whose prior, weights and alpha state what an image is and how large the noise is; or its
-        modes, for several filters.
+    modes
+        Of the operator whose prior, weights and alpha state what an image is and how large the
+        noise is.
     time_constant
         τ, s: how long an image lasts. 0 gives the operator's own images.
 
@@ -68,8 +117,8 @@ class Temporal:
         When the time constant is below 0 or not finite.
     """
 
-    def __init__(self, operator: OneStep | Modes, time_constant: float) -> None:
-        self.modes = Modes.taken_from(operator)
+    def __init__(self, modes: Modes, time_constant: float) -> None:
+        self.modes = modes
         if not (np.isfinite(time_constant) and time_constant >= 0):
             raise ModelError(f"expected a time constant of 0 s or more, got {time_constant}")
         self.time_constant = time_constant
