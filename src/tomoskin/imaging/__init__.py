@@ -16,8 +16,7 @@ from tomoskin.imaging.resolution import (
     picard,
     unresolved,
 )
-from tomoskin.imaging.thesis_metrics import ThesisMetrics
-from tomoskin.imaging.trained.merit import Merit, figures, noise_figure
+from tomoskin.imaging.trained.merit import Merit, ThesisMetrics, figures, noise_figure
 from tomoskin.imaging.trained.targets import Targets, along
 from tomoskin.imaging.trained.trainer import Greit
 from tomoskin.model.prior import (

@@ -12,11 +12,11 @@ from xml.etree import ElementTree
 import numpy as np
 
 from tomoskin.core import FloatArray, GeometryError, SkinError, StrPath
-from tomoskin.model.robot.elements import name_of, origin_of
 from tomoskin.model.robot.link_shapes import (
     MOST_TRIANGLES,
-    LinkMesh,
     LinkShape,
+    name_of,
+    origin_of,
     read_shapes,
     thinned,
 )
@@ -61,7 +61,7 @@ class Urdf:
     joints
         By the name of the link that each holds.
     shapes
-        Of all links, those that are seen before those for collisions.
+        Of all links, visual ones before those for collisions.
     """
 
     source: str
@@ -125,17 +125,17 @@ class Urdf:
     @property
     def meshes(self) -> dict[str, Pose]:
         """Pose on its link of the first mesh of each link that has one."""
-        return {s.link: s.pose for s in self.shapes[::-1] if isinstance(s.form, LinkMesh)}
+        return {s.link: s.pose for s in self.shapes[::-1] if s.is_mesh}
 
     def solids(self) -> tuple[LinkSolid, ...]:
-        """What is drawn of each link that has a shape: what is seen, else what may collide.
+        """What is drawn of each link that has a shape: its visual parts, else those that collide.
 
         Mesh files are read here; one that cannot be is a problem of its link.
         """
         found = []
         for link in self.links:
             shapes = [s for s in self.shapes if s.link == link]
-            found.append([s for s in shapes if s.seen] or shapes)
+            found.append([s for s in shapes if s.kind == "visual"] or shapes)
         most = MOST_TRIANGLES // max(1, sum(map(len, found)))
         return tuple(_solid(shapes, most) for shapes in found if shapes)
 
