@@ -1,8 +1,9 @@
-"""Many small touches at once, by stacks of matrices: the same formula, its calls shared.
+"""Touches by stacks of matrices, for the engine of scipy: the formula of a local update, its calls
+shared.
 
-A patch of a few dozen nodes costs more in calls than in arithmetic. So here no node is eliminated,
-and touches of about one size are taken together, each filled up by its first node, against which
-all the others are taken: what is filled up is zero.
+A patch of a few dozen nodes costs more in calls than in arithmetic. So no node is eliminated, and
+touches of about one size are taken together, each filled up by its first node, against which all
+the others are taken: what is filled up is zero.
 """
 
 from __future__ import annotations
@@ -17,9 +18,6 @@ from numpy.typing import NDArray
 from tomoskin.core import IntArray
 from tomoskin.model.forward.engine import BaseState
 from tomoskin.model.forward.touches import Touches
-
-MOST_NODES = 100
-"""Of a patch that is small."""
 
 _ENTRIES = 1 << 20
 """Of the matrices of one stack, together."""
@@ -48,20 +46,19 @@ class Stack:
 
 
 def stacks(cells: IntArray, touches: Touches) -> Iterator[Stack]:
-    """Stacks of the touches that are small, by the mesh's ``cells`` (m, k)."""
+    """Stacks of the touches that have any cells, by the mesh's ``cells`` (m, k)."""
     sizes = np.diff(touches.starts)
-    small = np.flatnonzero((sizes > 0) & (sizes <= 2 * MOST_NODES))
-    small = small[np.argsort(sizes[small], kind="stable")]
-    while len(small):
-        most = int(sizes[small[0]]) + 8
-        count = max(1, min(int(np.searchsorted(sizes[small], most)), _ENTRIES // most**2))
-        if stack := _stack(cells, touches, small[:count]):
-            yield stack
-        small = small[count:]
+    rest = np.flatnonzero(sizes > 0)
+    rest = rest[np.argsort(sizes[rest], kind="stable")]
+    while len(rest):
+        most = int(sizes[rest[0]]) + 8
+        count = max(1, min(int(np.searchsorted(sizes[rest], most)), _ENTRIES // most**2))
+        yield _stack(cells, touches, rest[:count])
+        rest = rest[count:]
 
 
-def _stack(cells: IntArray, touches: Touches, numbers: IntArray) -> Stack | None:
-    """None where a patch has too many nodes."""
+def _stack(cells: IntArray, touches: Touches, numbers: IntArray) -> Stack:
+    """These touches as a stack."""
     begin, end = touches.starts[numbers], touches.starts[numbers + 1]
     owner = np.repeat(np.arange(len(numbers)), end - begin)
     entries = np.arange(len(owner)) + np.repeat(
@@ -73,8 +70,6 @@ def _stack(cells: IntArray, touches: Touches, numbers: IntArray) -> Stack | None
     first = np.searchsorted(unique, np.arange(len(numbers) + 1) * n_nodes)
     count = np.diff(first)
     most = int(count.max())
-    if most > MOST_NODES:
-        return None
     within = np.arange(most)
     nodes = unique[first[:-1, None] + np.where(within < count[:, None], within, 0)] % n_nodes
     place = place.reshape(corners.shape) - first[owner][:, None]
@@ -91,7 +86,7 @@ def stack_change(
     """
     nodes, index = stack.nodes, touches.cells[stack.entries]
     moved = touches.conductivity[stack.entries] - base.conductivity[index]
-    change = summed(base.local[index] * moved[:, None, None], stack.keys, between.shape)
+    change = _summed(base.local[index] * moved[:, None, None], stack.keys, between.shape)
     between = between[:, 1:] - between[:, :1]
     between = between[:, :, 1:] - between[:, :, :1]
     fields = base.fields[nodes[:, 1:]] - base.fields[nodes[:, :1]]
@@ -105,7 +100,7 @@ def stack_change(
     return fields.swapaxes(1, 2) @ current, changed.swapaxes(1, 2) @ residual
 
 
-def summed(entries: NDArray[Any], keys: IntArray, shape: tuple[int, ...]) -> NDArray[Any]:
+def _summed(entries: NDArray[Any], keys: IntArray, shape: tuple[int, ...]) -> NDArray[Any]:
     """Of that ``shape``: the sum of the cells' matrices (c, k, k), by the ``keys`` (c, k, k)."""
     size, keys = int(np.prod(shape)), keys.ravel()
     total = np.bincount(keys, entries.real.ravel(), size).astype(entries.dtype)
