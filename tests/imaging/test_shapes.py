@@ -17,7 +17,7 @@ from tomoskin.imaging.iterative.shapes import BACKGROUND, LESS, MORE, Phases
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.pattern import Pattern
-from tomoskin.model.prior import CORRELATIONS
+from tomoskin.model.prior.smooth import CORRELATIONS
 
 LENGTH = 0.025
 

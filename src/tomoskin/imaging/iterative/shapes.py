@@ -20,7 +20,7 @@ from scipy.spatial.distance import cdist
 from scipy.special import expit, ndtr
 
 from tomoskin.core import FloatArray, IntArray, ModelError
-from tomoskin.imaging.iterative.absolute import Absolute, Quadratic, medium
+from tomoskin.imaging.iterative.absolute import Absolute, medium
 from tomoskin.imaging.iterative.newton import Goal, descend
 from tomoskin.imaging.iterative.observation import Observation
 from tomoskin.imaging.iterative.unknowns import (
@@ -300,13 +300,13 @@ class ShapeImaging:
         softest = Phases(field, self.softness[0], self.most)
         unknowns, descent = medium(self.model, data, softest, self.contacts, background)
         rest = others(unknowns.n_contacts, self.drift)
-        cost = Quadratic(Joint(Diagonal(np.ones(field.size)), 1.0, rest))
+        joint = Joint(Diagonal(np.ones(field.size)), 1.0, rest)
         again = {round(part * last) for part in CENTRED}
         for step, softness in enumerate(self.softness):
             if step in again:
                 field = self._centred(field, descent.unknowns[: field.size])
             unknowns = replace(unknowns, image=Phases(field, softness, self.most))
-            goal = Goal(unknowns, cost, data.target)
+            goal = Goal(unknowns.at, data.target, lambda _: joint)
             descent = descend(goal, descent, most=1, tolerance=0.0)
         point = unknowns.at(descent.unknowns)
         softest = replace(softest, field=field)
