@@ -46,8 +46,8 @@ def unresolved(
     spread, gram = problem.carried
     data = gram + np.diag(alpha**2 / problem.weights)  # covariance of the data
     prior = _prior_variance(problem, discs)
-    seen, shared = discs @ operator.matrix, discs @ spread
-    explained = 2 * _products(seen, shared) - _products(seen @ data, seen)
+    image, shared = discs @ operator.matrix, discs @ spread
+    explained = 2 * _products(image, shared) - _products(image @ data, image)
     return np.asarray(np.clip(1.0 - explained / prior, 0.0, 1.0))
 
 

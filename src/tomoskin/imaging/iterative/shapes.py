@@ -191,7 +191,7 @@ class Segmented:
 
     Attributes
     ----------
-    found
+    absolute
         Conductivity per cell, background, contacts and how they were found.
     field, latent
         The random field, and its numbers (k,).
@@ -200,7 +200,7 @@ class Segmented:
         where the edges are softest, since sharp ones hide what a new region would change.
     """
 
-    found: Absolute
+    absolute: Absolute
     field: RandomField
     latent: FloatArray
     covariance: FloatArray

@@ -19,8 +19,7 @@ from tomoskin.model.forward.engine import (
     Patches,
     singular,
 )
-from tomoskin.model.forward.patches import stack_change, stacks
-from tomoskin.model.forward.touches import Touches
+from tomoskin.model.forward.touches import Touches, stack_change, stacks
 from tomoskin.model.pattern import Pattern
 
 

@@ -77,8 +77,8 @@ def pose_numbers(text: str, units: str) -> tuple[float, ...]:
 
 def quaternion(axes: ArrayLike) -> tuple[float, ...]:
     """X, y, z, w of the rotation to three ``axes`` (3, 3), one a row."""
-    found: list[float] = Rotation.from_matrix(np.transpose(axes)).as_quat().tolist()
-    return tuple(found)
+    xyzw: list[float] = Rotation.from_matrix(np.transpose(axes)).as_quat().tolist()
+    return tuple(xyzw)
 
 
 @dataclass(frozen=True)

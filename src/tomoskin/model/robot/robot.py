@@ -176,12 +176,12 @@ def _each(tables: Mapping[str, Any], source: str) -> list[tuple[SkinSection, str
         raise SkinError(
             f"expected a list of tables, got {show(given)}", where=source, hint="write [[skin]]"
         )
-    found = []
+    sections = []
     for number, table in enumerate(given, 1):
         title = table.get("name") if isinstance(table, Mapping) else None
         where = f"{source}: skin {number}" + (f' "{title}"' if title else "")
-        found.append((SkinSection.read(table, where), where))
-    return found
+        sections.append((SkinSection.read(table, where), where))
+    return sections
 
 
 def _placed(given: SkinSection, where: str, folder: Path, urdf: Urdf | None) -> PlacedSkin:

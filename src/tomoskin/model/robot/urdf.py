@@ -100,9 +100,9 @@ class Urdf:
         links = tuple(name_of(link, where) for link in root.findall("link"))
         joints = [_joint(joint, where) for joint in root.findall("joint")]
         shapes = tuple(read_shapes(root, path))
-        found = cls(where, root.get("name", ""), links, {j.child: j for j in joints}, shapes)
-        found._check(joints)
-        return found
+        urdf = cls(where, root.get("name", ""), links, {j.child: j for j in joints}, shapes)
+        urdf._check(joints)
+        return urdf
 
     def check_link(self, link: str, where: str) -> None:
         """Raise SkinError where there is no such link, with the one that may have been meant."""
@@ -132,12 +132,12 @@ class Urdf:
 
         Mesh files are read here; one that cannot be is a problem of its link.
         """
-        found = []
+        drawn = []
         for link in self.links:
             shapes = [s for s in self.shapes if s.link == link]
-            found.append([s for s in shapes if s.kind == "visual"] or shapes)
-        most = MOST_TRIANGLES // max(1, sum(map(len, found)))
-        return tuple(_solid(shapes, most) for shapes in found if shapes)
+            drawn.append([s for s in shapes if s.kind == "visual"] or shapes)
+        most = MOST_TRIANGLES // max(1, sum(map(len, drawn)))
+        return tuple(_solid(shapes, most) for shapes in drawn if shapes)
 
     def bones(self, without: Container[str] = ()) -> FloatArray:
         """(n, 2, 3) m: from each link's origin, but those ``without``, to those that it holds."""

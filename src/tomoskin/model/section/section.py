@@ -190,8 +190,8 @@ def _add_parameters(cls: type[Section]) -> None:
         if declared is None or declared.options is None:
             continue
         for parameter, (default, words, own) in _parameters(declared.options).items():
-            whole = replace(own, when=declared.when, effective=(name, words))
-            setattr(cls, parameter, field(default=default, metadata={"key": whole}))
+            of = replace(own, when=declared.when, effective=(name, words))
+            setattr(cls, parameter, field(default=default, metadata={"key": of}))
             annotations[parameter] = "Any"
     cls.__annotations__ = annotations
 
