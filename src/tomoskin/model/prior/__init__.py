@@ -3,7 +3,6 @@
 from tomoskin.model.prior.penalty import (
     Carried,
     Diagonal,
-    Factored,
     Penalty,
     dense_penalty,
     sparse_penalty,
@@ -30,7 +29,6 @@ __all__ = [
     "PRIORS",
     "Carried",
     "Diagonal",
-    "Factored",
     "GaussianHighPass",
     "Identity",
     "Laplace",
