@@ -16,7 +16,8 @@ from tomoskin.board.source import BOARDS
 from tomoskin.board.wire import SCHEMA
 from tomoskin.board.wire.schema import FieldSpec
 from tomoskin.model.robot import SECTIONS as ROBOT_SECTIONS
-from tomoskin.model.skin import SECTIONS, Key, Section, literal
+from tomoskin.model.section import Key, Section, literal
+from tomoskin.model.skin import SECTIONS
 from tomoskin.twin import (
     PRESETS,
     BendSettings,

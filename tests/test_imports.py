@@ -15,7 +15,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 UNITS = {
     "core": (),
-    "model": ("mesh", "pattern", "skin", "robot", "forward"),
+    "model": ("section", "mesh", "pattern", "prior", "skin", "robot", "forward"),
     "imaging": (),
     "board": ("wire", "source"),
     "sensing": ("signal", "track", "segment", "fit"),

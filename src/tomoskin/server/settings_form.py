@@ -9,18 +9,17 @@ from typing import Any
 
 from tomoskin.core import PatternError, SkinError, TomoskinError
 from tomoskin.model.pattern import named
-from tomoskin.model.skin import (
-    SECTIONS,
+from tomoskin.model.section import (
     Choice,
     Number,
     NumberOrWord,
     OneOrEach,
     Quantity,
-    Skin,
     Table,
     ValueKind,
     Whole,
 )
+from tomoskin.model.skin import SECTIONS, Skin
 from tomoskin.server.page_messages import text_of
 
 Changes = Mapping[str, Mapping[str, Any]]

@@ -169,13 +169,13 @@ class ForceModel:
         under, rest = _goes_on(spots.xy, xy, 0.5 * self.radius)
         before = spots.memory
         if under != list(range(len(spots))):
-            before = before.beside(self._fresh).of_pieces(np.array(under))
+            before = before.joined(self._fresh).of_pieces(np.array(under))
         load, now = load_of(before, self.memory, depth, dt)
         terms = basis(xy, np.log(_radius(area) / self.radius), self.unit)
         forces = self._forces(terms, np.maximum(load, least), self._beyond(snr))
         if rest:
             others = np.array(rest[: max(_MOST_SPOTS - len(xy), 0)], dtype=np.intp)
-            now = now.beside(self._released(spots, others, dt))
+            now = now.joined(self._released(spots, others, dt))
             xy = np.concatenate([xy, spots.xy[others]])
         return forces, PressedSpots(xy, time, now)
 

@@ -11,8 +11,17 @@ from scipy.special import gamma, kv
 from golden import mismatch
 from shapes import box, disc
 from tomoskin.core import FloatArray, ModelError
-from tomoskin.imaging import PRIORS, Laplace, Matern, Noser, Structural, named_prior, prior_matrix
 from tomoskin.model.mesh import Mesh
+from tomoskin.model.prior import (
+    PRIORS,
+    Laplace,
+    Matern,
+    Noser,
+    Prior,
+    Structural,
+    prior_matrix,
+)
+from tomoskin.model.skin import Skin
 
 
 @pytest.fixture(scope="module", params=["plane", "volume"])
@@ -181,10 +190,20 @@ def test_a_smoothness_that_is_not_known() -> None:
         Matern(0.1, smoothness=1.0).penalty(plane, jacobian(plane))
 
 
-def test_a_named_prior_takes_what_the_skin_file_says() -> None:
-    assert named_prior("noser", exponent=1.0) == Noser(1.0)
-    assert named_prior("exponential", correlation_length=0.02) == Matern(0.02, 0.5)
-    assert named_prior("matern") == Matern(None, 1.5)
-    assert named_prior("laplace", exponent=1.0) == Laplace()
+@pytest.mark.parametrize(
+    ("keys", "prior"),
+    [
+        ({"exponent": 1.0}, Noser(1.0)),
+        ({"prior": "exponential", "correlation_length": "20 mm"}, Matern(0.02, 0.5)),
+        ({"prior": "matern"}, Matern(None, 1.5)),
+        ({"prior": "laplace", "exponent": 1.0}, Laplace()),
+    ],
+)
+def test_a_prior_takes_what_the_skin_file_says(keys: dict[str, Any], prior: Prior) -> None:
+    skin = Skin.load("textile-disc-8").altered({"inverse": keys})
+    assert skin.inverse.record("prior") == prior
+
+
+def test_a_prior_that_is_not_known(mesh: Mesh) -> None:
     with pytest.raises(ModelError, match=r'expected a prior among .*, got "tv"'):
-        named_prior("tv")
+        prior_matrix("tv", mesh, jacobian(mesh))

@@ -13,7 +13,8 @@ from scipy.sparse import coo_array, csr_array
 from scipy.spatial.distance import cdist
 
 from tomoskin.core import FloatArray, ModelError
-from tomoskin.imaging.priors.penalty import (
+from tomoskin.model.mesh import Mesh
+from tomoskin.model.prior.penalty import (
     Carried,
     Factored,
     Penalty,
@@ -21,7 +22,7 @@ from tomoskin.imaging.priors.penalty import (
     dense_solver,
     sparse_penalty,
 )
-from tomoskin.model.mesh import Mesh
+from tomoskin.model.section import Quantity, key
 
 LEAST_COUPLING = 1e-6
 """A coupling below this costs digits; zero, which cuts, does not."""
@@ -162,25 +163,29 @@ class GaussianHighPass:
 class Matern:
     """Q⁻¹ = C, the Matérn covariance of the cells' centres (Rasmussen & Williams 2006, 4.16, 4.17).
 
-    An image is held to be a random field of unit deviation, correlated over ``length``. In the
+    An image is held to be a random field of unit deviation, correlated over a length. In the
     space of the measurements C is used as it is, never inverted. Distances are taken in space,
     on a curved sheet too.
 
     Attributes
     ----------
-    length
-        Correlation length, m; without it a tenth of the mesh's largest extent.
+    correlation_length
+        The length, m; without it a tenth of the mesh's largest extent.
     smoothness
         ν: 0.5, exponential, with sharp changes; 1.5, once, and 2.5, twice differentiable.
     """
 
-    length: float | None = None
+    correlation_length: float | None = key(
+        Quantity("length", "mm", 0.1, 5000),
+        "The distance over which changes are similar. Default: a tenth of the sheet's extent.",
+        default=None,
+    )
     smoothness: float = 1.5
 
     def penalty(self, mesh: Mesh, jacobian: NDArray[Any]) -> Penalty:
         """Return Q on ``mesh``. Raises ModelError for an impossible length or smoothness."""
         del jacobian
-        length = self.length
+        length = self.correlation_length
         if length is None:
             length = DEFAULT_LENGTH * float(np.ptp(mesh.points, axis=0).max())
         correlation, scale = matern_correlation(length, self.smoothness)

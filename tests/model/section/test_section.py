@@ -7,7 +7,7 @@ import dataclasses
 import pytest
 
 from tomoskin.core import SkinError
-from tomoskin.model.skin import Choice, Quantity, Row, Section, Table, Whole, key
+from tomoskin.model.section import Choice, Quantity, Row, Section, Table, Whole, key
 
 _LENGTH = Quantity("length", "mm", 0, 100)
 _TIME = Quantity("time", "s", 0, 10)

@@ -12,7 +12,7 @@ from difflib import get_close_matches
 from typing import Any, ClassVar, Self, TypeVar, dataclass_transform
 
 from tomoskin.core import SkinError
-from tomoskin.model.skin.kinds import ValueKind, literal, show
+from tomoskin.model.section.kinds import ValueKind, literal, show
 
 T = TypeVar("T")
 
@@ -43,6 +43,9 @@ class Key:
     effective
         Another key of the section and the values of it with which this one has an effect; it may
         stand beside others.
+    options
+        The record that each word of the key stands for. Fields of such a record made by
+        :func:`key` are keys of this section too.
     """
 
     kind: ValueKind[Any]
@@ -53,6 +56,7 @@ class Key:
     unless: str
     needs: str
     effective: tuple[str, tuple[str, ...]] | None = None
+    options: Mapping[str, Any] | None = None
     name: str = ""
 
     def conflict(self, given: Mapping[str, object], filled: Mapping[str, object]) -> str:
@@ -86,19 +90,22 @@ def key(
     unless: str = "",
     needs: str = "",
     effective: tuple[str, tuple[str, ...]] | None = None,
+    options: Mapping[str, Any] | None = None,
     **when: str | tuple[str, ...],
 ) -> T:
     """A field of a :class:`Section`; without ``default`` (None: none at all) the key is required.
 
     ``when`` names another key and its values for which this one may stand: ``shape="disc"``;
-    ``effective`` those for which it does anything. In the record a key that is absent has its
+    ``effective`` those for which it does anything. With ``options`` its words name records, see
+    :class:`Key`. In the record a key that is absent has its
     default in SI units, or None.
     """
     condition = None
     for other, words in when.items():
         condition = other, (words,) if isinstance(words, str) else words
     written = None if default is MISSING else default
-    declared = Key(kind, meaning, written, default is MISSING, condition, unless, needs, effective)
+    required = default is MISSING
+    declared = Key(kind, meaning, written, required, condition, unless, needs, effective, options)
     metadata = {"key": declared}
     if declared.required and not (when or unless):
         return field(metadata=metadata)  # type: ignore[no-any-return]
@@ -118,6 +125,7 @@ class Section:
 
     def __init_subclass__(cls, section: str = "", *, many: bool = False) -> None:
         """Make the record, and list its keys."""
+        _add_parameters(cls)
         dataclass(frozen=True, kw_only=True)(cls)
         cls.meaning = " ".join(inspect.cleandoc(cls.__doc__ or "").split())
         cls.keys = tuple(
@@ -164,6 +172,41 @@ class Section:
         return cls(
             **{k.name: k.read(written[k.name], where) for k in cls.keys if k.name in written}
         )
+
+    def record(self, name: str) -> Any:
+        """The record that the word of the key ``name`` stands for, with its parameters."""
+        options = next(key.options for key in self.keys if key.name == name)
+        chosen = (options or {})[getattr(self, name)]
+        own = [one.name for one in fields(chosen) if "key" in one.metadata]
+        return replace(chosen, **{parameter: getattr(self, parameter) for parameter in own})
+
+
+def _add_parameters(cls: type[Section]) -> None:
+    """Give the section the keys of its options, each after the key whose word has them."""
+    annotations = {}
+    for name, annotation in cls.__annotations__.items():
+        annotations[name] = annotation
+        declared = getattr(vars(cls).get(name), "metadata", {}).get("key")
+        if declared is None or declared.options is None:
+            continue
+        for parameter, (default, words, own) in _parameters(declared.options).items():
+            of = replace(own, when=declared.when, effective=(name, words))
+            setattr(cls, parameter, field(default=default, metadata={"key": of}))
+            annotations[parameter] = "Any"
+    cls.__annotations__ = annotations
+
+
+def _parameters(options: Mapping[str, Any]) -> dict[str, tuple[Any, tuple[str, ...], Key]]:
+    """Default, words and declaration of each key that a record among ``options`` has."""
+    merged: dict[str, tuple[Any, tuple[str, ...], Key]] = {}
+    for word, record in options.items():
+        for one in fields(record):
+            if "key" in one.metadata:
+                _, words, own = merged.get(one.name, (None, (), one.metadata["key"]))
+                if own != one.metadata["key"]:
+                    raise TypeError(f"{word} and {words[0]} declare {one.name} differently")
+                merged[one.name] = one.default, (*words, word), own
+    return merged
 
 
 _COMMA = re.compile(r"=\s*[-+]?\d+,\d+\s*$", re.MULTILINE)
