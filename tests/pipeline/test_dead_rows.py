@@ -91,11 +91,11 @@ def test_rows_that_a_frame_lacks_do_not_count_in_it() -> None:
     broken = dv.copy()
     broken[:, 3] = np.nan  # dead
     broken[2, [17, 30]] = np.nan
-    broken[4, 5:15] = np.nan  # with the dead one more than a quarter
+    broken[4, 5:25] = np.nan  # more than half of the others
     found = reconstruct(prepared, recording(prepared.pattern, broken, is_change=True), None)
-    assert found.frames.tolist() == [0, 1, 2, 3]
+    assert found.frames.tolist() == [0, 1, 2, 3, 4]
     assert found.left_out.tolist() == [4]
-    assert found.rows_missing.tolist() == [0, 0, 2, 0]
+    assert found.rows_missing.tolist() == [0, 0, 2, 0, 20]
     for image, data, rows in zip(found.images, dv, ([3], [3], [3, 17, 30], [3]), strict=False):
         assert mismatch(image, prepared.operator.without(rows)(data).values) < 1e-4
 

@@ -217,11 +217,14 @@ class Followed:
         """See :class:`Conditioning`."""
         values, baseline = measured.values, self._baseline
         mean = baseline.mean
-        if measured.excluded.any():
-            values = np.where(np.isfinite(values), values, mean)
+        unknown = measured.excluded & ~np.isfinite(values)
+        values = np.where(unknown, mean, values)
+        from_rest = values - baseline.start
         health = self._monitor.push(
             values, measured.excluded, measured.time, measured.samples, measured.own
         )
+        if unknown.any():  # what is not there tells nothing of a sum either
+            health = replace(health, lost=health.lost | unknown)
         self._values, self._health = values, health
         subspace = self._nuisance(health)
         self._excluded = health.lost
@@ -252,7 +255,7 @@ class Followed:
             wander=baseline.common_deviation / JUMP,
             change=values - mean,
             drift=subspace.drift,
-            from_rest=measured.values - baseline.start,
+            from_rest=from_rest,
             excluded=health.lost,
         )
         problem = None if times is None else _gain_text(times)
@@ -320,11 +323,14 @@ class GivenDifferences:
     def condition(self, measured: Measured) -> Conditioned:
         """Of a frame whose values are difference data already."""
         operator, excluded = self.prepared.operator, measured.excluded
+        n_excluded = int(np.count_nonzero(excluded))
+        if n_excluded > MOST_NUISANCE * len(excluded):
+            return Conditioned(None, n_excluded)
         change = measured.values * _scale(self.prepared, operator.reference)
         filled = operator.filled(measured.values, excluded)
         given = Differences.of(filled, np.zeros((len(excluded), 0)), excluded)
         differences = replace(given, change=change, from_rest=change)
-        return Conditioned(differences, int(np.count_nonzero(excluded)))
+        return Conditioned(differences, n_excluded)
 
     def learn(
         self, time: float, moved: FloatArray | float, *, touched: bool, noise: bool = True

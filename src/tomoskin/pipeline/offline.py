@@ -46,7 +46,8 @@ class Reconstruction:
         (n,) number of rows that each of them lacks beside ``rows_left_out``: they were filled in
         so that they do not count.
     left_out, unseen
-        (k,) indices of those that lack too many rows, and of those that a run held or skipped.
+        (k,) indices of those of them that show no image, as most of their rows are lacking or all
+        changed at once, and of others, which a run held or skipped.
     shown
         The images, computed where somebody looks at them; see :attr:`images`.
     unit
@@ -86,11 +87,14 @@ class Reconstruction:
     ) -> Reconstruction:
         """What ``pipeline`` made of some ``frames``, which are asked for one by one."""
         kept: list[tuple[Any, ...]] = []
+        left_out: list[int] = []
         problems: dict[str, list[int]] = {}
         for number, time, result in frames:
             kept.append(
                 (number, time, result.left_out, result.image, result.touches, result.readings)
             )
+            if not result.has_image:
+                left_out.append(number)
             if result.problem is not None:
                 problems.setdefault(result.problem, []).append(number)
         numbers, times, missing, shown, touches, readings = (
@@ -100,7 +104,7 @@ class Reconstruction:
             frames=np.array(numbers, dtype=np.int64),
             time=np.array(times, dtype=np.float64),
             rows_missing=np.array(missing, dtype=np.int64),
-            left_out=np.zeros(0, dtype=np.int64),
+            left_out=np.array(left_out, dtype=np.int64),
             shown=shown,
             unit=prepared.operator.unit,
             touches=touches,
@@ -197,7 +201,6 @@ def reconstruct(
     return replace(
         found,
         rows_missing=recorded.missing[wanted].sum(axis=1),
-        left_out=recorded.left_out[(recorded.left_out >= start) & (recorded.left_out < stop)],
         model_agreement=recorded.agreement,
         rows_left_out=recorded.rows_left_out,
     )
