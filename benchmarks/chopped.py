@@ -144,7 +144,7 @@ def _drifted(mode: str, electrodes: str) -> tuple[object, ...]:
     for time in np.arange(0.0, SECONDS, table.seconds):
         counts = board.sample(table, float(time))
         voltages = readout(Frame(0, 0, 0.0, 1, 0, 0, *table.readings(counts)))
-        assert not voltages.railed.any()
+        assert not voltages.excluded.any()
         rows.append(voltages.values)
     values = np.array(rows)
     second = round(1 / table.seconds)

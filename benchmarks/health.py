@@ -14,8 +14,8 @@ from health_rig import PROBE, Rig, missed_by, places
 from report import Report
 from tomoskin.core import FloatArray
 from tomoskin.model.skin import Skin
-from tomoskin.pipeline import Measured, Pipeline, Prepared, prepare
-from tomoskin.pipeline.conditioning import Followed
+from tomoskin.pipeline import Pipeline, Prepared, prepare
+from tomoskin.pipeline.conditioning import BaselineDifferences
 from tomoskin.sensing.signal import Health, Reference
 from tomoskin.twin import Faults, Press
 
@@ -245,12 +245,11 @@ def cost() -> Report:
         rig, prepared = Rig(skin, "textile", 1), prepare(skin)
         idle = np.array([prepared.readout(rig.frame()).values for _ in range(20)])
         none = np.zeros(idle.shape[1], bool)
-        followed = Followed.of(prepared, Reference.of(idle), none, prepared.scan)
+        followed = BaselineDifferences.of(prepared, Reference.of(idle), none, prepared.scan)
         spent = []
         for _ in range(2000):
             frame = rig.frame()
-            volts = prepared.readout(frame)
-            measured = Measured.of(volts, frame.samples, prepared.skin.readout.tick_rate)
+            measured = prepared.readout(frame)
             start = time.process_time()
             followed.condition(measured)
             followed.learn(measured.time, 0.0, touched=False)

@@ -14,11 +14,9 @@ import numpy as np
 
 from report import Report
 from tomoskin.board.wire import encode
-from tomoskin.core import Frame
+from tomoskin.core import Frame, Mark, MarkedFrame
 from tomoskin.files.exports import write_parquet
 from tomoskin.files.session import (
-    Mark,
-    MarkedFrame,
     RawRead,
     Recorder,
     SessionReader,

@@ -18,7 +18,7 @@ from tomoskin.core import Detection, Frame
 from tomoskin.learning import Differences, FrameView
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import prepare
-from tomoskin.pipeline.finding import Finder, finding
+from tomoskin.pipeline.finding import Finder, finder_of
 from tomoskin.pipeline.nuisance import JUMP
 from tomoskin.pipeline.tune import tuned, tuned_sheet
 from tomoskin.sensing.fit import Whitener, row_covariance
@@ -64,8 +64,8 @@ class Lab:
         image = prepare(self.skin.altered({"touch": {"method": "image"}}))
         image, on_sheet = tuned(image, self.reference), tuned_sheet(fit, self.reference)
         self.image = image.operator
-        self.by_fit = lambda: finding(on_sheet, self.reference)
-        self.by_image = lambda: finding(image, self.reference)
+        self.by_fit = lambda: finder_of(on_sheet, self.reference)
+        self.by_image = lambda: finder_of(image, self.reference)
         self.floor = image.image_noise(self.reference)
         noise = fit.readout.noise / np.sqrt(2) * np.sqrt(1 + 1 / IDLE)
         self.whiten = Whitener.of(row_covariance(fit.scan, noise))

@@ -18,7 +18,7 @@ from tomoskin.learning import Differences, FrameView
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import prepare
-from tomoskin.pipeline.finding import Finder, finding
+from tomoskin.pipeline.finding import Finder, finder_of
 from tomoskin.pipeline.nuisance import JUMP
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.pipeline.tune import tuned, tuned_sheet
@@ -158,8 +158,8 @@ class Lab:
         )
         self._floor = self._image.image_noise(self.reference, self._nuisance)
         fit = tuned_sheet(fit, self.reference, self.lost)
-        self.by_fit = finding(fit, self.reference)
-        self.by_image = finding(self._image, self.reference)
+        self.by_fit = finder_of(fit, self.reference)
+        self.by_image = finder_of(self._image, self.reference)
 
     def found(self, finder: Finder, change: Floats) -> Sequence[Detection]:
         """Touches of a frame of this ``change`` (n_meas,) V after one in which nothing touches."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -170,3 +171,21 @@ def test_rows_in_another_order_are_refused_by_identity() -> None:
     other = replace(given, drive=given.drive[order], measure=given.measure[order])
     with pytest.raises(DataError, match=f"expected data of pattern {prepared.pattern.identity}"):
         reconstruct(prepared, other, voltages)
+
+
+def test_values_that_are_not_known_tell_nothing_of_their_sum_either() -> None:
+    """A cut wire: readings at a rail are no numbers in a file of voltages, as they are live."""
+    prepared = prepare(Skin.load("textile-disc-16"))
+    pattern, rng = prepared.pattern, np.random.default_rng(4)
+    square = ((prepared.mesh.centroids[:, :2] - (0.03, 0.02)) ** 2).sum(axis=1)
+    change = -0.3 * prepared.skin.conductivity * np.exp(-square / 0.014**2)
+    values = np.tile(prepared.operator.reference, (40, 1))
+    values[20:] += prepared.problem.jacobian @ change
+    values += prepared.readout.noise * rng.standard_normal(values.shape)
+    lost = (pattern.drive == 4).any(axis=1) | (pattern.measure == 4).any(axis=1)
+    values[25:, lost] = np.nan
+    timed = replace(recording(pattern, values), time=0.2 * np.arange(40.0))
+    found = reconstruct(prepared, timed, range(20))
+    for touches in found.touches[25:]:
+        (touch,) = touches
+        assert math.dist((touch.detection.x, touch.detection.y), (0.03, 0.02)) < 0.006

@@ -9,15 +9,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import DataError, FloatArray, Image, IntArray, Touch, check_fits
+from tomoskin.core import DataError, FloatArray, Image, IntArray, Touch, Voltages, check_fits
 from tomoskin.imaging import AlphaChoice
 from tomoskin.learning import BENDS, CLASSES, BendReading, ClassReading
 from tomoskin.pipeline.following import Setting
-from tomoskin.pipeline.model_agreement import ModelAgreement
 from tomoskin.pipeline.pipeline import Pipeline
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.pipeline.recorded import Idle, RecordedFrames, recorded_frames
-from tomoskin.pipeline.records import FrameResult, Measured
+from tomoskin.pipeline.records import FrameResult, ModelAgreement
 from tomoskin.pipeline.tune import tuned_by_rule
 from tomoskin.sensing.fit import EXHAUSTIVE
 from tomoskin.sensing.signal import Recording
@@ -230,7 +229,7 @@ def _flow(
         recorded.idle, recorded.idle_frames, recorded.idle_time, strict=True
     ):
         none: NDArray[np.bool_] = np.zeros(len(values), bool)
-        result = pipeline.follow(Measured(values, none, time, time, max(number, 0)))
+        result = pipeline.follow(Voltages(values, none, time, time, max(number, 0)))
         if 0 <= number < stop:
             yield Gathered(number, time, result)
     rest = np.flatnonzero(
@@ -238,6 +237,6 @@ def _flow(
     )
     for done, k in enumerate(rest.tolist(), start=1):
         number, time = int(recorded.frames[k]), float(recorded.time[k])
-        measured = Measured(recorded.values[k], recorded.missing[k], time, time, number)
+        measured = Voltages(recorded.values[k], recorded.missing[k], time, time, number)
         yield Gathered(number, time, pipeline.follow(measured))
         advance(done, len(rest))

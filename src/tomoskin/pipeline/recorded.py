@@ -12,8 +12,8 @@ from tomoskin.core import DataError, FloatArray, Image, IntArray
 from tomoskin.imaging import MOST_EXCLUDED, Evidence
 from tomoskin.model.pattern import Pattern
 from tomoskin.pipeline.conditioning import MOST_NUISANCE
-from tomoskin.pipeline.model_agreement import NO_AGREEMENT, REFUSED, ModelAgreement
 from tomoskin.pipeline.prepare import Prepared
+from tomoskin.pipeline.records import NO_AGREEMENT, REFUSED, ModelAgreement
 from tomoskin.sensing.signal import Consecutive, Recording, Reference, difference, in_phase
 
 _LISTED = 5
@@ -77,7 +77,7 @@ class RecordedFrames:
     @property
     def missing(self) -> NDArray[np.bool_]:
         """(n, n_meas) values that are not known."""
-        return ~np.isfinite(self.values)
+        return np.asarray(~np.isfinite(self.values))
 
     @property
     def time(self) -> FloatArray:

@@ -8,12 +8,10 @@ from concurrent.futures import Future
 from dataclasses import replace
 from pathlib import Path
 
-from tomoskin.core import Frame
+from tomoskin.core import Frame, Mark, MarkedFrame
 from tomoskin.files.session import (
     BoardInfo,
     Log,
-    Mark,
-    MarkedFrame,
     RawRead,
     Recorder,
     RunMessage,

@@ -455,7 +455,8 @@ _RECORD = """
 import sys, threading
 from pathlib import Path
 from files.session.runs import frame_of, SKIN
-from tomoskin.files.session import Mark, MarkedFrame, Recorder, SessionWriter
+from tomoskin.files.session import Recorder, SessionWriter
+from tomoskin.core import Mark, MarkedFrame
 from tomoskin.run.sinks import Capacity, Worker
 path = Path(sys.argv[1])
 recorder = Recorder(path, lambda: SessionWriter(path, SKIN), None, print)

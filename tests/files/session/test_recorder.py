@@ -15,11 +15,9 @@ import pytest
 
 from files.session.runs import INFO, SKIN, TOUCH, frame_of, same_frame
 from tomoskin.board.wire import encode
-from tomoskin.core import DataError, Event, Image
+from tomoskin.core import DataError, Event, Image, Mark, MarkedFrame
 from tomoskin.files.session import (
     BoardInfo,
-    Mark,
-    MarkedFrame,
     RawRead,
     Recorder,
     RunSettings,

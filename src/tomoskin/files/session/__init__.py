@@ -21,8 +21,6 @@ from tomoskin.files.session.foxglove import (
 )
 from tomoskin.files.session.info import OWN_FILES, SessionInfo, session_info
 from tomoskin.files.session.layout import (
-    Mark,
-    MarkedFrame,
     RecordedTouches,
     Truth,
     touch_row,
@@ -41,7 +39,6 @@ from tomoskin.files.session.recorder import (
 from tomoskin.files.session.repair import Lost, Repaired, repair
 from tomoskin.files.session.replay import ReplayTransport, open_replay, parse_replay
 from tomoskin.files.session.replayed import (
-    advance,
     as_recorded,
     reconstruct_session,
     recorded_calibrations,
@@ -72,8 +69,6 @@ __all__ = [
     "Log",
     "LogPart",
     "Lost",
-    "Mark",
-    "MarkedFrame",
     "RawRead",
     "RecordedTouches",
     "Recorder",
@@ -90,7 +85,6 @@ __all__ = [
     "Span",
     "Timeline",
     "Truth",
-    "advance",
     "all_blocks",
     "as_recorded",
     "encode_json",

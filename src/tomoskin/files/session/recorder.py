@@ -10,8 +10,8 @@ from typing import Any
 
 from tomoskin.board.source import ClockFitter
 from tomoskin.board.wire import Info
-from tomoskin.core import DataError, Event, Image, PixelMap, StrPath, Touch
-from tomoskin.files.session.layout import Mark, MarkedFrame, Truth
+from tomoskin.core import DataError, Event, Image, Mark, MarkedFrame, PixelMap, StrPath, Touch
+from tomoskin.files.session.layout import Truth
 from tomoskin.files.session.session_writer import SessionWriter
 from tomoskin.pipeline import FrameResult
 from tomoskin.sensing.track import TouchEvent

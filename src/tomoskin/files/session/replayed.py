@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from tomoskin.core import DataError, Frame
+from tomoskin.core import DataError, Mark
 from tomoskin.files.session.blocks import Advance, no_report
-from tomoskin.files.session.layout import Mark
 from tomoskin.files.session.scanned import ScannedFrame, scanned_touches, timed
 from tomoskin.files.session.session_reader import (
     SessionReader,
@@ -50,22 +49,6 @@ def recorded_calibrations(session: SessionReader) -> Iterator[Calibration[Any]]:
             yield kind.decode(data, f"{session.path}, {kind.attachment}")
 
 
-def advance(pipeline: Pipeline, frame: Frame, mark: Mark) -> FrameResult | None:
-    """Give the pipeline one frame as its ``mark`` says; None where there is no picture of it.
-
-    Raises
-    ------
-    DataError
-        When the frame has another number of samples than the scan.
-    """
-    if mark & Mark.SKIPPED:
-        return None
-    if mark & Mark.REFERENCE:
-        pipeline.take_reference()
-    pipeline.paused = bool(mark & Mark.HELD)
-    return pipeline.push(frame)
-
-
 def replaying(
     prepared: Prepared,
     session: SessionReader,
@@ -92,7 +75,7 @@ def gathered(
     for frame in timed(session.frames(), tick_rate(session), scan):
         mark = frame.item.mark if marked else Mark.NONE
         try:
-            result = advance(pipeline, frame.item.frame, mark)
+            result = pipeline.push(frame.item.frame, mark)
         except DataError:
             result = None
         if not frame.item.mark & Mark.EARLIER:

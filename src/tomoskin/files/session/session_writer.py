@@ -8,10 +8,20 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-from tomoskin.core import Event, Frame, Image, PixelMap, StrPath, Touch, encode_json, plain_values
+from tomoskin.core import (
+    Event,
+    Frame,
+    Image,
+    Mark,
+    PixelMap,
+    StrPath,
+    Touch,
+    encode_json,
+    plain_values,
+)
 from tomoskin.files.session import channels
 from tomoskin.files.session.foxglove import grid_message, log_message, scene_message
-from tomoskin.files.session.layout import Mark, encode_frame, encode_raw, touches_message
+from tomoskin.files.session.layout import encode_frame, encode_raw, touches_message
 from tomoskin.files.session.message_log import MessageLog
 
 if TYPE_CHECKING:
