@@ -178,14 +178,13 @@ def test_values_that_are_not_known_tell_nothing_of_their_sum_either() -> None:
     prepared = prepare(Skin.load("textile-disc-16"))
     pattern, rng = prepared.pattern, np.random.default_rng(4)
     square = ((prepared.mesh.centroids[:, :2] - (0.03, 0.02)) ** 2).sum(axis=1)
-    change = -0.3 * prepared.skin.conductivity * np.exp(-square / 0.014**2)
-    values = np.tile(prepared.operator.reference, (40, 1))
-    values[20:] += prepared.problem.jacobian @ change
-    values += prepared.readout.noise * rng.standard_normal(values.shape)
+    sigma = prepared.skin.conductivity * (1 - 0.5 * np.exp(-square / 0.014**2))
+    values = np.tile(prepared.operator.reference, (32, 1))
+    values[20:] = prepared.model.at(sigma).voltages
+    values += 0.5 * prepared.readout.noise * rng.standard_normal(values.shape)
     lost = (pattern.drive == 4).any(axis=1) | (pattern.measure == 4).any(axis=1)
     values[25:, lost] = np.nan
-    timed = replace(recording(pattern, values), time=0.2 * np.arange(40.0))
+    timed = replace(recording(pattern, values), time=0.2 * np.arange(32.0))
     found = reconstruct(prepared, timed, range(20))
-    for touches in found.touches[25:]:
-        (touch,) = touches
-        assert math.dist((touch.detection.x, touch.detection.y), (0.03, 0.02)) < 0.006
+    places = [(touch.detection.x, touch.detection.y) for (touch,) in found.touches[25:]]
+    assert math.dist(np.mean(places, axis=0), (0.03, 0.02)) < 0.0015

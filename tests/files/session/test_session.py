@@ -86,7 +86,7 @@ def test_a_clock_that_does_not_go_on_is_noted(tmp_path):
         for number in range(6):
             ticks = frame_of(min(number, 3)).ticks
             put(session, replace(frame_of(number), ticks=ticks))
-    (note,) = read_session(path).notes
+    (note,) = read_recording(path).notes
     assert note.startswith("the board's clock does not go on in 2 frames: 4, 5; each counts")
 
 
