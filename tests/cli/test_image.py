@@ -274,6 +274,19 @@ def test_a_frame_without_half_of_its_rows_shows_no_image_and_is_named(
     assert 3 in places(table)
 
 
+def test_a_longer_search_has_a_table_of_its_own(save, image, tmp_path) -> None:
+    plain, beside, longer = (tmp_path / f"{name}.csv" for name in ("plain", "beside", "longer"))
+    source = save(time_s=np.arange(4) / 10)
+    assert image(source, "--reference", "first:3", "--touches", plain)[0] == 0
+    code, out, _ = image(
+        source, "--reference", "first:3", "--touches", beside, "--thorough", longer
+    )
+    assert code == 0
+    assert plain.read_text() == beside.read_text()
+    assert f"{longer}: each frame searched by itself, 1 touches in them all" in out
+    assert math.dist(places(longer)[3], PLACE) < 0.015
+
+
 def test_dynamic_imaging_holds_each_frame_against_the_one_before(
     save, image, tmp_path, frames
 ) -> None:

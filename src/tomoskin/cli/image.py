@@ -130,6 +130,9 @@ def image(
     since = (result.time - first_time(recorded)).tolist()
     spans = touch_spans(zip(since, result.touches, strict=True))
     lines = _lines(result, spans, prepared)
+    if thorough is not None:
+        count = sum(map(len, tables[thorough].touches))
+        lines.append(f"{thorough}: each frame searched by itself, {count} touches in them all")
     if not recorded.timed:
         lines.append("the file has no times of its frames, so each is searched by itself")
     tell(_document(result, spans, prepared), lines, json=json)
