@@ -83,6 +83,7 @@ def test_frames_of_another_scan_are_left_out_of_the_recording(tmp_path):
 def test_a_clock_that_does_not_go_on_is_noted(tmp_path):
     path = tmp_path / "run.mcap"
     with SessionWriter(path, SKIN) as session:
+        session.device(0.0, INFO)
         for number in range(6):
             ticks = frame_of(min(number, 3)).ticks
             put(session, replace(frame_of(number), ticks=ticks))
