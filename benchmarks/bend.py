@@ -200,7 +200,7 @@ class Bench:
                 angles.append(math.radians(angle))
                 times.append(self.lab.time)
         axis = np.full(len(rows), math.pi / 2)
-        examples = BendExamples.of(np.array(rows), angles, axis, times)
+        examples = BendExamples.checked(np.array(rows), angles, axis, times)
         return BendModel.learn(examples, voltage_covariance(self.lab.prepared, self.flat))
 
     def moved(self) -> Found:

@@ -1,4 +1,5 @@
-"""Rough positions of unlabelled touches, from how strongly each row answers to each of them."""
+"""Where touches were that nobody has labelled, roughly: by the order in which measurements answer
+to them, by which frames are alike, and by the skin's model where the sheet answers as it says."""
 
 from __future__ import annotations
 
@@ -6,12 +7,15 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
+from scipy.linalg import eigh
 from scipy.optimize import minimize
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import shortest_path
 from scipy.special import ndtri
 
 from tomoskin.core import FloatArray
 from tomoskin.learning.touch.process import Basis, Likeness, squared_distances
-from tomoskin.learning.touch.topographic import TopographicMap, balanced
+from tomoskin.learning.touch.topographic import TopographicMap, balanced, coefficients_of
 from tomoskin.model.forward import ForwardModel
 
 _SMALL = 0.05
@@ -101,8 +105,7 @@ class Ranked:
         """``positions`` (n, 2) moved by the affine map that makes the scores fit them best."""
         basis = Basis.of(Likeness(_LENGTH), self.grid)
         values = basis(self.grid)
-        normal = values.T @ values + _RIDGE * np.eye(values.shape[1])
-        coefficients = np.linalg.solve(normal, values.T @ self.expected)
+        coefficients = coefficients_of(values, self.expected, _RIDGE)
         measured = self.scores - self.scores.mean(axis=0)
         measured = measured / max(float(np.linalg.norm(measured)), _LEAST)
         affine = affine_terms(positions)
@@ -135,3 +138,114 @@ def _logarithms(dv: FloatArray) -> FloatArray:
     sizes = np.abs(dv)
     usual = np.maximum(np.nanmedian(sizes, axis=0), np.finfo(float).tiny)
     return np.asarray(np.log(sizes / usual + _SMALL))
+
+
+_ROUGH = 5.0
+"""Labels for which all rough positions together count."""
+
+
+def unfolded(scores: FloatArray, neighbours: int) -> FloatArray:
+    """(n, 2) coordinates whose distances are those along the frames' manifold.
+
+    Isomap (Tenenbaum, de Silva & Langford 2000): from frame to frame by way of ``neighbours``.
+    """
+    away = np.sqrt(squared_distances(scores, scores))
+    n = len(away)
+    near = np.argsort(away, axis=1)[:, 1 : neighbours + 1]
+    links = np.take_along_axis(away, near, axis=1).ravel()
+    ends = (np.repeat(np.arange(n), neighbours), near.ravel())
+    along = shortest_path(csr_matrix((links, ends), (n, n)), directed=False)
+    along = np.where(np.isfinite(along), along, along[np.isfinite(along)].max()) ** 2
+    about = along - along.mean(axis=0) - along.mean(axis=1, keepdims=True) + along.mean()
+    size, axes = eigh(-0.5 * about, subset_by_index=(n - 2, n - 1))
+    return np.asarray(axes * np.sqrt(np.maximum(size, 0.0)))
+
+
+def laid_over(layout: FloatArray, rough: FloatArray, labels: FloatArray) -> FloatArray:
+    """(n, 2) the ``layout`` (n, 2) moved by an affine map to where the frames were.
+
+    ``rough`` (n, 2) positions, of which each says little; ``labels`` (n, 2), NaN where none is.
+    """
+    known = np.isfinite(labels).all(axis=1, keepdims=True)
+    root = np.sqrt(np.where(known, 1.0, _ROUGH / len(layout)))
+    terms = affine_terms(layout)
+    target = np.where(known, labels, rough)
+    return np.asarray(terms @ np.linalg.lstsq(terms * root, target * root, rcond=None)[0])
+
+
+_WIDTH = 0.1
+"""Deviation, in radii, of a touch on the sheet."""
+
+_MODEL_FREEDOM = 8.0
+"""Independent values in a frame: what the model leaves errs together."""
+
+_HOLDS = 0.5
+"""Part of a usual frame that the model must explain: 0.75 to 0.9 on the twin, at most 0.24 on the
+public hydrogels."""
+
+_TINY = 1e-99
+
+
+def model_responses(
+    model: ForwardModel, conductivity: float, positions: FloatArray, unit: float
+) -> FloatArray:
+    """(g, n_meas) change of each row by a touch at ``positions`` (g, 2) m, in any one unit.
+
+    ``unit`` m: radius of the skin.
+    """
+    off = squared_distances(positions, model.mesh.centroids[:, :2])
+    touched = np.exp(-0.5 * off / (_WIDTH * unit) ** 2) * model.mesh.volumes
+    return np.asarray(touched @ model.jacobian(conductivity).T)
+
+
+@dataclass(frozen=True, eq=False)
+class ModelFit:
+    """Frames against the model's responses.
+
+    Attributes
+    ----------
+    weights
+        (n, g) probabilities of the grid's positions. Touches may be anywhere, as often as it be.
+    explained
+        Part of a usual frame's square that the likeliest response explains (median).
+    """
+
+    weights: FloatArray
+    explained: float
+
+    @classmethod
+    def of(cls, dv: FloatArray, responses: FloatArray) -> Self:
+        """Compare shapes: how hard a touch is, and whether changes rise or fall, is not known.
+
+        ``dv`` (n, k), ``responses`` (g, k). Channels' gains are one, or those that make a usual
+        change as large as the model's: whatever explains more.
+        """
+        dv = np.nan_to_num(dv)
+        usual = _usual(dv) / _usual(responses)
+        scales = (np.ones(len(usual)), np.maximum(usual, _TINY))
+        fits = [cls._of(sign * dv / scale, responses) for scale in scales for sign in (1, -1)]
+        return max(fits, key=lambda fit: fit.explained)
+
+    @classmethod
+    def _of(cls, dv: FloatArray, responses: FloatArray) -> Self:
+        shapes, expected = _shapes(dv), _shapes(responses)
+        best = (shapes @ expected.T).max(axis=1)
+        off = squared_distances(shapes, expected)
+        noise = float(off.min(axis=1).mean()) / _MODEL_FREEDOM
+        weights = np.exp(-0.5 * (off - off.min(axis=1, keepdims=True)) / noise)
+        explained = float(np.median(np.maximum(best, 0.0) ** 2))
+        return cls(weights / weights.sum(axis=1, keepdims=True), explained)
+
+    @property
+    def holds(self) -> bool:
+        """Whether the sheet answers as the model says."""
+        return self.explained > _HOLDS
+
+
+def _shapes(values: FloatArray) -> FloatArray:
+    size = np.linalg.norm(values, axis=1, keepdims=True)
+    return np.asarray(values / np.maximum(size, _TINY))
+
+
+def _usual(values: FloatArray) -> FloatArray:
+    return np.asarray(np.maximum(np.median(np.abs(values), axis=0), _TINY))
