@@ -15,7 +15,7 @@ from tomoskin.core import Detection, Frame
 from tomoskin.learning import BENDS, BendExamples, BendModel, Differences, FrameView, JointReference
 from tomoskin.model.mesh import Cylinder, Hinge
 from tomoskin.pipeline import Pipeline
-from tomoskin.pipeline.finding import finding, voltage_covariance
+from tomoskin.pipeline.finding import finder_of, voltage_covariance
 from tomoskin.pipeline.nuisance import JUMP
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
 from tomoskin.sensing.signal import Reference
@@ -136,7 +136,7 @@ class Bench:
 
     def finder(self, reference: Reference) -> Callable[[Floats, Floats], list[Detection]]:
         """What finds touches in V less the reference, beside directions that say nothing."""
-        found = finding(self.lab.prepared, reference)
+        found = finder_of(self.lab.prepared, reference)
         image = self.lab.image
         n_meas = self.lab.prepared.pattern.n_meas
         none, excluded = np.zeros((n_meas, 0)), np.zeros(n_meas, bool)

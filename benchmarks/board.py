@@ -245,7 +245,7 @@ def _drifted(mode: str, electrodes: str) -> dict[str, Any]:
     )
     rig, readout = Rig(skin, "hydrogel", SEED), Readout.of(Scan.of(skin.pattern()), skin.readout)
     voltages = [readout(rig.at(float(t))) for t in np.arange(0.0, SECONDS, rig.interval)]
-    assert not any(v.railed.any() for v in voltages)
+    assert not any(v.excluded.any() for v in voltages)
     values, second = np.array([v.values for v in voltages]), round(1 / rig.interval)
     moved = values[-second:].mean(axis=0) - values[:second].mean(axis=0)
     return {

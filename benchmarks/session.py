@@ -15,11 +15,9 @@ import numpy as np
 
 from report import Report, resident, table
 from tomoskin.board.wire import encode
-from tomoskin.core import Capacity, Frame, Worker
+from tomoskin.core import Capacity, Frame, Mark, MarkedFrame, Worker
 from tomoskin.files.exports import write_parquet
 from tomoskin.files.session import (
-    Mark,
-    MarkedFrame,
     RawRead,
     Recorder,
     SessionReader,

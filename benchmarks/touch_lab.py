@@ -19,7 +19,7 @@ from tomoskin.model.mesh import Mesh, laid_on, triangulate
 from tomoskin.model.pattern import Scan
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, prepare
-from tomoskin.pipeline.finding import Finder, finding
+from tomoskin.pipeline.finding import Finder, finder_of
 from tomoskin.pipeline.nuisance import JUMP
 from tomoskin.pipeline.tune import tuned, tuned_sheet
 from tomoskin.sensing.fit import Whitener, row_covariance
@@ -213,8 +213,8 @@ class TwinLab:
         self.reference = Reference.of(np.array([self.volts(()) for _ in range(idle)]))
         image, on_sheet = tuned(image, self.reference), tuned_sheet(fit, self.reference)
         self.image, self.floor = image.operator, image.image_noise(self.reference)
-        self.by_fit = lambda: finding(on_sheet, self.reference)
-        self.by_image = lambda: finding(image, self.reference)
+        self.by_fit = lambda: finder_of(on_sheet, self.reference)
+        self.by_image = lambda: finder_of(image, self.reference)
         noise = fit.readout.noise / np.sqrt(2) * np.sqrt(1 + 1 / idle)
         self.whiten = Whitener.of(row_covariance(fit.scan, noise))
 
@@ -292,8 +292,8 @@ class PlantLab:
         )
         self._floor = self._image.image_noise(self.reference, self._nuisance)
         self._finders: tuple[Finder, Finder] = (
-            finding(tuned_sheet(fit, self.reference, self.lost), self.reference),
-            finding(self._image, self.reference),
+            finder_of(tuned_sheet(fit, self.reference, self.lost), self.reference),
+            finder_of(self._image, self.reference),
         )
 
     def found(self, fingers: Sequence[Finger]) -> tuple[Sequence[Detection], Sequence[Detection]]:

@@ -27,7 +27,7 @@ from tomoskin.core import FloatArray
 from tomoskin.learning import Differences, FrameView
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, prepare
-from tomoskin.pipeline.finding import finding
+from tomoskin.pipeline.finding import finder_of
 from tomoskin.pipeline.nuisance import JUMP
 from tomoskin.pipeline.tune import tuned_sheet
 from tomoskin.sensing.fit import Whitener, row_covariance
@@ -91,7 +91,7 @@ class Sheet:
         """m, root mean square over frames; infinite where a touch is missed."""
         missed = []
         for volts in self.frames(Press(x, y, FORCE, RADIUS), FRAMES):
-            finder = finding(self.fitted, self.reference)
+            finder = finder_of(self.fitted, self.reference)
             found = finder.push(self.view(volts))
             missed.append(min((np.hypot(d.x - x, d.y - y) for d in found), default=np.inf))
         return float(np.sqrt(np.mean(np.square(missed))))

@@ -15,8 +15,8 @@ import httpx
 import numpy as np
 import pytest
 
-from tomoskin.core import Frame
-from tomoskin.files.session import Mark, SessionReader, SessionWriter, session_info
+from tomoskin.core import Frame, Mark
+from tomoskin.files.session import SessionReader, SessionWriter, session_info
 from tomoskin.model.skin import Skin
 
 COMMAND = [sys.executable, "-c", "from tomoskin.cli import main; main()"]

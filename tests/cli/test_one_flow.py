@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import h5py
+import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
@@ -28,10 +29,12 @@ from tomoskin.files.session import (
     session_info,
     split,
 )
+from tomoskin.learning import TOUCH, Locator
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, prepare
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
 from tomoskin.run import Runner, commands, simulate
+from tomoskin.sensing.segment import Region
 from tomoskin.twin import Script
 
 HEAD = 'format = 1\n[script]\nduration = "1800 ms"\nlead_in = "1400 ms"\n'
@@ -50,6 +53,9 @@ SLIDE = PRESSES.format(id="a", x=-30, y=10, start=100, more='path = [["700 ms", 
 LOST = fault("cut", "600 ms", "1800 ms", electrode=2)
 SCRIPTS = {"two presses": A + B, "a slide": SLIDE, "an electrode lost": A + LOST}
 WAYS = (*SCRIPTS, "a late recording", "one skin of a robot")
+PLAIN = ("two presses", "a slide")
+"""Those of which a table of voltages tells all: it holds neither readings at a rail nor the run
+before it."""
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +65,7 @@ def fitted() -> Prepared:
 
 @pytest.fixture(scope="module", params=WAYS)
 def session(request: pytest.FixtureRequest, tmp_path_factory, fitted: Prepared) -> Path:
-    path = Path(tmp_path_factory.mktemp("flow") / "session.mcap")
+    path = Path(tmp_path_factory.mktemp("flow") / f"{request.param}.mcap")
     if request.param in SCRIPTS:
         simulate(Script.from_toml(HEAD + SCRIPTS[request.param]), fitted.skin, path)
     elif request.param == "a late recording":
@@ -73,7 +79,20 @@ def session(request: pytest.FixtureRequest, tmp_path_factory, fitted: Prepared) 
             RobotWatch(run).until(grown(run, boards))
             run.stop_recording()
         split(path)
-        return path.with_name("session-right.mcap")
+        return path.with_name(f"{path.stem}-right.mcap")
+    return path
+
+
+@pytest.fixture(scope="module")
+def calibration(fitted: Prepared, tmp_path_factory) -> Path:
+    """A file of 40 presses, each with what the linear model says of it."""
+    places = 0.8 * Region.of(fitted.skin).metres(Region.of(fitted.skin).lattice(40))
+    cells = fitted.mesh.centroids[:, None, :2] - places
+    change = -0.3 * np.exp(-(cells**2).sum(axis=2) / 0.014**2) * fitted.skin.conductivity
+    dv = (fitted.problem.jacobian @ change).T
+    locator = Locator.fit(dv, places, skin=fitted.skin)
+    path = Path(tmp_path_factory.mktemp("calibration") / "c.npz")
+    TOUCH.of(locator, fitted.pattern, fitted.skin).write(path)
     return path
 
 
@@ -147,6 +166,30 @@ def test_all_ways_are_the_same(session: Path, fitted: Prepared, tmp_path: Path, 
         assert [span.begin for span in info.spans] == [span.begin for span in again_info.spans]
     if "right" not in session.name:
         assert found
+
+    first, plain = tmp_path / "first.csv", tmp_path / "plain.csv"
+    code, _, err = tomoskin("image", session, "--reference", "first:20", "--touches", first)
+    assert code == 0, err
+    assert table(first) == table(one)
+    if session.stem in PLAIN:
+        voltages = tmp_path / "voltages.npz"
+        assert tomoskin("session", "export", session, voltages)[0] == 0
+        code, _, err = tomoskin("image", voltages, "--skin", "textile-disc-8", "--touches", plain)
+        assert code == 0, err
+        assert table(plain) == table(one)
+
+
+def test_a_calibration_locates_the_same_by_both_commands(
+    session: Path, calibration: Path, tmp_path: Path, tomoskin
+) -> None:
+    if session.stem not in PLAIN:
+        pytest.skip("two sessions are enough")
+    one, two = tmp_path / "image.csv", tmp_path / "locate.csv"
+    for command, out in (("image", one), ("locate", two)):
+        code, _, err = tomoskin(command, session, "--calibration", calibration, "--touches", out)
+        assert code == 0, err
+    assert table(one) == table(two)
+    assert len(table(one)) > 1
 
 
 def bag_positions(path: Path) -> list[tuple[float, float]]:

@@ -12,7 +12,7 @@ from tomoskin.core import Detection, Event, Frame, Image, Touch, Voltages
 READING = Detection(0.01, -0.02, np.nan, np.nan, 1e-4, -0.3, np.array([3, 4]))
 RECORDS = [
     Frame(1, 2, 3.0, 4, 0, 0, np.zeros(3, dtype=np.uint16)),
-    Voltages(np.zeros(3), np.zeros(3, dtype=bool), 1, 2, 3.0),
+    Voltages(np.zeros(3), np.zeros(3, dtype=bool), 2.0, 3.0),
     Image(np.zeros(3), "S", "mesh"),
     READING,
     Touch(1, "decrease", 0.5, READING),

@@ -14,8 +14,8 @@ from run.test_runner import Watch
 from tomoskin import run as room
 from tomoskin import server
 from tomoskin.cli import main
-from tomoskin.core import Frame
-from tomoskin.files.session import Mark, SessionReader, as_recorded, replayed, session_info
+from tomoskin.core import Frame, Mark
+from tomoskin.files.session import SessionReader, as_recorded, replayed, session_info
 from tomoskin.learning import BENDS, TOUCH, BendExamples, BendModel, BendReading, Locator
 from tomoskin.pipeline import Pipeline, prepare
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES

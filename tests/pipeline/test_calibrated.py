@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tomoskin.core import FloatArray
+from tomoskin.core import FloatArray, Voltages
 from tomoskin.learning import FORCE, TOUCH, ForceModel, Locator, WeighedPresses
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Pipeline, Prepared, prepare
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
-from tomoskin.pipeline.records import FrameResult, Measured
+from tomoskin.pipeline.records import FrameResult
 from tomoskin.sensing.segment import Region
 
 FITTED = prepare(Skin.load("textile-disc-8"))
@@ -60,7 +60,7 @@ def shown(prepared: Prepared, *places: FloatArray, size: float = 1.0) -> list[Fr
         values = size * (rest + dv + NOISE * random.standard_normal(len(rest)))
         none = np.zeros(len(rest), bool)
         results.append(
-            pipeline.follow(Measured(values, none, 0.05 * number, 0.05 * number, number))
+            pipeline.follow(Voltages(values, none, 0.05 * number, 0.05 * number, number))
         )
     return results[REFERENCE_FRAMES:]
 

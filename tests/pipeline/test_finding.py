@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +12,8 @@ from run.board import pressed, samples_of
 from tomoskin.core import Frame
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Pipeline, prepare, reconstruct
-from tomoskin.pipeline.finding import InData, InImage, finding
+from tomoskin.pipeline.finding import FitConditions, FitFinder, RegionFinder, finder_of
+from tomoskin.sensing.fit import EXHAUSTIVE, LIVE
 from tomoskin.sensing.signal import Recording, Reference
 
 NEEDED = 10
@@ -35,8 +37,8 @@ def frames(skin, samples, count, first=0, seed=0):
 
 def test_the_skin_file_chooses(fitted):
     by_image = prepare(fitted.skin.altered({"touch": {"method": "image"}}))
-    assert isinstance(finding(by_image, None), InImage)
-    assert isinstance(finding(fitted, None), InData)
+    assert isinstance(finder_of(by_image, None), RegionFinder)
+    assert isinstance(finder_of(fitted, None), FitFinder)
 
 
 def test_live_touches_are_where_the_skin_is_pressed(fitted):
@@ -74,12 +76,29 @@ def test_a_recording_gives_the_same_as_live(fitted):
         assert [touch.detection.x, touch.detection.y] == pytest.approx([-0.02, 0.04], abs=0.006)
 
 
+def test_what_moves_in_a_scan_follows_the_pace_of_the_board(fitted):
+    """A Pico scans in a fortieth of the Mega's time, whatever the skin file says."""
+    values = np.array([fitted.problem.reference])
+    reference = Reference.of(values)
+    reach = {}
+    for interval in (np.nan, 0.2, 1.4e-3):
+        finder = finder_of(fitted, reference, LIVE, interval)
+        beside = FitConditions(fitted, reference, fitted=False, interval=interval).touch_fit()
+        assert isinstance(finder, FitFinder)
+        assert beside is not None
+        reach[interval] = finder._spots._reach
+        other = inspect.getclosurevars(beside.detect).nonlocals["finder"]
+        assert other._spots._reach == pytest.approx(EXHAUSTIVE.speed / LIVE.speed * reach[interval])
+    assert reach[1.4e-3] == pytest.approx(1.4e-3 * LIVE.speed)
+    assert reach[0.2] == reach[np.nan] == pytest.approx(0.055 * LIVE.speed, rel=0.1)
+
+
 def test_noise_that_is_not_known_is_the_read_outs(fitted):
     """One idle frame, or none, tells no noise."""
     values = np.array([fitted.problem.reference])
     for reference in (None, Reference.of(values)):
-        finder = finding(fitted, reference)
-        assert isinstance(finder, InData)
+        finder = finder_of(fitted, reference)
+        assert isinstance(finder, FitFinder)
     louder = replace(fitted, readout=replace(fitted.readout, noise=3 * fitted.readout.noise))
-    quiet, loud = (finding(p, None)._spots._sight._noise for p in (fitted, louder))
+    quiet, loud = (finder_of(p, None)._spots._sight._noise for p in (fitted, louder))
     assert np.linalg.norm(loud) == pytest.approx(9 * np.linalg.norm(quiet), rel=0.1)

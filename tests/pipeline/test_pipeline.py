@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from run.board import pressed, samples_of
-from tomoskin.core import Frame
+from tomoskin.core import Frame, Mark
 from tomoskin.pipeline import Pipeline
 
 NEEDED = 5
@@ -24,12 +24,13 @@ def push(prepared):
     pipeline = Pipeline(prepared, reference_frames=NEEDED)
     rng, number = np.random.default_rng(3), count()
 
-    def push(samples):
+    def push(samples, mark=Mark.NONE):
         n = next(number)
         noise = rng.integers(-1, 2, len(samples))
         noisy = np.where((samples == 0) | (samples > 65000), samples, samples + noise)
         ticks = round(0.01 * n * pipeline.tick_rate)
-        return pipeline.push(Frame(n, ticks, 0.01 * n, 1, 0, 0, noisy.astype(np.uint16)))
+        frame = Frame(n, ticks, 0.01 * n, 1, 0, 0, noisy.astype(np.uint16))
+        return pipeline.push(frame, mark)
 
     push.pipeline = pipeline
     return push
@@ -94,9 +95,7 @@ def test_a_new_reference_takes_the_touch_for_rest(push, idle, touched):
 
 def test_pause(push, idle):
     settle(push, idle)
-    push.pipeline.paused = True
-    assert push(idle) is None
-    push.pipeline.paused = False
+    assert push(idle, Mark.HELD) is None
     assert push(idle) is not None
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tomoskin.run.backlog import MOST_AT_ONCE, Backlog
+from tomoskin.run.intake import MOST_AT_ONCE, Backlog
 
 LATE, PROMPT = 0.02, 0.0
 PERIOD = 1 / 400

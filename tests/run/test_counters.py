@@ -50,14 +50,14 @@ def test_rate_is_of_the_last_second():
 def test_latency_forgets_what_is_old():
     latency = Latency(window=10)
     for seconds in [9.0] * 50 + [1.0] * 10:
-        latency.add_age(seconds)
+        latency.add_result(0.0, seconds)
     assert latency.age() == (1.0, 1.0)
 
 
 def test_percentiles():
     latency = Latency(window=101)
     for seconds in range(101):
-        latency.add_age(float(seconds))
+        latency.add_result(0.0, float(seconds))
     assert latency.age() == (50.0, 99.0)
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from run.test_replay import Recorded, recorded_touches, touches_of
-from tomoskin.files.session import Mark, SessionReader, as_recorded, replayed
+from tomoskin.core import Mark
+from tomoskin.files.session import SessionReader, as_recorded, replayed
 from tomoskin.pipeline import prepare
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
 from tomoskin.run import commands

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tomoskin.core import Event
-from tomoskin.run.repeats import PERIOD, Repeats
+from tomoskin.run.intake import PERIOD, Repeats
 
 
 def times(text):

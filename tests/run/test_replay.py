@@ -11,14 +11,14 @@ import pytest
 from run.board import Board, pressed, samples_of
 from run.test_runner import PATIENCE, Watch
 from tomoskin.board.source import Link, ScanSettings
-from tomoskin.core import DataError, Frame, SourceError
-from tomoskin.files.session import Mark, SessionReader, advance, replayed
+from tomoskin.core import DataError, Frame, Mark, SourceError
+from tomoskin.files.session import SessionReader, replayed
 from tomoskin.files.session.replay import ReplayTransport, open_replay, parse_replay
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Pipeline, prepare
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
 from tomoskin.run import Runner, commands
-from tomoskin.run.backlog import MOST_AT_ONCE
+from tomoskin.run.intake import MOST_AT_ONCE
 
 
 def noisy(samples, number):
@@ -482,7 +482,7 @@ def test_advance_gives_no_picture_of_a_skipped_frame(run, prepared):
     with SessionReader(run) as session:
         frame = next(session.frames()).frame
     pipeline = Pipeline(prepared)
-    assert advance(pipeline, frame, Mark.SKIPPED) is None
-    assert advance(pipeline, frame, Mark.HELD) is None
+    assert pipeline.push(frame, Mark.SKIPPED) is None
+    assert pipeline.push(frame, Mark.HELD) is None
     assert pipeline.reference_state.frames == 0
-    assert advance(pipeline, frame, Mark.NONE) is not None
+    assert pipeline.push(frame, Mark.NONE) is not None

@@ -14,9 +14,9 @@ from tomoskin.core import DataError, OutputError, SourceError
 from tomoskin.files.session import SessionReader, repair, split, split_names
 from tomoskin.model.robot import Place, Pose
 from tomoskin.run import Member, RobotRun
+from tomoskin.run.publisher import Turns
 from tomoskin.run.robot_run import board_problems
 from tomoskin.run.sinks import ContactListener
-from tomoskin.run.turns import Turns
 
 PATIENCE = 300
 

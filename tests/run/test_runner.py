@@ -17,7 +17,7 @@ from tomoskin.model.skin import Skin
 from tomoskin.pipeline import prepare
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES, Pipeline
 from tomoskin.run import Runner, commands
-from tomoskin.run.backlog import MOST_AT_ONCE
+from tomoskin.run.intake import MOST_AT_ONCE
 from tomoskin.run.publisher import EventLog
 from tomoskin.run.recordings import Recordings
 from tomoskin.twin import Press

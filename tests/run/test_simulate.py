@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from run.scripted import FRAME, PRESS, fault, run
-from tomoskin.core import DataError
-from tomoskin.files.session import Mark, SessionReader, read_session
+from tomoskin.core import DataError, Mark
+from tomoskin.files.session import SessionReader, read_session
 from tomoskin.pipeline import Prepared, reconstruct
 from tomoskin.sensing.signal import Recording
 

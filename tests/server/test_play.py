@@ -13,8 +13,8 @@ from run.board import Board
 from run.test_replay import run, same, touches_of  # the recorded run
 from run.test_runner import PATIENCE, Watch
 from server.serving import Site
-from tomoskin.core import DataError
-from tomoskin.files.session import Mark, SessionReader, end_time, read_timeline, replayed
+from tomoskin.core import DataError, Mark
+from tomoskin.files.session import SessionReader, end_time, read_timeline, replayed
 from tomoskin.files.session.replay import open_replay
 from tomoskin.run import Runner, commands
 

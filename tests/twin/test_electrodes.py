@@ -114,7 +114,7 @@ def drift(mode):
     for time in times:
         counts = board.sample(table, float(time))
         voltages = readout(Frame(0, 0, 0.0, 1, 0, 0, *table.readings(counts)))
-        assert not voltages.railed.any()
+        assert not voltages.excluded.any()
         rows.append(voltages.values)
     values = np.array(rows)
     moved = values[times > 9.5].mean(axis=0) - values[times < 0.5].mean(axis=0)

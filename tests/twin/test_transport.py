@@ -188,7 +188,7 @@ def test_a_cut_electrode_shows_in_the_next_frame(skin):
     transport.set_faults(Faults(cut=frozenset({2})))
     readout = Readout.of(Scan.of(skin.pattern()), skin.readout)
     (frame,) = [item for item in link.poll(1.0) if isinstance(item, Frame)]
-    railed = readout(frame).railed
+    railed = readout(frame).excluded
     pattern = skin.pattern()
     reads = (pattern.measure == 2).any(axis=1)
     assert railed[reads].all()

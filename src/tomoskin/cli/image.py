@@ -38,12 +38,13 @@ from tomoskin.cli.recording import first_time, reconstructed, say_notes, span_li
 from tomoskin.core import DataError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
 
     from tomoskin.core import Touch
     from tomoskin.files.exports import Display
     from tomoskin.model.pattern import Pattern
     from tomoskin.pipeline import Prepared, Reconstruction, Unresolved
+    from tomoskin.sensing.signal import Recording
     from tomoskin.sensing.track import Span
 
 
@@ -123,38 +124,49 @@ def image(
             write_touches(path, rows, surface, forces=forces, overwrite=force)
     if out is not None:
         WRITERS[out.suffix.lower()](out, prepared, result, display, overwrite=force)
-    _warn(recording, result, prepared.pattern)
+    _warn(recorded, result, prepared.pattern)
     if located_alone(prepared, result.model_agreement):
         remark(f"{recording}: the calibration alone locates touches, one at a time")
     since = (result.time - first_time(recorded)).tolist()
     spans = touch_spans(zip(since, result.touches, strict=True))
-    tell(_document(result, spans, prepared), _lines(result, spans, prepared), json=json)
+    lines = _lines(result, spans, prepared)
+    if thorough is not None:
+        count = sum(map(len, tables[thorough].touches))
+        lines.append(f"{thorough}: each frame searched by itself, {count} touches in them all")
+    if not recorded.timed:
+        lines.append("the file has no times of its frames, so each is searched by itself")
+    tell(_document(result, spans, prepared), lines, json=json)
 
 
-def _lines(result: Reconstruction, spans: tuple[Span, ...], prepared: Prepared) -> Iterator[str]:
+def _lines(result: Reconstruction, spans: tuple[Span, ...], prepared: Prepared) -> list[str]:
     number = "1 touch" if len(spans) == 1 else f"{len(spans)} touches"
-    yield f"{len(result.frames) + len(result.unseen)} frames, {number}"
+    lines = [f"{len(result.frames) + len(result.unseen)} frames, {number}"]
     if len(result.unseen):
-        yield f"{len(result.unseen)} of them were held or skipped in the run"
+        lines.append(f"{len(result.unseen)} of them were held or skipped in the run")
     if math.isfinite(result.agreement):
-        yield result.model_agreement.text
-    yield alpha_line(result.choice)
+        lines.append(result.model_agreement.text)
+    lines.append(alpha_line(result.choice))
     if prepared.modes is not None:
         seconds = prepared.skin.inverse.time_constant
-        yield f"filtered over frames, time constant {seconds:g} s"
+        lines.append(f"filtered over frames, time constant {seconds:g} s")
     bends = [reading.state for reading in result.bends if reading]
     classes = [("unknown" if one.unknown else one.name) for one in result.classes if one]
     for names in filter(None, (bends, classes)):
-        yield ", ".join(f"{name}: {count} frames" for name, count in Counter(names).items())
-    yield from span_lines(spans, result.unit)
+        counts = Counter(names).items()
+        lines.append(", ".join(f"{name}: {count} frames" for name, count in counts))
+    lines += span_lines(spans, result.unit)
     if spans:
-        yield "times count from the first frame; --touches X.csv writes each touch in each frame"
+        lines.append(
+            "times count from the first frame; --touches X.csv writes each touch in each frame"
+        )
+    return lines
 
 
-def _warn(source: Path, result: Reconstruction, pattern: Pattern) -> None:
+def _warn(recorded: Recording, result: Reconstruction, pattern: Pattern) -> None:
     """Say on stderr what was left out, and what looks wrong."""
     from tomoskin.files.imports import is_session
 
+    source = Path(recorded.source)
     if len(result.rows_left_out):
         rows = result.rows_left_out.tolist()
         remark(
@@ -165,7 +177,8 @@ def _warn(source: Path, result: Reconstruction, pattern: Pattern) -> None:
         counted: list[tuple[int, int]] = []
     else:
         counted = list(zip(result.frames.tolist(), result.rows_missing.tolist(), strict=True))
-    named = [f"{frame} ({_rows(count)})" for frame, count in counted if count]
+    without = set(result.left_out.tolist())
+    named = [f"{frame} ({_rows(k)})" for frame, k in counted if k and frame not in without]
     if named:
         remark(
             f"{source}: {len(named)} frames hold values that are not finite; these rows were "
@@ -173,10 +186,10 @@ def _warn(source: Path, result: Reconstruction, pattern: Pattern) -> None:
         )
     for text, some in sorted(result.problems.items(), key=lambda item: -len(item[1]))[:_TOLD]:
         remark(f"{source}: {len(some)} frames, from {some[0]} on: {text}")
-    if len(result.left_out):
+    if blank := [frame for frame, k in counted if k and frame in without]:
         remark(
-            f"{source}: {len(result.left_out)} frames hold too many values that are not finite "
-            f"and were left out: {_listed(result.left_out.tolist())}"
+            f"{source}: {len(blank)} frames hold too many values that are not finite "
+            f"and show no image: {_listed(blank)}"
         )
     if (doubt := result.model_agreement.doubt(volts=is_session(source))) is not None:
         remark(f"{source}: {doubt}")

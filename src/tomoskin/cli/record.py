@@ -58,6 +58,7 @@ def record(
     chosen = skin_for_source(skin, source)
     with Bar("preparing"):
         prepared = prepare(chosen)
+        prepared.warm_up()  # else this would take up some of the seconds
     say_headroom(prepared.headroom)
     runner = Runner(prepared, lambda: open_source(source, chosen), sinks=sinks)
     with ended_by_signals(), recording_to(runner, file) as stopped:

@@ -73,15 +73,19 @@ def reconstructed(
     rule: str | None = None,
     setting: Setting | None = None,
 ) -> Reconstruction:
-    """What the pipeline makes of some ``frames`` of a file: a session is replayed unless another
-    ``reference`` is asked for, or the skin has other rows than it."""
+    """What the pipeline makes of some ``frames`` of a file.
+
+    A session is replayed, unless its reference is to be other than its first frames, or the skin
+    has other rows than it.
+    """
     from tomoskin.files.imports import is_session
     from tomoskin.files.session import SessionReader, reconstruct_session
     from tomoskin.pipeline import reconstruct, recorded_frames, tuned_by_rule, with_choice
 
     path, (start, stop) = Path(recording.source), frame_range(recording, frames)
     idle = _idle(recording, reference, prepared.pattern)
-    if reference is None and is_session(path):
+    count = len(idle) if isinstance(idle, range) and not idle.start else 1
+    if is_session(path) and (reference is None or count > 1):
         with SessionReader(path) as session:
             if session.skin.pattern().identity == prepared.pattern.identity:
                 if rule is not None:
@@ -89,7 +93,13 @@ def reconstructed(
                     choice = tuned_by_rule(known.prepared, rule, known.evidence()).choice
                     prepared = with_choice(prepared, choice)
                 return reconstruct_session(
-                    prepared, session, start=start, stop=stop, setting=setting, advance=advance
+                    prepared,
+                    session,
+                    start=start,
+                    stop=stop,
+                    setting=setting,
+                    idle=None if reference is None else count,
+                    advance=advance,
                 )
     return reconstruct(
         prepared, recording, idle, start=start, stop=stop, rule=rule, setting=setting,

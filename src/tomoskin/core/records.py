@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from enum import IntFlag
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,20 +55,58 @@ class Frame:
     sums: NDArray[np.uint16] | None = None
 
 
+class Mark(IntFlag):
+    """What became of a frame on its way to the pipeline."""
+
+    NONE = 0
+    REFERENCE = 1
+    """A new reference begins with this frame."""
+    HELD = 2
+    """Left out: the image was held."""
+    SKIPPED = 4
+    """Left out: too many frames waited."""
+    OPENED = 8
+    """First frame since the source was opened."""
+    EARLIER = 16
+    """From before the recording began: what its reference and operator were made of."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MarkedFrame:
+    """A frame, and what became of it."""
+
+    frame: Frame
+    mark: Mark
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Voltages:
-    """One frame in volts, in the order of the pattern's rows.
+    """One frame in volts.
 
-    ``values`` is (n_meas,) V; ``railed`` is (n_meas,) bool, True where a sample that the row
-    is made of stood at a rail of the converter; ``own`` is (n_electrodes,) V that each electrode
-    shows whatever the current does, against their mean, where the drive alternates.
+    Attributes
+    ----------
+    values
+        (n_meas,) V, in the order of the pattern.
+    excluded
+        (n_meas,) bool: at a rail of the converter, or not finite.
+    time, host_time
+        s, of the device's clock and of the host's: host times of frames that were read together
+        are the same.
+    sequence
+        The frame's number.
+    samples
+        What the board sent, where there is a board.
+    own
+        (n_electrodes,) V that each electrode shows whatever the current does, against their mean;
+        None where the drive does not alternate.
     """
 
     values: FloatArray
-    railed: NDArray[np.bool_]
-    sequence: int
-    ticks: int
+    excluded: NDArray[np.bool_]
+    time: float
     host_time: float
+    sequence: int = 0
+    samples: NDArray[np.uint16] | None = None
     own: FloatArray | None = None
 
 

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import FloatArray
-from tomoskin.pipeline.model_agreement import NO_AGREEMENT, ModelAgreement
-from tomoskin.pipeline.records import Measured
+from tomoskin.core import FloatArray, Voltages
+from tomoskin.pipeline.records import NO_AGREEMENT, ModelAgreement
 from tomoskin.sensing.signal import Reference
 
 _MOST_EXCLUDED, _MOST_LOST = 0.5, 0.25
@@ -72,7 +71,7 @@ class Collecting:
         """Frames that make a reference."""
         return len(self._values)
 
-    def push(self, measured: Measured) -> Rest | None:
+    def push(self, measured: Voltages) -> Rest | None:
         """Take one frame; the untouched skin once there are enough."""
         self._values[self.taken] = np.where(measured.excluded, self._model, measured.values)
         self._times[self.taken] = measured.time

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple, Protocol, Self
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import FloatArray, IntArray
+from tomoskin.core import FloatArray, IntArray, Voltages
 from tomoskin.learning import Differences
 from tomoskin.model.pattern import Scan
 from tomoskin.pipeline.nuisance import JUMP, Drift, Nuisance
 from tomoskin.pipeline.prepare import Prepared
-from tomoskin.pipeline.records import Measured
 from tomoskin.sensing.signal import (
     Baseline,
     BaselineState,
@@ -68,53 +67,8 @@ class Learnt(NamedTuple):
     touches: bool
 
 
-class Conditioning(Protocol):
-    """What makes difference data of one frame after the other."""
-
-    @property
-    def prepared(self) -> Prepared:
-        """The skin with the operator for what is well."""
-        ...
-
-    @property
-    def reference(self) -> Reference | None:
-        """What the untouched skin reads as far as it is known now."""
-        ...
-
-    @property
-    def mean(self) -> FloatArray:
-        """(n_meas,) V of the untouched skin, as they are known now; else the model's."""
-        ...
-
-    @property
-    def state(self) -> BaselineState | None:
-        """How the baseline is."""
-        ...
-
-    def subspace(self) -> NuisanceSubspace | None:
-        """The nuisance subspace of late."""
-        ...
-
-    def condition(self, measured: Measured) -> Conditioned:
-        """Difference data of a frame."""
-        ...
-
-    def learn(
-        self, time: float, moved: FloatArray | float, *, touched: bool, noise: bool = True
-    ) -> Learnt:
-        """Take the newest frame, without what of it has ``moved`` V, for the baseline.
-
-        ``noise``: whether what it shows beside the reference is noise that may be learnt.
-        """
-        ...
-
-    def renew(self, prepared: Prepared) -> None:
-        """Go on with another operator of the same skin."""
-        ...
-
-
-class Followed:
-    """Against a baseline that follows the skin from its reference on.
+class BaselineDifferences:
+    """Difference data against a baseline that follows the skin from its reference on.
 
     Parameters
     ----------
@@ -169,7 +123,7 @@ class Followed:
         drift = Drift(prepared, reference)
         return cls(prepared, monitor, _baseline(prepared, reference), drift)
 
-    def with_settings(self, prepared: Prepared, reference: Reference) -> Followed:
+    def with_settings(self, prepared: Prepared, reference: Reference) -> BaselineDifferences:
         """One for other settings of the same skin that goes on where this one is.
 
         ``reference`` is that which this one was made with.
@@ -177,10 +131,10 @@ class Followed:
         baseline, drift = self._baseline, self._drift
         if prepared.skin.signal != self._given.skin.signal:
             baseline, drift = _baseline(prepared, reference), Drift(prepared, reference)
-        return Followed(prepared, self._monitor, baseline, drift, self._health)
+        return BaselineDifferences(prepared, self._monitor, baseline, drift, self._health)
 
     def renew(self, prepared: Prepared) -> None:
-        """See :class:`Conditioning`."""
+        """Go on with another operator of the same skin."""
         self._given = self._prepared = prepared
         health = self._health
         if health is not None and health.sick:
@@ -201,27 +155,30 @@ class Followed:
 
     @property
     def mean(self) -> FloatArray:
-        """See :class:`Conditioning`."""
+        """(n_meas,) V of the untouched skin, as they are known now."""
         return self._baseline.mean
 
     @property
     def state(self) -> BaselineState:
-        """See :class:`Conditioning`."""
+        """How the baseline is."""
         return self._baseline.state
 
     def subspace(self) -> NuisanceSubspace:
-        """See :class:`Conditioning`."""
+        """The nuisance subspace of late."""
         return self._nuisance(self._health).nuisance
 
-    def condition(self, measured: Measured) -> Conditioned:
-        """See :class:`Conditioning`."""
+    def condition(self, measured: Voltages) -> Conditioned:
+        """Difference data of a frame."""
         values, baseline = measured.values, self._baseline
         mean = baseline.mean
-        if measured.excluded.any():
-            values = np.where(np.isfinite(values), values, mean)
+        unknown = measured.excluded & ~np.isfinite(values)
+        values = np.where(unknown, mean, values)
+        from_rest = values - baseline.start
         health = self._monitor.push(
             values, measured.excluded, measured.time, measured.samples, measured.own
         )
+        if unknown.any():  # what is not there tells nothing of a sum either
+            health = replace(health, lost=health.lost | unknown)
         self._values, self._health = values, health
         subspace = self._nuisance(health)
         self._excluded = health.lost
@@ -252,7 +209,7 @@ class Followed:
             wander=baseline.common_deviation / JUMP,
             change=values - mean,
             drift=subspace.drift,
-            from_rest=measured.values - baseline.start,
+            from_rest=from_rest,
             excluded=health.lost,
         )
         problem = None if times is None else _gain_text(times)
@@ -261,7 +218,10 @@ class Followed:
     def learn(
         self, time: float, moved: FloatArray | float, *, touched: bool, noise: bool = True
     ) -> Learnt:
-        """See :class:`Conditioning`."""
+        """Take the newest frame, without what of it has ``moved`` V, for the baseline.
+
+        ``noise``: whether what it shows beside the reference is noise that may be learnt.
+        """
         health, baseline = self._health, self._baseline
         if health is None or self._has_gain:  # another gain is nothing that the skin does
             return Learnt(image=False, touches=False)
@@ -311,20 +271,23 @@ class GivenDifferences:
 
     @property
     def mean(self) -> FloatArray:
-        """See :class:`Conditioning`."""
+        """(n_meas,) V of the model."""
         return self.prepared.operator.reference
 
     def subspace(self) -> None:
-        """See :class:`Conditioning`."""
+        """There is none."""
 
-    def condition(self, measured: Measured) -> Conditioned:
+    def condition(self, measured: Voltages) -> Conditioned:
         """Of a frame whose values are difference data already."""
         operator, excluded = self.prepared.operator, measured.excluded
+        n_excluded = int(np.count_nonzero(excluded))
+        if n_excluded > MOST_NUISANCE * len(excluded):
+            return Conditioned(None, n_excluded)
         change = measured.values * _scale(self.prepared, operator.reference)
         filled = operator.filled(measured.values, excluded)
         given = Differences.of(filled, np.zeros((len(excluded), 0)), excluded)
         differences = replace(given, change=change, from_rest=change)
-        return Conditioned(differences, int(np.count_nonzero(excluded)))
+        return Conditioned(differences, n_excluded)
 
     def learn(
         self, time: float, moved: FloatArray | float, *, touched: bool, noise: bool = True
@@ -334,8 +297,12 @@ class GivenDifferences:
         return Learnt(image=False, touches=False)
 
     def renew(self, prepared: Prepared) -> None:
-        """See :class:`Conditioning`."""
+        """Go on with another operator of the same skin."""
         self.prepared = prepared
+
+
+Conditioning = BaselineDifferences | GivenDifferences
+"""What makes difference data of one frame after the other."""
 
 
 def _baseline(prepared: Prepared, reference: Reference) -> Baseline:

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from dataclasses import dataclass, replace
-from typing import Protocol, Self
+from typing import Self
 
 import numpy as np
 
 from tomoskin.board.source import Configuration, ScanSettings
 from tomoskin.core import Detection, FloatArray, finished
 from tomoskin.learning import FrameView, TouchFit
-from tomoskin.pipeline.model_agreement import ModelAgreement
 from tomoskin.pipeline.nuisance import JUMP
 from tomoskin.pipeline.prepare import Prepared
+from tomoskin.pipeline.records import ModelAgreement
 from tomoskin.sensing.fit import (
     EXHAUSTIVE,
     Pace,
@@ -29,45 +29,8 @@ _PRESSES = replace(EXHAUSTIVE, joint=0, rounds=0)
 """Of frames that hold one press each, which have nothing to do with each other."""
 
 
-class Finder(Protocol):
-    """What finds the touches of one frame after the other."""
-
-    def renewing(self, prepared: Prepared, reference: Reference | None) -> Finding:
-        """What goes on with another operator or noise, in pieces of work."""
-        ...
-
-    def push(self, view: FrameView) -> list[Detection]:
-        """Readings of a frame, strongest first."""
-        ...
-
-    @property
-    def others(self) -> FloatArray | None:
-        """(k, n_meas) V: for each reading of the newest frame what all others change; None where
-        they are not fitted."""
-        ...
-
-    @property
-    def like_touch(self) -> bool:
-        """Whether the newest frame may hold a touch, though none was found."""
-        ...
-
-    @property
-    def rises(self) -> bool:
-        """Whether the newest frames show a change of the sign that touches do not have."""
-        ...
-
-    @property
-    def problem(self) -> str | None:
-        """What is wrong with the newest frame, in a sentence, or None."""
-        ...
-
-
-Finding = Generator[None, None, Finder]
-"""Pieces of work, each of a millisecond or less, that lead to a finder."""
-
-
-class InImage:
-    """Touches are regions of the picture."""
+class RegionFinder:
+    """Touches are regions of the image."""
 
     like_touch = rises = False
     others: FloatArray | None = None
@@ -76,25 +39,37 @@ class InImage:
     def __init__(self, prepared: Prepared) -> None:
         self._segmenter = prepared.segmenter
 
-    def renewing(self, prepared: Prepared, reference: Reference | None) -> Finding:
-        """See :class:`Finder`."""
+    def renewing(self, prepared: Prepared, reference: Reference | None) -> FinderSteps:
+        """What goes on with another operator or noise."""
         del reference
         yield from ()
-        return InImage(prepared)
+        return RegionFinder(prepared)
 
     def push(self, view: FrameView) -> list[Detection]:
-        """See :class:`Finder`."""
+        """Detections of a frame, strongest first."""
         return self._segmenter(view.image, view.image_noise)
 
 
-class InData:
-    """Touches are fitted to the data themselves; a filter over frames does not enter."""
+class FitFinder:
+    """Touches are fitted to the data themselves; a filter over frames does not enter.
+
+    Attributes
+    ----------
+    model
+        The sheet on which touches are fitted.
+    like_touch
+        Whether the newest frame may hold a touch, though none was found.
+    rises
+        Whether the newest frames show a change of the sign that touches do not have.
+    problem
+        What is wrong with the newest frame, in a sentence, or None.
+    """
 
     def __init__(
         self, model: SpotModel, spots: SpotFinder, volts: float, pace: Pace, interval: float
     ) -> None:
-        self.model = model
-        """The sheet on which touches are fitted."""
+        self.model, self.like_touch, self.rises = model, False, False
+        self.problem: str | None = None
         self._spots, self._volts, self._pace, self._interval = spots, volts, pace, interval
 
     @classmethod
@@ -123,26 +98,30 @@ class InData:
         )  # fmt: skip
         return cls(model, spots, _voltage_ratio(model, reference), pace, interval)
 
-    def renewing(self, prepared: Prepared, reference: Reference | None) -> Finding:
-        """See :class:`Finder`; where the sheet is another one, what is found begins anew."""
+    def renewing(self, prepared: Prepared, reference: Reference | None) -> FinderSteps:
+        """What goes on with another operator or noise; on another sheet it begins anew."""
         if prepared.spots is None or prepared.spots is self.model:
             gain = _gain(self.model, prepared, reference)
             noise = yield from _noise(prepared, reference, gain)
             yield from self._spots.renewing(noise, gain)
             self._volts = _voltage_ratio(self.model, reference)
             return self
-        other = yield from InData.making(
+        other = yield from FitFinder.making(
             prepared.spots, prepared, reference, self._pace, self._interval
         )
         yield from other._spots.preparing(self._spots)
         return other
 
     def push(self, view: FrameView) -> list[Detection]:
-        """See :class:`Finder`."""
-        differences = view.differences
-        return self._spots.push(
+        """Detections of a frame, strongest first."""
+        differences, spots, watch = view.differences, self._spots, self._spots.watch
+        detections = spots.push(
             differences.whole, differences.unknown, differences.jumps, differences.wander
         )
+        jump = spots.jump
+        self.like_touch, self.rises = watch.like_touch or jump is not None, watch.rises
+        self.problem = watch.problem or (None if jump is None else _jump_text(JUMP * jump))
+        return detections
 
     def strongest(self, dv: FloatArray) -> Detection | None:
         """The strongest touch in difference data (n_meas,), NaN where a value is missing."""
@@ -154,24 +133,15 @@ class InData:
 
     @property
     def others(self) -> FloatArray:
-        """See :class:`Finder`."""
+        """(k, n_meas) V: for each detection of the newest frame what all others change."""
         return self._volts * self._spots.others()
 
-    @property
-    def like_touch(self) -> bool:
-        """See :class:`Finder`."""
-        return self._spots.watch.like_touch or self._spots.jump is not None
 
-    @property
-    def rises(self) -> bool:
-        """See :class:`Finder`."""
-        return self._spots.watch.rises
+Finder = RegionFinder | FitFinder
+"""What finds the touches of one frame after the other."""
 
-    @property
-    def problem(self) -> str | None:
-        """See :class:`Finder`."""
-        jump = self._spots.jump
-        return self._spots.watch.problem or (None if jump is None else _jump_text(JUMP * jump))
+FinderSteps = Generator[None, None, Finder]
+"""Pieces of work, each of a millisecond or less, that lead to a finder."""
 
 
 def _jump_text(part: float) -> str:
@@ -190,7 +160,7 @@ def located_alone(prepared: Prepared, agreement: ModelAgreement) -> bool:
     return locates and agreement.doubt(volts=True) is not None
 
 
-def finding(
+def finder_of(
     prepared: Prepared,
     reference: Reference | None,
     pace: Pace = EXHAUSTIVE,
@@ -204,12 +174,12 @@ def finding(
     ``fitted``: whether the voltages are those of the skin's model, so that a fit is possible.
     """
     if prepared.spots is None or prepared.skin.touch.method != "fit" or not fitted:
-        return InImage(prepared)
-    return finished(InData.making(prepared.spots, prepared, reference, pace, interval))
+        return RegionFinder(prepared)
+    return finished(FitFinder.making(prepared.spots, prepared, reference, pace, interval))
 
 
 @dataclass(frozen=True, eq=False)
-class Fitting:
+class FitConditions:
     """Conditions under which calibrations are applied: touches can be fitted beside them.
 
     Attributes
@@ -218,11 +188,14 @@ class Fitting:
         The skin, and what it reads while nothing touches it, where that is known.
     fitted
         Whether detections are touches that were fitted to the data.
+    interval
+        Between frames, s, or NaN.
     """
 
     prepared: Prepared
     reference: Reference | None
     fitted: bool
+    interval: float = np.nan
 
     def fitted_presses(self, dv: FloatArray) -> list[Detection | None] | None:
         """See :class:`tomoskin.learning.Conditions`."""
@@ -232,7 +205,7 @@ class Fitting:
         mean = prepared.operator.reference if reference is None else reference.mean
         is_plain = prepared.operator.difference == "plain"
         data = dv if is_plain else dv / np.abs(mean)
-        finder = finished(InData.making(model, prepared, reference, _PRESSES))
+        finder = finished(FitFinder.making(model, prepared, reference, _PRESSES))
         return [finder.strongest(frame) for frame in data]
 
     def touch_fit(self) -> TouchFit | None:
@@ -244,8 +217,8 @@ class Fitting:
         gain = _voltage_ratio(model, reference)
         if self.fitted:
             return TouchFit(model.response, gain, lambda _, detections: detections)
-        beside = finished(InData.making(model, prepared, reference))
-        return TouchFit(model.response, gain, lambda view, _: beside.push(view))
+        finder = finished(FitFinder.making(model, prepared, reference, interval=self.interval))
+        return TouchFit(model.response, gain, lambda view, _: finder.push(view))
 
 
 def voltage_covariance(

@@ -8,23 +8,27 @@ from typing import Any
 
 import numpy as np
 
-from tomoskin.core import Detection, FloatArray, Image, ModelError, Touch, reach
+from tomoskin.core import Detection, FloatArray, Image, ModelError, Touch, Voltages, reach
 from tomoskin.learning import Differences, FrameView
 from tomoskin.model.pattern import Scan
 from tomoskin.pipeline.collecting import Rest
-from tomoskin.pipeline.conditioning import Conditioned, Conditioning, Followed, GivenDifferences
+from tomoskin.pipeline.conditioning import (
+    BaselineDifferences,
+    Conditioned,
+    Conditioning,
+    GivenDifferences,
+)
 from tomoskin.pipeline.finding import (
-    Finder,
-    Finding,
-    Fitting,
-    InImage,
-    finding,
+    FinderSteps,
+    FitConditions,
+    FitFinder,
+    finder_of,
     located_alone,
 )
-from tomoskin.pipeline.imaging import Filtered, SingleFrame, imaging
+from tomoskin.pipeline.imaging import Filtered, SingleFrame
 from tomoskin.pipeline.prepare import Prepared
-from tomoskin.pipeline.records import FrameResult, Measured
-from tomoskin.pipeline.tune import Steps, tune, tuned_sheet
+from tomoskin.pipeline.records import FrameResult
+from tomoskin.pipeline.tune import tune, tuned_sheet
 from tomoskin.sensing.fit import LIVE, Pace
 from tomoskin.sensing.signal import Reference
 from tomoskin.sensing.track import FingerTracker, Tracker
@@ -73,6 +77,11 @@ class Following:
         Of the run.
     reference
         Of the first frames: as it was taken, or as the baseline tells it by now.
+
+    Attributes
+    ----------
+    prepared
+        The skin, its alpha as it has been tuned.
     """
 
     def __init__(
@@ -89,29 +98,29 @@ class Following:
         if reference is not None and any(c.kind.fits for c in prepared.calibrations.values()):
             prepared = tuned_sheet(prepared, reference, excluded)  # they are applied once
         self.rest, self._setting = rest, setting
-        self._prepared, self._conditioning = prepared, conditioning
+        self.prepared, self.conditioning = prepared, conditioning
         self._tracker = FingerTracker(tracker, prepared.skin.touch.slide_lag)
         self._imaging = _imaging(conditioning, rest, reference)
         interval = np.nan if rest is None else rest.interval
         if not interval > 0:
             interval = setting.interval
         known = rest is None or not located_alone(prepared, rest.agreement)
-        self._finder: Finder = finding(prepared, reference, setting.pace, interval, fitted=known)
-        self._finding: Finding | None = None
+        self._finder = finder_of(prepared, reference, setting.pace, interval, fitted=known)
+        self._renewal: FinderSteps | None = None
         self._is_outdated = False
-        fitted = not isinstance(self._finder, InImage)
-        conditions = Fitting(prepared, reference, fitted)
+        fitted = isinstance(self._finder, FitFinder)
+        conditions = FitConditions(prepared, reference, fitted, interval)
         self._applied = {k: c.apply(conditions) for k, c in prepared.calibrations.items()}
-        self._tuning: Steps | None = None
-        if reference is not None:
-            self._tuning = tune(prepared, reference, excluded)
+        self._tuning = None if reference is None else tune(prepared, reference, excluded)
 
     @classmethod
     def from_rest(
         cls, prepared: Prepared, rest: Rest, tracker: Tracker, setting: Setting
     ) -> Following:
         """Against the voltages of the untouched skin."""
-        conditioning = Followed.of(prepared, rest.reference, rest.without_reference, setting.scan)
+        conditioning = BaselineDifferences.of(
+            prepared, rest.reference, rest.without_reference, setting.scan
+        )
         return cls(prepared, rest, conditioning, tracker, setting, reference=rest.reference)
 
     @classmethod
@@ -121,11 +130,11 @@ class Following:
 
     def with_settings(self, prepared: Prepared, tracker: Tracker) -> Following:
         """One for other settings of the same body that goes on where this one is."""
-        spots = self._prepared.spots
+        spots = self.prepared.spots
         if spots is not None and prepared.spots is spots.even:
             prepared = replace(prepared, spots=spots)
-        conditioning = self._conditioning
-        if self.rest is not None and isinstance(conditioning, Followed):
+        conditioning = self.conditioning
+        if self.rest is not None and isinstance(conditioning, BaselineDifferences):
             conditioning = conditioning.with_settings(prepared, self.rest.reference)
         return Following(
             prepared,
@@ -136,43 +145,39 @@ class Following:
             reference=conditioning.reference,
         )
 
-    @property
-    def prepared(self) -> Prepared:
-        """The skin, its alpha as it has been tuned."""
-        return self._prepared
-
-    @property
-    def conditioning(self) -> Conditioning:
-        """What is known of the reference and of the electrodes."""
-        return self._conditioning
-
-    def push(self, measured: Measured) -> FrameResult:
+    def push(self, measured: Voltages) -> FrameResult:
         """Take one frame."""
         self._tune()
         self._refind()
         reach("voltages")
-        conditioned = self._conditioning.condition(measured)
+        conditioned = self.conditioning.condition(measured)
         if conditioned.differences is None:
             return self._without_touches(measured, conditioned)
         try:
-            image, view, detections = self._found(measured.time, conditioned.differences)
+            view, detections = self._detected(measured.time, conditioned.differences)
         except ModelError as error:  # the next frame may be well
             problem = f"no touch can be found in this frame: {error}"
             failed = replace(conditioned, differences=None, problem=problem)
             return self._without_touches(measured, failed)
         reach("tracking")
         touches = self._tracker.update(detections, measured.time, measured.host_time)
-        reach("calibrations")
-        readings = self._read(view, detections, touched=bool(touches))
-        untouched = not (detections or self._finder.like_touch)
-        held = bool(touches) or self._finder.rises
+        readings = {}
+        if self._applied:
+            reach("calibrations")
+            for kind, applied in self._applied.items():
+                reading = applied.read(view, detections, touched=bool(touches))
+                if reading is not None:
+                    readings[kind] = reading
         reach("baseline")
-        self._learn(measured.time, touched=held, noise=untouched)
-        return self._result(measured, conditioned, image, touches, readings)
+        self._learn(
+            measured.time,
+            touched=bool(touches) or self._finder.rises,
+            noise=not (detections or self._finder.like_touch),
+        )
+        return self._result(measured, conditioned, view.image, touches, readings)
 
-    def _found(
-        self, time: float, differences: Differences
-    ) -> tuple[Image, FrameView, list[Detection]]:
+    def _detected(self, time: float, differences: Differences) -> tuple[FrameView, list[Detection]]:
+        """What a frame shows, and the touches in it."""
         reach("image")
         image, noise = self._imaging.push(differences.dv, time)
         view = FrameView(time, image, noise, differences)
@@ -181,61 +186,51 @@ class Following:
         if self._applied:
             reach("calibrations")
             view = replace(view, others=self._finder.others)
-        for applied in self._applied.values():
-            detections = applied.locate(view, detections)
-        return image, view, detections
+            for applied in self._applied.values():
+                detections = applied.locate(view, detections)
+        return view, detections
 
-    def _without_touches(self, measured: Measured, conditioned: Conditioned) -> FrameResult:
+    def _without_touches(self, measured: Voltages, conditioned: Conditioned) -> FrameResult:
         """Of a frame without an image."""
         touches = self._tracker.update([], measured.time, measured.host_time)
-        return self._result(measured, conditioned, self._prepared.no_image, touches, {})
+        return self._result(measured, conditioned, self.prepared.no_image, touches, {})
 
-    def first(self, measured: Measured) -> FrameResult:
+    def first(self, measured: Voltages) -> FrameResult:
         """The frame that completed the rest: nothing shows in it."""
         return FrameResult.at_rest(
             measured,
-            self._prepared.no_image,
-            self._conditioning.mean,
+            self.prepared.no_image,
+            self.conditioning.mean,
             self._tracker.events,
-            self._conditioning.state,
+            self.conditioning.state,
         )
 
-    def _read(
-        self, view: FrameView, detections: list[Detection], *, touched: bool
-    ) -> dict[str, Any]:
-        readings = {
-            kind: applied.read(view, detections, touched=touched)
-            for kind, applied in self._applied.items()
-        }
-        return {kind: reading for kind, reading in readings.items() if reading is not None}
-
     def _learn(self, time: float, *, touched: bool, noise: bool) -> None:
-        conditioning = self._conditioning
-        moved = sum((applied.moved for applied in self._applied.values()), start=0.0)
+        conditioning = self.conditioning
+        moved: FloatArray | float = 0.0
+        for applied in self._applied.values():
+            moved = moved + applied.moved
         learnt = conditioning.learn(time, moved, touched=touched, noise=noise)
-        if not any(learnt) or (reference := conditioning.reference) is None:
-            return
-        if learnt.image:
-            prepared = conditioning.prepared
-            self._imaging.renew(prepared, reference, conditioning.subspace())
-        self._is_outdated = True
+        if learnt.image and (reference := conditioning.reference) is not None:
+            self._imaging.renew(conditioning.prepared, reference, conditioning.subspace())
+        self._is_outdated |= learnt.image or learnt.touches
 
     def _refind(self) -> None:
         """One step towards a finder of what is known now; what there is serves meanwhile."""
-        if self._finding is None:
+        if self._renewal is None:
             if not self._is_outdated:
                 return
-            conditioning, self._is_outdated = self._conditioning, False
-            self._finding = self._finder.renewing(conditioning.prepared, conditioning.reference)
+            conditioning, self._is_outdated = self.conditioning, False
+            self._renewal = self._finder.renewing(conditioning.prepared, conditioning.reference)
         reach("new noise")
         try:
-            next(self._finding)
+            next(self._renewal)
         except StopIteration as end:
-            self._finder, self._finding = end.value, None
+            self._finder, self._renewal = end.value, None
 
     def _tune(self) -> None:
         """One step towards what the reference says; what there is serves meanwhile."""
-        if self._tuning is None or self._finding is not None:
+        if self._tuning is None or self._renewal is not None:
             return
         reach("tuning")
         try:
@@ -244,13 +239,13 @@ class Following:
             self._tuning = None
             return
         if better is not None:
-            self._prepared, self._is_outdated = better, True
-            self._conditioning.renew(better)
-            self._imaging = _imaging(self._conditioning, self.rest, self._conditioning.reference)
+            self.prepared, self._is_outdated = better, True
+            self.conditioning.renew(better)
+            self._imaging = _imaging(self.conditioning, self.rest, self.conditioning.reference)
 
     def _result(
         self,
-        measured: Measured,
+        measured: Voltages,
         conditioned: Conditioned,
         image: Image,
         touches: tuple[Touch, ...],
@@ -264,12 +259,12 @@ class Following:
             has_image=shows,
             image=image,
             voltages=measured.values,
-            reference=self._conditioning.mean,
+            reference=self.conditioning.mean,
             touches=touches,
             left_out=conditioned.n_excluded,
             events=self._tracker.events,
             health=conditioned.health,
-            baseline=self._conditioning.state,
+            baseline=self.conditioning.state,
             readings=readings,
             unexplained=conditioned.problem or (shows and self._finder.problem) or None,
         )
@@ -278,5 +273,9 @@ class Following:
 def _imaging(
     conditioning: Conditioning, rest: Rest | None, reference: Reference | None
 ) -> SingleFrame | Filtered:
+    """What makes the images: filtered where the skin has a time constant."""
+    prepared, subspace = conditioning.prepared, conditioning.subspace()
+    if prepared.modes is None:
+        return SingleFrame(prepared, reference, subspace)
     interval = np.nan if rest is None else rest.interval
-    return imaging(conditioning.prepared, reference, interval, conditioning.subspace())
+    return Filtered(prepared, prepared.modes, reference, interval, subspace)

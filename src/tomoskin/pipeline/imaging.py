@@ -1,15 +1,16 @@
-"""Difference data → image and its noise floor: the operator alone, or a filter over frames."""
+"""Difference data → image and its noise floor; and what of a change the image leaves open."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from tomoskin.core import FloatArray, Image
-from tomoskin.imaging import Modes, Temporal
+from tomoskin.core import FloatArray, Image, IntArray, ModelError
+from tomoskin.imaging import Modes, Temporal, unresolved
 from tomoskin.pipeline.prepare import Prepared
+from tomoskin.sensing.fit import SpotPrior
 from tomoskin.sensing.segment import ImageNoise
 from tomoskin.sensing.signal import NuisanceSubspace, Reference
 
@@ -120,16 +121,37 @@ class Filtered:
         return replace(self._alone, sd=np.maximum(self._alone.sd, self._steady.sd))
 
 
-def imaging(
-    prepared: Prepared,
-    reference: Reference | None,
-    interval: float,
-    subspace: NuisanceSubspace | None = None,
-) -> SingleFrame | Filtered:
-    """What makes the images of ``prepared``: filtered where its skin has a time constant.
+@dataclass(frozen=True, eq=False)
+class Unresolved:
+    """One map for all frames of a skin with the same alpha and the same measurements.
 
-    ``subspace``: the nuisance subspace, for the noise of the image; the data come without it.
+    Attributes
+    ----------
+    values
+        (n_cells,) from 0, all is told, to 1, nothing is; see :func:`tomoskin.imaging.unresolved`.
+    radius
+        Of the disc about each cell, m: that of a usual touch.
     """
-    if prepared.modes is None:
-        return SingleFrame(prepared, reference, subspace)
-    return Filtered(prepared, prepared.modes, reference, interval, subspace)
+
+    values: FloatArray
+    radius: float
+
+    @classmethod
+    def of(cls, prepared: Prepared, alpha: float, excluded: IntArray) -> Unresolved:
+        """Of an image by ``alpha`` without the measurements ``excluded``.
+
+        Raises
+        ------
+        ModelError
+            For a trained operator, which stands for no prior.
+        DataError
+            When too few measurements are left.
+        """
+        if prepared.skin.inverse.method != "one-step":
+            raise ModelError(
+                "a trained operator has no prior, so what it leaves open is not known",
+                hint='set method = "one-step" in [inverse]',
+            )
+        operator = prepared.problem.operator(alpha).without(np.asarray(excluded))
+        radius = SpotPrior.of(prepared.mesh).radius
+        return cls(unresolved(operator, prepared.problem, alpha, radius), radius)

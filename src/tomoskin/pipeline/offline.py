@@ -9,15 +9,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import DataError, FloatArray, Image, IntArray, Touch, check_fits
+from tomoskin.core import DataError, FloatArray, Image, IntArray, Touch, Voltages, check_fits
 from tomoskin.imaging import AlphaChoice
 from tomoskin.learning import BENDS, CLASSES, BendReading, ClassReading
 from tomoskin.pipeline.following import Setting
-from tomoskin.pipeline.model_agreement import ModelAgreement
 from tomoskin.pipeline.pipeline import Pipeline
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.pipeline.recorded import Idle, RecordedFrames, recorded_frames
-from tomoskin.pipeline.records import FrameResult, Measured
+from tomoskin.pipeline.records import FrameResult, ModelAgreement
 from tomoskin.pipeline.tune import tuned_by_rule
 from tomoskin.sensing.fit import EXHAUSTIVE
 from tomoskin.sensing.signal import Recording
@@ -46,7 +45,8 @@ class Reconstruction:
         (n,) number of rows that each of them lacks beside ``rows_left_out``: they were filled in
         so that they do not count.
     left_out, unseen
-        (k,) indices of those that lack too many rows, and of those that a run held or skipped.
+        (k,) indices of those of them that show no image, as most of their rows are lacking or all
+        changed at once, and of others, which a run held or skipped.
     shown
         The images, computed where somebody looks at them; see :attr:`images`.
     unit
@@ -86,11 +86,14 @@ class Reconstruction:
     ) -> Reconstruction:
         """What ``pipeline`` made of some ``frames``, which are asked for one by one."""
         kept: list[tuple[Any, ...]] = []
+        left_out: list[int] = []
         problems: dict[str, list[int]] = {}
         for number, time, result in frames:
             kept.append(
                 (number, time, result.left_out, result.image, result.touches, result.readings)
             )
+            if not result.has_image:
+                left_out.append(number)
             if result.problem is not None:
                 problems.setdefault(result.problem, []).append(number)
         numbers, times, missing, shown, touches, readings = (
@@ -100,7 +103,7 @@ class Reconstruction:
             frames=np.array(numbers, dtype=np.int64),
             time=np.array(times, dtype=np.float64),
             rows_missing=np.array(missing, dtype=np.int64),
-            left_out=np.zeros(0, dtype=np.int64),
+            left_out=np.array(left_out, dtype=np.int64),
             shown=shown,
             unit=prepared.operator.unit,
             touches=touches,
@@ -197,7 +200,6 @@ def reconstruct(
     return replace(
         found,
         rows_missing=recorded.missing[wanted].sum(axis=1),
-        left_out=recorded.left_out[(recorded.left_out >= start) & (recorded.left_out < stop)],
         model_agreement=recorded.agreement,
         rows_left_out=recorded.rows_left_out,
     )
@@ -227,7 +229,7 @@ def _flow(
         recorded.idle, recorded.idle_frames, recorded.idle_time, strict=True
     ):
         none: NDArray[np.bool_] = np.zeros(len(values), bool)
-        result = pipeline.follow(Measured(values, none, time, time, max(number, 0)))
+        result = pipeline.follow(Voltages(values, none, time, time, max(number, 0)))
         if 0 <= number < stop:
             yield Gathered(number, time, result)
     rest = np.flatnonzero(
@@ -235,6 +237,6 @@ def _flow(
     )
     for done, k in enumerate(rest.tolist(), start=1):
         number, time = int(recorded.frames[k]), float(recorded.time[k])
-        measured = Measured(recorded.values[k], recorded.missing[k], time, time, number)
+        measured = Voltages(recorded.values[k], recorded.missing[k], time, time, number)
         yield Gathered(number, time, pipeline.follow(measured))
         advance(done, len(rest))

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from tomoskin.core import Frame, reach
+from tomoskin.core import Frame, Mark, Voltages, reach
 from tomoskin.imaging import AlphaChoice
 from tomoskin.pipeline.collecting import Collecting
 from tomoskin.pipeline.following import Following, Setting
 from tomoskin.pipeline.prepare import Prepared
-from tomoskin.pipeline.records import FrameResult, Measured, ReferenceState
+from tomoskin.pipeline.records import FrameResult, ReferenceState
 from tomoskin.sensing.signal import Reference
 from tomoskin.sensing.track import Tracker, TrackSettings
 
@@ -32,8 +32,6 @@ class Pipeline:
 
     Attributes
     ----------
-    paused
-        Whether frames are left out.
     refused
         Frames that were not of this skin's scan.
     tick_rate
@@ -50,8 +48,7 @@ class Pipeline:
         self._given, self._needed = prepared, reference_frames
         self._setting = setting or Setting(scan=prepared.scan)
         self._tracker = self._new_tracker()
-        self.tick_rate = prepared.skin.readout.tick_rate
-        self.paused = False
+        self.tick_rate = prepared.readout.tick_rate
         self.refused = 0
         self.take_reference()
 
@@ -126,23 +123,27 @@ class Pipeline:
     def _prepared(self) -> Prepared:
         return self._state.prepared if isinstance(self._state, Following) else self._given
 
-    def push(self, frame: Frame) -> FrameResult | None:
-        """Take one frame; None while paused, or where the frame is not of this scan."""
-        if self.paused:
+    def push(self, frame: Frame, mark: Mark = Mark.NONE) -> FrameResult | None:
+        """Take one frame as its ``mark`` says; None where it is left out or not of this scan."""
+        if mark & Mark.SKIPPED:
+            return None
+        if mark & Mark.REFERENCE:
+            self.take_reference()
+        if mark & Mark.HELD:
             return None
         given = self._given
         if len(frame.samples) != given.scan.n_samples:
             self.refused += 1
             return None
-        return self.follow(Measured.of(given.readout(frame), frame.samples, self.tick_rate))
+        return self.follow(given.readout(frame, self.tick_rate))
 
-    def follow(self, measured: Measured) -> FrameResult:
+    def follow(self, measured: Voltages) -> FrameResult:
         """Take one frame whose voltages are known already: what :meth:`push` does with counts."""
         if isinstance(self._state, Following):
             return self._state.push(measured)
         return self._collect(self._state, measured)
 
-    def _collect(self, state: Collecting, measured: Measured) -> FrameResult:
+    def _collect(self, state: Collecting, measured: Voltages) -> FrameResult:
         given = self._given
         rest = state.push(measured)
         if rest is not None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from tomoskin.core import DataError, FloatArray, Image, IntArray
 from tomoskin.imaging import MOST_EXCLUDED, Evidence
 from tomoskin.model.pattern import Pattern
-from tomoskin.pipeline.model_agreement import NO_AGREEMENT, REFUSED, ModelAgreement
+from tomoskin.pipeline.conditioning import MOST_NUISANCE
 from tomoskin.pipeline.prepare import Prepared
+from tomoskin.pipeline.records import NO_AGREEMENT, REFUSED, ModelAgreement
 from tomoskin.sensing.signal import Consecutive, Recording, Reference, difference, in_phase
 
 _LISTED = 5
@@ -32,31 +33,26 @@ differences."""
 
 @dataclass(frozen=True, eq=False)
 class RecordedFrames:
-    """Frames of a recording that can be reconstructed.
+    """Frames of a recording as the pipeline takes them.
 
     Attributes
     ----------
     prepared
         The skin without the measurements that are excluded, ``n_meas`` of them left; alpha chosen
         for these.
+    recording
+        Where they are from.
     rows_left_out
         (r,) measurements of the skin's pattern that are excluded: dead in the whole recording.
-    frames
-        (n,) indices in the recording of the frames that can be used.
-    left_out
-        (k,) indices of those that lack too many measurements.
     values
-        (n, n_meas) V; difference data where there is no reference.
-    missing
-        (n, n_meas) bool: values that are not finite in the frame, or in the one it is held against.
-    positions
-        (n, 2) m, where the skin was touched, or None.
+        (n, n_meas) V, or difference data where there is no reference; NaN where they are not
+        known in the frame, or in the one that it is held against.
+    first
+        Index in the recording of the first of the frames; the others follow it.
     reference
         Mean and noise of the idle frames; None where there are none.
     agreement
         Of the reference with the model's voltages.
-    time
-        (n,) s, later from frame to frame.
     idle
         (n_idle, n_meas) V, the frames of which the reference is; none where there are differences.
     idle_frames
@@ -64,32 +60,45 @@ class RecordedFrames:
     """
 
     prepared: Prepared
+    recording: Recording
     rows_left_out: IntArray
-    frames: IntArray
-    left_out: IntArray
-    values: FloatArray
-    missing: NDArray[np.bool_]
-    positions: FloatArray | None
-    reference: Reference | None
-    agreement: ModelAgreement
-    time: FloatArray
-    idle: FloatArray
-    idle_frames: IntArray
+    values: NDArray[Any]
+    first: int = 0
+    reference: Reference | None = None
+    agreement: ModelAgreement = NO_AGREEMENT
+    idle: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    idle_frames: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+
+    @property
+    def frames(self) -> IntArray:
+        """(n,) indices of the frames in the recording."""
+        return np.arange(self.first, len(self.recording))
+
+    @property
+    def missing(self) -> NDArray[np.bool_]:
+        """(n, n_meas) values that are not known."""
+        return np.asarray(~np.isfinite(self.values))
+
+    @property
+    def time(self) -> FloatArray:
+        """(n,) s, later from frame to frame."""
+        return self.recording.time[self.first :]
 
     @property
     def interval(self) -> float:
         """Between frames, s; NaN where there is a single one."""
-        return float(np.median(np.diff(self.time))) if len(self.time) > 1 else np.nan
+        time = self.time
+        return float(np.median(np.diff(time))) if len(time) > 1 else np.nan
 
     @property
     def idle_time(self) -> list[float]:
         """(n_idle,) s: as recorded where the recording begins with them, else just before it."""
-        own, n = self.idle_frames, len(self.idle)
-        others = np.flatnonzero(~np.isin(self.frames, own))
-        if n and own[0] >= 0 and (not len(others) or own[-1] < self.frames[others[0]]):
-            return list(map(float, self.time[np.searchsorted(self.frames, own)]))
-        interval = self.interval if len(self.time) > 1 else 1.0
-        begin = self.time[others[0]] if len(others) else 0.0
+        own, n, time = self.idle_frames, len(self.idle), self.recording.time
+        others = np.setdiff1d(self.frames, own)
+        if n and own[0] >= 0 and (not len(others) or own[-1] < others[0]):
+            return list(map(float, time[own]))
+        interval = self.interval if len(time) > 1 else 1.0
+        begin = time[others[0]] if len(others) else 0.0
         return [float(begin - interval * before) for before in range(n, 0, -1)]
 
     @property
@@ -108,12 +117,13 @@ class RecordedFrames:
     def evidence(self) -> Evidence:
         """What the recording tells a parameter-choice criterion; complete frames only."""
         noise, complete = None, ~self.missing.any(axis=1)
+        labels = self.recording.labels
         if self.reference is not None and self.reference.noise_is_known:
             noise = self.prepared.difference_noise(self.reference)
         return Evidence(
             noise=noise,
             frames=self.differences[complete],
-            places=None if self.positions is None else self.positions[complete],
+            places=None if labels is None else labels[self.first :][complete],
             locate=self._located,
         )
 
@@ -126,7 +136,7 @@ class RecordedFrames:
 
 
 def recorded_frames(prepared: Prepared, recording: Recording, idle: Idle) -> RecordedFrames:
-    """Every frame of ``recording``, whose rows are in the pattern's order, that can be used.
+    """The frames of ``recording``, whose rows are in the pattern's order.
 
     Raises
     ------
@@ -143,71 +153,25 @@ def recorded_frames(prepared: Prepared, recording: Recording, idle: Idle) -> Rec
         idle = recording.voltages[own]
     rest = None if isinstance(idle, str) else idle
     dead = dead_rows(recording.voltages, rest, pattern, recording.source)
-    left = _Left.of(prepared.without(dead), recording, dead)
+    living = np.delete(recording.voltages, dead, axis=1)
+    frames = RecordedFrames(prepared.without(dead), recording, dead, living)
+    if (frames.missing.mean(axis=1) > MOST_NUISANCE).all():
+        raise DataError("no frame has finite values in enough rows", where=recording.source)
     if idle is None:
-        return left.frames_of(left.missing, _given(left, recording, dead))
+        return replace(frames, values=_given(frames))
     if isinstance(idle, str):
-        return _against_the_one_before(left)
-    living = np.delete(idle, dead, axis=1)
-    complete = _complete(living, recording.source)
-    values, quiet, agreement = _in_volts(left, living[complete])
-    reference = Reference.of(quiet, _rounding(left.prepared, quiet))
-    values = np.where(left.missing, reference.mean, values)
+        return _against_the_one_before(frames)
+    idle = np.delete(idle, dead, axis=1)
+    complete = _complete(idle, recording.source)
+    values, quiet, agreement = _in_volts(frames, idle[complete])
     return replace(
-        left.frames_of(left.missing, values, reference, agreement),
+        frames,
+        values=values,
+        reference=Reference.of(quiet, _rounding(frames.prepared, quiet)),
+        agreement=agreement,
         idle=quiet,
         idle_frames=own[complete] if len(own) else np.full(len(quiet), -1),
     )
-
-
-@dataclass(frozen=True, eq=False)
-class _Left:
-    """What is left of a recording: rows that live, ``values`` of frames that hold enough."""
-
-    prepared: Prepared
-    recording: Recording
-    dead: IntArray
-    frames: IntArray
-    left_out: IntArray
-    values: NDArray[Any]
-    missing: NDArray[np.bool_]
-
-    @classmethod
-    def of(cls, prepared: Prepared, recording: Recording, dead: IntArray) -> _Left:
-        living = np.delete(recording.voltages, dead, axis=1) if len(dead) else recording.voltages
-        missing = ~np.isfinite(living)
-        most = MOST_EXCLUDED * recording.voltages.shape[1] - len(dead)
-        enough = missing.sum(axis=1) <= most
-        if not enough.any():
-            raise DataError("no frame has finite values in enough rows", where=recording.source)
-        frames, left_out = np.flatnonzero(enough), np.flatnonzero(~enough)
-        if len(left_out):
-            living, missing = living[enough], missing[enough]
-        return cls(prepared, recording, dead, frames, left_out, living, missing)
-
-    def frames_of(
-        self,
-        missing: NDArray[np.bool_],
-        values: FloatArray,
-        reference: Reference | None = None,
-        agreement: ModelAgreement = NO_AGREEMENT,
-    ) -> RecordedFrames:
-        """These values of the last of the frames."""
-        frames, labels = self.frames[len(self.frames) - len(values) :], self.recording.labels
-        return RecordedFrames(
-            prepared=self.prepared,
-            rows_left_out=self.dead,
-            frames=frames,
-            left_out=self.left_out,
-            values=values,
-            missing=missing,
-            positions=None if labels is None else labels[frames],
-            reference=reference,
-            agreement=agreement,
-            time=self.recording.time[frames],
-            idle=np.zeros((0, values.shape[1])),
-            idle_frames=np.zeros(0, dtype=np.int64),
-        )
 
 
 def _complete(idle: NDArray[Any], source: str) -> NDArray[np.bool_]:
@@ -233,11 +197,13 @@ def _rounding(prepared: Prepared, quiet: FloatArray) -> FloatArray:
     return np.where(still, scale * prepared.readout.rounding, 0.0)
 
 
-def _in_volts(left: _Left, quiet: NDArray[Any]) -> tuple[FloatArray, FloatArray, ModelAgreement]:
+def _in_volts(
+    frames: RecordedFrames, quiet: NDArray[Any]
+) -> tuple[FloatArray, FloatArray, ModelAgreement]:
     """Values and idle frames as a real model has them, and how well they agree with it."""
-    operator, source = left.prepared.operator, left.recording.source
+    operator, source = frames.prepared.operator, frames.recording.source
     model, mean = operator.reference, quiet.mean(axis=0)
-    values, _ = in_phase(left.values, mean, model)
+    values, _ = in_phase(frames.values, mean, model)
     quiet, _ = in_phase(quiet, mean, model)
     agreement = _agreement(quiet.mean(axis=0), model, source)
     if operator.difference == "plain":
@@ -245,23 +211,24 @@ def _in_volts(left: _Left, quiet: NDArray[Any]) -> tuple[FloatArray, FloatArray,
     return values, quiet, agreement
 
 
-def _against_the_one_before(left: _Left) -> RecordedFrames:
+def _against_the_one_before(frames: RecordedFrames) -> RecordedFrames:
     """Dynamic imaging; what a frame or the one before it lacks is missing."""
-    base = left.values.mean(axis=0, where=~left.missing)
-    values, mean, agreement = _in_volts(left, base[None])
-    steps = Consecutive(left.prepared.operator.difference)
-    found = [steps.push(frame) for frame in np.where(left.missing, mean, values)]
-    if len(found) < 2:
+    if len(frames.values) < 2:
         raise DataError(
-            f"expected at least two frames, got {len(found)}", where=left.recording.source
+            f"expected at least two frames, got {len(frames.values)}",
+            where=frames.recording.source,
         )
-    missing = left.missing[1:] | left.missing[:-1]
-    return left.frames_of(missing, np.array(found[1:]), None, agreement)
+    missing = frames.missing
+    values, mean, agreement = _in_volts(frames, frames.values.mean(axis=0, where=~missing)[None])
+    steps = Consecutive(frames.prepared.operator.difference)
+    changes = np.array([steps.push(frame) for frame in np.where(missing, mean, values)][1:])
+    changes[missing[1:] | missing[:-1]] = np.nan
+    return replace(frames, values=changes, first=1, agreement=agreement)
 
 
-def _given(left: _Left, recording: Recording, dead: IntArray) -> FloatArray:
+def _given(frames: RecordedFrames) -> FloatArray:
     """Differences of a file in the operator's kind of difference."""
-    operator, dv = left.prepared.operator, left.values
+    operator, recording, dv = frames.prepared.operator, frames.recording, frames.values
     if np.iscomplexobj(dv):
         raise DataError(
             "expected real dv, got complex", where=recording.source, hint="give voltages instead"
@@ -270,7 +237,7 @@ def _given(left: _Left, recording: Recording, dead: IntArray) -> FloatArray:
         return dv
     reference = operator.reference
     if recording.reference is not None:
-        reference = np.delete(recording.reference.real, dead)
+        reference = np.delete(recording.reference.real, frames.rows_left_out)
     return difference(dv + reference, reference, operator.difference)
 
 

@@ -1,60 +1,73 @@
-"""What goes into the frame flow, and what comes out: one frame, all the way to touches."""
+"""What comes out of the frame flow: one frame, all the way to touches."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, Image, Touch, Voltages
 from tomoskin.learning import BENDS, CLASSES, TOUCH, BendReading, CalibrationHealth, ClassReading
-from tomoskin.pipeline.model_agreement import NO_AGREEMENT, ModelAgreement
 from tomoskin.sensing.signal import BaselineState, Health
 from tomoskin.sensing.track import TouchEvent
 
+REFUSED = 0.3
+DOUBTED = 0.8
+"""Cosine below which a recording is refused as another skin's, and below which it is doubted. Real
+recordings with the right skin have 0.33 to 0.998; another shape or order 0.73 to −0.1."""
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Measured:
-    """Voltages of one frame.
+_MOST_SIZE = 3.0
+"""Voltages in V are doubted where they differ from the model's by more than this factor: a skin of
+the same pattern and another resistance or current shows in nothing else."""
+
+
+@dataclass(frozen=True, slots=True)
+class ModelAgreement:
+    """A reference beside the voltages that a skin's model expects; NaN where there is none.
 
     Attributes
     ----------
-    values
-        (n_meas,) V, in the order of the pattern.
-    excluded
-        (n_meas,) bool: at a rail of the converter, or not finite.
-    time, host_time
-        s, of the device's clock and of the host's: host times of frames that were read together
-        are the same.
-    sequence
-        The frame's number.
-    samples
-        What the board sent, where there is a board.
-    own
-        (n_electrodes,) V that each electrode shows whatever the current does; None where the drive
-        does not alternate.
+    cosine
+        Of the angle between them: 1 where they are proportional.
+    size
+        Norm of the reference as a part of the model's.
     """
 
-    values: FloatArray
-    excluded: NDArray[np.bool_]
-    time: float
-    host_time: float
-    sequence: int = 0
-    samples: NDArray[np.uint16] | None = None
-    own: FloatArray | None = None
+    cosine: float = math.nan
+    size: float = math.nan
 
     @classmethod
-    def of(cls, voltages: Voltages, samples: NDArray[np.uint16], tick_rate: float) -> Self:
-        """From a board's frame, whose clock runs at ``tick_rate`` Hz."""
-        excluded = voltages.railed | ~np.isfinite(voltages.values)
-        time = voltages.ticks / tick_rate
-        return cls(
-            voltages.values, excluded, time, voltages.host_time, voltages.sequence, samples,
-            voltages.own,
-        )  # fmt: skip
+    def of(cls, reference: FloatArray, model: FloatArray) -> Self:
+        """Of two vectors (n_meas,)."""
+        length, expected = float(np.linalg.norm(reference)), float(np.linalg.norm(model))
+        if not length or not expected:
+            return cls(0.0, length / expected if expected else 0.0)
+        return cls(float(reference @ model) / (length * expected), length / expected)
+
+    @property
+    def text(self) -> str:
+        """How well they agree."""
+        return (
+            f"the reference agrees with the skin's model by {self.cosine:.3f} (1 = "
+            f"proportional), at {self.size:.3g} times its size"
+        )
+
+    def doubt(self, *, volts: bool) -> str | None:
+        """What to look at, in a sentence, or None; ``volts``: whether the size can be meant."""
+        if math.isnan(self.cosine):  # there is no reference yet
+            return None
+        if self.cosine < DOUBTED:
+            return f"{self.text}: check the skin and the order of the electrodes"
+        if volts and not 1 / _MOST_SIZE < self.size < _MOST_SIZE:
+            return f"{self.text}: check the skin, its current and its sheet resistance"
+        return None
+
+
+NO_AGREEMENT = ModelAgreement()
+"""Where there is no reference."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,7 +119,7 @@ class FrameResult:
     @classmethod
     def at_rest(
         cls,
-        measured: Measured,
+        measured: Voltages,
         image: Image,
         reference: FloatArray,
         events: tuple[TouchEvent, ...],

@@ -13,7 +13,6 @@ from tomoskin.run.labelled_frames import (
     on_cluster,
     processors,
 )
-from tomoskin.run.marker import ReplaySource
 from tomoskin.run.robot_run import Member, RobotRun
 from tomoskin.run.runner import Runner
 from tomoskin.run.simulate import Simulated, simulate
@@ -26,7 +25,6 @@ __all__ = [
     "BoardMemory",
     "CheckFinding",
     "Member",
-    "ReplaySource",
     "RobotRun",
     "Runner",
     "SetMade",

@@ -1,4 +1,4 @@
-"""What was lost on the way, how fast frames came, and where the age of a picture comes from.
+"""How fast frames came, and where the age of a picture comes from.
 
 How long each stage takes, from the sample to the page:
 
@@ -16,13 +16,13 @@ far less than a millisecond.
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass
-from typing import Literal, Self
+from typing import Literal
 
 import numpy as np
 
-from tomoskin.board.source import Link
-from tomoskin.core import FloatArray, Frame
+from tomoskin.core import Frame
 
 _WINDOW = 512
 """Frames whose times are kept: some seconds of a real board."""
@@ -31,6 +31,7 @@ _RECENT = 1.0
 """Seconds over which the rate is counted."""
 
 Timed = Literal["sample", "decode", "reconstruct", "publish"]
+_TIMED: tuple[Timed, ...] = ("sample", "decode", "reconstruct", "publish")
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,90 +43,38 @@ class StageLatency:
     p99: float
 
 
-@dataclass(frozen=True, slots=True)
-class Losses:
-    """Counts of what did not arrive.
-
-    ``dropped`` frames that the device or this host left out, ``corrupt`` messages damaged on
-    the line, ``gaps`` frames missing in the sequence.
-    """
-
-    dropped: int = 0
-    corrupt: int = 0
-    gaps: int = 0
-
-    @classmethod
-    def of(cls, link: Link, device_drops: int) -> Self:
-        """Counts of one link; ``device_drops`` is what its last frame said."""
-        frames = link.frames
-        return cls(device_drops + frames.foreign, link.counters.corrupt, frames.lost)
-
-    def __add__(self, other: Losses) -> Losses:
-        """The sum of both losses."""
-        return Losses(
-            self.dropped + other.dropped,
-            self.corrupt + other.corrupt,
-            self.gaps + other.gaps,
-        )
-
-
-class Ring:
-    """The last so many numbers; written by one thread, read by any."""
-
-    def __init__(self, size: int = _WINDOW) -> None:
-        """Make an empty ring."""
-        self._values = np.zeros(size)
-        self.count = 0
-
-    def add(self, value: float) -> None:
-        """Note one; the oldest makes room."""
-        self._values[self.count % len(self._values)] = value
-        self.count += 1
-
-    def values(self) -> FloatArray:
-        """Those that are kept, in no order."""
-        return self._values[: self.count].copy()
-
-    def percentiles(self) -> tuple[float, float]:
-        """(p50, p99); NaN before the first."""
-        values = self.values()
-        if not len(values):
-            return float("nan"), float("nan")
-        p50, p99 = np.percentile(values, (50, 99))
-        return float(p50), float(p99)
-
-
 class Latency:
-    """Times of the last frames, in bounded memory; each is written by one thread, read by any."""
+    """Times of the last frames, in bounded memory; each is written by one thread, read by any.
+
+    ``frames``: their number since the start.
+    """
 
     def __init__(self, window: int = _WINDOW) -> None:
         """Make counters without any times."""
-        self._rings: dict[Timed, Ring] = {
-            name: Ring(window) for name in ("sample", "decode", "reconstruct", "publish")
-        }
-        self._arrivals, self._ages = Ring(window), Ring(window)
+        self._times = {name: deque[float](maxlen=window) for name in _TIMED}
+        self._arrivals, self._ages = deque[float](maxlen=window), deque[float](maxlen=window)
         self._painted: dict[object, tuple[float, float]] = {}
         self._last: Frame | None = None
-
-    @property
-    def frames(self) -> int:
-        """Number of frames since the start."""
-        return self._arrivals.count
+        self.frames = 0
 
     def add_frame(self, frame: Frame, read: float, tick_rate: float) -> None:
         """Note a frame whose last byte was read at ``read``, s; ``tick_rate`` in Hz."""
-        self._arrivals.add(read)
+        self.frames += 1
+        self._arrivals.append(read)
         last, self._last = self._last, frame
         if last is not None and frame.sequence == last.sequence + 1 and frame.ticks > last.ticks:
-            self.add("sample", (frame.ticks - last.ticks) / tick_rate)
+            self._times["sample"].append((frame.ticks - last.ticks) / tick_rate)
 
-    def add(self, stage: Timed, seconds: float) -> None:
-        """Note how long a stage took."""
-        self._rings[stage].add(seconds)
+    def add_result(self, decode: float, reconstruct: float) -> None:
+        """Note how long a frame took from its last byte to the pipeline, and from there to its
+        touches, s."""
+        self._times["decode"].append(decode)
+        self._times["reconstruct"].append(reconstruct)
+        self._ages.append(decode + reconstruct)
 
-    def add_age(self, seconds: float) -> None:
-        """Note the time from a frame's last byte to its touches."""
-        self._ages.add(seconds)
+    def add_published(self, seconds: float) -> None:
+        """Note how long it took from a frame's touches to a page's connection."""
+        self._times["publish"].append(seconds)
 
     def set_paint(self, page: object, p50: float, p99: float) -> None:
         """What a page says of its own drawing, s."""
@@ -137,13 +86,12 @@ class Latency:
 
     def age(self) -> tuple[float, float]:
         """(p50, p99) from a frame's last byte to its touches, s; NaN before the first."""
-        return self._ages.percentiles()
+        return _percentiles(self._ages)
 
     def rate(self, now: float) -> float:
         """Frames per second over the last second; 0 where fewer than two came."""
-        arrivals = self._arrivals.values()
-        recent = arrivals[arrivals > now - _RECENT]
-        span = float(np.ptp(recent)) if len(recent) else 0.0
+        recent = [time for time in self._arrivals.copy() if time > now - _RECENT]
+        span = max(recent) - min(recent) if recent else 0.0
         return (len(recent) - 1) / span if span > 0 else 0.0
 
     def stages(self) -> tuple[StageLatency, ...]:
@@ -151,5 +99,14 @@ class Latency:
         slowest = max(
             self._painted.copy().values(), key=lambda p: p[1], default=(float("nan"),) * 2
         )
-        timed = (StageLatency(name, *ring.percentiles()) for name, ring in self._rings.items())
+        timed = [StageLatency(name, *_percentiles(self._times[name])) for name in _TIMED]
         return *timed, StageLatency("paint", *slowest)
+
+
+def _percentiles(times: deque[float]) -> tuple[float, float]:
+    """(p50, p99); NaN before the first. ``times`` may grow meanwhile, in another thread."""
+    values = list(times.copy())
+    if not values:
+        return float("nan"), float("nan")
+    p50, p99 = np.percentile(values, (50, 99))
+    return float(p50), float(p99)

@@ -9,22 +9,18 @@ from dataclasses import dataclass
 
 from tomoskin.board.source import Link, ScanSettings, Transport
 from tomoskin.board.wire import Info
-from tomoskin.core import Event, Frame, TomoskinError
-from tomoskin.files.session import BoardInfo, Mark, MarkedFrame, RawRead, Truth, advance
+from tomoskin.core import Event, Frame, Mark, MarkedFrame, TomoskinError
+from tomoskin.files.session import BoardInfo, RawRead, Truth
 from tomoskin.pipeline import FrameResult, Pipeline, Prepared, ReferenceState
-from tomoskin.run.backlog import Backlog
-from tomoskin.run.counters import Latency, Losses
+from tomoskin.run.counters import Latency
 from tomoskin.run.frame_cost import CostMeter
+from tomoskin.run.intake import Intake
 from tomoskin.run.marker import Marker, replay_status
 from tomoskin.run.publisher import Audience, Publisher
 from tomoskin.run.recall import Recall
-from tomoskin.run.repeats import Repeats
 from tomoskin.run.status import Status
 from tomoskin.run.twin_control import TwinControl, described
 from tomoskin.twin import Contact
-
-_STANDSTILL = frozenset({"silent", "fault", "reset"})
-"""Events after which no frame comes until the board is well again."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,6 +49,8 @@ class Flow:
         What the board said of itself, once it has.
     pipeline, marker, twin, out
         What makes results, what marks frames, what presses the source, and where messages go.
+    intake
+        What comes from the source.
     latency, costs
         How long all that takes, and what the slowest frames took it for.
     """
@@ -67,13 +65,7 @@ class Flow:
         self.out = Publisher(prepared, audience, lambda: self.pipeline.numbered)
         self.latency, self.costs = Latency(), CostMeter(time.perf_counter)
         self._clock, self._turns = audience.clock, audience.turns
-        self._recall, self._backlog = Recall(audience.memory), Backlog()
-        self._settings = ScanSettings.of(prepared.skin)
-        self._losses, self._earlier, self._skipped = Losses(), Losses(), 0
-        self._drops, self._polled, self._waited = 0, 0.0, 0.0
-        self._standstill: str | None = None
-        self._saturated: str | None = None
-        self._repeats = Repeats()
+        self._recall, self.intake = Recall(audience.memory), Intake()
         self._ended = False
 
     def now(self) -> float:
@@ -88,13 +80,12 @@ class Flow:
         self.source = f"{name} of {skin}" if self.twin.pressable else f"{skin} on {name}"
         replay = self.marker.replay
         self.out.begin(self.prepared, self.source, replay.epoch if replay else None)
-        self._saturated = self.prepared.headroom.problem
-        if self._saturated is not None:
-            self.out.say("saturated", self._saturated)
+        if (saturated := self.prepared.headroom.problem) is not None:
+            self.out.say("saturated", saturated)
 
     def link(self, transport: Transport) -> Link:
         """The protocol session with its source, which has just been opened, maybe again."""
-        self._standstill, self._drops = None, 0
+        self.intake.open()
         self.marker.begin(transport)
         self.twin.attach(transport)
         if self.marker.replay:
@@ -103,14 +94,14 @@ class Flow:
         return Link(
             transport,
             self.prepared.scan,
-            self._settings,
+            ScanSettings.of(self.prepared.skin),
             clock=self._clock,
             tap=lambda host_time, data: self.out.put(RawRead(host_time, data)),
         )
 
     def unlink(self) -> None:
         """The protocol session is over; another may follow."""
-        self._earlier, self._losses = self._earlier + self._losses, Losses()
+        self.intake.close()
 
     def adopt(self, prepared: Prepared) -> Future[None] | None:
         """Go on with other settings; nothing is done where they are of another sheet or scan."""
@@ -133,19 +124,26 @@ class Flow:
 
     def take(self, link: Link, items: Sequence[Frame | Event]) -> None:
         """What one read of the link brought: frames and events."""
-        self._polled, self._waited = self._clock(), link.waited
-        self._note_board(link.info, link.board.text if link.board else "")
-        frames = [item for item in items if isinstance(item, Frame)]
-        self._drops = frames[-1].drops if frames else self._drops
-        self._losses = Losses.of(link, self._drops)
-        events = [item for item in items if isinstance(item, Event)]
-        for event in events:
-            if event.kind in _STANDSTILL:
-                self._standstill = event.text
+        intake, out = self.intake, self.out
+        frames = intake.take(link, items, self._clock())
+        if link.info is not self.board:
+            self._note_board(link.info, link.board.text if link.board else "")
         if items:
-            self._say(items[-1].host_time, events)
-        self._take_frames(frames)
-        self._end()
+            for event in intake.worth_saying(items[-1].host_time, items):
+                out.put(event)
+        late = intake.late(len(frames))
+        for number, frame in enumerate(frames):
+            mark = self.marker.mark(frame, late=number < late)
+            if mark is not None:
+                for before in out.recordings.again():
+                    self.pipeline.push(*before)
+                out.put(MarkedFrame(frame, mark))
+                with self._turns:
+                    self._take_frame(frame, mark)
+        replay = self.marker.replay
+        if replay is not None and replay.ended != self._ended:
+            self._ended = replay.ended  # when its last frames have been processed, not when read
+            out.wake()
 
     def status(self, trouble: str | None) -> Status:
         """How it is doing now; ``trouble``: why there is no source, or None."""
@@ -153,20 +151,20 @@ class Flow:
         p50, p99 = self.latency.age()
         reference = self.pipeline.reference_state
         result = self.newest.result if self.newest else None
-        total = self._earlier + self._losses
+        losses, standstill = self.intake.losses, self.intake.standstill
         here = replay.now() if replay else now
         return Status(
             source=self.source,
-            running=trouble is None and self._standstill is None,
+            running=trouble is None and standstill is None,
             paused=self.marker.held,
             recording=self.out.recordings.path,
             sinks=self.out.sink_reports(),
             replay=replay_status(replay, ended=self._ended) if replay else None,
             frames=self.latency.frames,
             fps=self.latency.rate(now),
-            dropped=total.dropped + self._skipped + self.pipeline.refused,
-            corrupt=total.corrupt,
-            gaps=total.gaps,
+            dropped=losses.dropped + self.intake.skipped + self.pipeline.refused,
+            corrupt=losses.corrupt,
+            gaps=losses.gaps,
             p50=p50,
             p99=p99,
             stages=self.latency.stages(),
@@ -180,8 +178,8 @@ class Flow:
             class_reading=result.class_reading if result and result.ready else None,
             calibration=result.calibration if result and result.ready else None,
             problem=trouble
-            or self._standstill
-            or self._saturated
+            or standstill
+            or (self.prepared.headroom.problem if self.source else None)
             or (result.problem if result else None)
             or self._recall.problem
             or _doubt(self.prepared, reference),
@@ -195,8 +193,6 @@ class Flow:
             self._recall.keep(self.prepared, self.out)
 
     def _note_board(self, info: Info | None, name: str) -> None:
-        if info is self.board:
-            return
         self.board, self.board_name = info, name
         if info is None:
             return
@@ -206,53 +202,29 @@ class Flow:
         if self.marker.replay is None:
             self._recall.meet(info, self)
 
-    def _end(self) -> None:
-        """A replay has ended when its last frames have been processed, not when they were read."""
-        replay = self.marker.replay
-        ended = replay is not None and replay.ended
-        if ended != self._ended:
-            self._ended = ended
-            self.out.wake()
-
-    def _say(self, now: float, events: Sequence[Event]) -> None:
-        """Publish what happens, and what happens again and again once a second."""
-        for event in self._repeats.push(now, events):
-            self.out.put(event)
-
-    def _take_frames(self, frames: Sequence[Frame]) -> None:
-        late = self._backlog.late(len(frames), self._waited) if frames else 0
-        for number, frame in enumerate(frames):
-            mark = self.marker.mark(frame, late=number < late)
-            if mark is not None:
-                for before in self.out.recordings.again():
-                    advance(self.pipeline, *before)
-                self.out.put(MarkedFrame(frame, mark))
-                with self._turns:
-                    self._take_frame(frame, mark)
-
     def _take_frame(self, frame: Frame, mark: Mark) -> None:
+        intake = self.intake
         if mark & Mark.SKIPPED:
-            self._skipped += 1
+            intake.skipped += 1
             return
-        self._standstill = None
+        intake.standstill = None
         # the times in a replay are the recording's
-        read, begun = self._polled if self.marker.replay else frame.host_time, self._clock()
+        read, begun = intake.polled if self.marker.replay else frame.host_time, self._clock()
         self.latency.add_frame(frame, read, self.pipeline.tick_rate)
-        self.latency.add("decode", begun - read + self._waited)
         try:
             with self.costs.of(frame):
-                result = advance(self.pipeline, frame, mark)
+                result = self.pipeline.push(frame, mark)
         except TomoskinError as error:  # of this frame: the source is well
-            self._skipped += 1
+            intake.skipped += 1
             refused = Event(frame.host_time, "refused", f"a frame was left out: {error}")
-            self._say(frame.host_time, [refused])
+            for event in intake.worth_saying(frame.host_time, [refused]):
+                self.out.put(event)
             return
         if result is None:
             return
-        ready = self._clock()
-        self.latency.add_age(ready - read + self._waited)
-        self.latency.add("reconstruct", ready - begun)
-        self.newest = Snapshot(result, self.twin.truth, ready - read + self._waited, ready)
+        ready, decode = self._clock(), begun - read + intake.waited
+        self.latency.add_result(decode, ready - begun)
+        self.newest = Snapshot(result, self.twin.truth, decode + ready - begun, ready)
         self._recall.see(result, self)
         self.out.put(result)
 

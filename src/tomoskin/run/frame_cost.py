@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import heapq
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -66,23 +67,24 @@ class CostMeter:
         self._clock, self._count = clock, 0
         self._stage, self._since = _BEGIN, 0.0
         self._spent: dict[str, list[float]] = {}
-        self._slowest: tuple[FrameCost, ...] = ()
+        self._kept: list[tuple[float, int, FrameCost]] = []  # a heap by s and number, negative
 
     @property
     def slowest(self) -> tuple[FrameCost, ...]:
         """The slowest of the newest frames, the slowest first."""
-        return self._slowest
+        return tuple(cost for _, _, cost in sorted(self._kept, reverse=True))
 
     @contextmanager
     def of(self, frame: Frame) -> Iterator[None]:
         """Time what the block does with ``frame``."""
-        self._spent, self._stage, self._since = {}, _BEGIN, self._clock()
+        begun = self._clock()
+        self._spent, self._stage, self._since = {}, _BEGIN, begun
         try:
             with watch_stages(self._reach):
                 yield
         finally:
             self._reach("")
-            self._keep(frame)
+            self._keep(frame, self._since - begun)
 
     def _reach(self, stage: str) -> None:
         now = self._clock()
@@ -91,13 +93,17 @@ class CostMeter:
         spent[1] += stage != self._stage
         self._stage, self._since = stage or self._stage, now
 
-    def _keep(self, frame: Frame) -> None:
-        self._count += 1
-        stages = tuple((name, 1e6 * t, int(n)) for name, (t, n) in self._spent.items())
-        cost = FrameCost(self._count - 1, frame.sequence, frame.host_time, stages)
-        if cost.number % _OFTEN == 0:
-            first = cost.number - _WINDOW
-            self._slowest = tuple(one for one in self._slowest if one.number > first)
-        kept = self._slowest
-        if len(kept) < _KEPT or cost.seconds > kept[-1].seconds:
-            self._slowest = tuple(sorted([*kept, cost], key=lambda c: -c.seconds)[:_KEPT])
+    def _keep(self, frame: Frame, seconds: float) -> None:
+        number, self._count = self._count, self._count + 1
+        if number % _OFTEN == 0:
+            first = number - _WINDOW
+            self._kept = [one for one in self._kept if -one[1] > first]
+            heapq.heapify(self._kept)
+        if len(self._kept) >= _KEPT and seconds <= self._kept[0][0]:
+            return
+        stages = [(name, 1e6 * spent, int(times)) for name, (spent, times) in self._spent.items()]
+        cost = FrameCost(number, frame.sequence, frame.host_time, tuple(stages))
+        if len(self._kept) < _KEPT:
+            heapq.heappush(self._kept, (seconds, -number, cost))
+        else:
+            heapq.heapreplace(self._kept, (seconds, -number, cost))

@@ -3,68 +3,15 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
-from typing import Protocol, runtime_checkable
 
 from tomoskin.board.source import Transport
-from tomoskin.core import Frame
-from tomoskin.files.session import Mark
+from tomoskin.core import Frame, Mark
+from tomoskin.files.session import ReplayTransport
 from tomoskin.run.commands import ReplayCommand, Seek, SetLoop, SetSpeed
 from tomoskin.run.status import ReplayStatus
 
 
-@runtime_checkable
-class ReplaySource(Protocol):
-    """A source that plays a recording; its methods may be called from any thread."""
-
-    path: Path
-    """The recording."""
-
-    start: float
-    """Host time of its first frame, those from before the recording left out."""
-
-    end: float
-    """Host time of its last message."""
-
-    speed: float
-    """Recorded seconds per second; inf for as fast as it is read."""
-
-    epoch: float
-    """What is added to its host times to give seconds since 1970."""
-
-    touches_before: int
-    """The last identity that a touch had before it begins."""
-
-    reference_frames: int
-    """How many of its frames make a reference."""
-
-    loop: bool
-    """Whether it begins again at the end."""
-
-    ended: bool
-    """Whether nothing is left to play."""
-
-    @property
-    def paused(self) -> bool:
-        """Whether the replay is paused."""
-
-    def now(self) -> float:
-        """The time in the recording, host monotonic s."""
-
-    def seek(self, host_time: float) -> None:
-        """Go on from the first frame at ``host_time``."""
-
-    def step(self) -> None:
-        """Play one read and stand still."""
-
-    def mark(self, sequence: int) -> Mark | None:
-        """What became of a frame that was just read; None: it never reached the pipeline."""
-
-    def pause(self, on: bool) -> None:
-        """Pause the replay, or go on."""
-
-
-def play(replay: ReplaySource, command: ReplayCommand) -> None:
+def play(replay: ReplayTransport, command: ReplayCommand) -> None:
     """Do what is asked; a seek reads the file up to there when it is the first."""
     if isinstance(command, Seek):
         replay.seek(replay.start + command.at_s)
@@ -76,7 +23,7 @@ def play(replay: ReplaySource, command: ReplayCommand) -> None:
         replay.step()
 
 
-def replay_status(replay: ReplaySource, *, ended: bool) -> ReplayStatus:
+def replay_status(replay: ReplayTransport, *, ended: bool) -> ReplayStatus:
     """Where a replay is; ``ended``: its last frame has been processed."""
     speed = None if math.isinf(replay.speed) else replay.speed
     now, end = replay.now() - replay.start, replay.end - replay.start
@@ -94,7 +41,7 @@ class Marker:
 
     def __init__(self) -> None:
         """The first frame begins a reference."""
-        self.replay: ReplaySource | None = None
+        self.replay: ReplayTransport | None = None
         self._reference = True
         self._held = False
         self._opened = False
@@ -122,7 +69,7 @@ class Marker:
     def begin(self, transport: Transport) -> None:
         """What comes from now on is of ``transport``, which has just been opened."""
         self._opened = True
-        self.replay = transport if isinstance(transport, ReplaySource) else None
+        self.replay = transport if isinstance(transport, ReplayTransport) else None
 
     def mark(self, frame: Frame, *, late: bool) -> Mark | None:
         """What becomes of ``frame``; ``late``: newer ones wait already. None: leave it out."""

@@ -17,7 +17,6 @@ from tomoskin.pipeline import FrameResult, Prepared
 from tomoskin.run.board_memory import BoardMemory
 from tomoskin.run.recordings import Recordings
 from tomoskin.run.sinks import Sink, SinkConsumer, SinkReport, sink_report, sink_worker
-from tomoskin.run.turns import Turns
 
 MOST_WAITING = 256
 """Results that may wait for a subscriber; the oldest make room."""
@@ -64,6 +63,40 @@ class Subscriber(Consumer):
     def handle_failure(self, error: Exception) -> None:
         """A fault of our own: it is given no more."""
         _log.error("%s is given no more results", self.name, exc_info=error)
+
+
+class Turns:
+    """A context manager that one thread is in at a time; those who wait come in their order.
+
+    Many runs that computed at once would take the interpreter from each other, and every frame
+    of all of them would be late. One after the other, a run that is flooded with frames holds
+    up the others for a frame at most.
+    """
+
+    def __init__(self) -> None:
+        """Make turns that nobody holds."""
+        self._lock = threading.Lock()
+        self._waiting: deque[threading.Lock] = deque()
+        self._taken = False
+
+    def __enter__(self) -> None:
+        """Wait for the turn and take it."""
+        with self._lock:
+            if not self._taken:
+                self._taken = True
+                return
+            ticket = threading.Lock()
+            ticket.acquire()
+            self._waiting.append(ticket)
+        ticket.acquire()
+
+    def __exit__(self, *_: object) -> None:
+        """Give the turn to the next one."""
+        with self._lock:
+            if self._waiting:
+                self._waiting.popleft().release()
+            else:
+                self._taken = False
 
 
 class Audience:

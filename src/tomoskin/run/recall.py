@@ -6,8 +6,7 @@ import threading
 from typing import TYPE_CHECKING
 
 from tomoskin.board.wire import Info
-from tomoskin.core import TomoskinError
-from tomoskin.files.session import Mark, MarkedFrame, advance
+from tomoskin.core import Mark, MarkedFrame, TomoskinError
 from tomoskin.pipeline import FrameResult, Prepared
 from tomoskin.run.board_memory import BoardMemory, Remembered, Trial
 from tomoskin.run.publisher import Publisher
@@ -116,7 +115,7 @@ class Recall:
         for number, frame in enumerate(found.frames):
             mark = Mark.EARLIER | (Mark.NONE if number else Mark.REFERENCE)
             flow.out.put(MarkedFrame(frame, mark))
-            advance(flow.pipeline, frame, mark)
+            flow.pipeline.push(frame, mark)
         flow.marker.keep_reference()
         self._trial = Trial(found.kept)
         names = ", ".join(c.kind.name for c in missing)

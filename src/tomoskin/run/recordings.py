@@ -8,12 +8,10 @@ from concurrent.futures import Future
 from dataclasses import replace
 from pathlib import Path
 
-from tomoskin.core import Capacity, Frame, Worker
+from tomoskin.core import Capacity, Frame, Mark, MarkedFrame, Worker
 from tomoskin.files.messages import epoch, raster
 from tomoskin.files.session import (
     BoardInfo,
-    Mark,
-    MarkedFrame,
     MessageLog,
     RawRead,
     Recorder,

@@ -18,10 +18,10 @@ from tomoskin.pipeline import Prepared
 from tomoskin.run import commands
 from tomoskin.run.board_memory import BoardMemory
 from tomoskin.run.commands import Opener
+from tomoskin.run.publisher import Turns
 from tomoskin.run.runner import Runner
 from tomoskin.run.sinks import Sink
 from tomoskin.run.status import Status
-from tomoskin.run.turns import Turns
 
 _OFTEN = 0.25
 """Seconds between two looks at all runs."""

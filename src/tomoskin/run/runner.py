@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 
 from tomoskin.board.source import Transport
+from tomoskin.files.session import ReplayTransport
 from tomoskin.model.robot import Place
 from tomoskin.pipeline import Prepared
 from tomoskin.run.board_memory import BoardMemory
@@ -16,11 +17,9 @@ from tomoskin.run.counters import Latency
 from tomoskin.run.direct import do
 from tomoskin.run.flow import Snapshot
 from tomoskin.run.loop import Loop
-from tomoskin.run.marker import ReplaySource
-from tomoskin.run.publisher import Audience
+from tomoskin.run.publisher import Audience, Turns
 from tomoskin.run.sinks import Sink
 from tomoskin.run.status import Status
-from tomoskin.run.turns import Turns
 from tomoskin.run.twin_control import TwinControl
 from tomoskin.sensing.signal import Reference
 
@@ -152,7 +151,7 @@ class Runner:
         return self._loop.flow.pipeline.reference
 
     @property
-    def replay(self) -> ReplaySource | None:
+    def replay(self) -> ReplayTransport | None:
         """The recording that is being played; None where the source is another."""
         return self._loop.flow.marker.replay
 

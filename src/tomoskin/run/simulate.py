@@ -9,8 +9,8 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from tomoskin.board.source import Configuration, Link, ScanSettings, Transport
-from tomoskin.core import DataError, Event, Frame, StrPath, VirtualClock
-from tomoskin.files.session import Advance, Mark, SessionWriter, no_report
+from tomoskin.core import DataError, Event, Frame, Mark, StrPath, VirtualClock
+from tomoskin.files.session import Advance, SessionWriter, no_report
 from tomoskin.model.pattern import Scan
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import REFERENCE_FRAMES

@@ -89,7 +89,7 @@ class NewestFrame:
     def note_sent(self, message: bytes) -> None:
         """Note how long it took until a page's connection had ``message``."""
         if self._made is not None and self._made[1] is message:
-            self._runner.latency.add("publish", time.monotonic() - self._made[0].ready)
+            self._runner.latency.add_published(time.monotonic() - self._made[0].ready)
 
 
 def encode_result(result: FrameResult, truth: Sequence[Contact], latency: float) -> bytes:

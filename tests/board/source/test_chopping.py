@@ -199,7 +199,7 @@ def test_a_chopped_session_is_kept_and_read_to_the_bit(tmp_path):
         voltages[mode] = read_session(path).voltages[0]
         if mode == "chopped":
             live = Readout.of(SCAN, skin.readout)(kept[0])
-            assert np.array_equal(np.where(live.railed, np.nan, live.values), voltages[mode],
+            assert np.array_equal(np.where(live.excluded, np.nan, live.values), voltages[mode],
                                   equal_nan=True)  # fmt: skip
     step = skin.readout.reference_voltage / (2**skin.readout.adc_bits * skin.readout.gain)
     assert voltages["chopped"] == pytest.approx(voltages["direct"], abs=2 * step)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from tomoskin.board.wire import Info, Reset, encode
-from tomoskin.core import Detection, Event, Frame, Image, Touch
-from tomoskin.files.session import Mark, SessionWriter
+from tomoskin.core import Detection, Event, Frame, Image, Mark, Touch
+from tomoskin.files.session import SessionWriter
 from tomoskin.model.pattern import Scan
 from tomoskin.model.skin import Skin
 

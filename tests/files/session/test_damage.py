@@ -462,8 +462,8 @@ _RECORD = """
 import sys, threading
 from pathlib import Path
 from files.session.runs import frame_of, SKIN
-from tomoskin.core import Capacity, Worker
-from tomoskin.files.session import Mark, MarkedFrame, Recorder, SessionWriter
+from tomoskin.core import Capacity, Mark, MarkedFrame, Worker
+from tomoskin.files.session import Recorder, SessionWriter
 path = Path(sys.argv[1])
 recorder = Recorder(path, lambda: SessionWriter(path, SKIN), None, print)
 worker = Worker(recorder, Capacity(1 << 20, "oldest"), print)

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tomoskin.core import DataError, Frame
-from tomoskin.files.session.layout import Mark, decode_frame, encode_frame
+from tomoskin.core import DataError, Frame, Mark
+from tomoskin.files.session.layout import decode_frame, encode_frame
 
 counts = st.lists(st.integers(0, 65535), max_size=40)
 

@@ -15,11 +15,9 @@ import pytest
 
 from files.session.runs import INFO, SKIN, TOUCH, frame_of, same_frame
 from tomoskin.board.wire import encode
-from tomoskin.core import Capacity, DataError, Event, Image, Worker
+from tomoskin.core import Capacity, DataError, Event, Image, Mark, MarkedFrame, Worker
 from tomoskin.files.session import (
     BoardInfo,
-    Mark,
-    MarkedFrame,
     RawRead,
     Recorder,
     RunSettings,

@@ -9,9 +9,10 @@ from pathlib import Path
 import pytest
 
 from files.session.runs import INFO, SCAN, SKIN, TOUCH, frame_of, put
+from tomoskin.core import Mark
 from tomoskin.files.exports import WRITERS, Export, write_touches
 from tomoskin.files.imports import read_recording
-from tomoskin.files.session import Mark, SessionReader, SessionWriter
+from tomoskin.files.session import SessionReader, SessionWriter
 from tomoskin.files.session.blocks import no_report
 
 

@@ -15,9 +15,9 @@ from mcap.stream_reader import StreamReader
 from files.session.runs import INFO, PRESS, SCAN, SKIN, TOUCH, frame_of, put, same_frame, write_all
 from files.session.runs import write_frames as write
 from tomoskin.board.wire import encode
-from tomoskin.core import DataError
+from tomoskin.core import DataError, Mark
 from tomoskin.files.imports import read_recording
-from tomoskin.files.session import Mark, SessionReader, SessionWriter
+from tomoskin.files.session import SessionReader, SessionWriter
 from tomoskin.sensing.signal import Readout
 
 
@@ -60,8 +60,8 @@ def test_the_recording_has_the_voltages_of_the_readout_and_labels_from_truth(who
     got = read_recording(whole)
     readout = Readout.of(SCAN, SKIN.readout)
     expected = readout(frame_of(7))
-    assert np.array_equal(got.voltages[7][~expected.railed], expected.values[~expected.railed])
-    assert np.array_equal(np.isnan(got.voltages[7]), expected.railed)
+    assert np.array_equal(got.voltages[7][~expected.excluded], expected.values[~expected.excluded])
+    assert np.array_equal(np.isnan(got.voltages[7]), expected.excluded)
     assert np.array_equal(got.drive, SKIN.pattern().drive)
     assert np.array_equal(got.measure, SKIN.pattern().measure)
     assert got.time[7] == pytest.approx(frame_of(7).host_time, abs=1e-6)  # by its ticks
@@ -78,6 +78,17 @@ def test_frames_of_another_scan_are_left_out_of_the_recording(tmp_path):
         put(session, frame_of(0))
         put(session, frame_of(1, n_samples=5))
     assert len(read_recording(tmp_path / "x.mcap")) == 1
+
+
+def test_a_clock_that_does_not_go_on_is_noted(tmp_path):
+    path = tmp_path / "run.mcap"
+    with SessionWriter(path, SKIN) as session:
+        session.device(0.0, INFO)
+        for number in range(6):
+            ticks = frame_of(min(number, 3)).ticks
+            put(session, replace(frame_of(number), ticks=ticks))
+    (note,) = read_recording(path).notes
+    assert note.startswith("the board's clock does not go on in 2 frames: 4, 5; each counts")
 
 
 def test_the_same_calls_give_the_same_bytes(tmp_path):

@@ -38,7 +38,7 @@ def test_a_large_one_is_said_in_words_and_the_electrode_is_used():
     own[4] = 20e-3
     readout, frame = chopped(own)
     reads = readout(frame)
-    assert not reads.railed.any()
+    assert not reads.excluded.any()
     noise = np.full(PATTERN.n_meas, 1e-5)
     rest = np.where(reads.values == 0, 1e-3, reads.values)
     monitor = Monitor(
@@ -47,12 +47,12 @@ def test_a_large_one_is_said_in_words_and_the_electrode_is_used():
     )  # fmt: skip
     assert readout.own_voltage.large < 20e-3
     for time in range(3):
-        health = monitor.push(rest, reads.railed, float(time), None, reads.own)
+        health = monitor.push(rest, reads.excluded, float(time), None, reads.own)
     (sick,) = health.sick
     assert (sick.electrode, sick.state) == (4, "offset")
     assert "+20.0 mV whatever the current does" in sick.text
     assert not health.lost.any()
     assert not health.floating.any()
     for time in range(30):
-        health = monitor.push(rest, reads.railed, 3.0 + time, None, np.zeros(8))
+        health = monitor.push(rest, reads.excluded, 3.0 + time, None, np.zeros(8))
     assert health.sick == ()

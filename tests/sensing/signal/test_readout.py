@@ -56,7 +56,7 @@ def test_volts_come_back_within_a_step_of_the_converter(bits: int, seed: int) ->
     expected = potential[PATTERN.drive_index, plus] - potential[PATTERN.drive_index, minus]
     step = settings.reference_voltage / 2**bits / settings.gain
     assert np.abs(voltages.values - expected).max() <= step * (1 + 1e-9)
-    assert not voltages.railed.any()
+    assert not voltages.excluded.any()
 
 
 def test_differences_do_not_wrap_around() -> None:
@@ -74,8 +74,9 @@ def test_offset_leaves_with_the_difference() -> None:
 
 def test_frame_data_travel_along() -> None:
     voltages = READOUT(frame(middle()))
-    assert (voltages.sequence, voltages.ticks, voltages.host_time) == (7, 1234, 0.5)
-    assert voltages.values.shape == voltages.railed.shape == (PATTERN.n_meas,)
+    assert (voltages.sequence, voltages.host_time) == (7, 0.5)
+    assert voltages.time == 1234 / SETTINGS.tick_rate
+    assert voltages.values.shape == voltages.excluded.shape == (PATTERN.n_meas,)
 
 
 @pytest.mark.parametrize(
@@ -88,7 +89,7 @@ def test_rows_made_of_a_railed_sample_are_marked(count: int, railed: bool) -> No
     voltages = READOUT(frame(samples))
     made_of = (SCAN.plus == 2) | (SCAN.minus == 2)
     assert made_of.sum() == 2
-    assert np.array_equal(voltages.railed, made_of & railed)
+    assert np.array_equal(voltages.excluded, made_of & railed)
 
 
 def test_a_converter_that_fills_sixteen_bits() -> None:
@@ -97,7 +98,7 @@ def test_a_converter_that_fills_sixteen_bits() -> None:
     samples[SCAN.plus[0]], samples[SCAN.minus[0]] = 65535, 0
     voltages = readout(frame(samples))
     assert voltages.values[0] == pytest.approx(65535 / 65536 * 5.0 / 40.0)
-    assert voltages.railed[0]
+    assert voltages.excluded[0]
 
 
 @pytest.mark.parametrize("n", [0, SCAN.n_samples - 1, SCAN.n_samples + 1])

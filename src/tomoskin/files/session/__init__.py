@@ -13,8 +13,6 @@ from tomoskin.files.session.blocks import (
 from tomoskin.files.session.channels import schema_of
 from tomoskin.files.session.info import OWN_FILES, SessionInfo, session_info
 from tomoskin.files.session.layout import (
-    Mark,
-    MarkedFrame,
     Truth,
 )
 from tomoskin.files.session.message_log import MessageLog, errors_of
@@ -36,7 +34,6 @@ from tomoskin.files.session.repair import (
 )
 from tomoskin.files.session.replay import ReplayTransport, open_replay, parse_replay
 from tomoskin.files.session.replayed import (
-    advance,
     as_recorded,
     reconstruct_session,
     recorded_calibrations,
@@ -63,8 +60,6 @@ __all__ = [
     "Block",
     "BoardInfo",
     "Lost",
-    "Mark",
-    "MarkedFrame",
     "MessageLog",
     "RawRead",
     "Recorder",
@@ -80,7 +75,6 @@ __all__ = [
     "Span",
     "Timeline",
     "Truth",
-    "advance",
     "all_blocks",
     "as_recorded",
     "end_time",

@@ -26,6 +26,9 @@ def no_report(_done: float, _total: float) -> None:
 MOST_FRAMES = 2048
 """Frames of a block."""
 
+_LISTED = 5
+"""Frames that a note names."""
+
 
 @dataclass(frozen=True, eq=False)
 class Block:
@@ -123,9 +126,24 @@ def recording_of(session: SessionReader) -> Recording:
         labels=None if positions is None else np.concatenate(list(map(positions, blocks))),
         is_change=False,
         source=str(session.path),
-        notes=(f"the file {session.torn}",) if session.torn else (),
+        notes=_notes(session, blocks),
         idle=min(idle_count(session, rows.readout.scan), n_frames),
     )
+
+
+def _notes(session: SessionReader, blocks: list[Block]) -> tuple[str, ...]:
+    """What is missing at the end, and where the board's clock did not go on."""
+    notes = [f"the file {session.torn}"] if session.torn else []
+    ticks = np.concatenate([block.ticks for block in blocks]).astype(np.int64)
+    again = 1 + np.flatnonzero(np.diff(ticks) <= 0)
+    if len(again):
+        listed = ", ".join(map(str, again[:_LISTED].tolist()))
+        more = ", …" if len(again) > _LISTED else ""
+        notes.append(
+            f"the board's clock does not go on in {len(again)} frames: {listed}{more}; each counts "
+            "from when it was read"
+        )
+    return tuple(notes)
 
 
 def press_positions(session: SessionReader) -> Callable[[Block], FloatArray] | None:

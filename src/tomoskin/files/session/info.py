@@ -10,9 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from tomoskin.board.source import ClockFit, ClockFitter
-from tomoskin.core import StrPath
+from tomoskin.core import Mark, MarkedFrame, StrPath
 from tomoskin.files.session.blocks import Advance, no_report
-from tomoskin.files.session.layout import Mark, MarkedFrame
 from tomoskin.files.session.scanned import first_scan, scanned_touches
 from tomoskin.files.session.session_reader import (
     SessionReader,

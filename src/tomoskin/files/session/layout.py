@@ -6,44 +6,19 @@ import math
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from enum import IntFlag
 from typing import Any
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import DataError, Detection, Event, Force, Frame, Touch
+from tomoskin.core import DataError, Detection, Event, Force, Frame, Mark, MarkedFrame, Touch
 
 _CDR = b"\x00\x01\x00\x00"
 _FRAME = struct.Struct("<4sdQIHHBBxxI")
 _COUNT = struct.Struct("<I")
 _RAW = struct.Struct("<4sdI")
 _HOST_TIME = struct.Struct("<4xd")
-
-
-class Mark(IntFlag):
-    """What became of a frame on its way to the pipeline."""
-
-    NONE = 0
-    REFERENCE = 1
-    """A new reference begins with this frame."""
-    HELD = 2
-    """Left out: the image was held."""
-    SKIPPED = 4
-    """Left out: too many frames waited."""
-    OPENED = 8
-    """First frame since the source was opened."""
-    EARLIER = 16
-    """From before the recording began: what its reference and operator were made of."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class MarkedFrame:
-    """A frame, and what became of it."""
-
-    frame: Frame
-    mark: Mark
 
 
 def encode_frame(frame: Frame, mark: Mark) -> bytes:

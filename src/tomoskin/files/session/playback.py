@@ -7,8 +7,7 @@ from dataclasses import dataclass, field, replace
 from itertools import chain, islice
 
 from tomoskin.board.wire import SCHEMA, Deframer, decode_payload, encode
-from tomoskin.core import Event, Frame, StrPath
-from tomoskin.files.session.layout import Mark, MarkedFrame
+from tomoskin.core import Event, Frame, Mark, MarkedFrame, StrPath
 from tomoskin.files.session.session_reader import SessionReader, end_time, start_time
 from tomoskin.sensing.track import Span, touch_spans
 

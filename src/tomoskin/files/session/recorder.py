@@ -10,9 +10,9 @@ from typing import Any
 
 from tomoskin.board.source import ClockFitter
 from tomoskin.board.wire import Info
-from tomoskin.core import Consumer, DataError, Event, PixelMap, StrPath
+from tomoskin.core import Consumer, DataError, Event, Mark, MarkedFrame, PixelMap, StrPath
 from tomoskin.files.messages import Every, event_of
-from tomoskin.files.session.layout import Mark, MarkedFrame, RecordedTouches, Truth
+from tomoskin.files.session.layout import RecordedTouches, Truth
 from tomoskin.files.session.session_writer import SessionWriter
 from tomoskin.pipeline import FrameResult
 

@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING
 
 from tomoskin.board.source import Configuration, ScanSettings
 from tomoskin.board.wire import OLDER, SCHEMA
-from tomoskin.core import Clock, SourceError, WallClock
+from tomoskin.core import Clock, Mark, MarkedFrame, SourceError, WallClock
 from tomoskin.files.session.info import References
-from tomoskin.files.session.layout import Mark, MarkedFrame
 from tomoskin.files.session.playback import Item, Playhead
 from tomoskin.files.session.replay_board import ReplayBoard
 from tomoskin.files.session.session_reader import (

@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from tomoskin.core import DataError, Frame
+from tomoskin.core import DataError, Mark
 from tomoskin.files.session.blocks import Advance, no_report
-from tomoskin.files.session.layout import Mark
 from tomoskin.files.session.scanned import ScannedFrame, scanned_touches, timed
 from tomoskin.files.session.session_reader import (
     SessionReader,
@@ -50,42 +49,33 @@ def recorded_calibrations(session: SessionReader) -> Iterator[Calibration[Any]]:
             yield kind.decode(data, f"{session.path}, {kind.attachment}")
 
 
-def advance(pipeline: Pipeline, frame: Frame, mark: Mark) -> FrameResult | None:
-    """Give the pipeline one frame as its ``mark`` says; None where there is no picture of it.
-
-    Raises
-    ------
-    DataError
-        When the frame has another number of samples than the scan.
-    """
-    if mark & Mark.SKIPPED:
-        return None
-    if mark & Mark.REFERENCE:
-        pipeline.take_reference()
-    pipeline.paused = bool(mark & Mark.HELD)
-    return pipeline.push(frame)
-
-
 def replaying(
-    prepared: Prepared, session: SessionReader, setting: Setting | None = None
+    prepared: Prepared,
+    session: SessionReader,
+    setting: Setting | None = None,
+    idle: int | None = None,
 ) -> Pipeline:
-    """A pipeline that begins where that of the run began; ``setting``: unless it is a live one."""
-    pipeline = Pipeline(
-        prepared, reference_frames=reference_frames(session.settings()), setting=setting
-    )
+    """A pipeline that begins where that of the run began; ``setting``: unless it is a live one.
+
+    ``idle``: frames that make its reference, where not as many as in the run.
+    """
+    needed = reference_frames(session.settings()) if idle is None else idle
+    pipeline = Pipeline(prepared, reference_frames=needed, setting=setting)
     pipeline.tick_rate = tick_rate(session)
     pipeline.number_after(touches_before(session))
     return pipeline
 
 
 def gathered(
-    pipeline: Pipeline, session: SessionReader, scan: Scan
+    pipeline: Pipeline, session: SessionReader, scan: Scan, *, marked: bool = True
 ) -> Iterator[tuple[ScannedFrame, FrameResult | None]]:
     """Every frame of ``scan`` but those from before the recording, and what ``pipeline`` makes of
-    it: None where it was held, skipped or refused."""
+    it: None where it was held, skipped or refused. Not ``marked``: as if the run had followed all
+    of them, from one reference on."""
     for frame in timed(session.frames(), tick_rate(session), scan):
+        mark = frame.item.mark if marked else Mark.NONE
         try:
-            result = advance(pipeline, frame.item.frame, frame.item.mark)
+            result = pipeline.push(frame.item.frame, mark)
         except DataError:
             result = None
         if not frame.item.mark & Mark.EARLIER:
@@ -122,6 +112,7 @@ def reconstruct_session(
     start: int = 0,
     stop: int | None = None,
     setting: Setting | None = None,
+    idle: int | None = None,
     advance: Advance = no_report,
 ) -> Reconstruction:
     """A whole session as its replay tells it, to the bit; ``unseen`` are the frames that the run
@@ -133,6 +124,9 @@ def reconstruct_session(
         Numbers of the frames that are wanted; all before run through the pipeline all the same.
     setting
         How frames are followed: as they are live, or another way.
+    idle
+        So many frames, from the first one on, are the reference, and all others are followed,
+        whatever was done in the run. None: as in the run.
 
     Raises
     ------
@@ -141,12 +135,12 @@ def reconstruct_session(
     """
     if setting is not None:
         setting = replace(setting, scan=prepared.scan)
-    pipeline, without, ended = replaying(prepared, session, setting), list[int](), False
+    pipeline, without, ended = replaying(prepared, session, setting, idle), list[int](), False
     total = indexed_frames(session)
 
     def wanted() -> Iterator[Gathered]:
         nonlocal ended
-        for frame, result in gathered(pipeline, session, prepared.scan):
+        for frame, result in gathered(pipeline, session, prepared.scan, marked=idle is None):
             if stop is not None and frame.number >= stop:
                 break
             advance(frame.number, max(total, frame.number + 1))

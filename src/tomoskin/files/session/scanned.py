@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator
 from typing import NamedTuple
 
-from tomoskin.core import DataError, Frame
-from tomoskin.files.session.layout import Mark, MarkedFrame
+from tomoskin.core import DataError, Frame, Mark, MarkedFrame
 from tomoskin.files.session.session_reader import (
     SessionReader,
     indexed_frames,

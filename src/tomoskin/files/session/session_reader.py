@@ -12,12 +12,10 @@ from typing import Any, TypeVar
 import msgspec
 
 from tomoskin.board.source import TICK_RATES
-from tomoskin.core import DataError, Event, SkinError, StrPath
+from tomoskin.core import DataError, Event, Mark, MarkedFrame, SkinError, StrPath
 from tomoskin.files.session import channels
 from tomoskin.files.session.container_reader import MEND, ContainerReader
 from tomoskin.files.session.layout import (
-    Mark,
-    MarkedFrame,
     RecordedTouches,
     Truth,
     decode_frame,

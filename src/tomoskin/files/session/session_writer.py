@@ -8,11 +8,21 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tomoskin.core import Event, Frame, Image, PixelMap, StrPath, Touch, encode_json, plain_values
+from tomoskin.core import (
+    Event,
+    Frame,
+    Image,
+    Mark,
+    PixelMap,
+    StrPath,
+    Touch,
+    encode_json,
+    plain_values,
+)
 from tomoskin.files.messages import Contact, grid_message, log_message, scene_message, touch_row
 from tomoskin.files.session import channels
 from tomoskin.files.session.channels import robot_channels
-from tomoskin.files.session.layout import Mark, encode_frame, encode_raw
+from tomoskin.files.session.layout import encode_frame, encode_raw
 from tomoskin.files.session.message_log import MessageLog
 from tomoskin.model.mesh import Plane
 

@@ -40,6 +40,8 @@ class Readout:
         Standard deviation of a row that the converter alone causes, V.
     rounding
         The part of it that rounding alone causes, V: 1/√12 of a step a reading.
+    tick_rate
+        Of the frames' ticks, Hz, where the board states no other.
     """
 
     scan: Scan
@@ -48,6 +50,7 @@ class Readout:
     high: int
     noise: float
     rounding: float
+    tick_rate: float
 
     @classmethod
     def of(cls, scan: Scan, settings: ReadoutSettings) -> Self:
@@ -58,10 +61,10 @@ class Readout:
         noise, rounding = (
             volts * float(np.sqrt(2 * n * (sd**2 + 1 / 12))) for sd in (CONVERSION_NOISE, 0.0)
         )
-        return cls(scan, volts, low=n, high=(levels - 2) * n, noise=noise, rounding=rounding)
+        return cls(scan, volts, n, (levels - 2) * n, noise, rounding, settings.tick_rate)
 
-    def __call__(self, frame: Frame) -> Voltages:
-        """Voltages of one frame.
+    def __call__(self, frame: Frame, tick_rate: float | None = None) -> Voltages:
+        """Voltages of one frame, whose clock runs at ``tick_rate`` Hz.
 
         The amplifier's offset is common to both samples of a row and leaves with the difference.
 
@@ -78,10 +81,11 @@ class Readout:
         values, railed = self.rows(frame.samples, frame.sums)
         return Voltages(
             values=values,
-            railed=railed,
-            sequence=frame.sequence,
-            ticks=frame.ticks,
+            excluded=railed,
+            time=frame.ticks / (tick_rate or self.tick_rate),
             host_time=frame.host_time,
+            sequence=frame.sequence,
+            samples=frame.samples,
             own=None if frame.sums is None else self.own_voltage(frame.sums),
         )
 

@@ -1,0 +1,162 @@
+"""What comes from the source: frames and events of each read, what was lost, what is repeated."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Self
+
+from tomoskin.board.source import Link
+from tomoskin.core import Event, Frame
+
+MOST_AT_ONCE = 16
+"""Frames of one read that are computed at most: a late picture helps nobody."""
+
+_PROMPT = 1e-3
+"""s that a read's first byte has waited at most where the host keeps up."""
+
+_CALM = 100
+"""Prompt reads in a row after which more frames are computed at once again."""
+
+PERIOD = 1.0
+"""s in which the same event is said once."""
+
+COUNTED = frozenset({"fault", "refused"})
+"""Kinds of events that a sick board causes in masses; all others are said each time."""
+
+_STANDSTILL = frozenset({"silent", "fault", "reset"})
+"""Events after which no frame comes until the board is well again."""
+
+
+@dataclass(frozen=True, slots=True)
+class Losses:
+    """Counts of what did not arrive.
+
+    ``dropped`` frames that the device or this host left out, ``corrupt`` messages damaged on
+    the line, ``gaps`` frames missing in the sequence.
+    """
+
+    dropped: int = 0
+    corrupt: int = 0
+    gaps: int = 0
+
+    @classmethod
+    def of(cls, link: Link, device_drops: int) -> Self:
+        """Counts of one link; ``device_drops`` is what its last frame said."""
+        frames = link.frames
+        return cls(device_drops + frames.foreign, link.counters.corrupt, frames.lost)
+
+    def __add__(self, other: Losses) -> Losses:
+        """The sum of both losses."""
+        return Losses(
+            self.dropped + other.dropped,
+            self.corrupt + other.corrupt,
+            self.gaps + other.gaps,
+        )
+
+
+class Backlog:
+    """How many frames of a read are left out.
+
+    A host that was held up once catches up with all but the oldest. One that goes on being behind
+    computes half as many at once each time, until it computes the newest frame alone.
+    """
+
+    def __init__(self) -> None:
+        self._most, self._calm = MOST_AT_ONCE, 0
+
+    def late(self, frames: int, waited: float) -> int:
+        """How many of ``frames`` of a read, the oldest, are left out; ``waited`` s: its first byte
+        before it was read."""
+        late = max(frames - self._most, 0)
+        self._calm = self._calm + 1 if waited <= _PROMPT else 0
+        if late and not self._calm:
+            self._most = max(self._most // 2, 1)
+        elif self._calm >= _CALM:
+            self._most, self._calm = min(2 * self._most, MOST_AT_ONCE), 0
+        return late
+
+
+class Repeats:
+    """Counts events of one kind and text, which are said once a second with how often they were;
+    only of the kinds that are :data:`COUNTED`."""
+
+    def __init__(self) -> None:
+        self._said: dict[tuple[str, str], float] = {}
+        self._waiting: dict[tuple[str, str], tuple[Event, int]] = {}
+
+    def push(self, now: float, events: Sequence[Event]) -> Iterator[Event]:
+        """What is to be said at ``now``, s: of ``events``, and of those that have waited."""
+        for event in events:
+            key = event.kind, event.text
+            if event.kind not in COUNTED:
+                yield event
+            elif key in self._said and abs(now - self._said[key]) < PERIOD:
+                self._waiting[key] = event, self._waiting.get(key, (event, 0))[1] + 1
+            else:
+                yield self._counted(now, event, 1 + self._waiting.pop(key, (event, 0))[1])
+        for key, (event, count) in list(self._waiting.items()):
+            if key not in self._said or abs(now - self._said[key]) >= PERIOD:
+                del self._waiting[key]
+                yield self._counted(now, event, count)
+
+    def _counted(self, now: float, event: Event, count: int) -> Event:
+        self._said = {key: time for key, time in self._said.items() if abs(now - time) < PERIOD}
+        self._said[event.kind, event.text] = now
+        return event if count == 1 else replace(event, text=f"{event.text} ({count} times)")
+
+
+class Intake:
+    """The reads of one source after the other.
+
+    Attributes
+    ----------
+    polled, waited
+        Host time of the newest read, s, and how long its first byte had waited, s.
+    standstill
+        Why no frame comes until the board is well again, or None.
+    skipped
+        Frames that this host has left out.
+    """
+
+    def __init__(self) -> None:
+        self.polled, self.waited = 0.0, 0.0
+        self.standstill: str | None = None
+        self.skipped = 0
+        self._link: Link | None = None
+        self._drops, self._earlier = 0, Losses()
+        self._backlog, self._repeats = Backlog(), Repeats()
+
+    def open(self) -> None:
+        """A protocol session is to begin."""
+        self.standstill, self._drops = None, 0
+
+    def close(self) -> None:
+        """The protocol session is over; another may follow."""
+        self._earlier, self._link = self.losses, None
+
+    @property
+    def losses(self) -> Losses:
+        """All that did not arrive, but what this host has left out; from any thread."""
+        link = self._link
+        return self._earlier if link is None else self._earlier + Losses.of(link, self._drops)
+
+    def take(self, link: Link, items: Sequence[Frame | Event], now: float) -> list[Frame]:
+        """The frames of a read of ``link`` that was made at ``now``, host s."""
+        self._link, self.polled, self.waited = link, now, link.waited
+        frames = []
+        for item in items:
+            if isinstance(item, Frame):
+                frames.append(item)
+                self._drops = item.drops
+            elif item.kind in _STANDSTILL:
+                self.standstill = item.text
+        return frames
+
+    def late(self, frames: int) -> int:
+        """How many of ``frames`` of the newest read, the oldest, are left out."""
+        return self._backlog.late(frames, self.waited) if frames else 0
+
+    def worth_saying(self, now: float, items: Sequence[Frame | Event]) -> Iterator[Event]:
+        """The events of a read, and what happens again and again once a second."""
+        return self._repeats.push(now, [item for item in items if isinstance(item, Event)])
