@@ -9,7 +9,7 @@ from sensing.fit.scene import noise, whitener
 from sensing.fit.test_finder import data, finder, model, press
 from tomoskin.core import FloatArray
 from tomoskin.sensing.fit.joint_starts import JointStarts
-from tomoskin.sensing.fit.refine import WhitenedTable
+from tomoskin.sensing.fit.problem import WhitenedTable
 
 THREE = np.concatenate(
     [press(*at, depth=-0.1) for at in ((-0.05, 0.03), (0.0, 0.03), (0.05, -0.04))]

@@ -13,7 +13,8 @@ from sensing.fit.test_finder import NOTHING, data, model, place, press, skin, sp
 from tomoskin.core import Detection, FloatArray
 from tomoskin.sensing.fit import EXHAUSTIVE, LIVE, Pace, SpotFinder
 from tomoskin.sensing.fit.expectation import Known
-from tomoskin.sensing.fit.refine import Answer, Deficit, Fit, Limits, Problem, Question, Solver
+from tomoskin.sensing.fit.problem import Limits, Matched, Problem, Solver
+from tomoskin.sensing.fit.spot_fit import Deficit, Fit
 
 SCAN = 0.1
 """Seconds of a scan."""
@@ -104,23 +105,18 @@ class Counting:
         return self._solver.standing(left, fit)
 
     def standing_out(
-        self, signatures: FloatArray, squares: FloatArray, fit: Fit, limits: Limits
+        self, matched: Matched, fit: Fit, limits: Limits
     ) -> tuple[FloatArray, FloatArray]:
-        return self._solver.standing_out(signatures, squares, fit, limits)
+        return self._solver.standing_out(matched, fit, limits)
 
     def judged(self, problem: Problem, fit: Fit, uneven: float) -> tuple[FloatArray, FloatArray]:
         return self._solver.judged(problem, fit, uneven)
 
-    def searched(self, question: Question, before: FloatArray) -> Answer | None:
-        """None: the search goes step by step, which comes to the same."""
+    def searched(self, *question: Any) -> None:
+        """The search goes step by step, which comes to the same."""
 
     def settled(
-        self,
-        problem: Problem,
-        spots: FloatArray,
-        deficit: Deficit,
-        most: int,
-        known: Known = (),
+        self, problem: Problem, spots: FloatArray, deficit: Deficit, most: int, known: Known = ()
     ) -> Fit:
         self.steps += 1 + most
         return self._solver.settled(problem, spots, deficit, most, known)

@@ -20,7 +20,7 @@ from tomoskin.model.forward.engine import (
 )
 from tomoskin.model.pattern import Pattern
 
-INTERFACE = 6
+INTERFACE = 7
 """The interface of tomoskin_core that is called here and in ``touch``; raised with its own."""
 
 

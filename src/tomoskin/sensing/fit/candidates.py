@@ -11,7 +11,7 @@ import numpy as np
 
 from tomoskin.core import FloatArray
 from tomoskin.sensing.fit.prior import SpotPrior
-from tomoskin.sensing.fit.refine import Fit, Limits, Solver, WhitenedTable
+from tomoskin.sensing.fit.problem import Matched, WhitenedTable
 from tomoskin.sensing.fit.spot import CONTENT, FILLING, LOG_RADIUS, Footprints, Response, spots_of
 
 _SPACING = 0.7
@@ -19,12 +19,6 @@ _SPACING = 0.7
 
 _SIZES = (0.6, 1.0, 1.6)
 """Radii of the candidates, in median radii."""
-
-_LEAST = 1.0
-"""Deviations of the noise below which a candidate is none, whatever else could take it up."""
-
-_USEFUL = 0.02
-"""Part of a candidate's square that the spots that are there must leave of it."""
 
 _FAINT = 0.05
 """Depth at which signatures are taken: linear, and far above rounding."""
@@ -85,46 +79,6 @@ class Candidates:
     def matched(self, seen: WhitenedTable) -> Matched:
         """The same for one noise."""
         return Matched.of(self.spots, self.signatures @ seen.matrix[: seen.narrow].T)
-
-
-@dataclass(frozen=True, eq=False)
-class Matched:
-    """Candidates, their whitened signatures (n, narrow), and (n,) the squares of these."""
-
-    spots: FloatArray
-    signatures: FloatArray
-    squares: FloatArray
-
-    @classmethod
-    def of(cls, spots: FloatArray, signatures: FloatArray) -> Self:
-        """Spots (n, 4) of these signatures (n, narrow)."""
-        return cls(spots, signatures, np.einsum("nr,nr->n", signatures, signatures))
-
-    def louder(self, times: float) -> Self:
-        """The same in so many times the noise's variance."""
-        return self.of(self.spots, self.signatures / math.sqrt(times))
-
-    def ratios(self, solver: Solver, fit: Fit, sign: str) -> tuple[FloatArray, FloatArray]:
-        """(n,) likelihood ratio of each candidate, and (n,) its most likely content.
-
-        The ratio is the square root of twice its logarithm: deviations by which the candidate
-        stands out (GLRT; Kay 1998, section 7.6.2, for a linear model), after what the spots of
-        ``fit`` could take up.
-        """
-        return solver.standing_out(self.signatures, self.squares, fit, limits_of(sign))
-
-    def spot(self, number: int, content: FloatArray) -> FloatArray:
-        """(4,) candidate ``number`` with its content of ``contents`` (n,)."""
-        chosen = self.spots[number].copy()
-        chosen[CONTENT] = content[number]
-        return np.asarray(chosen)
-
-
-def limits_of(sign: str) -> Limits:
-    """What counts of candidates for touches of this ``sign``."""
-    low = 0.0 if sign == "increase" else -math.inf
-    high = 0.0 if sign == "decrease" else math.inf
-    return Limits(low, high, _LEAST, _USEFUL)
 
 
 def footprints_of(response: Response, prior: SpotPrior) -> tuple[Footprints, ...]:

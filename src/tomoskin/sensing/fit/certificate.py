@@ -198,14 +198,14 @@ class Reduced:
     @cached_property
     def _native(self) -> Any:
         """The same in the native engine; None where that does not run."""
-        own, certificate, rim = self.interaction, self.certificate, self.rim
-        core = own.state.model.engine.core
+        core = self.interaction.state.model.engine.core
         return core and core.Reduced(
-            PROFILE,
-            (own.centres, own.spread, own.fields, own.between),
-            (certificate.like, certificate.parts, rim.tree.data),
-            (certificate.margin, certificate.moved, rim.radius),
-            _NEIGHBOURS,
+            profile=PROFILE,
+            interaction=self.interaction,
+            certificate=self.certificate,
+            rim=self.rim.tree.data,
+            radius=self.rim.radius,
+            neighbours=_NEIGHBOURS,
         )
 
 

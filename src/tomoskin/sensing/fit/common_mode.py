@@ -14,22 +14,11 @@ from functools import cached_property
 import numpy as np
 
 from tomoskin.core import FloatArray
-from tomoskin.sensing.fit.openings import misshapen
-from tomoskin.sensing.fit.refine import Fit, Problem
+from tomoskin.sensing.fit.detections import SpotDetections
+from tomoskin.sensing.fit.policy import SUDDEN, SURE, DetectionPolicy
+from tomoskin.sensing.fit.problem import Problem
 from tomoskin.sensing.fit.rival import Rival
-from tomoskin.sensing.fit.search import SpotDetections
-
-_SUDDEN = 1.0
-"""Logarithm of how much more often the common mode jumps than a touch begins."""
-
-_SURE = 8.0
-"""Logarithm of the odds from which frames have decided between the two."""
-
-_LEAVES = 5.0
-"""Deviations left along a jump, from which the common mode may have jumped."""
-
-_USUAL = 3.0
-"""Deviations along a jump within which the common mode is where it is expected."""
+from tomoskin.sensing.fit.spot_fit import Fit
 
 _FAINT = 0.3
 """Deviations of the noise below which it does not matter where the common mode has moved."""
@@ -139,59 +128,61 @@ class CommonModeJump:
         What it has jumped by, in deviations of a jump.
     """
 
-    odds: float = -_SUDDEN
+    odds: float = -SUDDEN
     proven: int = 0
     rest: float = 0.0
     jumped: bool = False
     size: float = 0.0
 
     def decided(
-        self, usual: Problem, jumps: Jumps, least: float, explain: Callable[[Problem], Explained]
+        self,
+        usual: Problem,
+        jumps: Jumps,
+        policy: DetectionPolicy,
+        explain: Callable[[Problem], Explained],
     ) -> tuple[Explained, CommonModeJump]:
-        """What explains a frame, ``usual`` or with ``jumps``.
-
-        A touch stands out by ``least`` deviations.
-        """
+        """What explains a frame, ``usual`` or with ``jumps``."""
         if not len(jumps.rows):
             return explain(usual), self
         jumps = jumps.beside(usual.left)
         if self.jumped:
             explained = explain(jumps.free(usual))
-            return explained, self._after_jump(jumps, explained[0].fit)
+            return explained, self._after_jump(jumps, explained[0].fit, policy)
         explained = explain(usual)
         fit = explained[0].fit
         count, (rest, _) = len(fit.spots), jumps.along(fit.residual)
-        if self._is_clear(usual, fit, rest, jumps, least):
+        if self._is_clear(usual, fit, rest, jumps, policy):
             return explained, CommonModeJump(proven=count, rest=rest) if count else _NONE
         other = explain(jumps.free(usual))
         beside, size = jumps.along(other[0].fit.residual)
-        if abs(beside) < math.hypot(_USUAL, misshapen(other[0].fit)):  # there is none
+        if policy.is_no_jump(beside, other[0].fit):
             return explained, CommonModeJump(proven=count, rest=rest)
-        gain = usual.evidence(fit) - usual.evidence(other[0].fit)
-        odds = self.odds + float(np.clip(gain, -2 * _SURE, 2 * _SURE))
+        gain = usual.gain(other[0].fit, fit)
+        odds = self.odds + float(np.clip(gain, -2 * SURE, 2 * SURE))
         if odds > 0:
-            proven = count if odds > _SURE else min(self.proven, count)
+            proven = count if odds > SURE else min(self.proven, count)
             return explained, CommonModeJump(odds, proven, rest)
-        return other, CommonModeJump(odds, jumped=odds < -_SURE, size=size)
+        return other, CommonModeJump(odds, jumped=odds < -SURE, size=size)
 
-    def _is_clear(self, usual: Problem, fit: Fit, rest: float, jumps: Jumps, least: float) -> bool:
+    def _is_clear(
+        self, usual: Problem, fit: Fit, rest: float, jumps: Jumps, policy: DetectionPolicy
+    ) -> bool:
         """Whether no jump explains the frame as the touches of a ``fit`` do, which leave ``rest``
         deviations along it: as much as before, and they stand out whatever the jump."""
-        moved = abs(rest - self.rest)
-        if moved > _LEAVES and moved > math.hypot(_LEAVES, misshapen(fit)):
+        if policy.may_have_jumped(abs(rest - self.rest), fit):
             return False
         if len(fit.spots) <= self.proven:
             return True
         free = jumps.free(usual)
         again = free.refined(fit.spots, fit.deficit, _STEPS, fit.known)
-        return bool(free.solver.standing(free.left, again).min() > least**2)
+        return bool(free.solver.standing(free.left, again).min() > policy.least**2)
 
-    def _after_jump(self, jumps: Jumps, fit: Fit) -> CommonModeJump:
+    def _after_jump(self, jumps: Jumps, fit: Fit, policy: DetectionPolicy) -> CommonModeJump:
         """After a further frame: over where the common mode is as it was, and nothing touches."""
         rest, size = jumps.along(fit.residual)
-        if len(fit.spots) or abs(rest) > _USUAL:
-            return replace(self, size=max(self.size, size, key=abs))
-        return _NONE
+        if policy.is_no_jump(rest) and not len(fit.spots):
+            return _NONE
+        return replace(self, size=max(self.size, size, key=abs))
 
 
 _NONE = CommonModeJump()

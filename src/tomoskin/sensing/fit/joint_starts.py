@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tomoskin.core import FloatArray, IntArray
-from tomoskin.sensing.fit.candidates import Matched
 from tomoskin.sensing.fit.prior import SpotPrior
+from tomoskin.sensing.fit.problem import Matched
 from tomoskin.sensing.fit.spot import CONTENT, LOG_RADIUS
 
 _BEAM = 30

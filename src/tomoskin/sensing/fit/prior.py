@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -48,6 +48,12 @@ class SpotPrior:
     content
         Standard deviation of the content about none, m².
     """
+
+    directed: ClassVar = 0.7
+    """Standard deviation of a spot's direction (:class:`Part`) about none."""
+
+    reshaped: ClassVar = 0.5
+    """Standard deviation of its shape, of the way from a tail to a bell: both are one from ours."""
 
     area: float
     radius: float

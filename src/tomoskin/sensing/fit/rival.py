@@ -10,22 +10,11 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from tomoskin.sensing.fit.detections import SpotDetections, judged
 from tomoskin.sensing.fit.expectation import Expectation, newcomers
-from tomoskin.sensing.fit.openings import against, misshapen
-from tomoskin.sensing.fit.refine import Fit
-from tomoskin.sensing.fit.search import SpotDetections, judged
+from tomoskin.sensing.fit.policy import ELSEWHERE
 from tomoskin.sensing.fit.selection import ForwardSelection
-from tomoskin.sensing.track import HELD
-
-_BORN = -4.0
-"""Logarithm of the odds that one frame must give a rival, beginning apart."""
-
-_DROPPED = -12.0
-"""Logarithm of the odds below which it is given up."""
-
-_ASTRAY = 9.0
-"""Squared deviations from where it is expected, beyond which a touch may have left its place to
-explain another one that has begun."""
+from tomoskin.sensing.fit.spot_fit import Fit
 
 GoingOn = Callable[[SpotDetections], Expectation]
 """What is expected of the touches of one frame in the next."""
@@ -56,20 +45,20 @@ def challenged(
     that stays does, at a place of its own. What a wrong profile of those that were found may leave
     is no evidence: it would say the same in every frame.
     """
+    policy = selection.policy
     if rival is not None and _is_beside(rival, found.fit):
         fit, gain = _followed(selection, found.fit, rival, going_on)
-        odds = rival.odds + gain - against(found.fit, fit)
+        odds = rival.odds + gain - policy.against(found.fit, fit)
     else:
         proposed, gain = _proposed(selection, found.fit)
-        if proposed is None or gain < _BORN:
+        if proposed is None or not policy.begins_rival(gain):
             return found, None
-        fit, odds = proposed, gain - against(found.fit, proposed) - selection.pace.rare
-    if odds < _DROPPED:
+        fit, odds = proposed, gain - policy.against(found.fit, proposed) - policy.pace.rare
+    if policy.drops_rival(odds):
         return found, None
     fit = replace(fit, known=newcomers(len(fit.spots)))  # of what was found
-    stays = math.hypot(HELD * selection.least, misshapen(found.fit))
     detected = judged(selection, fit)
-    if odds > 0 and selection.ratios(fit).min() >= stays:
+    if policy.elects_rival(found.fit, selection.ratios(fit).min(), odds):
         return detected, None
     return found, Rival(detected, odds)
 
@@ -83,11 +72,11 @@ def _followed(
     selection: ForwardSelection, found: Fit, rival: Rival, going_on: GoingOn
 ) -> tuple[Fit, float]:
     """The rival in a further frame, and the logarithm of the odds that this gives."""
-    pace, before = selection.pace, rival.detected.fit
+    pace, before = selection.policy.pace, rival.detected.fit
     problem = replace(selection.problem, expected=going_on(rival.detected))
     known = tuple(range(len(problem.expected.spots)))
     fit = problem.refined(before.spots, before.deficit, pace.warm, known)
-    fit = problem.corrected(fit, pace.closing, pace.near, pace.tolerance)
+    fit = problem.corrected(fit, pace, pace.closing)
     return fit, problem.evidence(fit) - selection.problem.evidence(found)
 
 
@@ -104,7 +93,8 @@ def _proposed(selection: ForwardSelection, found: Fit) -> tuple[Fit | None, floa
 def _beside_expected(selection: ForwardSelection, found: Fit) -> Fit | None:
     """One spot beside those that are expected, where these may have left their places in vain."""
     expected = selection.problem.expected
-    if len(found.spots) != len(expected.spots) or expected.away(found.spots, found.known) < _ASTRAY:
+    away = expected.away(found.spots, found.known)
+    if len(found.spots) != len(expected.spots) or away < ELSEWHERE:
         return None
     known = tuple(range(len(expected.spots)))
     return selection.proposed(

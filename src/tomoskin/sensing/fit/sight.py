@@ -10,11 +10,10 @@ from typing import NamedTuple
 import numpy as np
 
 from tomoskin.core import FloatArray, finished
-from tomoskin.sensing.fit.candidates import Matched
 from tomoskin.sensing.fit.common_mode import Jumps
 from tomoskin.sensing.fit.excess import Channels, Excess, Gauge
 from tomoskin.sensing.fit.noise import Whitener
-from tomoskin.sensing.fit.refine import WhitenedTable
+from tomoskin.sensing.fit.problem import Matched, WhitenedTable
 from tomoskin.sensing.fit.spot_model import SpotModel
 
 _MASKS = 8

@@ -11,24 +11,17 @@ from scipy.spatial import cKDTree
 from tomoskin.core import FloatArray
 from tomoskin.model.mesh import Mesh
 from tomoskin.sensing.fit.expectation import Expectation, Known, newcomers
+from tomoskin.sensing.fit.policy import DetectionPolicy
 from tomoskin.sensing.fit.prior import SpotPrior
-from tomoskin.sensing.fit.refine import Deficit, Fit, Limits, Problem, Question
+from tomoskin.sensing.fit.problem import RIDGE, Limits, Matched, Problem
 from tomoskin.sensing.fit.spot import CONTENT, N_PARAMETERS, X, Y
+from tomoskin.sensing.fit.spot_fit import Deficit, Fit
 from tomoskin.sensing.fit.table import ResponseTable
 
 _SETTLED = 0.05
 """Newton decrement, squared, at which a step is too small to matter: 0.22 deviations."""
 
 _LEAST_DAMPING, _MOST_DAMPING = 1e-6, 1e3
-
-DIRECTED = 0.7
-"""Standard deviation of a spot's direction (:class:`Part`) about none."""
-
-RESHAPED = 0.5
-"""Standard deviation of its shape, of the way from a tail to a bell: both are one from ours."""
-
-RIDGE = 1e-9
-"""Part of a square that keeps the equations of slopes solvable that are in proportion."""
 
 
 class SheetDomain:
@@ -69,12 +62,7 @@ class NumpySolver:
         return self.table.expanded(spots)
 
     def settled(
-        self,
-        problem: Problem,
-        spots: FloatArray,
-        deficit: Deficit,
-        most: int,
-        known: Known = (),
+        self, problem: Problem, spots: FloatArray, deficit: Deficit, most: int, known: Known = ()
     ) -> Fit:
         """See :class:`Solver`.
 
@@ -120,8 +108,8 @@ class NumpySolver:
         directed, reshaped = parts[:, 1 + N_PARAMETERS :].swapaxes(0, 1) @ direct.T
         unknown = np.vstack([
             problem.left,
-            DIRECTED * directed,
-            RESHAPED * reshaped,
+            self.prior.directed * directed,
+            self.prior.reshaped * reshaped,
             *_within_scan(problem, spots, own),
         ])  # fmt: skip
         predicted = each.sum(axis=0) + direct @ deficit.change
@@ -183,8 +171,15 @@ class NumpySolver:
         covariance = scatter * fit.covariance + max(beyond, uneven**2) * (moved @ moved.T)
         return self.standing(fit.unknown[:0], fit), covariance
 
-    def searched(self, question: Question, before: FloatArray) -> None:
-        """See :class:`Solver`."""
+    def searched(
+        self,
+        problem: Problem,
+        matched: Matched,
+        policy: DetectionPolicy,
+        deficit: Deficit,
+        before: FloatArray,
+    ) -> None:
+        """See :class:`Solver`: this one goes step by step."""
 
     def standing(self, left: FloatArray, fit: Fit) -> FloatArray:
         """See :class:`Solver`."""
@@ -202,9 +197,10 @@ class NumpySolver:
         return np.maximum(squares, 0.0)
 
     def standing_out(
-        self, signatures: FloatArray, squares: FloatArray, fit: Fit, limits: Limits
+        self, matched: Matched, fit: Fit, limits: Limits
     ) -> tuple[FloatArray, FloatArray]:
         """See :class:`Solver`."""
+        signatures, squares = matched.signatures, matched.squares
         beside = _Beside.of(fit.unknown, fit.slopes)
         clean = beside.projected(fit.residual[None])[0, : signatures.shape[1]]
         onto = np.clip(signatures @ clean, limits.low, limits.high)

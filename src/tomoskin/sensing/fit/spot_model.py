@@ -17,7 +17,7 @@ from tomoskin.sensing.fit.candidates import Candidates, footprints_of
 from tomoskin.sensing.fit.certificate import Certificate, Reduced
 from tomoskin.sensing.fit.native import NativeSolver
 from tomoskin.sensing.fit.prior import SpotPrior
-from tomoskin.sensing.fit.refine import Solver
+from tomoskin.sensing.fit.problem import Solver
 from tomoskin.sensing.fit.sheet import fields_of, fitting_sheet
 from tomoskin.sensing.fit.solver import NumpySolver, SheetDomain
 from tomoskin.sensing.fit.spot import Footprints, Response

@@ -9,26 +9,15 @@ from typing import NamedTuple
 
 from scipy.optimize import linear_sum_assignment
 
-from tomoskin.sensing.track.motion import GATE, TrackObservation, TrackState, distance
+from tomoskin.sensing.track.motion import TrackObservation, TrackState, distance
+from tomoskin.sensing.track.policy import APART, EXCHANGED, GATE, JUMP, STRENGTH
 from tomoskin.sensing.track.strength import ELSEWHERE, NOISE, TouchStrength
-
-_STRENGTH = 4.0
-"""What a strength costs at the most, in logarithms of a likelihood: forces come and go."""
 
 _PARTED = 0.02
 """How far from the middle of two, along each axis, what is seen of them may be, m."""
 
-_JUMP = 4.0
-"""What it costs that two touches are seen as one, half-way between."""
-
-_APART = 7.5
-"""Cost of a touch that ends and another that begins: of a pair that is as likely."""
-
 _LIMIT = 60.0
 """More than any pair costs."""
-
-_OPEN = 6.0
-"""Logarithm of the odds below which two touches may have changed places."""
 
 
 class ExpectedTouch(NamedTuple):
@@ -97,9 +86,9 @@ def _costs(touch: ExpectedTouch, seen: Sequence[SeenDetection]) -> list[float]:
         if far > GATE or sign != touch.sign:
             costs.append(_LIMIT)
             continue
-        apart = min(0.5 * _unlike(touch.strength, content), _STRENGTH)
+        apart = min(0.5 * _unlike(touch.strength, content), STRENGTH)
         cost = 0.5 * far + 0.5 * math.log(area / 1e-8) + apart + there
-        costs.append(cost if cost <= _APART else _LIMIT)
+        costs.append(cost if cost <= APART else _LIMIT)
     return costs
 
 
@@ -124,7 +113,7 @@ def _jumps(
             )
             nearest = min(away, default=math.inf)
         # the stronger one goes on
-        cost = _JUMP + 0.5 * nearest - touch.strength.mean / 8
+        cost = JUMP + 0.5 * nearest - touch.strength.mean / 8
         costs.append(cost if nearest <= GATE else _LIMIT)
     return costs
 
@@ -167,6 +156,6 @@ def _exchanges(
     for number, (a, i) in enumerate(found):
         for b, k in found[:number]:
             odds = cost[i][a] + cost[k][b] - cost[i][b] - cost[k][a]
-            if odds > -_OPEN and cost[i][b] < _LIMIT and cost[k][a] < _LIMIT:
+            if odds > EXCHANGED and cost[i][b] < _LIMIT and cost[k][a] < _LIMIT:
                 open_ones.append((i, k, min(odds, 0.0)))
     return open_ones

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Self
 
 from tomoskin.core import Detection
-from tomoskin.sensing.track import existence
 from tomoskin.sensing.track.association import (
     NOTHING,
     Association,
@@ -18,6 +17,7 @@ from tomoskin.sensing.track.association import (
 )
 from tomoskin.sensing.track.clock import TrackClock
 from tomoskin.sensing.track.motion import TrackSettings, TrackState, begin, observe, predict, update
+from tomoskin.sensing.track.policy import confirmed, missed
 from tomoskin.sensing.track.strength import log_content
 from tomoskin.sensing.track.trace import Trace, sign_of
 
@@ -93,9 +93,7 @@ def miss(
         if trace.missing is None:
             trace.missing, trace.beside, trace.met = clock.now, now, {}
         trace.state = state
-        trace.odds = existence.missed(
-            trace.odds, trace.detection.snr, frame.settings.least_snr, clock.passed
-        )
+        trace.odds = missed(trace.odds, trace.detection.snr, frame.settings.least_snr, clock.passed)
 
 
 def see(
@@ -115,4 +113,4 @@ def see(
         else:
             trace.state = update(states[number], position)
         strongest = frame.strongest if reported > trace.reported else 0.0
-        trace.odds = existence.seen(trace.odds, detection, settings.snr, strongest, clock.passed)
+        trace.odds = confirmed(trace.odds, detection, settings.snr, strongest, clock.passed)

@@ -8,11 +8,9 @@ from typing import Self
 
 from tomoskin.core import Detection
 from tomoskin.sensing.track.motion import region_radius
+from tomoskin.sensing.track.policy import RESIDUAL
 
 # Chosen on the twin's seeds 101 to 103 (docs/theory/tracking.md).
-
-_RECOVERY = 1.0
-"""Seconds in which a sheet recovers: for so long it responds to what no longer presses."""
 
 _DIFFUSION = 5e-4
 """Variance along each axis by which a touch may move in a second that tells nothing of it, m²."""
@@ -70,7 +68,7 @@ class Position:
         region, and moves the position as far as a Kalman filter (1960) lets it.
         """
         since = max(time - self.time, 0.0)
-        strength = max(size, self.strength * math.exp(-since / _RECOVERY))
+        strength = max(size, self.strength * math.exp(-since / RESIDUAL.recovery))
         unseen, region = self.unseen + _DIFFUSION * since, region_radius(detection) ** 2
         astray = region * (strength / size - 1.0) ** 2 if size > 0 else math.inf
         trust = unseen / (unseen + astray) if astray > 0 else 1.0

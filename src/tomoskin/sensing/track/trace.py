@@ -8,11 +8,9 @@ from dataclasses import dataclass, field
 from tomoskin.core import Detection
 from tomoskin.sensing.track.merging import Alone, MergedFinger
 from tomoskin.sensing.track.motion import TrackState, region_radius
+from tomoskin.sensing.track.policy import RESIDUAL
 from tomoskin.sensing.track.position import Position
 from tomoskin.sensing.track.strength import TouchStrength, content_of
-
-_STEP = 0.012
-"""A touch that slides leaves a footprint every so many metres."""
 
 _MOST_FOOTPRINTS = 40
 _STRONG = 0.5
@@ -148,12 +146,12 @@ class Trace:
     def _step(self) -> None:
         x, y, size = self.detection.x, self.detection.y, size_of(self.detection)
         feet = self.footprints
-        if not feet or (x - feet[-1].x) ** 2 + (y - feet[-1].y) ** 2 >= _STEP**2:
+        if not feet or (x - feet[-1].x) ** 2 + (y - feet[-1].y) ** 2 >= RESIDUAL.spacing**2:
             feet.append(Footprint(x, y, size))
             del feet[:-_MOST_FOOTPRINTS]
         elif size > feet[-1].top:
             feet[-1].top = size
-        reach = max(region_radius(self.detection), _STEP) ** 2
+        reach = max(region_radius(self.detection), RESIDUAL.spacing) ** 2
         near = [foot.top for foot in feet if (foot.x - x) ** 2 + (foot.y - y) ** 2 <= reach]
         self.top = max(near, default=feet[-1].top)
 

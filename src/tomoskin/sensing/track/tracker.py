@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from tomoskin.core import Detection, Touch
-from tomoskin.sensing.track import existence
+from tomoskin.sensing.track import policy
 from tomoskin.sensing.track.clock import TrackClock
 from tomoskin.sensing.track.event import Happening, TouchEvent
 from tomoskin.sensing.track.ledger import IdentityLedger
@@ -96,7 +96,7 @@ class Tracker:
         see(traces, states, found, frame)
         weigh_meetings(traces)
         for index, detection in enumerate(frame.detections):
-            if index in found.pairs or detection.weak or detection.snr < self.settings.snr:
+            if index in found.pairs or not policy.may_begin(detection, self.settings.snr):
                 continue
             if not self._residuals.explain(detection, now, self._traces):
                 self._begin(index, frame, beside)
@@ -114,7 +114,7 @@ class Tracker:
         self._keys += 1
         detection = frame.detections[index]
         others = any(trace.reported and trace.missing is None for trace in self._traces)
-        odds = existence.first(detection, self.settings.snr, frame.strongest if others else 0.0)
+        odds = policy.initiated(detection, self.settings.snr, frame.strongest if others else 0.0)
         state = begin(frame.seen[index].position, self.settings)
         clock = self._clock
         trace = Trace(detection, state, clock.now, clock.host, odds, [MergedFinger(self._keys)])
@@ -143,7 +143,7 @@ class Tracker:
             self._traces.remove(trace)
             return
         seconds = self._clock.now - trace.since
-        if trace.odds < existence.BEGUN or not existence.placed(trace.detection, seconds):
+        if not policy.is_reported(trace.odds, trace.detection, seconds):
             return
         if self._residuals.explain(trace.detection, self._clock.now, self._traces):
             self._traces.remove(trace)
@@ -175,8 +175,8 @@ class Tracker:
     def _lose(self, trace: Trace) -> None:
         """Of one that is missing: it has met another, or has been lifted, or is waited for."""
         odds, carrier = met_by(trace, self._traces)
-        over = self.settings.still or trace.odds < existence.ENDED
-        if carrier is not None and (odds > existence.MET or (over and odds > 0)):
+        over = self.settings.still or policy.is_deleted(trace.odds)
+        if carrier is not None and policy.has_met(odds, deleted=over):
             self._traces.remove(trace)
             merge(carrier, trace, self._clock.now)
             self._report("merge", carrier)
