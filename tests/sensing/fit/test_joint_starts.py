@@ -8,7 +8,7 @@ import pytest
 from sensing.fit.scene import noise, whitener
 from sensing.fit.test_finder import data, finder, model, press
 from tomoskin.core import FloatArray
-from tomoskin.sensing.fit.joint_starts import JointStarts
+from tomoskin.sensing.fit.candidates import JointStarts
 from tomoskin.sensing.fit.problem import WhitenedTable
 
 THREE = np.concatenate(

@@ -13,9 +13,8 @@ from tomoskin.core import FloatArray
 from tomoskin.model.forward import ForwardModel, State
 from tomoskin.model.mesh import triangulate
 from tomoskin.sensing.fit import SpotFinder
-from tomoskin.sensing.fit.channels import channel_errors
-from tomoskin.sensing.fit.random_field import field_modes
 from tomoskin.sensing.fit.sheet import fitted_sheet
+from tomoskin.sensing.fit.sheet_terms import channel_errors, field_modes
 
 UNEVEN = 0.2
 """Height of the waves of log σ: a standard deviation of 14 %."""

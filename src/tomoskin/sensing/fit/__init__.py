@@ -1,15 +1,13 @@
 """Touches fitted to voltages by their parameters, with the exact forward model."""
 
-from tomoskin.sensing.fit.bound import (
-    detection_bound,
-    fisher_information,
-    least_content,
-    position_bound,
-)
 from tomoskin.sensing.fit.bounds import (
     Demand,
     ResolutionBounds,
     Variant,
+    detection_bound,
+    fisher_information,
+    least_content,
+    position_bound,
     resolution_bounds,
     variants,
 )

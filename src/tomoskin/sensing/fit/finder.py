@@ -13,14 +13,11 @@ import numpy as np
 from tomoskin.core import Detection, FloatArray, reach
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.skin import Skin
-from tomoskin.sensing.fit.cell_discs import CellDiscs
-from tomoskin.sensing.fit.common_mode import CommonModeJump, Explained, Jumps
-from tomoskin.sensing.fit.detections import SpotDetections, joined, judged
-from tomoskin.sensing.fit.expectation import Expectation
+from tomoskin.sensing.fit.detections import CellDiscs, SpotDetections, joined, judged
+from tomoskin.sensing.fit.expectation import Expectation, ResidualDirections, ResidualResponse
+from tomoskin.sensing.fit.hypotheses import CommonModeJump, Explained, Jumps, Rival, challenged
 from tomoskin.sensing.fit.policy import EXHAUSTIVE, DetectionPolicy, Pace, favours
 from tomoskin.sensing.fit.problem import Matched, Problem
-from tomoskin.sensing.fit.residual import ResidualDirections, ResidualResponse
-from tomoskin.sensing.fit.rival import Rival, challenged
 from tomoskin.sensing.fit.selection import ForwardSelection
 from tomoskin.sensing.fit.sight import Sight
 from tomoskin.sensing.fit.spot import FILLING, N_PARAMETERS

@@ -8,8 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from tomoskin.core import FloatArray
+from tomoskin.sensing.fit.candidates import JointStarts
 from tomoskin.sensing.fit.expectation import Known, less
-from tomoskin.sensing.fit.joint_starts import JointStarts
 from tomoskin.sensing.fit.policy import DetectionPolicy
 from tomoskin.sensing.fit.problem import Matched, Problem
 from tomoskin.sensing.fit.spot import CONTENT, LOG_RADIUS

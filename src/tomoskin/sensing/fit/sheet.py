@@ -21,9 +21,12 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve, cholesky, solve_tri
 from tomoskin.core import FloatArray, finished, reach
 from tomoskin.model.forward import ForwardModel, State
 from tomoskin.model.mesh import Mesh
-from tomoskin.sensing.fit.anisotropy import anisotropy_slopes, directed
-from tomoskin.sensing.fit.channels import channel_errors
-from tomoskin.sensing.fit.random_field import field_modes
+from tomoskin.sensing.fit.sheet_terms import (
+    anisotropy_slopes,
+    channel_errors,
+    directed,
+    field_modes,
+)
 
 _UNEVEN = (0.01, 0.03, 0.06, 0.12, 0.24)
 """Standard deviations of log σ over a sheet that are compared."""

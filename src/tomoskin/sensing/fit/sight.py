@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from tomoskin.core import FloatArray, finished
-from tomoskin.sensing.fit.common_mode import Jumps
 from tomoskin.sensing.fit.excess import Channels, Excess, Gauge
+from tomoskin.sensing.fit.hypotheses import Jumps
 from tomoskin.sensing.fit.noise import Whitener
 from tomoskin.sensing.fit.problem import Matched, WhitenedTable
 from tomoskin.sensing.fit.spot_model import SpotModel

@@ -1,7 +1,14 @@
 """Counts → voltages → differences: an idle skin's noise and drift, and its electrodes' health."""
 
 from tomoskin.sensing.signal.baseline import Baseline, BaselineState
-from tomoskin.sensing.signal.board_diagnosis import CountScale, Diagnosis, diagnose
+from tomoskin.sensing.signal.board_diagnosis import (
+    STAGES,
+    CountScale,
+    Diagnosis,
+    MeterStep,
+    diagnose,
+    meter_steps,
+)
 from tomoskin.sensing.signal.difference import (
     DIFFERENCES,
     Consecutive,
@@ -18,11 +25,9 @@ from tomoskin.sensing.signal.idle import Idle
 from tomoskin.sensing.signal.load_ring import LoadRing
 from tomoskin.sensing.signal.monitor import Monitor
 from tomoskin.sensing.signal.nuisance import NuisanceSubspace
-from tomoskin.sensing.signal.power_up import STAGES, MeterStep, meter_steps
 from tomoskin.sensing.signal.readout import FIGURES, BoardFigures, Readout, directions
 from tomoskin.sensing.signal.recording import Recording, frame_times, time_notes
-from tomoskin.sensing.signal.reference import Reference
-from tomoskin.sensing.signal.scatter import Scatter
+from tomoskin.sensing.signal.reference import Reference, Scatter
 
 __all__ = [
     "DIFFERENCES",

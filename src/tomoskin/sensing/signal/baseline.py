@@ -10,9 +10,8 @@ from functools import cached_property
 import numpy as np
 
 from tomoskin.core import FloatArray
-from tomoskin.sensing.signal.common_mode import CommonMode
 from tomoskin.sensing.signal.health import Mask
-from tomoskin.sensing.signal.idle import Idle
+from tomoskin.sensing.signal.idle import CommonMode, Idle
 from tomoskin.sensing.signal.reference import Reference
 
 SLOWEST = 60.0

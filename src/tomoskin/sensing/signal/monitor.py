@@ -10,8 +10,13 @@ from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, IntArray
 from tomoskin.model.pattern import Pattern, Scan
-from tomoskin.sensing.signal.equal_readings import EqualReadings
-from tomoskin.sensing.signal.evidence import Groups, Reciprocity, sign_limit, unchanged
+from tomoskin.sensing.signal.evidence import (
+    EqualReadings,
+    Groups,
+    Reciprocity,
+    sign_limit,
+    unchanged,
+)
 from tomoskin.sensing.signal.health import ElectrodeHealth, Health, Mask, Roles
 from tomoskin.sensing.signal.reference import Reference
 

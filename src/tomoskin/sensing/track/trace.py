@@ -6,16 +6,31 @@ import math
 from dataclasses import dataclass, field
 
 from tomoskin.core import Detection
-from tomoskin.sensing.track.merging import Alone, MergedFinger
 from tomoskin.sensing.track.motion import TrackState, region_radius
 from tomoskin.sensing.track.policy import RESIDUAL
-from tomoskin.sensing.track.position import Position
-from tomoskin.sensing.track.strength import TouchStrength, content_of
+from tomoskin.sensing.track.position import Position, TouchStrength, content_of
 
 _MOST_FOOTPRINTS = 40
 _STRONG = 0.5
 _FRESH = 1.0
 """Seconds for which the strength of a touch that has come out of a merged one tells who it is."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Alone:
+    """A touch as it was when last seen by itself, at the device's ``time`` s."""
+
+    state: TrackState
+    strength: TouchStrength
+    time: float
+
+
+@dataclass(eq=False, slots=True)
+class MergedFinger:
+    """One finger, as far as frames told it from others: its number, and how it was ``alone``."""
+
+    key: int
+    alone: Alone | None = None
 
 
 @dataclass(slots=True)

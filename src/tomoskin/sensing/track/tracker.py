@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 from tomoskin.core import Detection, Touch
 from tomoskin.sensing.track import policy
-from tomoskin.sensing.track.clock import TrackClock
-from tomoskin.sensing.track.event import Happening, TouchEvent
-from tomoskin.sensing.track.ledger import IdentityLedger
-from tomoskin.sensing.track.meetings import (
+from tomoskin.sensing.track.association import FrameOfTouches, expected, miss, pairs_of, see
+from tomoskin.sensing.track.event import Happening, TouchEvent, TrackClock
+from tomoskin.sensing.track.identity import IdentityLedger
+from tomoskin.sensing.track.merging import (
     divide,
     merge,
     met_by,
@@ -17,11 +17,9 @@ from tomoskin.sensing.track.meetings import (
     sibling_of,
     weigh_meetings,
 )
-from tomoskin.sensing.track.merging import Alone, MergedFinger
 from tomoskin.sensing.track.motion import TrackSettings, begin
-from tomoskin.sensing.track.pairing import FrameOfTouches, expected, miss, pairs_of, see
 from tomoskin.sensing.track.residual import ResidualResponses, is_residual
-from tomoskin.sensing.track.trace import Trace
+from tomoskin.sensing.track.trace import Alone, MergedFinger, Trace
 
 
 class Tracker:
