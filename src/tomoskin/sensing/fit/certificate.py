@@ -75,7 +75,7 @@ class Certificate:
         parts = _norms(alone - table.expanded(spots)[:, 0] @ table.basis) / _norms(alone)
         pairs = _pairs(random, spots, _APART * prior.radius)
         beyond = _exact(response, spots[pairs]) - alone[pairs].sum(axis=1)
-        interaction = Interaction.of(response)
+        interaction = finished(Interaction.making(response))
         said = np.array([interaction.change(spots[pair]) for pair in pairs])
         pair = float(np.quantile(_norms(beyond - said) / _norms(said), _HELD))
         like = Rim.of(response, prior).like(spots)
@@ -173,15 +173,10 @@ class Reduced:
     rim: Rim
 
     @classmethod
-    def of(cls, response: Response, certificate: Certificate, prior: SpotPrior) -> Self:
-        """For a sheet."""
-        return finished(cls.making(response, certificate, prior))
-
-    @classmethod
     def making(
         cls, response: Response, certificate: Certificate, prior: SpotPrior
     ) -> Generator[None, None, Self]:
-        """As :meth:`of`, a piece between two yields."""
+        """For a sheet, a piece between two yields."""
         interaction = yield from Interaction.making(response)
         yield
         return cls(interaction, certificate, Rim.of(response, prior))

@@ -10,7 +10,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import FloatArray, IntArray, finished
+from tomoskin.core import FloatArray, IntArray
 from tomoskin.model.pattern import Pattern, Scan
 from tomoskin.sensing.fit.noise import Whitener
 from tomoskin.sensing.signal import Reciprocity
@@ -150,11 +150,6 @@ class Gauge:
     variance: FloatArray
     limit: FloatArray
     judged: IntArray
-
-    @classmethod
-    def of(cls, channels: Channels, covariance: FloatArray, nuisance: FloatArray) -> Self:
-        """As :meth:`making`, at once."""
-        return finished(cls.making(channels, covariance, nuisance))
 
     @classmethod
     def making(

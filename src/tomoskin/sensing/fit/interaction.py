@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, vstack
 from scipy.spatial import cKDTree
 
-from tomoskin.core import FloatArray, IntArray, finished
+from tomoskin.core import FloatArray, IntArray
 from tomoskin.model.forward import State
 from tomoskin.sensing.fit.spot import CONTENT, FILLING, LOG_RADIUS, REACH, Response, profile
 
@@ -56,13 +56,8 @@ class Interaction:
     between: NDArray[np.float32]
 
     @classmethod
-    def of(cls, response: Response) -> Self:
-        """Some ten milliseconds of work for a mesh of 1,500 cells."""
-        return finished(cls.making(response))
-
-    @classmethod
     def making(cls, response: Response) -> Generator[None, None, Self]:
-        """As :meth:`of`, a piece between two yields."""
+        """Some ten milliseconds of work for a mesh of 1,500 cells, a piece between two yields."""
         state = response.state
         mesh, sigma = state.model.mesh, np.asarray(state.conductivity)
         patch, centres, area = _patches(mesh.centroids, mesh.volumes)

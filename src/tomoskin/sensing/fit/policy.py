@@ -161,22 +161,26 @@ class Pace:
         not follow each other.
     """
 
-    warm: int
-    glance: int
-    cold: int
-    finalists: int
-    rounds: int
-    closing: int
-    near: float
-    tolerance: float
-    tries: int
-    look: float
-    rare: float
-    joint: int
-    restart: bool
-    speed: float
-    fading: float
+    warm: int = 4
+    glance: int = 1
+    cold: int = 4
+    finalists: int = 1
+    rounds: int = 0
+    closing: int = 1
+    near: float = 0.5
+    tolerance: float = 0.1
+    tries: int = 3
+    look: float = 0.6
+    rare: float = _FAVOURS
+    joint: int = 0
+    restart: bool = False
+    speed: float = 0.1
+    fading: float = 8.0
 
+
+LIVE = Pace()
+"""What is not found in this frame is found in the next. With one try, presses that begin together
+are one touch between them for some frames."""
 
 EXHAUSTIVE = Pace(
     warm=6,
@@ -196,26 +200,6 @@ EXHAUSTIVE = Pace(
     fading=0.0,
 )
 """Each frame as if it were the only one, of touches that stand still."""
-
-LIVE = Pace(
-    warm=4,
-    glance=1,
-    cold=4,
-    finalists=1,
-    rounds=0,
-    closing=1,
-    near=0.5,
-    tolerance=0.1,
-    tries=3,
-    look=0.6,
-    rare=_FAVOURS,
-    joint=0,
-    restart=False,
-    speed=0.1,
-    fading=8.0,
-)
-"""What is not found in this frame is found in the next. With one try, presses that begin together
-are one touch between them for some frames."""
 
 
 @dataclass(frozen=True, slots=True)

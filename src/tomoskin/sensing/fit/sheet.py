@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cho_factor, cho_solve, cholesky, solve_triangular
 
-from tomoskin.core import FloatArray, finished, reach
+from tomoskin.core import FloatArray, reach
 from tomoskin.model.forward import ForwardModel, State
 from tomoskin.model.mesh import Mesh
 from tomoskin.sensing.fit.sheet_terms import (
@@ -127,11 +127,6 @@ def fields_of(mesh: Mesh) -> list[FloatArray]:
     """(n_cells, k) modes of a field of each length: some ten milliseconds of work for a mesh."""
     breadth = math.sqrt(float(mesh.volumes.sum()))
     return [field_modes(mesh, part * breadth) for part in _LENGTHS]
-
-
-def fitted_sheet(state: State, reference: FloatArray, deviation: FloatArray | float) -> State:
-    """As :func:`fitting_sheet`, at once."""
-    return finished(fitting_sheet(state, reference, deviation))
 
 
 def fitting_sheet(

@@ -113,7 +113,7 @@ class SpotModel:
     def reduced(self) -> Reduced:
         """What stands for the exact model on this sheet."""
         made = self.tabulation if self.adapted is None else self.adapted
-        return Reduced.of(self.response, made.certificate, self.prior)
+        return finished(Reduced.making(self.response, made.certificate, self.prior))
 
     def warm_up(self) -> None:
         """Do what takes seconds the first time, and half a second later on, before frames come."""
@@ -123,10 +123,6 @@ class SpotModel:
     def changes(self, spots: FloatArray) -> FloatArray:
         """(k, n_meas) V that each of ``spots`` (k, 4) alone adds to the reference, by the table."""
         return np.asarray(self.solver.expanded(spots)[:, 0] @ self.solver.table.basis)
-
-    def fitted_to(self, reference: FloatArray, deviation: FloatArray | float = 0.0) -> SpotModel:
-        """As :meth:`fitting`, at once."""
-        return finished(self.fitting(reference, deviation))
 
     def fitting(
         self, reference: FloatArray, deviation: FloatArray | float = 0.0

@@ -73,6 +73,8 @@ class Trace:
         for a press that slid leaves a residual response anywhere along its way.
     held
         Where it is held to be.
+    ahead
+        Where it is expected in the frame that comes.
     """
 
     detection: Detection
@@ -94,6 +96,7 @@ class Trace:
     strength: TouchStrength = field(init=False)
     fresh: TouchStrength = field(init=False)
     held: Position = field(init=False)
+    ahead: TrackState = field(init=False)
 
     def __post_init__(self) -> None:
         """Leave the first footprint."""
@@ -126,7 +129,7 @@ class Trace:
         """As it is now."""
         return Alone(self.state, self.strength, time)
 
-    def see(self, detection: Detection, time: float, seconds: float, *, still: bool) -> None:
+    def take(self, detection: Detection, time: float, seconds: float, *, still: bool) -> None:
         """Take the detection of this frame, ``seconds`` after the frame before; ``still``: the last
         ones say nothing of it."""
         self.detection = detection

@@ -6,7 +6,12 @@ from collections.abc import Sequence
 
 from tomoskin.core import Detection, Touch
 from tomoskin.sensing.track import policy
-from tomoskin.sensing.track.association import FrameOfTouches, expected, miss, pairs_of, see
+from tomoskin.sensing.track.association import (
+    FrameOfTouches,
+    ObservedDetection,
+    associate,
+    follow,
+)
 from tomoskin.sensing.track.event import Happening, TouchEvent, TrackClock
 from tomoskin.sensing.track.identity import IdentityLedger
 from tomoskin.sensing.track.merging import (
@@ -86,18 +91,17 @@ class Tracker:
     def _follow(self, frame: FrameOfTouches) -> None:
         """One frame: who is where, who has begun, ended, met and parted."""
         traces, now = list(self._traces), self._clock.now
-        states = expected(traces, frame)
-        found = pairs_of(traces, states, frame)
-        fresh = len(found.pairs) < len(frame.detections)
+        found = associate(traces, frame)
+        fresh = len(found.pairs) < len(frame.observed)
         beside = {m.key: t.alone(now) for t in traces if fresh and t.reported for m in t.members}
-        miss(traces, states, found, frame)
-        see(traces, states, found, frame)
+        follow(traces, found, frame)
         weigh_meetings(traces)
-        for index, detection in enumerate(frame.detections):
+        for index, observed in enumerate(frame.observed):
+            detection = observed.detection
             if index in found.pairs or not policy.may_begin(detection, self.settings.snr):
                 continue
             if not self._residuals.explain(detection, now, self._traces):
-                self._begin(index, frame, beside)
+                self._begin(observed, frame, beside)
         for i, k, odds in found.exchanges:  # while both were seen
             one, other = traces[i], traces[k]
             if one.reported and other.reported and not self.settings.still:
@@ -108,12 +112,14 @@ class Tracker:
         self._settle()
         self._ledger.judge(self._traces)
 
-    def _begin(self, index: int, frame: FrameOfTouches, beside: dict[int, Alone]) -> None:
+    def _begin(
+        self, observed: ObservedDetection, frame: FrameOfTouches, beside: dict[int, Alone]
+    ) -> None:
         self._keys += 1
-        detection = frame.detections[index]
+        detection = observed.detection
         others = any(trace.reported and trace.missing is None for trace in self._traces)
         odds = policy.initiated(detection, self.settings.snr, frame.strongest if others else 0.0)
-        state = begin(frame.seen[index].position, self.settings)
+        state = begin(observed.position, self.settings)
         clock = self._clock
         trace = Trace(detection, state, clock.now, clock.host, odds, [MergedFinger(self._keys)])
         trace.beside = beside
