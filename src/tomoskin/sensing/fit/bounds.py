@@ -27,7 +27,7 @@ def fisher_information(response: Response, spots: FloatArray, noise: Whitener) -
     For Gaussian noise it is JᵀC⁻¹J (Kay 1993, eq. 3.31 without its second term), in the order of
     the columns: 1/m² for x and y, 1 for the logarithm of the radius, 1/m⁴ for the content.
     """
-    whitened = [noise(jacobian.T) for _, jacobian in response.each(spots)]
+    whitened = [noise(response.expanded(spot[None])[1].T) for spot in spots]
     jacobians = np.stack(whitened)
     return np.asarray(jacobians @ jacobians.swapaxes(1, 2))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from scipy.linalg.lapack import dposv, dtrtrs
@@ -71,33 +72,37 @@ class NumpySolver:
         pull = Pull.of(self.prior, problem.expected, known or newcomers(len(spots)))
         best = self._at(problem, self._held(spots, problem.sign), deficit, pull)
         while most > 0:
-            descent = self._descended(problem, best, most, pull)
-            best = replace(best, settled=descent.settled)
-            if np.array_equal(descent.spots, best.spots):
+            moved, steps, settled = self._descended(problem, best, most, pull)
+            best = replace(best, settled=settled)
+            if np.array_equal(moved, best.spots):
                 break
-            most -= descent.steps
-            best = self._at(problem, descent.spots, deficit, pull)
-            best = replace(best, settled=_gain(best, pull) < _SETTLED)
+            most -= steps
+            best = self._at(problem, moved, deficit, pull)
+            gradient = pull.pulled(best.spots, best.gradient)
+            gain = float(gradient @ _solved(best.normal, gradient, _LEAST_DAMPING))
+            best = replace(best, settled=gain < _SETTLED)
         return best
 
-    def _descended(self, problem: Problem, fit: Fit, most: int, pull: Pull) -> FitDescent:
-        """Steps from a fit down to where its metric sees nothing to gain."""
-        metric = NuisanceMetric.of(fit.unknown)
-        gradient = pull.pulled(fit.spots, fit.gradient)
-        best, damping = Slope(fit.spots, fit.normal, gradient, fit.cost), _LEAST_DAMPING
+    def _descended(
+        self, problem: Problem, fit: Fit, most: int, pull: Pull
+    ) -> tuple[FloatArray, int, bool]:
+        """Spots where so many steps lead from a fit by its metric, these, and whether there is
+        nothing to gain."""
+        metric, best = NuisanceMetric.of(fit.unknown), Slope.of(fit, pull)
+        damping = _LEAST_DAMPING
         for steps in range(most):
             step = _solved(best.normal, best.gradient, damping)
             if best.gradient @ step < _SETTLED:
-                return FitDescent(best.spots, steps, settled=True)
+                return best.spots, steps, True
             moved = self._held(best.spots + step.reshape(-1, N_PARAMETERS), problem.sign)
             tried = self._slope(problem, metric, moved, fit.deficit, pull)
             if tried.cost < best.cost:
                 best, damping = tried, max(damping / 10, _LEAST_DAMPING)
             elif damping > _MOST_DAMPING:
-                return FitDescent(best.spots, steps, settled=True)
+                return best.spots, steps, True
             else:
                 damping = max(damping * 30, 1e-2)
-        return FitDescent(best.spots, most, settled=False)
+        return best.spots, most, False
 
     def _at(self, problem: Problem, spots: FloatArray, deficit: Deficit, pull: Pull) -> Fit:
         """The frame with these spots, as they are."""
@@ -150,10 +155,8 @@ class NumpySolver:
         residual = problem.data - seen[:, 0].sum(axis=0) - direct @ deficit.change
         slopes = seen[:, 1:].reshape(-1, len(residual))
         square = metric.products(np.vstack([slopes, residual]))
-        misfit = problem.rest + float(square[-1, -1])
-        gradient = pull.pulled(spots, square[:-1, -1])
-        cost = (misfit + pull.square(spots)) / 2
-        return Slope(spots, pull.normal(square), gradient, cost)
+        cost = (problem.rest + float(square[-1, -1]) + pull.square(spots)) / 2
+        return Slope(spots, pull.normal(square), pull.pulled(spots, square[:-1, -1]), cost)
 
     def _held(self, spots: FloatArray, sign: str) -> FloatArray:
         return self.prior.held(self.sheet.held(spots), sign)
@@ -185,12 +188,9 @@ class NumpySolver:
         """See :class:`Solver`."""
         k = len(fit.spots)
         own = NuisanceMetric.of(left).products(np.vstack([fit.slopes, fit.each]))
-        squares = np.empty(k)
+        number, squares = np.arange(N_PARAMETERS * k), np.empty(k)
         for spot in range(k):
-            mine = N_PARAMETERS * k + spot
-            others = np.delete(
-                np.arange(N_PARAMETERS * k), np.arange(N_PARAMETERS) + N_PARAMETERS * spot
-            )
+            mine, others = N_PARAMETERS * k + spot, number[number // N_PARAMETERS != spot]
             root, scale = _even_root(own[np.ix_(others, others)])
             taken = _solved_lower(root, scale * own[others, mine])
             squares[spot] = own[mine, mine] - taken @ taken
@@ -212,12 +212,6 @@ class NumpySolver:
         content[chosen] = onto[chosen] / size
         ratio[chosen] = np.abs(onto[chosen]) / np.sqrt(size)
         return ratio, content
-
-
-def _gain(fit: Fit, pull: Pull) -> float:
-    """Squared Newton decrement of a fit."""
-    gradient = pull.pulled(fit.spots, fit.gradient)
-    return float(gradient @ _solved(fit.normal, gradient, _LEAST_DAMPING))
 
 
 @dataclass(frozen=True, eq=False)
@@ -317,14 +311,10 @@ class Slope:
     gradient: FloatArray
     cost: float
 
-
-@dataclass(frozen=True, eq=False)
-class FitDescent:
-    """Where so many ``steps`` have led; ``settled``: there is nothing to gain."""
-
-    spots: FloatArray
-    steps: int
-    settled: bool
+    @classmethod
+    def of(cls, fit: Fit, pull: Pull) -> Self:
+        """Of a fit."""
+        return cls(fit.spots, fit.normal, pull.pulled(fit.spots, fit.gradient), fit.cost)
 
 
 @dataclass(frozen=True, eq=False)
