@@ -119,7 +119,7 @@ class InData:
         scan_time = min(longest, between)
         spots = SpotFinder(
             model, skin, prepared.mesh, noise, gain,
-            scan_time=scan_time, interval=between, pace=pace,
+            pace=replace(pace, scan_time=scan_time, interval=between),
         )  # fmt: skip
         return cls(model, spots, _voltage_ratio(model, reference), pace, interval)
 

@@ -26,7 +26,11 @@ LEFT = 0.12
 
 def finder(pace: Pace = LIVE, scan_time: float = SCAN) -> SpotFinder:
     return SpotFinder(
-        model(), skin(), skin().mesh(), covariance(), scan_time=scan_time, interval=SCAN, pace=pace
+        model(),
+        skin(),
+        skin().mesh(),
+        covariance(),
+        pace=replace(pace, scan_time=scan_time, interval=SCAN),
     )
 
 
@@ -127,7 +131,11 @@ def test_a_frame_has_a_bounded_number_of_steps() -> None:
     counted = replace(model())
     vars(counted)["solver"] = counting
     ours = SpotFinder(
-        counted, skin(), skin().mesh(), covariance(), scan_time=SCAN, interval=SCAN, pace=LIVE
+        counted,
+        skin(),
+        skin().mesh(),
+        covariance(),
+        pace=replace(LIVE, scan_time=SCAN, interval=SCAN),
     )
     three = np.concatenate([press(-0.05, 0.0), press(0.05, 0.02), press(0.0, -0.06)])
     frames = [*[three] * 4, np.add(three, [0.01, 0.0, 0.0, 0.0]), STANDING, three]

@@ -77,7 +77,7 @@ class Candidates:
         return Candidates(self.spots, signatures)
 
     def matched(self, seen: WhitenedTable) -> Matched:
-        """The same for one noise."""
+        """The candidates as data of one noise show them."""
         return Matched.of(self.spots, self.signatures @ seen.matrix[: seen.narrow].T)
 
 
@@ -89,7 +89,7 @@ def footprints_of(response: Response, prior: SpotPrior) -> tuple[Footprints, ...
 
 
 def _positions(response: Response, prior: SpotPrior) -> FloatArray:
-    """(n, 2) m."""
+    """(n, 2) m of the grid that candidates stand on."""
     return _grid(response.spots.mesh.centroids, _SPACING * prior.radius)
 
 

@@ -91,7 +91,7 @@ class Certificate:
         return cls(spots, like, parts, margin, pair)
 
     def packed(self) -> Arrays:
-        """All there is, in arrays."""
+        """All that the certificate holds, in arrays."""
         return {
             "certified": np.array([self.margin, self.pair]),
             "certified_spots": self.spots,

@@ -135,7 +135,7 @@ class CellDiscs:
 
     @classmethod
     def of(cls, mesh: Mesh) -> Self:
-        """Of a mesh."""
+        """The cells of a mesh, along its x axis."""
         x, y = mesh.centroids.T
         order = np.argsort(x, kind="stable")
         return cls(order, (x + 1j * y)[order])

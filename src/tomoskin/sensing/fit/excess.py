@@ -70,7 +70,7 @@ class Channels:
 
     @classmethod
     def of(cls, pattern: Pattern) -> Self:
-        """Of the rows of a pattern."""
+        """The channels that the rows of a pattern are read by."""
         scan, rows = Scan.of(pattern), np.arange(pattern.n_meas)
         samples = np.zeros((scan.n_samples, pattern.n_meas))
         samples[scan.plus, rows], samples[scan.minus, rows] = 1.0, -1.0
@@ -219,13 +219,13 @@ class Excess:
 
     @classmethod
     def none(cls, channels: Channels) -> Self:
-        """As it was learnt."""
+        """The noise is as it was learnt."""
         none = np.zeros(len(channels.names))
         return cls(1.0, none, 0, none)
 
     @cached_property
     def any(self) -> bool:
-        """Whether there is some."""
+        """Whether there is more noise than was learnt."""
         return self.level > 1.0 or bool(self.variance.any())
 
     @property

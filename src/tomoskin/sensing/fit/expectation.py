@@ -37,7 +37,7 @@ class Expectation:
 
     @classmethod
     def none(cls) -> Expectation:
-        """Nothing is expected."""
+        """Nothing is expected of this frame."""
         return cls(np.zeros((0, N_PARAMETERS)), np.zeros((0, CONTENT, CONTENT)))
 
     @classmethod
@@ -74,12 +74,12 @@ class Expectation:
 
 
 def newcomers(count: int) -> Known:
-    """So many."""
+    """So many spots of which none was there before."""
     return (None,) * count
 
 
 def less(known: Known, number: int) -> Known:
-    """Without one of them."""
+    """Those that remain without one of them."""
     return (*known[:number], *known[number + 1 :])
 
 

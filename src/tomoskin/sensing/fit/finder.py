@@ -16,7 +16,7 @@ from tomoskin.model.skin import Skin
 from tomoskin.sensing.fit.detections import CellDiscs, SpotDetections, joined, judged
 from tomoskin.sensing.fit.expectation import Expectation, ResidualDirections, ResidualResponse
 from tomoskin.sensing.fit.hypotheses import CommonModeJump, Explained, Jumps, Rival, challenged
-from tomoskin.sensing.fit.policy import EXHAUSTIVE, DetectionPolicy, Pace, favours
+from tomoskin.sensing.fit.policy import EXHAUSTIVE, DetectionPolicy, Pace, favours, rises_beside
 from tomoskin.sensing.fit.problem import Matched, Problem
 from tomoskin.sensing.fit.selection import ForwardSelection
 from tomoskin.sensing.fit.sight import Sight
@@ -50,12 +50,8 @@ class SpotFinder:
         (n_meas, n_meas) covariance of difference data, the reference's own part included.
     gain
         Of the data against the model: the ratio of their references.
-    scan_time
-        That a scan takes, s: in it touches move and grow. 0 where rows are read all at once.
-    interval
-        Between two frames, s: how many of them a residual response lasts.
     pace
-        How much is tried in a frame.
+        How much is tried in a frame, and how fast frames are.
 
     Attributes
     ----------
@@ -71,14 +67,11 @@ class SpotFinder:
         noise: FloatArray,
         gain: float = 1.0,
         *,
-        scan_time: float = 0.0,
-        interval: float = 0.0,
         pace: Pace = EXHAUSTIVE,
     ) -> None:
         self._model, self._policy = model, DetectionPolicy.of(skin.touch, pace)
         self._cells = CellDiscs.of(mesh)
-        self._reach, self._unrest = pace.speed * scan_time, 1.0
-        self._fading = math.ceil(pace.fading / interval) if interval else 0
+        self._reach, self._unrest = pace.reach, 1.0
         self._residual, self._left = ResidualResponse(), ResidualDirections()
         self._unit = skin.conductivity
         self._before = self._shown = np.zeros((0, N_PARAMETERS))
@@ -138,8 +131,8 @@ class SpotFinder:
         self._unrest = self._motion(detected.fit.spots)
         self._before, self._deficit = detected.fit.spots, detected.fit.deficit
         self._expected = self._going_on(detected)
-        if self._fading:
-            self._residual = self._residual.after(self._before, self._model.changes, self._fading)
+        if frames := self._policy.pace.fading_frames:
+            self._residual = self._residual.after(self._before, self._model.changes, frames)
         self._change = detected.fit.change + detected.fit.deficit.change
         return self._detections(joined(detected))
 
@@ -202,7 +195,7 @@ class SpotFinder:
         if self.watch.puzzled(problem, detected.fit):
             reach("both signs")
             both = self._anew(selection, len(detected.fit.spots) + 1)
-            rises = policy.rises_beside(detected.fit, both.fit, both.ratio)
+            rises = rises_beside(policy, detected.fit, both.fit, both.ratio)
             if rises and favours(problem.gain(detected.fit, both.fit)):
                 detected = both
         return detected, rival
@@ -233,7 +226,7 @@ class SpotFinder:
         return min(1.0, math.hypot(_REST, moved / self._reach))
 
     def _detections(self, detected: SpotDetections) -> list[Detection]:
-        """Strongest first."""
+        """The touches as detections, strongest first."""
         spots = detected.fit.spots
         shown = np.flatnonzero(~self.watch.wrong(spots))
         found = [self._detection(detected, k, spots[k].tolist()) for k in shown.tolist()]

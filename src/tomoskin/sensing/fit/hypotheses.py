@@ -19,7 +19,17 @@ import numpy as np
 from tomoskin.core import FloatArray
 from tomoskin.sensing.fit.detections import SpotDetections, judged
 from tomoskin.sensing.fit.expectation import Expectation, newcomers
-from tomoskin.sensing.fit.policy import ELSEWHERE, SUDDEN, SURE, DetectionPolicy
+from tomoskin.sensing.fit.policy import (
+    ELSEWHERE,
+    SUDDEN,
+    SURE,
+    DetectionPolicy,
+    begins_rival,
+    drops_rival,
+    elects_rival,
+    is_no_jump,
+    may_have_jumped,
+)
 from tomoskin.sensing.fit.problem import Problem
 from tomoskin.sensing.fit.selection import ForwardSelection
 from tomoskin.sensing.fit.spot_fit import Fit
@@ -59,14 +69,14 @@ def challenged(
         odds = rival.odds + gain - policy.against(found.fit, fit)
     else:
         proposed, gain = _proposed(selection, found.fit)
-        if proposed is None or not policy.begins_rival(gain):
+        if proposed is None or not begins_rival(gain):
             return found, None
         fit, odds = proposed, gain - policy.against(found.fit, proposed) - policy.pace.rare
-    if policy.drops_rival(odds):
+    if drops_rival(odds):
         return found, None
     fit = replace(fit, known=newcomers(len(fit.spots)))  # of what was found
     detected = judged(selection, fit)
-    if policy.elects_rival(found.fit, selection.ratios(fit).min(), odds):
+    if elects_rival(policy, found.fit, selection.ratios(fit).min(), odds):
         return detected, None
     return found, Rival(detected, odds)
 
@@ -185,7 +195,7 @@ class Jumps:
 
     @cached_property
     def _kept(self) -> list[Jumps]:
-        """The last of :meth:`beside`."""
+        """The jumps that :meth:`beside` gave last."""
         return []
 
     @cached_property
@@ -245,7 +255,7 @@ class CommonModeJump:
             return explained, CommonModeJump(proven=count, rest=rest) if count else _NONE
         other = explain(jumps.free(usual))
         beside, size = jumps.along(other[0].fit.residual)
-        if policy.is_no_jump(beside, other[0].fit):
+        if is_no_jump(policy, beside, other[0].fit):
             return explained, CommonModeJump(proven=count, rest=rest)
         gain = usual.gain(other[0].fit, fit)
         odds = self.odds + float(np.clip(gain, -2 * SURE, 2 * SURE))
@@ -259,7 +269,7 @@ class CommonModeJump:
     ) -> bool:
         """Whether no jump explains the frame as the touches of a ``fit`` do, which leave ``rest``
         deviations along it: as much as before, and they stand out whatever the jump."""
-        if policy.may_have_jumped(abs(rest - self.rest), fit):
+        if may_have_jumped(policy, abs(rest - self.rest), fit):
             return False
         if len(fit.spots) <= self.proven:
             return True
@@ -270,7 +280,7 @@ class CommonModeJump:
     def _after_jump(self, jumps: Jumps, fit: Fit, policy: DetectionPolicy) -> CommonModeJump:
         """After a further frame: over where the common mode is as it was, and nothing touches."""
         rest, size = jumps.along(fit.residual)
-        if policy.is_no_jump(rest) and not len(fit.spots):
+        if is_no_jump(policy, rest) and not len(fit.spots):
             return _NONE
         return replace(self, size=max(self.size, size, key=abs))
 

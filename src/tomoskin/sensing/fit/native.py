@@ -35,19 +35,19 @@ class NativeSolver:
         )
 
     def expanded(self, spots: FloatArray) -> FloatArray:
-        """See :class:`Solver`."""
+        """What spots do by the table; see :class:`Solver`."""
         return np.asarray(self._spots.expanded(spots))
 
     def keep(
         self, direct: FloatArray, timed: FloatArray, matrix: FloatArray, squares: FloatArray
     ) -> Any:
-        """See :class:`Solver`."""
+        """What the engine keeps of it; see :class:`Solver`."""
         return self._core.SeenTable(direct, timed, matrix, self.table.basis, squares)
 
     def settled(
         self, problem: Problem, spots: FloatArray, deficit: Deficit, most: int, known: Known = ()
     ) -> Fit:
-        """See :class:`Solver`."""
+        """The minimum near ``spots``; see :class:`Solver`."""
         known = known or newcomers(len(spots))
         kept, offset = problem.seen.kept, deficit.change
         return _fit(
@@ -62,7 +62,7 @@ class NativeSolver:
         deficit: Deficit,
         before: FloatArray,
     ) -> Answer | None:
-        """See :class:`Solver`."""
+        """The touches in one call; see :class:`Solver`."""
         if policy.pace.rounds or policy.pace.joint:
             return None
         kept, limits = problem.seen.kept, Limits.of(problem.sign)
@@ -75,19 +75,19 @@ class NativeSolver:
         return Answer(_fit(problem, deficit, fit), others and tuple(others), more)
 
     def judged(self, problem: Problem, fit: Fit, uneven: float) -> tuple[FloatArray, FloatArray]:
-        """See :class:`Solver`."""
+        """How sure each spot is; see :class:`Solver`."""
         change = fit.change + fit.deficit.change
         squares, covariance = problem.seen.kept.judged(fit, change, uneven, RIDGE)
         return squares, covariance
 
     def standing(self, left: FloatArray, fit: Fit) -> FloatArray:
-        """See :class:`Solver`."""
+        """How far each spot stands out; see :class:`Solver`."""
         return np.asarray(self._core.standing(left, fit.slopes, fit.each, RIDGE))
 
     def standing_out(
         self, matched: Matched, fit: Fit, limits: Limits
     ) -> tuple[FloatArray, FloatArray]:
-        """See :class:`Solver`."""
+        """How far candidates stand out; see :class:`Solver`."""
         signatures, squares = matched.signatures, matched.squares
         ratio, content = self._core.standing_out(
             signatures, squares, fit.unknown, fit.slopes, fit.residual, limits

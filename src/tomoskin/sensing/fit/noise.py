@@ -66,7 +66,7 @@ class Whitener:
         return Whitener(basis[:, rank:].T @ self.matrix)
 
     def __call__(self, rows: FloatArray) -> FloatArray:
-        """(…, r) of rows (…, n_meas)."""
+        """(…, r) whitened values of rows (…, n_meas)."""
         return np.asarray(rows @ self.matrix.T)
 
 

@@ -159,6 +159,10 @@ class Pace:
     fading
         Seconds for which residual responses of touches count as noise; 0 where frames do
         not follow each other.
+    scan_time
+        Seconds that a scan takes: in it touches move and grow. 0 where rows are read all at once.
+    interval
+        Seconds between two frames: how many of them a residual response lasts.
     """
 
     warm: int = 4
@@ -176,6 +180,18 @@ class Pace:
     restart: bool = False
     speed: float = 0.1
     fading: float = 8.0
+    scan_time: float = 0.0
+    interval: float = 0.0
+
+    @property
+    def reach(self) -> float:
+        """How far a touch goes within a scan along each axis, standard deviation, m."""
+        return self.speed * self.scan_time
+
+    @property
+    def fading_frames(self) -> int:
+        """Frames without a touch after which a residual response is none any more."""
+        return math.ceil(self.fading / self.interval) if self.interval else 0
 
 
 LIVE = Pace()
@@ -240,7 +256,7 @@ class DetectionPolicy:
 
     @classmethod
     def of(cls, settings: TouchSettings, pace: Pace) -> Self:
-        """As a skin has it."""
+        """The policy that the settings of a skin ask for."""
         return cls(settings.snr, settings.sign, min(settings.max_touches, MOST), pace)
 
     # Evidence: does something stand out?
@@ -309,59 +325,72 @@ class DetectionPolicy:
             return in_vain
         return len(fit.spots) != len(before) or not fit.settled
 
-    # A rival: one touch more, that no frame alone shows.
-
-    def begins_rival(self, gain: float) -> bool:
-        """Whether one spot more is followed, by what this frame says for it."""
-        return gain >= _BORN
-
-    def drops_rival(self, odds: float) -> bool:
-        """Whether frames have spoken against a rival."""
-        return odds < _DROPPED
-
-    def elects_rival(self, fit: Fit, weakest: float, odds: float) -> bool:
-        """Whether frames speak for a rival of a ``fit``, each of whose touches stands out as one
-        that stays does."""
-        return odds > 0 and weakest >= math.hypot(self.held * self.least, self.left_by(fit))
-
-    # Other explanations: a rise, noise.
-
     def is_wrong(self, content: FloatArray) -> NDArray[np.bool_]:
         """Whether contents are not of the skin's sign."""
         return np.asarray(content * _SIGNS[self.sign] < 0)
 
-    def may_be_lifted(self, square: float, degrees: int) -> bool:
-        """Whether so much is in a frame without touches that it is looked at for a rise."""
-        return square >= degrees + self.least**2
 
-    def lifted(self, ratio: float, content: FloatArray) -> bool:
-        """Whether a press has been lifted that was there when the reference was taken."""
-        return bool(self.is_wrong(content)) and ratio > _LIFTED * self.least
+# A rival: one touch more, that no frame alone shows.
 
-    def leaves_much(self, fit: Fit) -> bool:
-        """Whether touches leave so much that some of it may be a rise."""
-        return fit.beyond >= _ASTRAY * self.least**2
 
-    def rises_beside(self, fit: Fit, both: Fit, ratio: FloatArray) -> bool:
-        """Whether touches of ``both`` signs explain what those of a ``fit`` leave: some clearly are
-        not of the skin's sign, and little remains then. Where much does, more touches come."""
-        clear = bool((ratio[self.is_wrong(both.spots[:, CONTENT])] > _CLEAR * self.least).any())
-        return clear and both.beyond < _HALF * fit.beyond
+def begins_rival(gain: float) -> bool:
+    """Whether one spot more is followed, by what this frame says for it."""
+    return gain >= _BORN
 
-    def is_like_touch(self, fit: Fit, ratio: float) -> bool:
-        """Whether a candidate of that ratio may be a touch too faint to be accepted."""
-        return bool(ratio**2 > max(self.least**2, _EXPLAINS * fit.beyond))
 
-    # Other explanations: a jump of the common mode.
+def drops_rival(odds: float) -> bool:
+    """Whether frames have spoken against a rival."""
+    return odds < _DROPPED
 
-    def may_have_jumped(self, moved: float, fit: Fit) -> bool:
-        """Whether touches leave so much more along a jump than before."""
-        return moved > _LEAVES and moved > math.hypot(_LEAVES, self.left_by(fit))
 
-    def is_no_jump(self, along: float, fit: Fit | None = None) -> bool:
-        """Whether the common mode is where it is expected, so much being left along a jump."""
-        most = _USUAL if fit is None else math.hypot(_USUAL, self.left_by(fit))
-        return abs(along) < most
+def elects_rival(policy: DetectionPolicy, fit: Fit, weakest: float, odds: float) -> bool:
+    """Whether frames speak for a rival of a ``fit``, each of whose touches stands out as one
+    that stays does."""
+    return odds > 0 and weakest >= math.hypot(policy.held * policy.least, policy.left_by(fit))
+
+
+# Other explanations: a rise, noise.
+
+
+def may_be_lifted(policy: DetectionPolicy, square: float, degrees: int) -> bool:
+    """Whether so much is in a frame without touches that it is looked at for a rise."""
+    return square >= degrees + policy.least**2
+
+
+def lifted(policy: DetectionPolicy, ratio: float, content: FloatArray) -> bool:
+    """Whether a press has been lifted that was there when the reference was taken."""
+    return bool(policy.is_wrong(content)) and ratio > _LIFTED * policy.least
+
+
+def leaves_much(policy: DetectionPolicy, fit: Fit) -> bool:
+    """Whether touches leave so much that some of it may be a rise."""
+    return fit.beyond >= _ASTRAY * policy.least**2
+
+
+def rises_beside(policy: DetectionPolicy, fit: Fit, both: Fit, ratio: FloatArray) -> bool:
+    """Whether touches of ``both`` signs explain what those of a ``fit`` leave: some clearly are
+    not of the skin's sign, and little remains then. Where much does, more touches come."""
+    clear = bool((ratio[policy.is_wrong(both.spots[:, CONTENT])] > _CLEAR * policy.least).any())
+    return clear and both.beyond < _HALF * fit.beyond
+
+
+def is_like_touch(policy: DetectionPolicy, fit: Fit, ratio: float) -> bool:
+    """Whether a candidate of that ratio may be a touch too faint to be accepted."""
+    return bool(ratio**2 > max(policy.least**2, _EXPLAINS * fit.beyond))
+
+
+# Other explanations: a jump of the common mode.
+
+
+def may_have_jumped(policy: DetectionPolicy, moved: float, fit: Fit) -> bool:
+    """Whether touches leave so much more along a jump than before."""
+    return moved > _LEAVES and moved > math.hypot(_LEAVES, policy.left_by(fit))
+
+
+def is_no_jump(policy: DetectionPolicy, along: float, fit: Fit | None = None) -> bool:
+    """Whether the common mode is where it is expected, so much being left along a jump."""
+    most = _USUAL if fit is None else math.hypot(_USUAL, policy.left_by(fit))
+    return abs(along) < most
 
 
 def favours(gain: float) -> bool:

@@ -138,7 +138,7 @@ class Solver(Protocol):
 
     @property
     def table(self) -> ResponseTable:
-        """What one spot does."""
+        """The table of what one spot does."""
         ...
 
     def keep(
@@ -298,7 +298,7 @@ class Problem:
 
     @property
     def square(self) -> float:
-        """Of all whitened data."""
+        """The square of all whitened data."""
         return float(self.data @ self.data) + self.rest
 
     @property
@@ -308,7 +308,7 @@ class Problem:
 
     @property
     def solver(self) -> Solver:
-        """What fits spots."""
+        """The solver that fits spots to this frame."""
         return self.seen.solver
 
     def nothing(self) -> Fit:
@@ -317,7 +317,7 @@ class Problem:
         return self.solver.settled(self, none, Deficit.none(len(self.solver.table.basis)), 0)
 
     def refined(self, spots: FloatArray, deficit: Deficit, most: int, known: Known = ()) -> Fit:
-        """See :meth:`Solver.settled`."""
+        """The best fit near ``spots``, see :meth:`Solver.settled`."""
         return self.solver.settled(self, spots, deficit, most, known)
 
     def corrected(self, fit: Fit, pace: Pace, rounds: int) -> Fit:

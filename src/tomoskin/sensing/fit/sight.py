@@ -106,7 +106,7 @@ class Sight:
         return self._kept[key]
 
     def _scaled(self, scale: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """V of the model."""
+        """Nuisance directions and jumps, in V of the model."""
         return self._nuisance / scale[:, None], self._jumps / scale[:, None]
 
     def _making(

@@ -59,7 +59,7 @@ class NumpySolver:
         """See :class:`Solver`; nothing."""
 
     def expanded(self, spots: FloatArray) -> FloatArray:
-        """See :class:`Solver`."""
+        """What spots do by the table; see :class:`Solver`."""
         return self.table.expanded(spots)
 
     def settled(
@@ -162,7 +162,7 @@ class NumpySolver:
         return self.prior.held(self.sheet.held(spots), sign)
 
     def judged(self, problem: Problem, fit: Fit, uneven: float) -> tuple[FloatArray, FloatArray]:
-        """See :class:`Solver`."""
+        """What the engine keeps of it; see :class:`Solver`."""
         seen = problem.seen
         change = (fit.change + fit.deficit.change) @ self.table.basis
         onto = _Beside.of(fit.unknown, fit.slopes[:0]).projected(fit.slopes)
@@ -185,7 +185,7 @@ class NumpySolver:
         """See :class:`Solver`: this one goes step by step."""
 
     def standing(self, left: FloatArray, fit: Fit) -> FloatArray:
-        """See :class:`Solver`."""
+        """The minimum near ``spots``; see :class:`Solver`."""
         k = len(fit.spots)
         own = NuisanceMetric.of(left).products(np.vstack([fit.slopes, fit.each]))
         number, squares = np.arange(N_PARAMETERS * k), np.empty(k)
@@ -199,7 +199,7 @@ class NumpySolver:
     def standing_out(
         self, matched: Matched, fit: Fit, limits: Limits
     ) -> tuple[FloatArray, FloatArray]:
-        """See :class:`Solver`."""
+        """The touches in one call; see :class:`Solver`."""
         signatures, squares = matched.signatures, matched.squares
         beside = _Beside.of(fit.unknown, fit.slopes)
         clean = beside.projected(fit.residual[None])[0, : signatures.shape[1]]
@@ -288,7 +288,7 @@ class NuisanceMetric:
 
     @classmethod
     def of(cls, unknown: FloatArray) -> NuisanceMetric:
-        """Of directions (q, c)."""
+        """The metric of directions (q, c)."""
         root = np.asarray(np.linalg.cholesky(np.eye(len(unknown)) + unknown @ unknown.T))
         return cls(unknown, root, float(np.log(np.diag(root)).sum()))
 
@@ -313,7 +313,7 @@ class Slope:
 
     @classmethod
     def of(cls, fit: Fit, pull: Pull) -> Self:
-        """Of a fit."""
+        """The slope where a fit stands."""
         return cls(fit.spots, fit.normal, pull.pulled(fit.spots, fit.gradient), fit.cost)
 
 
@@ -338,7 +338,7 @@ class _Beside:
         return cls(scale[:, None] * both, root)
 
     def projected(self, rows: FloatArray) -> FloatArray:
-        """(m, c) of rows (m, c)."""
+        """(m, c): what is left of rows (m, c)."""
         if not len(self.both):
             return rows
         taken = _solved_lower(self.root, self.both @ rows.T)

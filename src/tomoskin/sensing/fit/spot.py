@@ -205,7 +205,7 @@ class Spots:
         return isinstance(other, Spots) and self.mesh.identity == other.mesh.identity
 
     def __hash__(self) -> int:
-        """Of the sheet."""
+        """The hash of the sheet."""
         return hash(self.mesh.identity)
 
     def change(self, spots: FloatArray) -> tuple[IntArray, FloatArray]:
@@ -275,7 +275,7 @@ class Response:
 
     @property
     def reference(self) -> FloatArray:
-        """(n_meas,) V without a spot."""
+        """(n_meas,) V of the sheet without a spot."""
         return np.asarray(self.state.voltages)
 
     def changes(self, sets: Sequence[FloatArray]) -> FloatArray:

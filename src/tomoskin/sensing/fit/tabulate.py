@@ -151,7 +151,7 @@ class Tabulation:
         return cls(response, table, arrays["parts"], Certificate.unpacked(arrays))
 
     def packed(self) -> Arrays:
-        """What takes long to compute."""
+        """The arrays that take long to compute."""
         table = self.table
         return {
             "values": table.values,

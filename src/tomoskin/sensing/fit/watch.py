@@ -12,8 +12,12 @@ from tomoskin.model.pattern import Pattern
 from tomoskin.sensing.fit.excess import Channels, Excess, Gauge
 from tomoskin.sensing.fit.policy import (
     DetectionPolicy,
+    is_like_touch,
+    leaves_much,
+    lifted,
     looks_again,
     may_be_found,
+    may_be_lifted,
     may_be_noise,
     stands_as_rise,
 )
@@ -77,11 +81,11 @@ class FrameWatch:
         policy = self._policy
         if policy.sign == "both" or self.wrong(self._before).any():
             return "both"
-        if len(self._before) or not policy.may_be_lifted(problem.square, len(problem.seen.full)):
+        if len(self._before) or not may_be_lifted(policy, problem.square, len(problem.seen.full)):
             return policy.sign
         ratio, content = matched.ratios(problem.solver, problem.nothing(), "both")
         best = int(ratio.argmax())
-        return "both" if policy.lifted(ratio[best], content[best]) else policy.sign
+        return "both" if lifted(policy, ratio[best], content[best]) else policy.sign
 
     def puzzled(self, problem: Problem, fit: Fit) -> bool:
         """Whether touches leave so much of a frame unexplained that some of it may be of the sign
@@ -94,7 +98,7 @@ class FrameWatch:
             return False
         if len(fit.spots) > len(self._before) + 1:
             return True
-        if not self._policy.leaves_much(fit):
+        if not leaves_much(self._policy, fit):
             return False
         self._astray = True
         if not self._in_vain and problem.reach:  # as a rule it is a touch that began in the scan
@@ -125,7 +129,7 @@ class FrameWatch:
         self.like_touch = bool(len(fit.spots))
         if fit.beyond > 0 and not self.like_touch:
             ratio, _ = matched.ratios(solver, fit, "both")
-            self.like_touch = self._policy.is_like_touch(fit, ratio.max())
+            self.like_touch = is_like_touch(self._policy, fit, ratio.max())
 
     def wrong(self, spots: FloatArray) -> NDArray[np.bool_]:
         """(k,) whether each of ``spots`` (k, 4) is not of the skin's sign."""

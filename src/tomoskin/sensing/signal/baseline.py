@@ -77,7 +77,7 @@ class BaselineState:
 
     @cached_property
     def noise(self) -> float:
-        """V, rms of the rows."""
+        """The noise of one frame, V, rms of the rows."""
         return _rms(self.deviation)
 
     @cached_property
@@ -238,7 +238,7 @@ class Baseline:
 
     @property
     def state(self) -> BaselineState:
-        """How it is now."""
+        """The state of the baseline by now."""
         return BaselineState(
             self.start,
             self.mean,

@@ -47,7 +47,7 @@ class MeterStep:
 
     @property
     def expected(self) -> str:
-        """``11.80 to 12.20 V``."""
+        """The range as people read it: ``11.80 to 12.20 V``."""
         digits = 3 if self.high < 0.05 else 2
         return f"{self.low:.{digits}f} to {self.high:.{digits}f} V"
 

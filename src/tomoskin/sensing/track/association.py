@@ -77,7 +77,7 @@ class FrameOfTouches:
     def of(
         cls, detections: Sequence[Detection], clock: TrackClock, settings: TrackSettings
     ) -> Self:
-        """Of detections in any order."""
+        """The frame of detections in any order."""
         observed = [
             ObservedDetection(d, observe(d, settings), sign_of(d), log_content(d))
             for d in detections

@@ -62,7 +62,7 @@ class TouchEvent:
 
     @property
     def text(self) -> str:
-        """A sentence for people."""
+        """The event in a sentence for people."""
         r = self.touch.detection
         position = f"{1e3 * r.x:.0f}, {1e3 * r.y:.0f} mm"
         others = [str(number) for number in self.touch.merged if number != self.touch.id]

@@ -47,7 +47,7 @@ class IdentityLedger:
         self.forget()
 
     def forget(self) -> None:
-        """Forget all; numbers go on."""
+        """Forget all fingers; numbers go on."""
         self._hypotheses = [IdentityHypothesis(0.0, {})]
         self._numbers: dict[int, int] = {}
         self._began: dict[int, float] = {}

@@ -31,7 +31,7 @@ class TouchStrength:
 
     @classmethod
     def of(cls, detection: Detection) -> Self:
-        """As one frame tells it."""
+        """The strength as one frame shows it."""
         return cls(log_content(detection), NOISE**2)
 
     def after(self, detection: Detection, seconds: float) -> Self:

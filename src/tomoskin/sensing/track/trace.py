@@ -99,7 +99,7 @@ class Trace:
     ahead: TrackState = field(init=False)
 
     def __post_init__(self) -> None:
-        """Leave the first footprint."""
+        """Begin with what the first detection shows."""
         self.strong = self.since
         self.strength = self.fresh = TouchStrength.of(self.detection)
         self.held = Position.of(self.detection, content_of(self.detection), self.since)
@@ -117,7 +117,7 @@ class Trace:
 
     @property
     def sign(self) -> float:
-        """Of its peak."""
+        """The sign of its peak: 1 or −1."""
         return sign_of(self.detection)
 
     @property
@@ -126,7 +126,7 @@ class Trace:
         return self.held.of_detection(self.detection)
 
     def alone(self, time: float) -> Alone:
-        """As it is now."""
+        """The touch as it is now, by itself."""
         return Alone(self.state, self.strength, time)
 
     def take(self, detection: Detection, time: float, seconds: float, *, still: bool) -> None:
@@ -157,7 +157,7 @@ class Trace:
         self._step()
 
     def absorb(self, other: Trace) -> None:
-        """Stand for ``other`` too."""
+        """Stand for the fingers of ``other`` too."""
         self.members += other.members
         self.footprints = [*other.footprints, *self.footprints][-_MOST_FOOTPRINTS:]
 
@@ -181,5 +181,5 @@ def size_of(detection: Detection) -> float:
 
 
 def sign_of(detection: Detection) -> float:
-    """1 or −1."""
+    """1 where it raises the conductivity, else −1."""
     return -1.0 if detection.peak < 0 else 1.0
