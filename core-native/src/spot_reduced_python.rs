@@ -14,7 +14,7 @@ pub(crate) struct Reduced {
     certificate: Certificate,
 }
 
-/// As tomoskin.sensing.fit.interaction.Interaction has it.
+/// As tomoskin.sensing.fit.certificate.Interaction has it.
 #[derive(FromPyObject)]
 struct InteractionArrays<'py> {
     centres: Any<'py>,

@@ -10,7 +10,7 @@ import pytest
 
 from sensing.fit.scene import noise, whitener
 from sensing.fit.test_finder import data, model, press
-from tomoskin.core import FloatArray
+from tomoskin.core import FloatArray, finished
 from tomoskin.sensing.fit import EXHAUSTIVE, LIVE
 from tomoskin.sensing.fit.expectation import Expectation, Known
 from tomoskin.sensing.fit.native import NativeSolver
@@ -78,10 +78,15 @@ def test_a_shape_is_the_way_from_a_tail_to_a_bell() -> None:
     assert np.linalg.norm(ours - exact) < 0.35 * np.linalg.norm(exact)
 
 
+def whitened(solver: Solver) -> WhitenedTable:
+    times = model().response.times
+    return finished(WhitenedTable.making(solver, whitener(), times, np.zeros((len(times), 0))))
+
+
 def problem(solver: Solver, spots: FloatArray, reach: float) -> Problem:
-    seen = WhitenedTable.of(solver, whitener(), model().response.times)
+    seen = whitened(solver)
     volts = data(spots) + noise(16, 1, 3)[0]
-    whitened, rest = seen.whitened(volts)
+    along, rest = seen.whitened(volts)
     left = 0.05 * data(press(0.0, 0.06))[None] @ seen.matrix.T
     return Problem(
         response=model().response,
@@ -91,7 +96,7 @@ def problem(solver: Solver, spots: FloatArray, reach: float) -> Problem:
         sign="decrease",
         reach=reach,
         grows=0.5,
-        data=whitened,
+        data=along,
         rest=rest,
         left=left,
     )
@@ -194,7 +199,7 @@ def test_one_spot_more_that_was_not_worth_it_is_proposed_as_it_was_fitted() -> N
 
 
 def test_what_changes_do_not_show_along_is_noise() -> None:
-    seen = WhitenedTable.of(model().solver, whitener(), model().response.times)
+    seen = whitened(model().solver)
     volts = data(TWO)
     along, rest = seen.whitened(volts)
     every = whitener()(volts)

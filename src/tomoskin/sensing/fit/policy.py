@@ -1,7 +1,8 @@
 """What one frame says: what is looked at, what is accepted as a touch, and what else explains it.
 
 The thresholds by which a frame's touches are looked for, accepted and kept stand here, with the
-decisions that are taken by them; the other modules compute what is decided on. What a touch is over frames, :mod:`tomoskin.sensing.track.policy` says.
+decisions that are taken by them; the other modules compute what is decided on. What a touch is
+over frames, :mod:`tomoskin.sensing.track.policy` says.
 
 Sizes are deviations of the noise, and a gain is a logarithm of odds: what the evidence of one
 explanation has more than that of another.

@@ -72,12 +72,9 @@ class SpotPrior:
         spread = math.hypot(_SPREAD, math.log(scaled / _FINGER) / 2)
         return cls(area, radius, spread, _DEPTH * FILLING * radius**2)
 
-    def away(self, spots: FloatArray) -> FloatArray:
-        """(k, 4) deviations of spots (k, 4) from the prior's middle; positions have none."""
-        deviations = np.zeros_like(spots)
-        deviations[:, LOG_RADIUS] = (spots[:, LOG_RADIUS] - math.log(self.radius)) / self.spread
-        deviations[:, CONTENT] = spots[:, CONTENT] / self.content
-        return deviations
+    def widest(self, spots: FloatArray) -> float:
+        """Deviations of the prior by which the widest of spots (k, 4) is wide."""
+        return float(((spots[:, LOG_RADIUS] - math.log(self.radius)) / self.spread).max())
 
     @property
     def middle(self) -> FloatArray:

@@ -10,7 +10,7 @@ from typing import Any, Protocol, Self
 
 import numpy as np
 
-from tomoskin.core import FloatArray, finished, reach
+from tomoskin.core import FloatArray, reach
 from tomoskin.sensing.fit.certificate import Reduced
 from tomoskin.sensing.fit.expectation import Expectation, Known
 from tomoskin.sensing.fit.noise import Whitener
@@ -70,16 +70,11 @@ class WhitenedTable:
     timed: FloatArray
 
     @classmethod
-    def of(cls, solver: Solver, whiten: Whitener, times: FloatArray) -> WhitenedTable:
-        """``times`` (n_meas,) of the measurements about the middle of the scan."""
-        return finished(cls.making(solver, whiten, times, np.zeros((len(times), 0))))
-
-    @classmethod
     def making(
         cls, solver: Solver, whiten: Whitener, times: FloatArray, jumps: FloatArray
     ) -> Generator[None, None, WhitenedTable]:
-        """As :meth:`of`, a piece of work between two yields; the axes hold ``jumps`` (n_meas, j)
-        as well."""
+        """A piece of work between two yields; ``times`` (n_meas,) of the measurements about the
+        middle of the scan; the axes hold ``jumps`` (n_meas, j) as well."""
         full, table = whiten.matrix, solver.table
         direct, timed = full @ table.basis.T, full @ (times[:, None] * table.basis.T)
         yield

@@ -45,7 +45,7 @@ class Openings:
         """Sets of one spot more than ``fit`` has, wherever that has them."""
         if not self.policy.weighs_sets(fit):
             return []
-        widest = float(self.problem.prior.away(fit.spots)[:, LOG_RADIUS].max())
+        widest = self.problem.prior.widest(fit.spots)
         if not (self.starts(fit) or self.policy.may_be_several(fit, widest)):
             return []
         return self._joint.sets(len(fit.spots) + 1, self.policy.pace.joint)

@@ -296,24 +296,28 @@ class Segmenter:
             )
 
     def _centroid(self, cells: IntArray, image: FloatArray, floor: ImageNoise | None) -> Detection:
-        weights, snr = image[cells], _snr(cells, image, floor)
+        weights = image[cells]
         centre = centroid(self.mesh, cells, np.abs(image))
         sd = np.full(2, np.nan)
         if floor is not None:
             margin = REACH * self.settings.smoothing
             sd = centroid_sd(self.mesh, cells, image, margin, floor)
-        return Detection(
+        region = self._region(cells, image, floor)
+        return replace(
+            region,
             x=float(centre[0]),
             y=float(centre[1]),
             sd_x=float(sd[0]),
             sd_y=float(sd[1]),
-            area=float(self.mesh.volumes[cells].sum()),
             peak=float(weights[np.argmax(np.abs(weights))]),
-            cells=cells,
-            snr=snr,
-            weak=snr < self.settings.snr,
-            bias=_BIAS * math.sqrt(float(self.mesh.volumes[cells].sum()) / math.pi),
+            bias=_BIAS * math.sqrt(region.area / math.pi),
         )
+
+    def _region(self, cells: IntArray, image: FloatArray, floor: ImageNoise | None) -> Detection:
+        """A detection of ``cells`` whose position is not known yet."""
+        none, snr = math.nan, _snr(cells, image, floor)
+        area, weak = float(self.mesh.volumes[cells].sum()), snr < self.settings.snr
+        return Detection(none, none, none, none, area, none, cells, snr=snr, weak=weak)
 
     def _extremes(
         self, cells: IntArray, image: FloatArray, filtered: FloatArray, floor: ImageNoise | None
@@ -325,19 +329,9 @@ class Segmenter:
         height = np.append(np.abs(filtered), -1.0)  # the last is for "no neighbour"
         above = height[cells] > height[self._neighbours[cells]].max(axis=1)
         above[np.argmax(height[cells])] = True
-        area, snr = float(self.mesh.volumes[cells].sum()), _snr(cells, image, floor)
+        region, at = self._region(cells, image, floor), self.mesh.centroids
         return [
-            Detection(
-                x=float(self.mesh.centroids[top, 0]),
-                y=float(self.mesh.centroids[top, 1]),
-                sd_x=float("nan"),
-                sd_y=float("nan"),
-                area=area,
-                peak=float(image[top]),
-                cells=cells,
-                snr=snr,
-                weak=snr < self.settings.snr,
-            )
+            replace(region, x=float(at[top, 0]), y=float(at[top, 1]), peak=float(image[top]))
             for top in cells[above]
         ]
 

@@ -81,8 +81,12 @@ class ChannelFaults:
     low: int | None = None
 
 
+SOUND = ChannelFaults()
+"""No channel differs."""
+
+
 def potentials(
-    ring: LoadRing, drives: IntArray, current: float, faults: ChannelFaults | None = None
+    ring: LoadRing, drives: IntArray, current: float, faults: ChannelFaults = SOUND
 ) -> FloatArray:
     """Potential of each channel against ground, V.
 
@@ -97,7 +101,6 @@ def potentials(
 
     Returns (n_drives, n).
     """
-    faults = faults or ChannelFaults()
     n = len(ring.ohms)
     switch = 1 / FIGURES.switch_resistance
     matrix = np.zeros((len(drives), n + 1, n + 1))

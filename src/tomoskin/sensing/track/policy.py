@@ -1,7 +1,8 @@
 """What a touch is over frames: its initiation, association and deletion, and its residual response.
 
 The thresholds by which a touch begins, goes on and ends stand here, with the decisions that are
-taken by them; the other modules compute what is decided on. What one frame says, :mod:`tomoskin.sensing.fit.policy` decides.
+taken by them; the other modules compute what is decided on. What one frame says,
+:mod:`tomoskin.sensing.fit.policy` decides.
 
 Odds are logarithms. They grow and shrink with what frames show. Their numbers were chosen on the
 moving plant, seeds 1 to 3 (docs/theory/tracking.md).
