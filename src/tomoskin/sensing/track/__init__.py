@@ -1,4 +1,4 @@
-"""Readings of successive frames → touches that keep their identity, and what happens to them."""
+"""Detections of successive frames → touches that keep their identity, and what happens to them."""
 
 from tomoskin.sensing.track.event import TouchEvent
 from tomoskin.sensing.track.motion import STILL, TrackSettings
