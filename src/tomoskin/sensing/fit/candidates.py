@@ -89,12 +89,8 @@ def footprints_of(response: Response, prior: SpotPrior) -> tuple[Footprints, ...
 
 
 def _positions(response: Response, prior: SpotPrior) -> FloatArray:
-    """(n, 2) m of the grid that candidates stand on."""
-    return _grid(response.spots.mesh.centroids, _SPACING * prior.radius)
-
-
-def _grid(inside: FloatArray, step: float) -> FloatArray:
-    """(n, 2) hexagonal grid of positions near cells whose centroids are ``inside``."""
+    """(n, 2) m of a hexagonal grid of positions near the cells."""
+    inside, step = response.spots.mesh.centroids, _SPACING * prior.radius
     low, high = inside.min(axis=0), inside.max(axis=0)
     rows = np.arange(low[1], high[1] + step, step * math.sqrt(3) / 2)
     x = np.arange(low[0], high[0] + step, step)

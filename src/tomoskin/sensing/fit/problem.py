@@ -81,7 +81,7 @@ class WhitenedTable:
         axes = _axes(direct @ table.typical, least=1)
         yield
         others = np.hstack([timed @ table.typical, full @ jumps])
-        more = _axes(_less(others, axes), least=0)
+        more = _axes(others - axes @ (axes.T @ others), least=0)
         yield
         both, narrow = np.column_stack([axes, more]), axes.shape[1]
         direct = both.T @ direct
@@ -122,10 +122,6 @@ def _axes(typical: FloatArray, least: int) -> FloatArray:
     kept = max(wanted, min(-(-wanted // ABREAST) * ABREAST, clear))
     first = len(square) - kept
     return np.asarray(typical @ (vectors[:, first:] / np.sqrt(square[first:])))
-
-
-def _less(columns: FloatArray, axes: FloatArray) -> FloatArray:
-    return np.asarray(columns - axes @ (axes.T @ columns))
 
 
 class Solver(Protocol):

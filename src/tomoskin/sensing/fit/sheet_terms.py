@@ -26,16 +26,12 @@ def directed(mesh: Mesh, anisotropy: FloatArray) -> Mesh:
     """The mesh whose metric is exp(−D) in the frame of its own; D by ``anisotropy`` (xx, xy)."""
     size = float(np.hypot(*anisotropy))
     part = np.sinh(size) / size if size else 1.0
-    within = np.cosh(size) * np.eye(2) - part * _traceless(anisotropy)
+    xx, xy = anisotropy
+    within = np.cosh(size) * np.eye(2) - part * np.array([[xx, xy], [xy, -xx]])
     if mesh.metric is None:
         return mesh.with_metric(np.tile(within, (len(mesh.cells), 1, 1)))
     frame = np.linalg.cholesky(mesh.metric)
     return mesh.with_metric(frame @ within @ frame.transpose(0, 2, 1))
-
-
-def _traceless(anisotropy: FloatArray) -> FloatArray:
-    xx, xy = anisotropy
-    return np.array([[xx, xy], [xy, -xx]])
 
 
 _CONTACT = 0.3

@@ -180,16 +180,6 @@ class Reciprocity:
         return np.asarray(solution)
 
 
-def unchanged(
-    samples: NDArray[np.uint16], last: NDArray[np.uint16], members: FloatArray
-) -> FloatArray:
-    """(n_electrodes + 1,) share of each electrode's samples that did not change; last, of all.
-
-    ``members`` (n_electrodes + 1, n_samples) holds the averages.
-    """
-    return np.asarray(members @ (samples == last).astype(float))
-
-
 _EQUAL = 0.03
 """Part of what two electrodes usually differ by (rms over the drives), below which they read the
 same: potentials of two electrodes can be equal under some drives, never under all."""

@@ -15,7 +15,6 @@ from tomoskin.sensing.signal.evidence import (
     Groups,
     Reciprocity,
     sign_limit,
-    unchanged,
 )
 from tomoskin.sensing.signal.health import ElectrodeHealth, Health, Mask, Roles
 from tomoskin.sensing.signal.reference import Reference
@@ -132,6 +131,7 @@ class SampleWatch:
     def __init__(self, scan: Scan, n: int) -> None:
         each = (scan.sample_electrode == np.arange(n)[:, None]).astype(float)
         rows = np.concatenate([each, np.ones((1, scan.n_samples))])
+        # averages over each electrode's samples; the last, over all
         self._members = rows / np.maximum(rows.sum(axis=1), 1.0)[:, None]
         self._still = np.zeros(n)
         self._last: NDArray[np.uint16] | None = None
@@ -141,7 +141,7 @@ class SampleWatch:
         last, self._last = self._last, samples
         if samples is None or last is None:
             return {}
-        share = unchanged(samples, last, self._members)
+        share = np.asarray(self._members @ (samples == last).astype(float))
         alone = share[:-1] > 1.0 - 1e-9
         if share[-1] > 0.5 or not alone.any():
             self._still[:] = 0.0

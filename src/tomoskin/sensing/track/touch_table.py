@@ -98,9 +98,14 @@ def touch_rows(
     on = _curved(surface)
     for frame, time, touches in frames:
         for touch in touches:
-            more = force_values(touch.detection.force) if forces else ()
-            last = () if begun is None else (time - begun,)
-            yield _row(frame, time, touch) + more + _in_space(touch, on) + last
+            d, number = touch.detection, -1 if frame is None else frame
+            row: tuple[Value, ...] = (number, time, touch.id, d.x, d.y, d.sd_x, d.sd_y)
+            row += (d.area, d.peak, touch.said)
+            if forces:
+                row += force_values(d.force)
+            if on is not None:
+                row += tuple(on.point([[d.x, d.y]])[0].tolist())
+            yield row if begun is None else (*row, time - begun)
 
 
 def touch_columns(
@@ -126,12 +131,6 @@ def _curved(surface: Surface | None) -> Surface | None:
     return None if isinstance(surface, Plane) else surface
 
 
-def _row(frame: int | None, time: float, touch: Touch) -> tuple[Value, ...]:
-    d = touch.detection
-    number = -1 if frame is None else frame
-    return (number, time, touch.id, d.x, d.y, d.sd_x, d.sd_y, d.area, d.peak, touch.said)
-
-
 def has_forces(frames: Iterable[TouchedFrame]) -> bool:
     """Whether a touch of any frame has a force."""
     return any(t.detection.force is not None for *_, touches in frames for t in touches)
@@ -142,9 +141,3 @@ def force_values(force: Force | None) -> tuple[float, float, float, str]:
     if force is None:
         return (math.nan, math.nan, math.nan, "")
     return (force.newtons, force.low, force.high, force.state)
-
-
-def _in_space(touch: Touch, surface: Surface | None) -> tuple[Value, ...]:
-    if surface is None:
-        return ()
-    return tuple(surface.point([[touch.detection.x, touch.detection.y]])[0].tolist())
