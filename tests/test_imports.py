@@ -22,7 +22,7 @@ UNITS = {
     "learning": (),
     "pipeline": (),
     "twin": (".", "emulator"),
-    "files": ("session", "imports", "exports"),
+    "files": ("messages", "session", "imports", "exports"),
     "run": ("sinks", "."),
     "server": (),
     "cli": (),

@@ -13,9 +13,9 @@ import numpy as np
 
 from tomoskin import __version__
 from tomoskin.core import FloatArray, WireError, encode_json
+from tomoskin.files.messages import Contacts, Stream
 from tomoskin.model.robot import PlacedSkin, Pose, Robot
 from tomoskin.run import RobotRun, Runner, Status, commands
-from tomoskin.run.sinks import Moment, Naming, Stream, contacts_of
 from tomoskin.server.page_messages import finite, flat, text_of
 from tomoskin.server.requests import Request, SetRecording
 from tomoskin.server.run_handlers import FILE_NAME
@@ -53,8 +53,8 @@ class NewestTouches:
 
     def _touches(self, name: str, runner: Runner) -> dict[str, Any]:
         assert runner.newest is not None
-        moment = Moment.of(runner.newest.result, with_image=False)
-        found, pose = contacts_of(self._streams[name], moment), self._poses[name]
+        contacts = Contacts.of(self._streams[name], runner.newest.result)
+        pose = self._poses[name]
         touches = [
             {
                 "id": contact.touch.id,
@@ -63,9 +63,9 @@ class NewestTouches:
                 "peak": contact.touch.detection.peak,
                 "force": contact.force,
             }
-            for contact in found
+            for contact in contacts.touches
         ]
-        return {"valid": moment.valid, "touches": touches}
+        return {"valid": contacts.valid, "touches": touches}
 
 
 class Overview:
@@ -177,7 +177,7 @@ def _skin(skin: PlacedSkin, stream: Stream, pose: Pose) -> dict[str, Any]:
     corners = np.zeros((0, 3)) if stream.corners is None else stream.corners.reshape(-1, 3)
     return {
         "name": skin.name,
-        "frame": Naming().of_skin(stream).frame_id,
+        "frame": stream.naming.frame_id,
         "source": skin.source,
         "corners": _rounded(pose(corners).ravel()),
     }

@@ -7,7 +7,13 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from tomoskin.board.source import Transport, list_ports, open_source
+from tomoskin.board.source import (
+    BOARDS,
+    DEFAULT_BOARD,
+    Transport,
+    list_ports,
+    open_source,
+)
 from tomoskin.board.wire import SCHEMA
 from tomoskin.core import SourceError
 from tomoskin.files.session import ReplayTransport, SessionReader, as_recorded, parse_replay
@@ -18,13 +24,13 @@ from tomoskin.server.hub import Hub
 from tomoskin.server.page_messages import text_of
 from tomoskin.server.requests import Connect, ListSources
 from tomoskin.server.task import Listener
-from tomoskin.twin.emulator import BOARDS, DEFAULT
 
 EMULATED = {
     "emulator"
-    if name == DEFAULT
+    if name == DEFAULT_BOARD
     else f"emulator:{name}": f"Real firmware on a simulated {board.text}"
     for name, board in BOARDS.items()
+    if board.emulator
 }
 
 
