@@ -155,30 +155,6 @@ def jacobian(
     (n_meas, 2) plus and minus. ``threads``: as in :func:`transposed_product`.
     """
 
-Frame = tuple[
-    NDArray[np.float64],
-    float,
-    NDArray[np.float64],
-    NDArray[np.float64],
-    tuple[float, float, float, float],
-    tuple[float, float],
-    tuple[NDArray[np.float64], NDArray[np.float64], float],
-]
-"""Whitened data (c,), the square of their rest, directions (q, c) that are left, an offset (rank,),
-deviations of direction, shape, way and growth, the least and largest depth, and of the touches that
-are expected spots (m, 4), covariances (m, 3, 3) of all columns but the content, and the logarithm
-of the volume of a content's prior: see tomoskin.sensing.fit.expectation."""
-
-Fitted = tuple[
-    list[NDArray[np.float64]],
-    list[NDArray[np.float64]],
-    tuple[float, float, float, bool],
-    list[int | None],
-]
-"""Spots (k, 4), each (k, c), slopes (4k, c), unknown (q, c), normal (4k, 4k); change (rank,),
-predicted (c,), residual (c,), gradient (4k,); misfit, log_size, cost, settled; known (k): see
-tomoskin.sensing.fit.refine.Fit."""
-
 @final
 class Terminals:
     """The transfer resistance between a network's last nodes, again and again."""
@@ -275,13 +251,13 @@ class SpotTable:
         values: NDArray[np.float32],
         filling: float,
         sheet: NDArray[np.float64],
-        prior: NDArray[np.float64],
-        log_range: NDArray[np.float64],
+        prior: Any,
     ) -> SpotTable:
         """Take what the table is made of.
 
         ``grids`` (n, 5): origin, step and shape for each radius; ``values`` (n_points, n, rank);
-        ``sheet`` (n_cells, 3): centroids and margins; ``prior`` (2, 4): middle and weight.
+        ``sheet`` (n_cells, 3): centroids and margins; ``prior``: what has the attributes of a
+        tomoskin.sensing.fit.prior.SpotPrior.
 
         Raises
         ------
@@ -295,36 +271,40 @@ class SpotTable:
     def settled(
         self,
         seen: SeenTable,
-        frame: Frame,
+        frame: Any,
+        offset: NDArray[np.float64],
         spots: NDArray[np.float64],
         known: Sequence[int | None],
         most: int,
-    ) -> Fitted:
+    ) -> dict[str, Any]:
         """Fit spots (k, 4) to a frame by at most so many steps; ``known``: which of the expected
-        touches each is, or None."""
+        touches each is, or None.
+
+        ``frame``: what has the attributes of a tomoskin.sensing.fit.problem.Problem; ``offset``
+        (rank,): what the table lacks. The answer has the fields of a
+        tomoskin.sensing.fit.spot_fit.Fit, by name.
+        """
 
     def searched(
         self,
         seen: SeenTable,
-        frame: Frame,
+        frame: Any,
+        offset: NDArray[np.float64],
         spots: NDArray[np.float64],
-        candidates: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
-        limits: tuple[float, float, float, float, float],
-        pace: tuple[int, int, int, int, int, int, bool],
-        rules: tuple[float, float, float, float, float, float, float, float, float],
-    ) -> tuple[Fitted, bool, list[NDArray[np.float64]] | None, Fitted | None]:
+        candidates: Any,
+        limits: Any,
+        policy: Any,
+    ) -> tuple[dict[str, Any], bool, list[NDArray[np.float64]] | None, dict[str, Any] | None]:
         """Find the touches of a frame; the last one's were ``spots`` (k, 4).
 
         Parameters
         ----------
-        candidates
-            (n, 4) of content 1, signatures (n, narrow), and the squares (n,) of these.
-        limits
-            See :func:`standing_out`.
-        pace
-            Steps warm, at a glance and cold; finalists, tries, touches at most, restart.
-        rules
-            least, held, look, sure, rare, misshapen, and the logarithm of a spot's prior volume.
+        frame, offset
+            See :meth:`settled`.
+        candidates, limits
+            What have the attributes of Matched and Limits in tomoskin.sensing.fit.problem.
+        policy
+            What has the attributes of a tomoskin.sensing.fit.policy.DetectionPolicy.
 
         Returns
         -------
@@ -353,16 +333,12 @@ class SeenTable:
         """Of (narrow, rank), (c, rank), (c, n_meas), (rank, n_meas) and (n_meas,)."""
 
     def judged(
-        self,
-        fit: tuple[NDArray[np.float64], ...],
-        change: NDArray[np.float64],
-        quality: tuple[float, float, float],
-        ridge: float,
+        self, fit: Any, change: NDArray[np.float64], uneven: float, ridge: float
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Squares (k,) of what spots change beside each other, and their covariance (4k, 4k).
 
-        ``fit``: each, slopes, unknown and normal; ``change`` (rank,) what all spots change;
-        ``quality``: misfit, degrees of freedom, uneven.
+        ``fit``: what has the attributes of a tomoskin.sensing.fit.spot_fit.Fit; ``change`` (rank,)
+        what all spots change.
         """
 
 @final
@@ -372,9 +348,10 @@ class Reduced:
     def __new__(
         cls,
         profile: tuple[float, float, float, float, float, float],
-        interaction: tuple[NDArray[np.float64], float, NDArray[np.float32], NDArray[np.float32]],
-        certificate: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
-        numbers: tuple[float, float, float],
+        interaction: Any,
+        certificate: Any,
+        rim: NDArray[np.float64],
+        radius: float,
         neighbours: int,
     ) -> Reduced:
         """Take what it is made of.
@@ -383,12 +360,12 @@ class Reduced:
         ----------
         profile
             Of a spot: reach, filling, scales, and of the bell narrow, height and part.
-        interaction
-            Centres (p, 2) of patches, spread, fields (p, 2, n_electrodes), between (2p, 2p).
-        certificate
-            like (n, 2) and parts (n,) of some spots, and points (m, 2) of the rim.
-        numbers
-            margin, moved, and the radius of a median spot.
+        interaction, certificate
+            What have the attributes of an Interaction and of a Certificate in tomoskin.sensing.fit.
+        rim
+            (m, 2) m, points of it.
+        radius
+            Of a median spot, m.
         neighbours
             Spots that tell of one between them.
 
@@ -420,7 +397,7 @@ def standing_out(
     unknown: NDArray[np.float64],
     free: NDArray[np.float64],
     residual: NDArray[np.float64],
-    limits: tuple[float, float, float, float, float],
+    limits: Any,
 ) -> list[NDArray[np.float64]]:
     """Likelihood ratios (n,) and contents (n,) of candidates in a residual (c,).
 

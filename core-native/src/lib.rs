@@ -31,8 +31,6 @@ pub mod scalar;
 pub mod small;
 pub mod solve;
 pub mod spot_algebra;
-#[cfg(feature = "python")]
-mod spot_expected_python;
 pub mod spot_fit;
 pub mod spot_match;
 #[cfg(feature = "python")]

@@ -259,7 +259,7 @@ fn keep_freed_memory() {
 
 /// Number of what `tomoskin_core.pyi` says: raised with each change of it, so that tomoskin does
 /// not call an engine that was built for other arguments.
-const INTERFACE: u32 = 6;
+const INTERFACE: u32 = 7;
 
 #[pymodule]
 fn tomoskin_core(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -62,6 +62,14 @@ pub struct Prior {
     pub log_radii: [f64; 2],
     /// Content of a spot of radius and depth one.
     pub filling: f64,
+    /// Logarithm of the volume of one spot, and what the content has of that.
+    pub log_volume: f64,
+    /// See there.
+    pub log_content: f64,
+    /// Deviations of a spot's direction and of its shape.
+    pub directed: f64,
+    /// See there.
+    pub reshaped: f64,
 }
 
 impl Prior {
@@ -161,9 +169,10 @@ pub struct Frame<'a> {
     pub left: &'a [f64],
     /// (rows) what the table lacks, whitened.
     pub offset: &'a [f64],
-    /// Deviation of a spot's direction, of its shape, of its way within the scan, m, and of its
-    /// growth.
-    pub deviations: [f64; 4],
+    /// Deviation of a spot's way within the scan, m.
+    pub reach: f64,
+    /// Deviation of its growth within the scan, in parts of it.
+    pub grows: f64,
     /// Least and largest depth.
     pub depths: [f64; 2],
     /// Touches that go on from the frame before.
@@ -448,7 +457,10 @@ impl Frame<'_> {
     /// growth within the scan.
     fn unknown(&self, spots: &[Spot], parts: &[f64], own: [Matrix<f64>; 2]) -> Matrix<f64> {
         let (rows, rank) = (self.seen.rows, self.table.layout.rank);
-        let [directed, reshaped, reach, grows] = self.deviations;
+        let Prior {
+            directed, reshaped, ..
+        } = *self.prior;
+        let (reach, grows) = (self.reach, self.grows);
         let mut values = self.left.to_vec();
         for (size, directions) in [directed, reshaped].into_iter().zip(&own) {
             values.extend(directions.values.iter().map(|value| size * value));

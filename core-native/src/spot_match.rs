@@ -18,9 +18,12 @@ pub struct Signatures<'a> {
 
 /// What counts of candidates.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "python", derive(pyo3::FromPyObject))]
 pub struct Limits {
-    /// Least and largest content, by sign.
-    pub content: [f64; 2],
+    /// Least content, by sign.
+    pub low: f64,
+    /// Largest content, by sign.
+    pub high: f64,
     /// Deviations below which a candidate is none.
     pub least: f64,
     /// Part of a candidate's square that must be its own.
@@ -43,8 +46,8 @@ pub fn standing_out(
     let beside = Beside::of(unknown, free, rows, limits.ridge)?;
     let clean = beside.projected(residual, rows);
     let onto = dots(signatures.values, &clean.values[..narrow], narrow).values;
-    let [low, high] = limits.content;
-    let onto: Vec<f64> = onto.iter().map(|value| value.clamp(low, high)).collect();
+    let held = |value: &f64| value.clamp(limits.low, limits.high);
+    let onto: Vec<f64> = onto.iter().map(held).collect();
     let likely: Vec<usize> = (0..n)
         .filter(|&i| onto[i] * onto[i] > limits.least * limits.least * signatures.squares[i])
         .collect();

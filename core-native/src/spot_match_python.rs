@@ -6,8 +6,8 @@ use pyo3::prelude::*;
 use crate::arrays::{Any, array, contiguous, invalid, same};
 use crate::dense::Matrix;
 use crate::spot_algebra::Metric;
-use crate::spot_match;
-use crate::spot_python::{directions, limits_of, signatures_of};
+use crate::spot_match::{self, Limits};
+use crate::spot_python::{directions, signatures_of};
 use crate::spot_table::PARAMETERS;
 
 /// Squares of what each spot changes beside the others; left, slopes and each (…, rows).
@@ -36,7 +36,7 @@ pub(crate) fn standing<'py>(
 }
 
 /// Likelihood ratios and contents of candidates, signatures (n, narrow) of squares (n), in a
-/// residual (rows) with unknown and free directions (…, rows); `limits`: see the module.
+/// residual (rows) with unknown and free directions (…, rows).
 #[pyfunction]
 pub(crate) fn standing_out<'py>(
     signatures: &Any<'py>,
@@ -44,7 +44,7 @@ pub(crate) fn standing_out<'py>(
     unknown: &Any<'py>,
     free: &Any<'py>,
     residual: &Any<'py>,
-    limits: [f64; 5],
+    limits: Limits,
 ) -> PyResult<[Bound<'py, PyArray1<f64>>; 2]> {
     let py = residual.py();
     let signatures = array::<f64, Ix2>("signatures", signatures)?;
@@ -58,7 +58,6 @@ pub(crate) fn standing_out<'py>(
         contiguous("residual", &residual)?,
     ];
     let seen = signatures_of(&signatures, &squares, residual.len())?;
-    let limits = limits_of(limits);
     let out = py.detach(|| spot_match::standing_out(seen, parts, limits));
     let out = out.ok_or_else(|| invalid("free: directions in proportion"))?;
     Ok(out.map(|values| PyArray1::from_vec(py, values)))

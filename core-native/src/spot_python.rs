@@ -5,15 +5,15 @@ use numpy::{
     PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 
 use crate::arrays::{Any, array, contiguous, invalid, same};
 use crate::dense::Matrix;
 use crate::small::product;
 use crate::spot_algebra::{Beside, Metric};
-use crate::spot_expected_python::{ExpectedArrays, expected_of};
-use crate::spot_fit::{Expected, Fit, Frame, Known, Prior, Seen, Sheet};
+use crate::spot_fit::{CONTENT, Expected, Fit, Frame, Known, Prior, Seen, Sheet};
 use crate::spot_match::{self, Limits, Measurements, Quality, Signatures};
-use crate::spot_search::{Pace, Rules, Search};
+use crate::spot_search::{Policy, Search};
 use crate::spot_table::{DIRECTIONS, Grid, Layout, PARAMETERS, ROWS, Spot, Table};
 
 /// A table of spots, whose values stay Python's, and where they may be.
@@ -35,19 +35,41 @@ pub(crate) struct SeenTable {
     squares: Vec<f64>,
 }
 
-/// Spots, and what they do: arrays by rows, as Python has them.
-type Fitted<'py> = (
-    [Bound<'py, PyArray2<f64>>; 5],
-    [Bound<'py, PyArray1<f64>>; 4],
-    (f64, f64, f64, bool),
-    Vec<Known>,
-);
+/// Spots, and what they do, by name, as tomoskin.sensing.fit.problem.Fit has them.
+#[derive(IntoPyObject)]
+struct Fitted<'py> {
+    spots: Bound<'py, PyArray2<f64>>,
+    each: Bound<'py, PyArray2<f64>>,
+    slopes: Bound<'py, PyArray2<f64>>,
+    unknown: Bound<'py, PyArray2<f64>>,
+    normal: Bound<'py, PyArray2<f64>>,
+    change: Bound<'py, PyArray1<f64>>,
+    predicted: Bound<'py, PyArray1<f64>>,
+    residual: Bound<'py, PyArray1<f64>>,
+    gradient: Bound<'py, PyArray1<f64>>,
+    misfit: f64,
+    log_size: f64,
+    cost: f64,
+    settled: bool,
+    known: Bound<'py, PyTuple>,
+}
+
+/// What is likely of a spot, as tomoskin.sensing.fit.prior.SpotPrior has it.
+#[derive(FromPyObject)]
+struct PriorArrays<'py> {
+    middle: Any<'py>,
+    weights: Any<'py>,
+    log_radii: [f64; 2],
+    log_volume: f64,
+    log_content: f64,
+    directed: f64,
+    reshaped: f64,
+}
 
 #[pymethods]
 impl SpotTable {
-    /// `grids` (n, 5): origin, step, shape; `prior` (2, 4): middle and weight.
+    /// `grids` (n, 5): origin, step, shape.
     #[new]
-    #[expect(clippy::too_many_arguments, reason = "a table has as many parts")]
     fn new(
         log_radii: &Any<'_>,
         grids: &Any<'_>,
@@ -55,8 +77,7 @@ impl SpotTable {
         values: &Any<'_>,
         filling: f64,
         sheet: &Any<'_>,
-        prior: &Any<'_>,
-        log_range: [f64; 2],
+        prior: PriorArrays<'_>,
     ) -> PyResult<Self> {
         let values = array::<f32, Ix3>("values", values)?;
         let nodes = array::<f64, Ix1>("nodes", nodes)?;
@@ -67,10 +88,7 @@ impl SpotTable {
         )?;
         let sheet = array::<f64, Ix2>("sheet", sheet)?;
         same("columns of sheet", 3, sheet.shape()[1])?;
-        let prior = array::<f64, Ix2>("prior", prior)?;
-        same("entries of prior", 2 * PARAMETERS, prior.len())?;
-        let (sheet, prior) = (sheet.as_array(), prior.as_array());
-        let row = |number: usize| -> Spot { std::array::from_fn(|i| prior[(number, i)]) };
+        let sheet = sheet.as_array();
         let layout = Layout {
             log_radii: array::<f64, Ix1>("log_radii", log_radii)?
                 .as_array()
@@ -94,10 +112,14 @@ impl SpotTable {
                     .collect(),
             ),
             prior: Prior {
-                middle: row(0),
-                weight: row(1),
-                log_radii: log_range,
+                middle: columns_of("middle", &prior.middle)?,
+                weight: columns_of("weights", &prior.weights)?,
+                log_radii: prior.log_radii,
                 filling,
+                log_volume: prior.log_volume,
+                log_content: prior.log_content,
+                directed: prior.directed,
+                reshaped: prior.reshaped,
             },
         })
     }
@@ -125,12 +147,13 @@ impl SpotTable {
         &self,
         seen: &SeenTable,
         frame: FrameArrays<'py>,
+        offset: &Any<'py>,
         spots: &Any<'py>,
         known: Vec<Known>,
         most: usize,
     ) -> PyResult<Fitted<'py>> {
-        let (py, spots) = (frame.0.py(), spots_of(spots)?);
-        let arrays = Arrays::of(self, seen, &frame)?;
+        let (py, spots) = (offset.py(), spots_of(spots)?);
+        let arrays = Arrays::of(self, seen, &frame, offset)?;
         same("length of known", spots.len(), known.len())?;
         if known
             .iter()
@@ -142,30 +165,27 @@ impl SpotTable {
         let frame = arrays.frame(self, seen, &frame)?;
         let fit = py.detach(|| frame.settled(&spots, &known, most));
         let fit = fit.ok_or_else(|| invalid("spots: not comparable with the data"))?;
-        Ok(fitted(py, fit))
+        fitted(py, fit)
     }
 
-    /// Touches of a frame that before held `spots` (k, 4).
-    ///
-    /// `candidates`: spots (n, 4), signatures (n, narrow), squares (n); `limits`: see
-    /// `standing_out`; `pace` and `rules` in the order of their fields.
+    /// Touches of a frame that before held `spots` (k, 4); `candidates` of content 1.
     #[expect(clippy::too_many_arguments, reason = "a search has as many parts")]
     fn searched<'py>(
         &self,
         seen: &SeenTable,
         frame: FrameArrays<'py>,
+        offset: &Any<'py>,
         spots: &Any<'py>,
-        candidates: (Any<'py>, Any<'py>, Any<'py>),
-        limits: [f64; 5],
-        pace: (usize, usize, usize, usize, usize, usize, bool),
-        rules: [f64; 9],
+        candidates: CandidateArrays<'py>,
+        limits: Limits,
+        policy: Policy,
     ) -> PyResult<Searched<'py>> {
-        let (py, spots) = (frame.0.py(), spots_of(spots)?);
-        let arrays = Arrays::of(self, seen, &frame)?;
+        let (py, spots) = (offset.py(), spots_of(spots)?);
+        let arrays = Arrays::of(self, seen, &frame, offset)?;
         let frame = arrays.frame(self, seen, &frame)?;
-        let places = array::<f64, Ix2>("candidates", &candidates.0)?;
-        let signatures = array::<f64, Ix2>("signatures", &candidates.1)?;
-        let squares = array::<f64, Ix1>("squares", &candidates.2)?;
+        let places = array::<f64, Ix2>("candidates", &candidates.spots)?;
+        let signatures = array::<f64, Ix2>("signatures", &candidates.signatures)?;
+        let squares = array::<f64, Ix1>("squares", &candidates.squares)?;
         same("columns of candidates", PARAMETERS, places.shape()[1])?;
         same("candidates", squares.len(), places.shape()[0])?;
         let nothing = vec![0.0; seen.seen.rows];
@@ -178,41 +198,20 @@ impl SpotTable {
             height: seen.seen.rows,
         };
         let left = Metric::of(left).ok_or_else(|| invalid("left: expected finite directions"))?;
-        let (warm, glance, cold, finalists, tries, most, restart) = pace;
-        let [least, held, look, sure, rare, misshapen, within, near, volume] = rules;
         let search = Search {
             frames: [frame, bare],
             left: &left,
             candidates: contiguous("candidates", &places)?.as_chunks().0,
             signatures: signatures_of(&signatures, &squares, seen.seen.rows)?,
-            limits: limits_of(limits),
-            pace: Pace {
-                warm,
-                glance,
-                cold,
-                finalists,
-                tries,
-                most,
-                restart,
-            },
-            rules: Rules {
-                least,
-                held,
-                look,
-                sure,
-                rare,
-                misshapen,
-                within,
-                near,
-                volume,
-            },
+            limits,
+            policy,
         };
         let found = py.detach(|| search.found(&spots));
         let found = found.ok_or_else(|| invalid("spots: not comparable with the data"))?;
         let others = found.others;
         let others = others.map(|both| both.map(|values| PyArray1::from_vec(py, values)));
-        let turned_down = found.turned_down.map(|fit| fitted(py, fit));
-        Ok((fitted(py, found.fit), found.bare, others, turned_down))
+        let turned_down = found.turned_down.map(|fit| fitted(py, fit)).transpose()?;
+        Ok((fitted(py, found.fit)?, found.bare, others, turned_down))
     }
 }
 
@@ -225,6 +224,17 @@ impl SpotTable {
     }
 }
 
+/// A fit, as tomoskin.sensing.fit.problem.Fit has it.
+#[derive(FromPyObject)]
+struct FitArrays<'py> {
+    each: Any<'py>,
+    slopes: Any<'py>,
+    unknown: Any<'py>,
+    normal: Any<'py>,
+    misfit: f64,
+    degrees: f64,
+}
+
 /// Squares of what spots change, and a covariance.
 type Judged<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>);
 
@@ -234,17 +244,49 @@ type Searched<'py> = (Fitted<'py>, bool, Option<Others<'py>>, Option<Fitted<'py>
 /// Likelihood ratios and contents of candidates.
 type Others<'py> = [Bound<'py, PyArray1<f64>>; 2];
 
-/// Whitened data of a frame, the square of their rest, directions that are left, an offset,
-/// deviations and depths, and the expected touches; see `Frame`.
-type FrameArrays<'py> = (
-    Any<'py>,
-    f64,
-    Any<'py>,
-    Any<'py>,
-    [f64; 4],
-    [f64; 2],
-    ExpectedArrays<'py>,
-);
+/// Candidates, as tomoskin.sensing.fit.candidates.Matched has them.
+#[derive(FromPyObject)]
+struct CandidateArrays<'py> {
+    spots: Any<'py>,
+    signatures: Any<'py>,
+    squares: Any<'py>,
+}
+
+/// Whitened data of a frame, as tomoskin.sensing.fit.problem.Problem has them; see `Frame`.
+#[derive(FromPyObject)]
+struct FrameArrays<'py> {
+    data: Any<'py>,
+    rest: f64,
+    left: Any<'py>,
+    reach: f64,
+    grows: f64,
+    depths: [f64; 2],
+    expected: ExpectedArrays<'py>,
+}
+
+/// Touches that are expected, as tomoskin.sensing.fit.expectation.Expectation has them.
+#[derive(FromPyObject)]
+struct ExpectedArrays<'py> {
+    spots: Any<'py>,
+    covariances: Any<'py>,
+}
+
+impl ExpectedArrays<'_> {
+    /// Of spots (m, 4), covariances (m, 3, 3), and what contents take up of a volume.
+    fn expected(&self, content: f64) -> PyResult<Vec<Expected>> {
+        let spots = spots_of(&self.spots)?;
+        let spreads = array::<f64, Ix3>("covariances", &self.covariances)?;
+        let entries = spots.len() * CONTENT * CONTENT;
+        same("entries of covariances", entries, spreads.len())?;
+        let spreads = spreads.as_array();
+        let one = |(number, &middle): (usize, &Spot)| {
+            let spread = std::array::from_fn(|i| std::array::from_fn(|j| spreads[(number, i, j)]));
+            let expected = Expected::of(middle, &spread, content);
+            expected.ok_or_else(|| invalid("covariances: not positive"))
+        };
+        spots.iter().enumerate().map(one).collect()
+    }
+}
 
 /// A frame's arrays, checked.
 struct Arrays<'py> {
@@ -256,10 +298,15 @@ struct Arrays<'py> {
 }
 
 impl<'py> Arrays<'py> {
-    fn of(table: &SpotTable, seen: &SeenTable, frame: &FrameArrays<'py>) -> PyResult<Self> {
-        let data = array::<f64, Ix1>("data", &frame.0)?;
-        let left = array::<f64, Ix2>("left", &frame.2)?;
-        let offset = array::<f64, Ix1>("offset", &frame.3)?;
+    fn of(
+        table: &SpotTable,
+        seen: &SeenTable,
+        frame: &FrameArrays<'py>,
+        offset: &Any<'py>,
+    ) -> PyResult<Self> {
+        let data = array::<f64, Ix1>("data", &frame.data)?;
+        let left = array::<f64, Ix2>("left", &frame.left)?;
+        let offset = array::<f64, Ix1>("offset", offset)?;
         same("length of data", seen.seen.rows, data.len())?;
         same("columns of left", seen.seen.rows, left.shape()[1])?;
         same("length of offset", table.layout.rank, offset.len())?;
@@ -268,13 +315,13 @@ impl<'py> Arrays<'py> {
             table.layout.rank * seen.seen.rows,
             seen.seen.timed.len(),
         )?;
-        let values = table.values.bind(frame.0.py()).try_readonly()?;
+        let values = table.values.bind(data.py()).try_readonly()?;
         Ok(Self {
             data,
             left,
             offset: seen.seen.whitened(contiguous("offset", &offset)?).values,
             values,
-            expected: expected_of(&frame.6)?,
+            expected: frame.expected.expected(table.prior.log_content)?,
         })
     }
 
@@ -290,30 +337,45 @@ impl<'py> Arrays<'py> {
             sheet: &table.sheet,
             prior: &table.prior,
             data: contiguous("data", &self.data)?,
-            rest: frame.1,
+            rest: frame.rest,
             left: contiguous("left", &self.left)?,
             offset: &self.offset,
-            deviations: frame.4,
-            depths: frame.5,
+            reach: frame.reach,
+            grows: frame.grows,
+            depths: frame.depths,
             expected: &self.expected,
         })
     }
 }
 
-fn fitted(py: Python<'_>, fit: Fit) -> Fitted<'_> {
+fn fitted(py: Python<'_>, fit: Fit) -> PyResult<Fitted<'_>> {
     let spots = Matrix {
         values: fit.spots.concat(),
         height: PARAMETERS,
     };
-    let unknown = fit.metric.unknown;
-    let matrices = [spots, fit.each, fit.jacobian, unknown, fit.normal];
-    let vectors = [fit.change, fit.predicted, fit.residual, fit.gradient];
-    (
-        matrices.map(|matrix| by_rows(py, matrix)),
-        vectors.map(|vector| PyArray1::from_vec(py, vector)),
-        (fit.misfit, fit.metric.log_size, fit.cost, fit.settled),
-        fit.known,
-    )
+    Ok(Fitted {
+        spots: by_rows(py, spots),
+        each: by_rows(py, fit.each),
+        slopes: by_rows(py, fit.jacobian),
+        unknown: by_rows(py, fit.metric.unknown),
+        normal: by_rows(py, fit.normal),
+        change: PyArray1::from_vec(py, fit.change),
+        predicted: PyArray1::from_vec(py, fit.predicted),
+        residual: PyArray1::from_vec(py, fit.residual),
+        gradient: PyArray1::from_vec(py, fit.gradient),
+        misfit: fit.misfit,
+        log_size: fit.metric.log_size,
+        cost: fit.cost,
+        settled: fit.settled,
+        known: PyTuple::new(py, fit.known)?,
+    })
+}
+
+/// One number for each column of a spot.
+fn columns_of(name: &str, value: &Any<'_>) -> PyResult<Spot> {
+    let value = array::<f64, Ix1>(name, value)?;
+    same(name, PARAMETERS, value.len())?;
+    Ok(std::array::from_fn(|i| value.as_array()[i]))
 }
 
 pub(crate) fn signatures_of<'a>(
@@ -330,15 +392,6 @@ pub(crate) fn signatures_of<'a>(
         narrow: signatures.shape()[1],
         squares: contiguous("squares", squares)?,
     })
-}
-
-pub(crate) fn limits_of([low, high, least, useful, ridge]: [f64; 5]) -> Limits {
-    Limits {
-        content: [low, high],
-        least,
-        useful,
-        ridge,
-    }
 }
 
 #[pymethods]
@@ -378,22 +431,22 @@ impl SeenTable {
         })
     }
 
-    /// Squares of what each spot of a fit changes beside the others, and the covariance (4k, 4k).
-    ///
-    /// `fit`: each, slopes, unknown and normal; `change` (rank) what all spots change; `quality` in
-    /// the order of its fields.
+    /// Squares of what each spot of a fit changes beside the others, and the covariance (4k, 4k);
+    /// `change` (rank) what all spots change.
     fn judged<'py>(
         &self,
-        fit: [Any<'py>; 4],
+        fit: FitArrays<'py>,
         change: &Any<'py>,
-        quality: [f64; 3],
+        uneven: f64,
         ridge: f64,
     ) -> PyResult<Judged<'py>> {
         let py = change.py();
-        let [each, slopes, unknown, normal] = fit;
-        let [each, slopes, unknown] =
-            directions([("each", &each), ("slopes", &slopes), ("unknown", &unknown)])?;
-        let normal = array::<f64, Ix2>("normal", &normal)?;
+        let [each, slopes, unknown] = directions([
+            ("each", &fit.each),
+            ("slopes", &fit.slopes),
+            ("unknown", &fit.unknown),
+        ])?;
+        let normal = array::<f64, Ix2>("normal", &fit.normal)?;
         let change = array::<f64, Ix1>("change", change)?;
         let n = PARAMETERS * each.shape()[0];
         same("length of each", self.seen.rows, each.shape()[1])?;
@@ -409,10 +462,9 @@ impl SeenTable {
             values: contiguous("normal", &normal)?.to_vec(),
             height: n,
         };
-        let [misfit, degrees, uneven] = quality;
         let quality = Quality {
-            misfit,
-            degrees,
+            misfit: fit.misfit,
+            degrees: fit.degrees,
             uneven,
         };
         let out = py.detach(|| {

@@ -1,6 +1,6 @@
 //! What stands for the exact model of several spots, and how wrong it may be.
 //!
-//! As `Reduced` in tomoskin/sensing/fit/certificate.py; the interaction is that of interaction.py.
+//! As `Reduced` in tomoskin/sensing/fit/certificate.py.
 
 use crate::dense::Matrix;
 use crate::small::{dots, product};

@@ -14,37 +14,55 @@ pub(crate) struct Reduced {
     certificate: Certificate,
 }
 
+/// As tomoskin.sensing.fit.certificate.Interaction has it.
+#[derive(FromPyObject)]
+struct InteractionArrays<'py> {
+    centres: Any<'py>,
+    spread: f64,
+    fields: Any<'py>,
+    between: Any<'py>,
+}
+
+/// As tomoskin.sensing.fit.certificate.Certificate has it.
+#[derive(FromPyObject)]
+struct CertificateArrays<'py> {
+    like: Any<'py>,
+    parts: Any<'py>,
+    margin: f64,
+    moved: f64,
+}
+
 #[pymethods]
 impl Reduced {
-    /// `profile`: reach, filling, scales, and of the bell narrow, height and part; `interaction`:
-    /// centres, spread, fields, between; `certificate`: like, parts, rim; `numbers`: margin, moved,
-    /// a median radius; `neighbours` that tell of a spot.
+    /// `profile`: reach, filling, scales, and of the bell narrow, height and part; `rim`: points,
+    /// and a median `radius`; `neighbours` that tell of a spot.
     #[new]
     fn new(
         profile: [f64; 6],
-        interaction: (Any<'_>, f64, Any<'_>, Any<'_>),
-        certificate: [Any<'_>; 3],
-        numbers: [f64; 3],
+        interaction: InteractionArrays<'_>,
+        certificate: CertificateArrays<'_>,
+        rim: &Any<'_>,
+        radius: f64,
         neighbours: usize,
     ) -> PyResult<Self> {
-        let (centres, spread, fields, between) = interaction;
-        let fields = array::<f32, Ix3>("fields", &fields)?;
-        let between = array::<f32, Ix2>("between", &between)?;
-        let centres = points_of("centres", &centres)?;
+        let fields = array::<f32, Ix3>("fields", &interaction.fields)?;
+        let between = array::<f32, Ix2>("between", &interaction.between)?;
+        let centres = points_of("centres", &interaction.centres)?;
         let all = 2 * centres.len();
         same("patches of fields", centres.len(), fields.shape()[0])?;
         same("axes of fields", 2, fields.shape()[1])?;
         same("rows of between", all, between.shape()[0])?;
         same("columns of between", all, between.shape()[1])?;
-        let [like, parts, rim] = certificate;
-        let (like, rim) = (points_of("like", &like)?, points_of("rim", &rim)?);
-        let parts = array::<f64, Ix1>("parts", &parts)?;
+        let (like, rim) = (
+            points_of("like", &certificate.like)?,
+            points_of("rim", rim)?,
+        );
+        let parts = array::<f64, Ix1>("parts", &certificate.parts)?;
         same("parts", like.len(), parts.len())?;
         if all == 0 || like.is_empty() || neighbours == 0 {
             return Err(invalid("patches, spots and neighbours: one at least"));
         }
         let [reach, filling, scales, narrow, height, part] = profile;
-        let [margin, moved, radius] = numbers;
         Ok(Self {
             interaction: Interaction {
                 profile: Profile {
@@ -54,7 +72,7 @@ impl Reduced {
                     bell: [narrow, height, part],
                 },
                 centres,
-                spread,
+                spread: interaction.spread,
                 fields: contiguous("fields", &fields)?.to_vec(),
                 between: contiguous("between", &between)?.to_vec(),
             },
@@ -62,8 +80,8 @@ impl Reduced {
                 like,
                 squares: parts.as_array().iter().map(|part| part * part).collect(),
                 neighbours,
-                margin,
-                moved,
+                margin: certificate.margin,
+                moved: certificate.moved,
                 rim,
                 radius,
             },

@@ -1,6 +1,7 @@
 //! How many touches a frame holds: one more as long as the evidence for it grows.
 //!
-//! As `ForwardSelection` in tomoskin/sensing/fit/selection.py, of which it does what needs no exact model.
+//! As `ForwardSelection` in tomoskin/sensing/fit/selection.py, of which it does what needs no exact
+//! model. The numbers by which it decides come from tomoskin/sensing/fit/policy.py, by their names.
 
 use std::f64::consts::TAU;
 
@@ -9,8 +10,9 @@ use crate::spot_fit::{Fit, Frame, Known};
 use crate::spot_match::{Limits, Signatures, standing, standing_out};
 use crate::spot_table::{PARAMETERS, Spot};
 
-/// How much is tried in a frame; see `Pace` in tomoskin/sensing/fit/pace.py.
+/// How much is tried in a frame; see `Pace` in tomoskin/sensing/fit/policy.py.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "python", derive(pyo3::FromPyObject))]
 pub struct Pace {
     /// Steps from the touches of the frame before.
     pub warm: usize,
@@ -22,33 +24,34 @@ pub struct Pace {
     pub finalists: usize,
     /// New touches that are tried.
     pub tries: usize,
-    /// Touches at most.
-    pub most: usize,
+    /// Part of the ratio at which a touch begins from which a further one is tried.
+    pub look: f64,
+    /// Logarithm of the odds against a touch's beginning in a frame.
+    pub rare: f64,
     /// Whether a frame that changes is looked at from nothing too.
     pub restart: bool,
 }
 
-/// What counts as a touch.
+/// What counts as a touch; see `DetectionPolicy` in tomoskin/sensing/fit/policy.py.
 #[derive(Clone, Copy, Debug)]
-pub struct Rules {
+#[cfg_attr(feature = "python", derive(pyo3::FromPyObject))]
+pub struct Policy {
     /// Likelihood ratio, in deviations, at which a touch begins.
     pub least: f64,
+    /// Touches at most.
+    pub most: usize,
+    /// See there.
+    pub pace: Pace,
     /// Part of that at which it stays.
     pub held: f64,
-    /// Part of that from which a further one is tried.
-    pub look: f64,
     /// Times the ratio at which one begins from which no frame is explained better without it.
     pub sure: f64,
-    /// Logarithm of the odds against a touch's beginning in a frame.
-    pub rare: f64,
     /// Part of what touches change that a wrong profile may leave.
     pub misshapen: f64,
     /// Radii within which there is no room for another touch.
     pub within: f64,
     /// Radii within which a touch may stand for what the profile of another one does not say.
     pub near: f64,
-    /// Logarithm of the volume of a spot's prior.
-    pub volume: f64,
 }
 
 /// A fit, and whether it was made without what the table lacks.
@@ -81,9 +84,7 @@ pub struct Search<'a> {
     /// What counts of candidates.
     pub limits: Limits,
     /// See there.
-    pub pace: Pace,
-    /// See there.
-    pub rules: Rules,
+    pub policy: Policy,
 }
 
 impl Search<'_> {
@@ -98,18 +99,18 @@ impl Search<'_> {
             0 => 0,
             k => before.len() - k,
         };
-        let tries = self.pace.tries as isize - lost as isize;
+        let tries = self.policy.pace.tries as isize - lost as isize;
         let (mut found, tried, changed) = self.more(kept, tries)?;
         if tries > tried && tried == 0 {
             found = self.fewer(found, weakest)?;
         }
-        let astray = if self.pace.restart {
+        let astray = if self.policy.pace.restart {
             found.fit.spots.len() != before.len() || !found.fit.settled
         } else {
             tried > 0 && !changed
         };
         if !before.is_empty() && astray {
-            let (fresh, ..) = self.more(self.nothing()?, self.pace.tries as isize)?;
+            let (fresh, ..) = self.more(self.nothing()?, self.policy.pace.tries as isize)?;
             if self.evidence(&fresh.fit) >= self.evidence(&found.fit) {
                 found = fresh;
             }
@@ -135,8 +136,13 @@ impl Search<'_> {
         if before.is_empty() {
             return self.nothing();
         }
-        let most = before.len().min(self.pace.most);
-        self.refined(&before[..most], &known[..most], false, self.pace.warm)
+        let most = before.len().min(self.policy.most);
+        self.refined(
+            &before[..most],
+            &known[..most],
+            false,
+            self.policy.pace.warm,
+        )
     }
 
     fn without(&self, fit: &Fit, number: usize) -> Option<Found> {
@@ -147,7 +153,7 @@ impl Search<'_> {
     fn pruned(&self, mut found: Found) -> Option<(Found, (usize, f64))> {
         while !found.fit.spots.is_empty() {
             let (weakest, ratio) = self.weakest(&found.fit)?;
-            if ratio >= self.rules.held * self.rules.least {
+            if ratio >= self.policy.held * self.policy.least {
                 return Some((found, (weakest, ratio)));
             }
             found = self.without(&found.fit, weakest)?;
@@ -163,9 +169,9 @@ impl Search<'_> {
         let enough = if found.fit.settled {
             1.0
         } else {
-            self.rules.sure
+            self.policy.sure
         };
-        if ratio >= enough * self.rules.least {
+        if ratio >= enough * self.policy.least {
             return Some(found);
         }
         let fewer = self.without(&found.fit, weakest)?;
@@ -175,7 +181,7 @@ impl Search<'_> {
 
     /// With further spots, while they are worth it; how many were tried, and whether one was.
     fn more(&self, mut found: Found, tries: isize) -> Option<(Found, isize, bool)> {
-        let room = self.pace.most as isize - found.fit.spots.len() as isize;
+        let room = self.policy.most as isize - found.fit.spots.len() as isize;
         let mut changed = false;
         for tried in 0..tries.min(room) {
             let fit = &found.fit;
@@ -187,11 +193,11 @@ impl Search<'_> {
             let [ratios, contents] = standing_out(self.signatures, parts, self.limits)?;
             let (best, ratio) = largest(&ratios)?;
             let content = contents[best];
-            let held = self.rules.held;
+            let held = self.policy.held;
             let part = if fit.spots.is_empty() {
                 held
             } else {
-                self.rules.look
+                self.policy.pace.look
             };
             let few = ratio < self.threshold(fit, part);
             found.others = Some([ratios, contents]);
@@ -204,7 +210,7 @@ impl Search<'_> {
             let more = self.best(&starts(fit, fresh), found.bare)?;
             let worth = self.weakest(&more.fit)?.1 >= self.threshold(fit, 1.0);
             let gain = self.evidence(&more.fit) - self.evidence(fit);
-            if !worth || gain <= self.rules.rare + self.against(fit, &more.fit) {
+            if !worth || gain <= self.policy.pace.rare + self.against(fit, &more.fit) {
                 found.turned_down = Some(more.fit);
                 return Some((found, tried + 1, changed));
             }
@@ -215,15 +221,16 @@ impl Search<'_> {
 
     /// The most evident of those that come out best after a glance.
     fn best(&self, starts: &[Start], bare: bool) -> Option<Found> {
-        let glance = |(start, known): &Start| self.refined(start, known, bare, self.pace.glance);
+        let glance =
+            |(start, known): &Start| self.refined(start, known, bare, self.policy.pace.glance);
         let mut fits: Vec<Found> = starts.iter().map(glance).collect::<Option<_>>()?;
         fits.sort_by(|one, other| one.fit.cost.total_cmp(&other.fit.cost));
-        fits.truncate(self.pace.finalists);
+        fits.truncate(self.policy.pace.finalists);
         let mut best: Option<(f64, Found)> = None;
         for mut found in fits {
             if !found.fit.settled {
                 let Fit { spots, known, .. } = &found.fit;
-                found = self.refined(spots, known, bare, self.pace.cold)?;
+                found = self.refined(spots, known, bare, self.policy.pace.cold)?;
             }
             let evidence = self.evidence(&found.fit);
             if best.as_ref().is_none_or(|(most, _)| evidence > *most) {
@@ -244,13 +251,13 @@ impl Search<'_> {
 
     /// What a wrong profile may leave adds to the noise.
     fn threshold(&self, fit: &Fit, part: f64) -> f64 {
-        part * self.rules.least * 1.0_f64.hypot(self.misshapen(fit) / self.rules.least)
+        part * self.policy.least * 1.0_f64.hypot(self.misshapen(fit) / self.policy.least)
     }
 
     /// Deviations that a wrong profile of the spots of a fit may leave.
     fn misshapen(&self, fit: &Fit) -> f64 {
         let square: f64 = fit.predicted.iter().map(|value| value * value).sum();
-        self.rules.misshapen * square.sqrt()
+        self.policy.misshapen * square.sqrt()
     }
 
     /// Logarithm of the odds that a wrong profile of what was found may give to a fit with one
@@ -265,9 +272,9 @@ impl Search<'_> {
                 }
             }
         }
-        if least < self.rules.within {
+        if least < self.policy.within {
             f64::INFINITY
-        } else if least < self.rules.near {
+        } else if least < self.policy.near {
             self.misshapen(found).powi(2) / 2.0
         } else {
             0.0
@@ -287,7 +294,7 @@ impl Search<'_> {
         let new = fit.known.iter().filter(|known| known.is_none()).count();
         let orders: f64 = (1..=new).map(|i| (i as f64).ln()).sum();
         let volume = n as f64 * TAU.ln() / 2.0 - half_log_det;
-        let prior = orders - new as f64 * self.rules.volume - old;
+        let prior = orders - new as f64 * self.frames[0].prior.log_volume - old;
         prior + volume - fit.cost - fit.metric.log_size
     }
 }

@@ -23,6 +23,7 @@ from tomoskin.files.session import session_info
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import colour_limit, prepare
 from tomoskin.run import Runner, commands
+from tomoskin.run.sinks import Item, Sink, Stream
 from tomoskin.server import AccessPolicy, Hub, Server, application, listen
 from tomoskin.twin import Faults, Line, LineSettings, Press, TwinSettings, TwinTransport, make_twin
 
@@ -113,7 +114,7 @@ class BadDay:
             self._pulled = True
 
 
-class Hanging:
+class Hanging(Sink):
     """A sink that takes one result and never comes back."""
 
     name = "hanging"
@@ -121,10 +122,10 @@ class Hanging:
     def __init__(self) -> None:
         self._never = threading.Event()
 
-    def open(self, stream: object) -> None:
+    def open(self, stream: Stream) -> None:
         """Nothing to open."""
 
-    def publish(self, item: object) -> None:  # noqa: ARG002
+    def publish(self, item: Item) -> None:  # noqa: ARG002
         """Hang until it is closed."""
         self._never.wait()
 

@@ -94,7 +94,7 @@ class FitFinder:
         scan_time = min(longest, between)
         spots = SpotFinder(
             model, skin, prepared.mesh, noise, gain,
-            scan_time=scan_time, interval=between, pace=pace,
+            pace=replace(pace, scan_time=scan_time, interval=between),
         )  # fmt: skip
         return cls(model, spots, _voltage_ratio(model, reference), pace, interval)
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
+from tomoskin.core import finished
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import triangulate
 from tomoskin.model.skin import Skin
@@ -34,7 +35,7 @@ def voltages(skin, grain, factor=1.3):
 
 @pytest.mark.parametrize("grain", [(-0.1, 0.0), (0.08, -0.15)])
 def test_a_reference_tells_along_which_way_a_sheet_conducts(skin, spots, grain):
-    told = spots.fitted_to(voltages(skin, grain))
+    told = finished(spots.fitting(voltages(skin, grain)))
     size = np.hypot(*grain)
     metric = told.response.state.model.mesh.metric
     wanted = expm(-np.array([[grain[0], grain[1]], [grain[1], -grain[0]]]))
@@ -43,15 +44,15 @@ def test_a_reference_tells_along_which_way_a_sheet_conducts(skin, spots, grain):
 
 
 def test_a_sheet_that_conducts_alike_in_all_directions_stays_as_it_is(skin, spots):
-    assert spots.fitted_to(voltages(skin, (0.005, 0.0))) is spots
+    assert finished(spots.fitting(voltages(skin, (0.005, 0.0)))) is spots
     uneven = voltages(skin, (0.0, 0.0)) * np.exp(
         0.2 * np.random.default_rng(1).standard_normal(208)
     )
-    assert spots.fitted_to(uneven) is spots
+    assert finished(spots.fitting(uneven)) is spots
 
 
 def test_rows_without_a_value_do_not_count(skin, spots):
     lacking = voltages(skin, (-0.1, 0.0))
     lacking[::7] = np.nan
-    metric = spots.fitted_to(lacking).response.state.model.mesh.metric
+    metric = finished(spots.fitting(lacking)).response.state.model.mesh.metric
     assert metric[0] == pytest.approx(np.diag(np.exp([0.1, -0.1])), abs=0.005)

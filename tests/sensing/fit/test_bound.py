@@ -13,13 +13,11 @@ from tomoskin.model.skin import Skin
 from tomoskin.sensing.fit import (
     Response,
     Whitener,
-    detection_bound,
-    fisher_information,
-    least_content,
     position_bound,
     row_covariance,
     spots_of,
 )
+from tomoskin.sensing.fit.bounds import detection_bound, fisher_information, least_content
 from tomoskin.sensing.signal import Readout
 
 ALONG = np.column_stack([np.linspace(0.0, 0.085, 8), np.zeros(8)])

@@ -12,7 +12,8 @@ from sensing.fit.test_table import by_table, problem
 from tomoskin.core import FloatArray
 from tomoskin.sensing.fit import LIVE, Response
 from tomoskin.sensing.fit.certificate import drawn_spots
-from tomoskin.sensing.fit.refine import Deficit, Fit, Problem
+from tomoskin.sensing.fit.problem import Problem
+from tomoskin.sensing.fit.spot_fit import Deficit, Fit
 
 APART = np.concatenate([press(-0.045, 0.0, 0.018, -0.15), press(0.045, 0.0, 0.018, -0.15)])
 STRONG = np.concatenate([press(-0.02, 0.0, 0.025, -1.5), press(0.025, 0.0, 0.025, -1.5)])
@@ -31,7 +32,7 @@ def fitted(spots: FloatArray) -> tuple[Problem, Fit]:
 
 
 def live(frame: Problem, fit: Fit) -> Fit:
-    return frame.corrected(fit, LIVE.closing, LIVE.near, LIVE.tolerance)
+    return frame.corrected(fit, LIVE, LIVE.closing)
 
 
 @pytest.mark.parametrize(("apart", "most"), [(0.045, 0.3), (0.07, 0.2)])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -19,7 +21,7 @@ DEVIATION = 1 / float(np.linalg.norm(whitener()(MEAN)))
 
 def finder(pace: Pace = LIVE) -> SpotFinder:
     own = covariance() + np.outer(MEAN, MEAN) * 1e-4**2
-    return SpotFinder(model(), skin(), skin().mesh(), own, scan_time=0.05, pace=pace)
+    return SpotFinder(model(), skin(), skin().mesh(), own, pace=replace(pace, scan_time=0.05))
 
 
 def counts(ours: SpotFinder, frames: FloatArray) -> list[int]:
@@ -94,8 +96,7 @@ def test_numpy_decides_as_native_code_does() -> None:
         skin(),
         skin().mesh(),
         covariance() + np.outer(MEAN, MEAN) * 1e-4**2,
-        scan_time=0.05,
-        pace=LIVE,
+        pace=replace(LIVE, scan_time=0.05),
     )
     for frame in frames:
         ours, theirs = (f.push(frame, NOTHING, JUMPS) for f in (native, numpy))

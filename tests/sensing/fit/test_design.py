@@ -16,12 +16,12 @@ from tomoskin.sensing.fit import (
     ResolutionBounds,
     Response,
     Whitener,
-    detection_bound,
     resolution_bounds,
     row_covariance,
     spots_of,
     variants,
 )
+from tomoskin.sensing.fit.bounds import detection_bound
 from tomoskin.sensing.signal import Readout
 
 PLACES = 40

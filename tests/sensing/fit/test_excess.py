@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tomoskin.core import finished
 from tomoskin.model.pattern import Pattern, Scan
 from tomoskin.sensing.fit import row_covariance
 from tomoskin.sensing.fit.excess import Channels, Excess, Gauge
@@ -14,7 +15,7 @@ SCAN = Scan.of(PATTERN)
 NOISE = row_covariance(SCAN, 1.0) / 2
 CHANNELS = Channels.of(PATTERN)
 NOTHING = np.zeros((PATTERN.n_meas, 0))
-GAUGE = Gauge.of(CHANNELS, NOISE, NOTHING)
+GAUGE = finished(Gauge.making(CHANNELS, NOISE, NOTHING))
 
 
 def frames(count, seed, times=1.0, electrode=None):
@@ -28,7 +29,7 @@ def frames(count, seed, times=1.0, electrode=None):
 def followed(excess, data, noise=NOISE):
     last = data[0]
     for dv in data:
-        gauge = Gauge.of(CHANNELS, excess.added(noise, CHANNELS), NOTHING)
+        gauge = finished(Gauge.making(CHANNELS, excess.added(noise, CHANNELS), NOTHING))
         excess = excess.after(gauge.squares(dv, dv - last), gauge)
         last = dv
     return excess
@@ -89,6 +90,6 @@ def test_what_a_touch_changes_is_no_noise():
 def test_rows_without_a_reciprocal_say_nothing():
     alone = Pattern.from_tables(np.tile([0, 1], (3, 1)), np.array([[2, 3], [3, 4], [4, 5]]), 6)
     channels = Channels.of(alone)
-    gauge = Gauge.of(channels, np.eye(3), np.zeros((3, 0)))
+    gauge = finished(Gauge.making(channels, np.eye(3), np.zeros((3, 0))))
     wild = np.full(3, 1e6)
     assert not Excess.none(channels).after(gauge.squares(wild, wild), gauge).any

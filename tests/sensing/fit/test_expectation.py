@@ -12,7 +12,7 @@ from scipy.stats import multivariate_normal
 from sensing.fit.test_finder import model
 from sensing.fit.test_table import TWO, expected, problem
 from tomoskin.sensing.fit.expectation import Expectation, less, newcomers
-from tomoskin.sensing.fit.refine import Deficit
+from tomoskin.sensing.fit.spot_fit import Deficit
 
 
 def test_density_of_what_is_expected() -> None:

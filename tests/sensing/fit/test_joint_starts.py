@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sensing.fit.scene import noise, whitener
+from sensing.fit.scene import noise
 from sensing.fit.test_finder import data, finder, model, press
+from sensing.fit.test_table import whitened
 from tomoskin.core import FloatArray
-from tomoskin.sensing.fit.joint_starts import JointStarts
-from tomoskin.sensing.fit.refine import WhitenedTable
+from tomoskin.sensing.fit.candidates import JointStarts
 
 THREE = np.concatenate(
     [press(*at, depth=-0.1) for at in ((-0.05, 0.03), (0.0, 0.03), (0.05, -0.04))]
@@ -18,9 +18,9 @@ NOTHING = np.zeros((208, 0))
 
 
 def starts(spots: FloatArray, sign: str = "decrease") -> JointStarts:
-    seen = WhitenedTable.of(model().solver, whitener(), model().response.times)
-    whitened = seen.matrix[: seen.narrow] @ (data(spots) + noise(16, 1, 1)[0])
-    return JointStarts.of(model().candidates.matched(seen), whitened, model().prior, sign)
+    seen = whitened(model().solver)
+    volts = seen.matrix[: seen.narrow] @ (data(spots) + noise(16, 1, 1)[0])
+    return JointStarts.of(model().candidates.matched(seen), volts, model().prior, sign)
 
 
 def missed(found: FloatArray, spots: FloatArray) -> float:

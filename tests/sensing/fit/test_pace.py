@@ -13,7 +13,8 @@ from sensing.fit.test_finder import NOTHING, data, model, place, press, skin, sp
 from tomoskin.core import Detection, FloatArray
 from tomoskin.sensing.fit import EXHAUSTIVE, LIVE, Pace, SpotFinder
 from tomoskin.sensing.fit.expectation import Known
-from tomoskin.sensing.fit.refine import Answer, Deficit, Fit, Limits, Problem, Question, Solver
+from tomoskin.sensing.fit.problem import Limits, Matched, Problem, Solver
+from tomoskin.sensing.fit.spot_fit import Deficit, Fit
 
 SCAN = 0.1
 """Seconds of a scan."""
@@ -25,7 +26,11 @@ LEFT = 0.12
 
 def finder(pace: Pace = LIVE, scan_time: float = SCAN) -> SpotFinder:
     return SpotFinder(
-        model(), skin(), skin().mesh(), covariance(), scan_time=scan_time, interval=SCAN, pace=pace
+        model(),
+        skin(),
+        skin().mesh(),
+        covariance(),
+        pace=replace(pace, scan_time=scan_time, interval=SCAN),
     )
 
 
@@ -104,23 +109,18 @@ class Counting:
         return self._solver.standing(left, fit)
 
     def standing_out(
-        self, signatures: FloatArray, squares: FloatArray, fit: Fit, limits: Limits
+        self, matched: Matched, fit: Fit, limits: Limits
     ) -> tuple[FloatArray, FloatArray]:
-        return self._solver.standing_out(signatures, squares, fit, limits)
+        return self._solver.standing_out(matched, fit, limits)
 
     def judged(self, problem: Problem, fit: Fit, uneven: float) -> tuple[FloatArray, FloatArray]:
         return self._solver.judged(problem, fit, uneven)
 
-    def searched(self, question: Question, before: FloatArray) -> Answer | None:
-        """None: the search goes step by step, which comes to the same."""
+    def searched(self, *question: Any) -> None:
+        """The search goes step by step, which comes to the same."""
 
     def settled(
-        self,
-        problem: Problem,
-        spots: FloatArray,
-        deficit: Deficit,
-        most: int,
-        known: Known = (),
+        self, problem: Problem, spots: FloatArray, deficit: Deficit, most: int, known: Known = ()
     ) -> Fit:
         self.steps += 1 + most
         return self._solver.settled(problem, spots, deficit, most, known)
@@ -131,7 +131,11 @@ def test_a_frame_has_a_bounded_number_of_steps() -> None:
     counted = replace(model())
     vars(counted)["solver"] = counting
     ours = SpotFinder(
-        counted, skin(), skin().mesh(), covariance(), scan_time=SCAN, interval=SCAN, pace=LIVE
+        counted,
+        skin(),
+        skin().mesh(),
+        covariance(),
+        pace=replace(LIVE, scan_time=SCAN, interval=SCAN),
     )
     three = np.concatenate([press(-0.05, 0.0), press(0.05, 0.02), press(0.0, -0.06)])
     frames = [*[three] * 4, np.add(three, [0.01, 0.0, 0.0, 0.0]), STANDING, three]

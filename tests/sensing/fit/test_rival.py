@@ -12,11 +12,12 @@ from sensing.fit.test_pace import finder
 from sensing.fit.test_table import expected, problem
 from tomoskin.core import FloatArray
 from tomoskin.sensing.fit import LIVE
+from tomoskin.sensing.fit.detections import judged
 from tomoskin.sensing.fit.expectation import Expectation
-from tomoskin.sensing.fit.refine import Deficit
-from tomoskin.sensing.fit.rival import challenged
-from tomoskin.sensing.fit.search import judged
+from tomoskin.sensing.fit.hypotheses import challenged
+from tomoskin.sensing.fit.policy import DetectionPolicy
 from tomoskin.sensing.fit.selection import ForwardSelection
+from tomoskin.sensing.fit.spot_fit import Deficit
 
 STRONG = press(0.03, 0.0, depth=-0.5)
 
@@ -48,7 +49,7 @@ def test_a_touch_that_left_its_place_in_vain_goes_back_and_another_has_begun() -
     frame = replace(freely, expected=expected(faint[:1]))
     deficit = Deficit.none(len(model().solver.table.basis))
     matched = model().candidates.matched(frame.seen)
-    selection = ForwardSelection(frame, matched, 5.0, 5, LIVE, deficit)
+    selection = ForwardSelection(frame, matched, DetectionPolicy(5.0, "decrease", 5, LIVE), deficit)
     between = freely.refined(faint.mean(axis=0)[None], deficit, 12).spots
     moved = judged(selection, frame.refined(between, deficit, 0, (0,)))
     assert selection.proposed(moved.fit) is None

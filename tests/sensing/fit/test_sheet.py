@@ -9,13 +9,12 @@ import pytest
 
 from sensing.fit.scene import covariance, noise
 from sensing.fit.test_finder import NOTHING, model, place, skin, spread
-from tomoskin.core import FloatArray
+from tomoskin.core import FloatArray, finished
 from tomoskin.model.forward import ForwardModel, State
 from tomoskin.model.mesh import triangulate
 from tomoskin.sensing.fit import SpotFinder
-from tomoskin.sensing.fit.channels import channel_errors
-from tomoskin.sensing.fit.random_field import field_modes
-from tomoskin.sensing.fit.sheet import fitted_sheet
+from tomoskin.sensing.fit.sheet import fitting_sheet
+from tomoskin.sensing.fit.sheet_terms import channel_errors, field_modes
 
 UNEVEN = 0.2
 """Height of the waves of log σ: a standard deviation of 14 %."""
@@ -48,7 +47,7 @@ def pressed() -> FloatArray:
 
 def test_an_uneven_sheet_is_seen_as_it_is() -> None:
     rest = model().response.state
-    found = fitted_sheet(rest, uneven().voltages, 5e-6)
+    found = finished(fitting_sheet(rest, uneven().voltages, 5e-6))
     true = waves(rest.model.mesh.centroids)
     seen = np.log(found.conductivity / rest.conductivity)
     left = (seen - seen.mean()) - (true - true.mean())
@@ -61,7 +60,7 @@ def test_an_even_sheet_stays_as_it_is() -> None:
     ours, rest = skin(), model().response.state
     mesh = triangulate(ours.outline, ours.arcs, 5000, seed=23)
     even = ForwardModel(mesh, ours.pattern(), ours.contact_impedance, ours.current)
-    assert fitted_sheet(rest, even.solve(ours.conductivity).voltages, 5e-6) is rest
+    assert finished(fitting_sheet(rest, even.solve(ours.conductivity).voltages, 5e-6)) is rest
 
 
 def test_contacts_and_channels_are_no_unevenness() -> None:
@@ -69,7 +68,7 @@ def test_contacts_and_channels_are_no_unevenness() -> None:
     rest, random = model().response.state, np.random.default_rng(3)
     errors = channel_errors(rest)
     reference = rest.voltages + errors @ random.standard_normal(errors.shape[1])
-    found = fitted_sheet(rest, reference, 5e-6)
+    found = finished(fitting_sheet(rest, reference, 5e-6))
     assert np.log(found.conductivity / rest.conductivity).std() < 0.01
 
 
@@ -77,15 +76,15 @@ def test_rows_without_a_value_do_not_count_and_too_few_tell_nothing() -> None:
     rest, reference = model().response.state, uneven().voltages.copy()
     reference[::5] = np.nan
     true = waves(rest.model.mesh.centroids)
-    seen = np.log(fitted_sheet(rest, reference, 5e-6).conductivity)
+    seen = np.log(finished(fitting_sheet(rest, reference, 5e-6)).conductivity)
     assert np.corrcoef(seen, true)[0, 1] > 0.95
     reference[20:] = np.nan
-    assert fitted_sheet(rest, reference, 5e-6) is rest
+    assert finished(fitting_sheet(rest, reference, 5e-6)) is rest
 
 
 def test_a_press_on_an_uneven_sheet_is_nearer_to_where_it_is() -> None:
     state, plain = uneven(), model()
-    fitted = plain.fitted_to(state.voltages, 5e-6)
+    fitted = finished(plain.fitting(state.voltages, 5e-6))
     clean, errors = pressed(), []
     for spots in (plain, fitted):
         modelled = spots.response.reference

@@ -10,13 +10,15 @@ import pytest
 
 from sensing.fit.scene import noise, whitener
 from sensing.fit.test_finder import data, model, press
-from tomoskin.core import FloatArray
+from tomoskin.core import FloatArray, finished
 from tomoskin.sensing.fit import EXHAUSTIVE, LIVE
 from tomoskin.sensing.fit.expectation import Expectation, Known
 from tomoskin.sensing.fit.native import NativeSolver
-from tomoskin.sensing.fit.refine import Deficit, Problem, Solver, WhitenedTable
+from tomoskin.sensing.fit.policy import DetectionPolicy
+from tomoskin.sensing.fit.problem import Problem, Solver, WhitenedTable
 from tomoskin.sensing.fit.selection import ForwardSelection
 from tomoskin.sensing.fit.solver import NumpySolver, SheetDomain
+from tomoskin.sensing.fit.spot_fit import Deficit
 
 TWO = np.concatenate([press(-0.04, 0.03, 0.018, -0.4), press(0.05, -0.02, 0.024, -0.3)])
 SPREAD = np.array([4e-3, 2e-3, 0.2, 3e-5])
@@ -76,10 +78,15 @@ def test_a_shape_is_the_way_from_a_tail_to_a_bell() -> None:
     assert np.linalg.norm(ours - exact) < 0.35 * np.linalg.norm(exact)
 
 
+def whitened(solver: Solver) -> WhitenedTable:
+    times = model().response.times
+    return finished(WhitenedTable.making(solver, whitener(), times, np.zeros((len(times), 0))))
+
+
 def problem(solver: Solver, spots: FloatArray, reach: float) -> Problem:
-    seen = WhitenedTable.of(solver, whitener(), model().response.times)
+    seen = whitened(solver)
     volts = data(spots) + noise(16, 1, 3)[0]
-    whitened, rest = seen.whitened(volts)
+    along, rest = seen.whitened(volts)
     left = 0.05 * data(press(0.0, 0.06))[None] @ seen.matrix.T
     return Problem(
         response=model().response,
@@ -89,7 +96,7 @@ def problem(solver: Solver, spots: FloatArray, reach: float) -> Problem:
         sign="decrease",
         reach=reach,
         grows=0.5,
-        data=whitened,
+        data=along,
         rest=rest,
         left=left,
     )
@@ -151,17 +158,17 @@ def test_native_and_numpy_agree(spots: FloatArray, reach: float, known: Known) -
 @pytest.mark.parametrize("goes_on", [False, True])
 def test_one_call_finds_what_the_search_step_by_step_does(goes_on: bool) -> None:
     native, _ = solvers()
-    kept = {"most": 5, "least": 5.0, "pace": LIVE, "deficit": Deficit.none(len(native.table.basis))}
+    policy, none = DetectionPolicy(5.0, "decrease", 5, LIVE), Deficit.none(len(native.table.basis))
     counts, known = set(), set[int | None]()
     three = np.concatenate([TWO, press(0.0, -0.06)])
     for spots, before in ((TWO[:0], TWO[:0]), (TWO, TWO[:1]), (three, TWO), (TWO[:1], TWO)):
         frame = problem(native, spots, 0.01)
         if goes_on:
             frame = replace(frame, expected=expected(before))
-        search = ForwardSelection(frame, model().candidates.matched(frame.seen), **kept)
-        answer = native.searched(search.question, before)
+        matched = model().candidates.matched(frame.seen)
+        answer = native.searched(frame, matched, policy, none, before)
         assert answer is not None
-        other = search.found(before)
+        other = ForwardSelection(frame, matched, policy, none).step_by_step(before)
         close(answer.fit.spots, other.spots)
         assert answer.fit.cost == pytest.approx(other.cost, rel=1e-9)
         assert answer.fit.known == other.known
@@ -173,26 +180,26 @@ def test_one_call_finds_what_the_search_step_by_step_does(goes_on: bool) -> None
 
 def test_one_spot_more_that_was_not_worth_it_is_proposed_as_it_was_fitted() -> None:
     native, _ = solvers()
-    none, pace = Deficit.none(len(native.table.basis)), replace(LIVE, rare=500.0)
+    none = Deficit.none(len(native.table.basis))
+    policy = DetectionPolicy(5.0, "decrease", 5, replace(LIVE, rare=500.0))
     frame = problem(native, np.concatenate([TWO, press(0.0, -0.06, 0.018, -0.1)]), 0.01)
-    search = ForwardSelection(frame, model().candidates.matched(frame.seen), 5.0, 5, pace, none)
-    answer = native.searched(search.question, TWO)
+    matched = model().candidates.matched(frame.seen)
+    search = ForwardSelection(frame, matched, policy, none)
+    answer = native.searched(frame, matched, policy, none, TWO)
     assert answer is not None
     assert answer.turned_down is not None
     assert len(answer.fit.spots) == 2
     anew = search.proposed(answer.fit)
     assert anew is not None
     close(answer.turned_down.spots, anew.spots)
-    search.turn_down(answer.fit, answer.turned_down)
-    assert search.proposed(answer.fit) is answer.turned_down
-    stepwise = search.found(TWO)
+    stepwise = search.step_by_step(TWO)
     proposed = search.proposed(stepwise)
     assert proposed is not None
     close(proposed.spots, anew.spots)
 
 
 def test_what_changes_do_not_show_along_is_noise() -> None:
-    seen = WhitenedTable.of(model().solver, whitener(), model().response.times)
+    seen = whitened(model().solver)
     volts = data(TWO)
     along, rest = seen.whitened(volts)
     every = whitener()(volts)
@@ -206,7 +213,7 @@ def test_several_spots_are_those_of_the_exact_model() -> None:
     near = np.concatenate([press(-0.015, 0.0, 0.02, -0.8), press(0.025, 0.0, 0.02, -0.8)])
     frame = problem(model().solver, near, 0.0)
     fit = frame.refined(near, Deficit.none(len(frame.solver.table.basis)), 6)
-    exact = frame.corrected(fit, EXHAUSTIVE.rounds, EXHAUSTIVE.near, EXHAUSTIVE.tolerance)
+    exact = frame.corrected(fit, EXHAUSTIVE, EXHAUSTIVE.rounds)
     assert exact.misfit < fit.misfit
     assert np.abs((exact.spots - near)[:, :2]).max() < 1.5e-3
     alone = frame.solver.expanded(exact.spots)[:, 0].sum(axis=0)

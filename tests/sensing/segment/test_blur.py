@@ -10,7 +10,7 @@ import pytest
 from shapes import disc
 from tomoskin.core import FloatArray
 from tomoskin.model.mesh import Mesh
-from tomoskin.sensing.segment.cells import REACH, Blur
+from tomoskin.sensing.segment.segment import REACH, Blur
 
 COARSE, FINE = 800, 6000
 

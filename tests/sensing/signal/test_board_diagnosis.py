@@ -9,8 +9,7 @@ import pytest
 
 from tomoskin.core import DataError
 from tomoskin.sensing.signal import CountScale, LoadRing, diagnose, meter_steps
-from tomoskin.sensing.signal.board_faults import single_faults
-from tomoskin.sensing.signal.load_ring import potentials
+from tomoskin.sensing.signal.load_ring import potentials, single_faults
 
 SCALE = CountScale.of(35, 5, 10)
 CURRENT = 0.1

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from tomoskin.core import DataError
-from tomoskin.model.pattern import Pattern
-from tomoskin.sensing.signal import Consecutive, at_one_time
+from tomoskin.sensing.signal import Consecutive
 
 FRAMES = np.array([[1.0, -2.0], [1.5, -2.0], [1.5, -1.0]])
 
@@ -45,18 +44,3 @@ def test_a_bad_frame_is_refused_and_skipped() -> None:
 def test_an_unknown_kind() -> None:
     with pytest.raises(DataError, match='among plain, normalised, got "relative"'):
         Consecutive("relative")
-
-
-def test_a_steady_drift_is_undone_exactly() -> None:
-    """Voltages that grow linearly: every row as it was when the scan began."""
-    pattern = Pattern.adjacent(8)
-    rate = np.random.default_rng(0).standard_normal(pattern.n_meas)
-    late = pattern.drive_index / pattern.n_drive
-    first, second = (rate * (scan + late) for scan in (3.0, 4.0))
-    assert at_one_time(first, second, pattern.drive_index) == pytest.approx(4.0 * rate)
-    assert np.array_equal(at_one_time(first, first, pattern.drive_index), first)
-
-
-def test_scans_of_another_length() -> None:
-    with pytest.raises(DataError, match="expected two scans of"):
-        at_one_time(np.ones(3), np.ones(2), np.arange(2))

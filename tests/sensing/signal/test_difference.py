@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tomoskin.core import DataError
-from tomoskin.sensing.signal import DIFFERENCES, difference, in_phase
+from tomoskin.sensing.signal import difference, in_phase
+from tomoskin.sensing.signal.difference import DIFFERENCES
 
 REFERENCE = np.array([1.0, -2.0, 4.0])
 VALUES = np.array([[1.5, -2.0, 3.0], [1.0, -1.0, 4.0]])

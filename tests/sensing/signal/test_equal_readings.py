@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from tomoskin.model.pattern import Pattern, Scan
-from tomoskin.sensing.signal.equal_readings import EqualReadings
-from tomoskin.sensing.signal.evidence import Reciprocity
+from tomoskin.sensing.signal.evidence import EqualReadings, Reciprocity
 
 LOOKS = 40
 NOISE = 2e-3

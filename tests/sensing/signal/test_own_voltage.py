@@ -7,7 +7,7 @@ from tomoskin.core import Frame
 from tomoskin.model.pattern import Pattern, Scan
 from tomoskin.model.skin import Skin
 from tomoskin.sensing.signal import Monitor, Readout, Reference
-from tomoskin.sensing.signal.own_voltage import OwnVoltage
+from tomoskin.sensing.signal.readout import OwnVoltage
 
 PATTERN = Pattern.adjacent(8)
 SCAN = Scan.of(PATTERN)

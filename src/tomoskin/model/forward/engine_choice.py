@@ -28,7 +28,7 @@ from tomoskin.model.pattern import Pattern
 VARIABLE = "TOMOSKIN_ENGINE"
 """Environment variable that asks for one engine: scipy or native."""
 
-INTERFACE = 6
+INTERFACE = 7
 """The interface of tomoskin_core that is called here and in ``touch``; raised with its own."""
 
 

@@ -1,22 +1,16 @@
 """Touches fitted to voltages by their parameters, with the exact forward model."""
 
-from tomoskin.sensing.fit.bound import (
-    detection_bound,
-    fisher_information,
-    least_content,
-    position_bound,
-)
 from tomoskin.sensing.fit.bounds import (
     Demand,
     ResolutionBounds,
-    Variant,
+    position_bound,
     resolution_bounds,
     variants,
 )
 from tomoskin.sensing.fit.covariance import common_mode_variance, idle_covariance
 from tomoskin.sensing.fit.finder import SpotFinder
 from tomoskin.sensing.fit.noise import Whitener, measured_covariance, row_covariance
-from tomoskin.sensing.fit.pace import EXHAUSTIVE, LIVE, Pace
+from tomoskin.sensing.fit.policy import EXHAUSTIVE, LIVE, Pace
 from tomoskin.sensing.fit.prior import SpotPrior
 from tomoskin.sensing.fit.spot import Response, Spots, depth_of, spots_of
 from tomoskin.sensing.fit.spot_model import SpotModel
@@ -32,14 +26,10 @@ __all__ = [
     "SpotModel",
     "SpotPrior",
     "Spots",
-    "Variant",
     "Whitener",
     "common_mode_variance",
     "depth_of",
-    "detection_bound",
-    "fisher_information",
     "idle_covariance",
-    "least_content",
     "measured_covariance",
     "position_bound",
     "resolution_bounds",

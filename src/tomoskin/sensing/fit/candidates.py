@@ -1,4 +1,4 @@
-"""Where a touch may have begun: signatures of faint spots all over the sheet, matched at once."""
+"""Where touches may have begun: signatures of faint spots all over the sheet, and sets of them."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from typing import Self
 
 import numpy as np
 
-from tomoskin.core import FloatArray
+from tomoskin.core import FloatArray, IntArray
 from tomoskin.sensing.fit.prior import SpotPrior
-from tomoskin.sensing.fit.refine import Fit, Limits, Solver, WhitenedTable
+from tomoskin.sensing.fit.problem import Matched, WhitenedTable
 from tomoskin.sensing.fit.spot import CONTENT, FILLING, LOG_RADIUS, Footprints, Response, spots_of
 
 _SPACING = 0.7
@@ -19,12 +19,6 @@ _SPACING = 0.7
 
 _SIZES = (0.6, 1.0, 1.6)
 """Radii of the candidates, in median radii."""
-
-_LEAST = 1.0
-"""Deviations of the noise below which a candidate is none, whatever else could take it up."""
-
-_USEFUL = 0.02
-"""Part of a candidate's square that the spots that are there must leave of it."""
 
 _FAINT = 0.05
 """Depth at which signatures are taken: linear, and far above rounding."""
@@ -83,48 +77,8 @@ class Candidates:
         return Candidates(self.spots, signatures)
 
     def matched(self, seen: WhitenedTable) -> Matched:
-        """The same for one noise."""
+        """The candidates as data of one noise show them."""
         return Matched.of(self.spots, self.signatures @ seen.matrix[: seen.narrow].T)
-
-
-@dataclass(frozen=True, eq=False)
-class Matched:
-    """Candidates, their whitened signatures (n, narrow), and (n,) the squares of these."""
-
-    spots: FloatArray
-    signatures: FloatArray
-    squares: FloatArray
-
-    @classmethod
-    def of(cls, spots: FloatArray, signatures: FloatArray) -> Self:
-        """Spots (n, 4) of these signatures (n, narrow)."""
-        return cls(spots, signatures, np.einsum("nr,nr->n", signatures, signatures))
-
-    def louder(self, times: float) -> Self:
-        """The same in so many times the noise's variance."""
-        return self.of(self.spots, self.signatures / math.sqrt(times))
-
-    def ratios(self, solver: Solver, fit: Fit, sign: str) -> tuple[FloatArray, FloatArray]:
-        """(n,) likelihood ratio of each candidate, and (n,) its most likely content.
-
-        The ratio is the square root of twice its logarithm: deviations by which the candidate
-        stands out (GLRT; Kay 1998, section 7.6.2, for a linear model), after what the spots of
-        ``fit`` could take up.
-        """
-        return solver.standing_out(self.signatures, self.squares, fit, limits_of(sign))
-
-    def spot(self, number: int, content: FloatArray) -> FloatArray:
-        """(4,) candidate ``number`` with its content of ``contents`` (n,)."""
-        chosen = self.spots[number].copy()
-        chosen[CONTENT] = content[number]
-        return np.asarray(chosen)
-
-
-def limits_of(sign: str) -> Limits:
-    """What counts of candidates for touches of this ``sign``."""
-    low = 0.0 if sign == "increase" else -math.inf
-    high = 0.0 if sign == "decrease" else math.inf
-    return Limits(low, high, _LEAST, _USEFUL)
 
 
 def footprints_of(response: Response, prior: SpotPrior) -> tuple[Footprints, ...]:
@@ -135,12 +89,8 @@ def footprints_of(response: Response, prior: SpotPrior) -> tuple[Footprints, ...
 
 
 def _positions(response: Response, prior: SpotPrior) -> FloatArray:
-    """(n, 2) m."""
-    return _grid(response.spots.mesh.centroids, _SPACING * prior.radius)
-
-
-def _grid(inside: FloatArray, step: float) -> FloatArray:
-    """(n, 2) hexagonal grid of positions near cells whose centroids are ``inside``."""
+    """(n, 2) m of a hexagonal grid of positions near the cells."""
+    inside, step = response.spots.mesh.centroids, _SPACING * prior.radius
     low, high = inside.min(axis=0), inside.max(axis=0)
     rows = np.arange(low[1], high[1] + step, step * math.sqrt(3) / 2)
     x = np.arange(low[0], high[0] + step, step)
@@ -150,3 +100,100 @@ def _grid(inside: FloatArray, step: float) -> FloatArray:
     ])  # fmt: skip
     apart = np.linalg.norm(grid[:, None] - inside, axis=2).min(axis=1)
     return np.asarray(grid[apart < step / 2])
+
+
+_BEAM = 30
+"""Sets that are gone on with for each number of touches."""
+
+_RANKED = 800
+"""Sets among which those are looked for: most differ by a neighbour only."""
+
+_ALIKE = 0.05
+"""A candidate of which less than this part is its own, beside a set, adds nothing to it."""
+
+
+@dataclass(frozen=True, eq=False)
+class JointStarts:
+    """Sets of candidates for one frame.
+
+    Attributes
+    ----------
+    spots
+        (n, 4) candidates.
+    gram
+        (n, n) products of their signatures, with the prior of the content.
+    projected
+        (n,) products with the data.
+    prior, sign
+        Of the touches.
+    """
+
+    spots: FloatArray
+    gram: FloatArray
+    projected: FloatArray
+    prior: SpotPrior
+    sign: str
+
+    @classmethod
+    def of(cls, matched: Matched, data: FloatArray, prior: SpotPrior, sign: str) -> JointStarts:
+        """For whitened ``data`` (c,), of candidates of median radius."""
+        away = np.abs(matched.spots[:, LOG_RADIUS] - np.log(prior.radius))
+        chosen = np.flatnonzero(away < away.min() + 1e-9)
+        spots, signatures = matched.spots[chosen], matched.signatures[chosen]
+        gram = signatures @ signatures.T + np.eye(len(chosen)) / prior.content**2
+        return cls(spots, gram, signatures @ data[: signatures.shape[1]], prior, sign)
+
+    def sets(self, count: int, most: int) -> list[FloatArray]:
+        """At most so many sets (``count``, 4) of spots, the likeliest first, not alike."""
+        found = np.arange(len(self.projected))[:, None]
+        for number in range(1, count):
+            found = self._extended(found, most if number == count - 1 else _BEAM)
+            if not len(found):
+                return []
+        if count == 1:
+            found = self._distinct(self._ranked(found), most)
+        spots = self.spots[found]
+        spots[:, :, CONTENT] = self._contents(found)
+        return list(spots)
+
+    def _extended(self, sets: IntArray, most: int) -> IntArray:
+        """(b, k + 1) the best of all sets (p, k) with one more, best first."""
+        own = self.gram[sets[:, :, None], sets[:, None, :]]
+        across = self.gram[sets]
+        solved = np.linalg.solve(own, across)
+        left = np.diag(self.gram) - np.einsum("pkn,pkn->pn", across, solved)
+        data = self.projected - np.einsum("pkn,pk->pn", solved, self.projected[sets])
+        base = np.einsum("pk,pk->p", self.projected[sets], self._contents(sets))
+        useful = left > _ALIKE * np.diag(self.gram)
+        gain = base[:, None] + np.where(useful, data**2 / np.where(useful, left, 1.0), -np.inf)
+        best = np.argsort(gain, axis=None)[::-1][: 2 * _RANKED]
+        best = best[np.isfinite(gain.ravel()[best])]
+        row, new = np.unravel_index(best, gain.shape)
+        longer = np.unique(np.sort(np.column_stack([sets[row], new]), axis=1), axis=0)
+        return self._distinct(self._ranked(longer)[:_RANKED], most)
+
+    def _ranked(self, sets: IntArray) -> IntArray:
+        """Those whose touches have the sign that counts, by how much they explain."""
+        contents = self._contents(sets)
+        if self.sign != "both":
+            right = contents < 0 if self.sign == "decrease" else contents > 0
+            sets, contents = sets[right.all(axis=1)], contents[right.all(axis=1)]
+        explained = np.einsum("pk,pk->p", self.projected[sets], contents)
+        return np.asarray(sets[np.argsort(-explained)])
+
+    def _contents(self, sets: IntArray) -> FloatArray:
+        own = self.gram[sets[:, :, None], sets[:, None, :]]
+        return np.asarray(np.linalg.solve(own, self.projected[sets][:, :, None])[:, :, 0])
+
+    def _distinct(self, sets: IntArray, most: int) -> IntArray:
+        """(b, k) the first sets of which some touch is elsewhere than in those before."""
+        apart = np.linalg.norm(self.spots[:, None, :2] - self.spots[:, :2], axis=2)
+        kept: list[IntArray] = []
+        for each in sets:
+            between = apart[each[:, None, None], np.array(kept, dtype=int).reshape(-1, len(each)).T]
+            away = np.maximum(between.min(axis=1).max(axis=0), between.min(axis=0).max(axis=0))
+            if (away > self.prior.radius).all():
+                kept.append(each)
+                if len(kept) == most:
+                    break
+        return np.array(kept, dtype=int).reshape(-1, sets.shape[1])

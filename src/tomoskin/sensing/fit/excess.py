@@ -10,7 +10,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import FloatArray, IntArray, finished
+from tomoskin.core import FloatArray, IntArray
 from tomoskin.model.pattern import Pattern, Scan
 from tomoskin.sensing.fit.noise import Whitener
 from tomoskin.sensing.signal import Reciprocity
@@ -70,7 +70,7 @@ class Channels:
 
     @classmethod
     def of(cls, pattern: Pattern) -> Self:
-        """Of the rows of a pattern."""
+        """The channels that the rows of a pattern are read by."""
         scan, rows = Scan.of(pattern), np.arange(pattern.n_meas)
         samples = np.zeros((scan.n_samples, pattern.n_meas))
         samples[scan.plus, rows], samples[scan.minus, rows] = 1.0, -1.0
@@ -83,39 +83,6 @@ class Channels:
         reciprocal, single = Reciprocity.of(pattern), np.eye(pattern.n_meas)
         apart = single[reciprocal.first] - reciprocal.sign[:, None] * single[reciprocal.second]
         return cls(parts, channel, tuple(names), reciprocal, apart)
-
-
-@dataclass(frozen=True, eq=False)
-class PartsOfChannels:
-    """Which parts are of which channel: those of one after those of the other.
-
-    Attributes
-    ----------
-    n_channels
-        Of all.
-    some
-        Channels that have parts.
-    starts, count
-        Of each of these its first part, and how many it has.
-    """
-
-    n_channels: int
-    some: IntArray
-    starts: IntArray
-    count: IntArray
-
-    @classmethod
-    def of(cls, count: IntArray) -> Self:
-        """Where each channel has so many, (n_channels,)."""
-        some = np.flatnonzero(count)
-        return cls(len(count), some, (np.cumsum(count) - count)[some], count[some])
-
-    def means(self, values: FloatArray) -> FloatArray:
-        """(…, n_channels) means of ``values`` (…, n) over each channel's; 0 where it has none."""
-        out = np.zeros((*values.shape[:-1], self.n_channels))
-        if len(self.some):
-            out[..., self.some] = np.add.reduceat(values, self.starts, axis=-1) / self.count
-        return out
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,8 +100,8 @@ class Gauge:
         (n_seen, n_pairs) 1/V: how the parts that can be seen, one channel's after the other, show
         in the pairs' differences where these are white; as one deviation of noise does. In single
         precision: it is read through in each frame.
-    parts
-        Whose these are.
+    channels, starts, count
+        Numbers of the channels that have parts; of each its first part, and how many it has.
     variance
         (n_channels,) V² of noise in a part that shows as much as all other noise in its direction.
     limit
@@ -146,15 +113,12 @@ class Gauge:
 
     pairs: Reciprocity
     shows: NDArray[np.float32]
-    parts: PartsOfChannels
+    channels: IntArray
+    starts: IntArray
+    count: IntArray
     variance: FloatArray
     limit: FloatArray
     judged: IntArray
-
-    @classmethod
-    def of(cls, channels: Channels, covariance: FloatArray, nuisance: FloatArray) -> Self:
-        """As :meth:`making`, at once."""
-        return finished(cls.making(channels, covariance, nuisance))
 
     @classmethod
     def making(
@@ -174,18 +138,29 @@ class Gauge:
         order = order[shows[order]]
         yield
         count = np.bincount(channels.channel[order], minlength=len(channels.names))
-        ends, parts = np.cumsum(count), PartsOfChannels.of(count)
+        ends, some = np.cumsum(count), np.flatnonzero(count)
         own = [directions[order[b - n : b]] for b, n in zip(ends, count, strict=True)]
         spread = np.array([np.linalg.norm(d @ d.T) / max(len(d), 1) for d in own])
         limit = np.where(count >= _FEWEST, 1 + _LIMIT * np.sqrt(2) * spread, np.inf)
-        return cls(
+        gauge = cls(
             pairs=channels.pairs,
             shows=(directions[order] @ whiten.matrix).astype(np.float32),
-            parts=parts,
-            variance=parts.means(1 / squares[order]),
+            channels=some,
+            starts=(ends - count)[some],
+            count=count[some],
+            variance=np.zeros(len(count)),
             limit=limit,
             judged=np.flatnonzero(np.isfinite(limit)),
         )
+        return replace(gauge, variance=gauge.means(1 / squares[order]))
+
+    def means(self, values: FloatArray) -> FloatArray:
+        """(…, n_channels) means of ``values`` (…, n) over each channel's parts; 0 where it has
+        none."""
+        out = np.zeros((*values.shape[:-1], len(self.variance)))
+        if len(self.channels):
+            out[..., self.channels] = np.add.reduceat(values, self.starts, axis=-1) / self.count
+        return out
 
     def squares(self, dv: FloatArray, moved: FloatArray) -> FloatArray:
         """(n_channels,) mean squares of data (n_meas,) V; 1 where the noise is as it should be.
@@ -200,7 +175,7 @@ class Gauge:
         seen[0], seen[1:] = one[0] - other[0], one + other
         # one by one: a product with so few columns takes three times as long
         along = np.array([self.shows @ column for column in seen], np.float64)
-        differs, gains, changes = self.parts.means(along * along)
+        differs, gains, changes = self.means(along * along)
         allowed = _MOVES**2 * changes + _GAINS**2 * gains
         return np.asarray(differs - (allowed + allowed.mean()) / 2)
 
@@ -244,13 +219,13 @@ class Excess:
 
     @classmethod
     def none(cls, channels: Channels) -> Self:
-        """As it was learnt."""
+        """The noise is as it was learnt."""
         none = np.zeros(len(channels.names))
         return cls(1.0, none, 0, none)
 
     @cached_property
     def any(self) -> bool:
-        """Whether there is some."""
+        """Whether there is more noise than was learnt."""
         return self.level > 1.0 or bool(self.variance.any())
 
     @property

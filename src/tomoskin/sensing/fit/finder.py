@@ -13,23 +13,17 @@ import numpy as np
 from tomoskin.core import Detection, FloatArray, reach
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.skin import Skin
-from tomoskin.sensing.fit.candidates import Matched
-from tomoskin.sensing.fit.cell_discs import CellDiscs
-from tomoskin.sensing.fit.common_mode import CommonModeJump, Explained, Jumps
-from tomoskin.sensing.fit.expectation import Expectation
-from tomoskin.sensing.fit.noise import ResidualDirections, ResidualResponse
-from tomoskin.sensing.fit.pace import EXHAUSTIVE, Pace
-from tomoskin.sensing.fit.refine import Deficit, Problem
-from tomoskin.sensing.fit.rival import Rival, challenged
-from tomoskin.sensing.fit.search import SpotDetections, joined, search
+from tomoskin.sensing.fit.detections import CellDiscs, SpotDetections, joined, judged
+from tomoskin.sensing.fit.expectation import Expectation, ResidualDirections, ResidualResponse
+from tomoskin.sensing.fit.hypotheses import CommonModeJump, Explained, Jumps, Rival, challenged
+from tomoskin.sensing.fit.policy import EXHAUSTIVE, DetectionPolicy, Pace, favours, rises_beside
+from tomoskin.sensing.fit.problem import Matched, Problem
 from tomoskin.sensing.fit.selection import ForwardSelection
 from tomoskin.sensing.fit.sight import Sight
 from tomoskin.sensing.fit.spot import FILLING, N_PARAMETERS
+from tomoskin.sensing.fit.spot_fit import Deficit
 from tomoskin.sensing.fit.spot_model import SpotModel
 from tomoskin.sensing.fit.watch import FrameWatch
-
-_MOST = 5
-"""Touches at once: more have more parameters than 8 or 16 electrodes tell apart."""
 
 _GROWS = 0.5
 """Standard deviation of what a touch that has just begun grows by within a scan, in parts of it."""
@@ -56,12 +50,8 @@ class SpotFinder:
         (n_meas, n_meas) covariance of difference data, the reference's own part included.
     gain
         Of the data against the model: the ratio of their references.
-    scan_time
-        That a scan takes, s: in it touches move and grow. 0 where rows are read all at once.
-    interval
-        Between two frames, s: how many of them a residual response lasts.
     pace
-        How much is tried in a frame.
+        How much is tried in a frame, and how fast frames are.
 
     Attributes
     ----------
@@ -77,18 +67,13 @@ class SpotFinder:
         noise: FloatArray,
         gain: float = 1.0,
         *,
-        scan_time: float = 0.0,
-        interval: float = 0.0,
         pace: Pace = EXHAUSTIVE,
     ) -> None:
-        self._model, self._settings = model, skin.touch
+        self._model, self._policy = model, DetectionPolicy.of(skin.touch, pace)
         self._cells = CellDiscs.of(mesh)
-        self._pace, self._reach, self._unrest = pace, pace.speed * scan_time, 1.0
-        self._fading = math.ceil(pace.fading / interval) if interval else 0
-        self._residual = ResidualResponse.none()
-        self._left = ResidualDirections.none()
+        self._reach, self._unrest = pace.reach, 1.0
+        self._residual, self._left = ResidualResponse(), ResidualDirections()
         self._unit = skin.conductivity
-        self._most = min(skin.touch.max_touches, _MOST)
         self._before = self._shown = np.zeros((0, N_PARAMETERS))
         self._deficit = Deficit.none(len(model.solver.table.basis))
         self._change = self._deficit.change
@@ -96,7 +81,7 @@ class SpotFinder:
         self._rival: Rival | None = None
         self._jump = CommonModeJump()
         pattern = model.response.state.model.pattern
-        self.watch = FrameWatch(pattern, skin.touch.sign, skin.touch.snr)
+        self.watch = FrameWatch(pattern, self._policy)
         self._sight = Sight(model, self.watch.channels, noise, gain)
         self._wander = 0.0
         self._newest_slow: tuple[tuple[FloatArray, ...], FloatArray] | None = None
@@ -146,8 +131,8 @@ class SpotFinder:
         self._unrest = self._motion(detected.fit.spots)
         self._before, self._deficit = detected.fit.spots, detected.fit.deficit
         self._expected = self._going_on(detected)
-        if self._fading:
-            self._residual = self._residual.after(self._before, self._model.changes, self._fading)
+        if frames := self._policy.pace.fading_frames:
+            self._residual = self._residual.after(self._before, self._model.changes, frames)
         self._change = detected.fit.change + detected.fit.deficit.change
         return self._detections(joined(detected))
 
@@ -163,27 +148,27 @@ class SpotFinder:
         common mode has jumped."""
         seen, matched, _, jumps = self._sight.of(self.watch.excess).louder(times)
         whitened, rest = seen.whitened(data)
-        self._left = self._left.of(seen.matrix, self._residual.changes)
+        left = self._left.of(seen.matrix, self._residual.feet)
         problem = Problem(
             response=self._model.response,
             reduced=self._model.reduced,
             seen=seen,
             prior=self._model.prior,
-            sign=self._settings.sign,
+            sign=self._policy.sign,
             reach=self._unrest * self._reach,
             grows=self._unrest * _GROWS,
             data=whitened,
             rest=rest,
-            left=self._slow(jumps),
+            left=self._slow(left, jumps),
             expected=self._expected,
         )
         explain = partial(self._explained, matched)
-        return *self._jump.decided(problem, jumps, self._settings.snr, explain), matched
+        return *self._jump.decided(problem, jumps, self._policy, explain), matched
 
-    def _slow(self, jumps: Jumps) -> FloatArray:
+    def _slow(self, left: FloatArray, jumps: Jumps) -> FloatArray:
         """(k, c) what stays from frame to frame and is no touch: residual responses, and how far
         the common mode has wandered."""
-        now = self._left.rows, jumps.wandered(self._wander)
+        now = left, jumps.wandered(self._wander)
         newest = self._newest_slow
         if newest is None or not all(map(is_, now, newest[0])):
             newest = self._newest_slow = now, np.concatenate(now)
@@ -195,13 +180,13 @@ class SpotFinder:
         sign = self.watch.sign(problem, matched)
         if sign != problem.sign:
             problem = replace(problem, sign=sign)
-        least, pace = self._settings.snr, self._pace
-        selection = ForwardSelection(problem, matched, least, self._most, pace, self._deficit)
-        detected = search(selection, self._before)
-        if pace.joint and sign != self._settings.sign:  # presses may look like a rise between them
-            own = replace(selection, problem=replace(problem, sign=self._settings.sign))
-            pressed = search(own, self._before)
-            if not problem.favours(detected.fit, pressed.fit):
+        policy = self._policy
+        selection = ForwardSelection(problem, matched, policy, self._deficit)
+        detected = judged(selection, selection.explained(self._before))
+        if policy.pace.joint and sign != policy.sign:  # presses may look like a rise between them
+            own = replace(selection, problem=replace(problem, sign=policy.sign))
+            pressed = judged(own, own.explained(self._before))
+            if not favours(problem.gain(pressed.fit, detected.fit)):
                 detected = pressed
         rival: Rival | None = None
         if self._reach and sign != "both":
@@ -210,20 +195,19 @@ class SpotFinder:
         if self.watch.puzzled(problem, detected.fit):
             reach("both signs")
             both = self._anew(selection, len(detected.fit.spots) + 1)
-            if self.watch.turns(both, detected.fit) and problem.favours(both.fit, detected.fit):
+            rises = rises_beside(policy, detected.fit, both.fit, both.ratio)
+            if rises and favours(problem.gain(detected.fit, both.fit)):
                 detected = both
         return detected, rival
 
     def _anew(self, selection: ForwardSelection, most: int) -> SpotDetections:
         """Touches of both signs, ``most`` of them, as if there had been none in the last frame."""
-        most = min(most, self._most)
-        pace = replace(self._pace, tries=most)
+        most = min(most, self._policy.most)
+        policy = replace(self._policy, most=most, pace=replace(self._policy.pace, tries=most))
         none = Deficit.none(len(self._deficit.change))
         problem = replace(selection.problem, sign="both", expected=Expectation.none())
-        return search(
-            ForwardSelection(problem, selection.matched, selection.least, most, pace, none),
-            np.zeros((0, N_PARAMETERS)),
-        )
+        anew = ForwardSelection(problem, selection.matched, policy, none)
+        return judged(anew, anew.explained(np.zeros((0, N_PARAMETERS))))
 
     def _going_on(self, detected: SpotDetections) -> Expectation:
         """What is expected of the touches of this frame in the next one."""
@@ -242,7 +226,7 @@ class SpotFinder:
         return min(1.0, math.hypot(_REST, moved / self._reach))
 
     def _detections(self, detected: SpotDetections) -> list[Detection]:
-        """Strongest first."""
+        """The touches as detections, strongest first."""
         spots = detected.fit.spots
         shown = np.flatnonzero(~self.watch.wrong(spots))
         found = [self._detection(detected, k, spots[k].tolist()) for k in shown.tolist()]
@@ -264,6 +248,6 @@ class SpotFinder:
             cells=self._cells.within(x, y, radius),
             cov_xy=xy,
             snr=float(detected.ratio[k]),
-            weak=bool(detected.fresh[k] < self._settings.snr),
+            weak=bool(detected.fresh[k] < self._policy.least),
             close=bool(detected.close[k]),
         )

@@ -8,19 +8,13 @@ import numpy as np
 
 from tomoskin.core import FloatArray
 from tomoskin.sensing.fit.expectation import Known, newcomers
+from tomoskin.sensing.fit.policy import DetectionPolicy
 from tomoskin.sensing.fit.prior import SpotPrior
-from tomoskin.sensing.fit.refine import Answer, Deficit, Fit, Limits, Problem, Question
-from tomoskin.sensing.fit.solver import DIRECTED, RESHAPED, RIDGE, SheetDomain
+from tomoskin.sensing.fit.problem import RIDGE, Answer, Limits, Matched, Problem
+from tomoskin.sensing.fit.solver import SheetDomain
 from tomoskin.sensing.fit.spot import FILLING
+from tomoskin.sensing.fit.spot_fit import Deficit, Fit
 from tomoskin.sensing.fit.table import ResponseTable
-
-Fitted = tuple[
-    tuple[FloatArray, ...],
-    tuple[FloatArray, ...],
-    tuple[float, float, float, bool],
-    list[int | None],
-]
-"""Matrices, vectors and numbers of a fit, and who its spots are."""
 
 
 class NativeSolver:
@@ -29,117 +23,78 @@ class NativeSolver:
     def __init__(
         self, core: Any, table: ResponseTable, sheet: SheetDomain, prior: SpotPrior
     ) -> None:
-        self._core, self._prior, self.table = core, prior, table
+        self._core, self.table = core, table
         self._spots = core.SpotTable(
-            table.log_radii,
-            np.array([[*grid.origin, grid.step, *grid.shape] for grid in table.grids]),
-            table.nodes,
-            table.values,
-            FILLING,
-            np.column_stack([sheet.centroids, sheet.margin]),
-            np.array([prior.middle, prior.weights]),
-            np.array(prior.log_radii),
+            log_radii=table.log_radii,
+            grids=np.array([[*grid.origin, grid.step, *grid.shape] for grid in table.grids]),
+            nodes=table.nodes,
+            values=table.values,
+            filling=FILLING,
+            sheet=np.column_stack([sheet.centroids, sheet.margin]),
+            prior=prior,
         )
 
     def expanded(self, spots: FloatArray) -> FloatArray:
-        """See :class:`Solver`."""
+        """What spots do by the table; see :class:`Solver`."""
         return np.asarray(self._spots.expanded(spots))
 
     def keep(
         self, direct: FloatArray, timed: FloatArray, matrix: FloatArray, squares: FloatArray
     ) -> Any:
-        """See :class:`Solver`."""
+        """What the engine keeps of it; see :class:`Solver`."""
         return self._core.SeenTable(direct, timed, matrix, self.table.basis, squares)
 
     def settled(
+        self, problem: Problem, spots: FloatArray, deficit: Deficit, most: int, known: Known = ()
+    ) -> Fit:
+        """The minimum near ``spots``; see :class:`Solver`."""
+        known = known or newcomers(len(spots))
+        kept, offset = problem.seen.kept, deficit.change
+        return _fit(
+            problem, deficit, self._spots.settled(kept, problem, offset, spots, known, most)
+        )
+
+    def searched(
         self,
         problem: Problem,
-        spots: FloatArray,
+        matched: Matched,
+        policy: DetectionPolicy,
         deficit: Deficit,
-        most: int,
-        known: Known = (),
-    ) -> Fit:
-        """See :class:`Solver`."""
-        kept, frame = problem.seen.kept, self._frame(problem, deficit)
-        known = known or newcomers(len(spots))
-        return _fit(problem, deficit, self._spots.settled(kept, frame, spots, known, most))
-
-    def searched(self, question: Question, before: FloatArray) -> Answer | None:
-        """See :class:`Solver`."""
-        problem, pace = question.problem, question.pace
-        if pace.rounds or pace.joint:
+        before: FloatArray,
+    ) -> Answer | None:
+        """The touches in one call; see :class:`Solver`."""
+        if policy.pace.rounds or policy.pace.joint:
             return None
-        limits, rules = question.limits, question.rules
-        found, bare, others, more = self._spots.searched(
-            problem.seen.kept,
-            self._frame(problem, question.deficit),
-            before,
-            question.candidates,
-            (limits.low, limits.high, limits.least, limits.useful, RIDGE),
-            (
-                *(pace.warm, pace.glance, pace.cold, pace.finalists, pace.tries),
-                *(question.most, pace.restart),
-            ),
-            (
-                *(rules.least, rules.held, pace.look, rules.sure, pace.rare),
-                *(rules.misshapen, rules.within, rules.near, self._prior.log_volume),
-            ),
+        kept, limits = problem.seen.kept, Limits.of(problem.sign)
+        fit, bare, others, more = self._spots.searched(
+            kept, problem, deficit.change, before, matched, limits, policy
         )
-        rank = len(self.table.basis)
-        deficit = Deficit.none(rank) if bare else question.deficit
+        if bare:
+            deficit = Deficit.none(len(self.table.basis))
         more = more and _fit(problem, deficit, more)
-        return Answer(_fit(problem, deficit, found), others and tuple(others), more)
-
-    def _frame(self, problem: Problem, deficit: Deficit) -> tuple[Any, ...]:
-        deviations = (DIRECTED, RESHAPED, problem.reach, problem.grows)
-        depths = self._prior.depths(problem.sign)
-        data, expected = (problem.data, problem.rest, problem.left), problem.expected
-        going_on = expected.spots, expected.covariances, self._prior.log_content
-        return *data, deficit.change, deviations, depths, going_on
+        return Answer(_fit(problem, deficit, fit), others and tuple(others), more)
 
     def judged(self, problem: Problem, fit: Fit, uneven: float) -> tuple[FloatArray, FloatArray]:
-        """See :class:`Solver`."""
-        parts = fit.each, fit.slopes, fit.unknown, fit.normal
-        quality = fit.misfit, float(fit.degrees), uneven
+        """How sure each spot is; see :class:`Solver`."""
         change = fit.change + fit.deficit.change
-        squares, covariance = problem.seen.kept.judged(parts, change, quality, RIDGE)
+        squares, covariance = problem.seen.kept.judged(fit, change, uneven, RIDGE)
         return squares, covariance
 
     def standing(self, left: FloatArray, fit: Fit) -> FloatArray:
-        """See :class:`Solver`."""
+        """How far each spot stands out; see :class:`Solver`."""
         return np.asarray(self._core.standing(left, fit.slopes, fit.each, RIDGE))
 
     def standing_out(
-        self, signatures: FloatArray, squares: FloatArray, fit: Fit, limits: Limits
+        self, matched: Matched, fit: Fit, limits: Limits
     ) -> tuple[FloatArray, FloatArray]:
-        """See :class:`Solver`."""
-        numbers = (limits.low, limits.high, limits.least, limits.useful, RIDGE)
+        """How far candidates stand out; see :class:`Solver`."""
+        signatures, squares = matched.signatures, matched.squares
         ratio, content = self._core.standing_out(
-            signatures, squares, fit.unknown, fit.slopes, fit.residual, numbers
+            signatures, squares, fit.unknown, fit.slopes, fit.residual, limits
         )
         return ratio, content
 
 
-def _fit(problem: Problem, deficit: Deficit, fitted: Fitted) -> Fit:
-    matrices, vectors, numbers, known = fitted
-    found, each, slopes, unknown, normal = matrices
-    change, predicted, residual, gradient = vectors
-    misfit, log_size, cost, settled = numbers
-    return Fit(
-        spots=found,
-        deficit=deficit,
-        change=change,
-        each=each,
-        predicted=predicted,
-        residual=residual,
-        slopes=slopes,
-        unknown=unknown,
-        normal=normal,
-        gradient=gradient,
-        misfit=misfit,
-        log_size=log_size,
-        cost=cost,
-        degrees=max(len(problem.seen.full) - len(gradient), 1),
-        settled=settled,
-        known=tuple(known),
-    )
+def _fit(problem: Problem, deficit: Deficit, named: dict[str, Any]) -> Fit:
+    degrees = max(len(problem.seen.full) - len(named["gradient"]), 1)
+    return Fit(deficit=deficit, degrees=degrees, **named)

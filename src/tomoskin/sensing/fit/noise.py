@@ -1,11 +1,8 @@
-"""Noise of difference data: of the read-out, and of what a touch leaves behind."""
+"""Noise of difference data, as the read-out makes it, and what makes it independent."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from itertools import compress
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -13,7 +10,6 @@ from scipy.linalg.lapack import dpocon, dpotrf, dtrtri
 
 from tomoskin.core import FloatArray, ModelError
 from tomoskin.model.pattern import Scan
-from tomoskin.sensing.fit.spot import N_PARAMETERS
 
 _LEAST = 1e-10
 """Directions with less than this part of the largest variance hold no data: rows that follow
@@ -70,7 +66,7 @@ class Whitener:
         return Whitener(basis[:, rank:].T @ self.matrix)
 
     def __call__(self, rows: FloatArray) -> FloatArray:
-        """(…, r) of rows (…, n_meas)."""
+        """(…, r) whitened values of rows (…, n_meas)."""
         return np.asarray(rows @ self.matrix.T)
 
 
@@ -135,124 +131,3 @@ def _rounding(variance: FloatArray) -> FloatArray:
     """
     own = np.maximum(variance - 1 / 12, 0.0)
     return np.asarray(np.exp(-4 * np.pi**2 * own) / (2 * np.pi**2))
-
-
-_STEP = 0.012
-"""A touch that slides leaves a footprint every so many metres."""
-
-_LEFT = 0.05
-"""Deviation of the residual response of a touch, in parts of it: a quarter stands out by five."""
-
-_STRONGER = 1.25
-"""A footprint is replaced where a touch is by so much stronger than when it was made."""
-
-_MOST = 16
-"""Footprints that are kept, the newest."""
-
-
-@dataclass(frozen=True, eq=False)
-class ResidualResponse:
-    """Where touches have been since the baseline has had time to follow.
-
-    Attributes
-    ----------
-    spots
-        (k, 4), the newest last.
-    changes
-        (n_meas,) V of each, what it did to the rows.
-    quiet
-        Frames without any touch since each was made.
-    """
-
-    spots: FloatArray
-    changes: tuple[FloatArray, ...]
-    quiet: tuple[int, ...] = ()
-
-    @classmethod
-    def none(cls) -> Self:
-        """Where nothing has touched."""
-        return cls(np.zeros((0, N_PARAMETERS)), ())
-
-    def after(
-        self, spots: FloatArray, changes: Callable[[FloatArray], FloatArray], frames: int
-    ) -> Self:
-        """With a frame in which touches ``spots`` (k, 4) were; each is forgotten after so many
-        ``frames`` without one. ``changes`` gives (k, n_meas) V of spots (k, 4), each alone."""
-        if not len(spots):
-            return self._in_peace(frames)
-        kept = self.spots.tolist()
-        held = [_foot_of(spot, kept) for spot in spots.tolist()]
-        news = [foot is None for foot in held]
-        quiet = tuple(0 if n in held else q for n, q in enumerate(self.quiet))
-        if not any(news):
-            return self if quiet == self.quiet else replace(self, quiet=quiet)
-        fresh = spots[news]
-        stays = [not any(_is_near(foot, spot) for spot in fresh.tolist()) for foot in kept]
-        return type(self)(
-            np.concatenate([self.spots[stays], fresh])[-_MOST:],
-            (*compress(self.changes, stays), *changes(fresh))[-_MOST:],
-            (*compress(quiet, stays), *(len(fresh) * (0,)))[-_MOST:],
-        )
-
-    def _in_peace(self, frames: int) -> Self:
-        """After a frame without a touch."""
-        quiet = tuple(q + 1 for q in self.quiet)
-        stays = [q < frames for q in quiet]
-        if all(stays):
-            return replace(self, quiet=quiet) if quiet else self
-        return type(self)(
-            self.spots[stays], tuple(compress(self.changes, stays)), tuple(compress(quiet, stays))
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class ResidualDirections:
-    """Residual responses as whitened data see them, each as long as its deviation.
-
-    Attributes
-    ----------
-    matrix
-        (c, n_meas) 1/V, from data to whitened data.
-    changes
-        (n_meas,) V of each, see :class:`ResidualResponse`.
-    rows
-        (k, c).
-    """
-
-    matrix: FloatArray
-    changes: tuple[FloatArray, ...]
-    rows: FloatArray
-
-    @classmethod
-    def none(cls) -> Self:
-        """Where nothing has touched."""
-        return cls(np.zeros((0, 0)), (), np.zeros((0, 0)))
-
-    def of(self, matrix: FloatArray, changes: tuple[FloatArray, ...]) -> Self:
-        """Those of other ``changes``: a product for each that is new, and for all where the
-        ``matrix`` is."""
-        if matrix is self.matrix and changes is self.changes:
-            return self
-        before = zip(self.changes, self.rows, strict=True) if matrix is self.matrix else ()
-        known = {id(change): row for change, row in before}
-        rows = [
-            known[id(change)] if id(change) in known else _LEFT * (matrix @ change)
-            for change in changes
-        ]
-        return type(self)(matrix, changes, np.array(rows).reshape(-1, len(matrix)))
-
-
-def _is_near(foot: list[float], spot: list[float]) -> bool:
-    x, y = foot[0] - spot[0], foot[1] - spot[1]
-    return math.sqrt(x * x + y * y) < _STEP
-
-
-def _foot_of(spot: list[float], feet: list[list[float]]) -> int | None:
-    """Which footprint stands for a touch that is there; None where none does."""
-    x, y, _, content = spot
-    for number in range(len(feet) - 1, -1, -1):  # it is one of the newest, as a rule
-        there, across, _, strength = feet[number]
-        near = (there - x) ** 2 + (across - y) ** 2 < _STEP**2
-        if near and _STRONGER * abs(strength) >= abs(content):
-            return number
-    return None

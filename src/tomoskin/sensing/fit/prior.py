@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -49,6 +49,12 @@ class SpotPrior:
         Standard deviation of the content about none, m².
     """
 
+    directed: ClassVar = 0.7
+    """Standard deviation of a spot's direction (:class:`Part`) about none."""
+
+    reshaped: ClassVar = 0.5
+    """Standard deviation of its shape, of the way from a tail to a bell: both are one from ours."""
+
     area: float
     radius: float
     spread: float
@@ -66,12 +72,9 @@ class SpotPrior:
         spread = math.hypot(_SPREAD, math.log(scaled / _FINGER) / 2)
         return cls(area, radius, spread, _DEPTH * FILLING * radius**2)
 
-    def away(self, spots: FloatArray) -> FloatArray:
-        """(k, 4) deviations of spots (k, 4) from the prior's middle; positions have none."""
-        deviations = np.zeros_like(spots)
-        deviations[:, LOG_RADIUS] = (spots[:, LOG_RADIUS] - math.log(self.radius)) / self.spread
-        deviations[:, CONTENT] = spots[:, CONTENT] / self.content
-        return deviations
+    def widest(self, spots: FloatArray) -> float:
+        """Deviations of the prior by which the widest of spots (k, 4) is wide."""
+        return float(((spots[:, LOG_RADIUS] - math.log(self.radius)) / self.spread).max())
 
     @property
     def middle(self) -> FloatArray:

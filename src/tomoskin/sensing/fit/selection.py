@@ -8,40 +8,75 @@ from functools import cached_property
 import numpy as np
 
 from tomoskin.core import FloatArray
-from tomoskin.sensing.fit.candidates import Matched, limits_of
+from tomoskin.sensing.fit.candidates import JointStarts
 from tomoskin.sensing.fit.expectation import Known, less
-from tomoskin.sensing.fit.openings import (
-    MISSHAPEN,
-    NEAR,
-    WITHIN,
-    Beside,
-    Openings,
-    Start,
-    against,
-    misshapen,
-)
-from tomoskin.sensing.fit.pace import Pace
-from tomoskin.sensing.fit.refine import Deficit, Fit, Problem, Question, Rules
-from tomoskin.sensing.track import HELD
+from tomoskin.sensing.fit.policy import DetectionPolicy
+from tomoskin.sensing.fit.problem import Matched, Problem
+from tomoskin.sensing.fit.spot import CONTENT, LOG_RADIUS
+from tomoskin.sensing.fit.spot_fit import Deficit, Fit
 
-_SURE = 2.0
-"""Times the ratio at which a touch begins: half the square of that is more than what a simpler
-explanation of the frame is worth."""
+Start = tuple[FloatArray, Known]
+"""Spots (k, 4), and who they are."""
 
-_FAINT = 0.7
-"""Part of the ratio at which a touch begins that each spot keeps where the evidence decides: a
-faint one may explain much."""
 
-_FURTHER = 1.0
-"""Evidence that a further spot needs beyond what a wrong profile of the others may give."""
+@dataclass(frozen=True, eq=False)
+class Openings:
+    """Where one spot more may begin in a frame.
 
-_DETOUR = 1.5
-"""Evidence that a spot may cost beside which one more is tried: the two may be worth it."""
+    Attributes
+    ----------
+    problem, matched, policy
+        See :class:`ForwardSelection`.
+    """
+
+    problem: Problem
+    matched: Matched
+    policy: DetectionPolicy
+
+    def starts(self, fit: Fit) -> list[Start]:
+        """One spot more beside those of ``fit``, where a candidate stands out."""
+        ratio, content = self.candidates(fit)
+        best = int(ratio.argmax())
+        if ratio[best] < self.policy.look(fit):
+            return []
+        return _starts(fit, self.matched.spot(best, content))
+
+    def sets(self, fit: Fit) -> list[FloatArray]:
+        """Sets of one spot more than ``fit`` has, wherever that has them."""
+        if not self.policy.weighs_sets(fit):
+            return []
+        widest = self.problem.prior.widest(fit.spots)
+        if not (self.starts(fit) or self.policy.may_be_several(fit, widest)):
+            return []
+        return self._joint.sets(len(fit.spots) + 1, self.policy.pace.joint)
+
+    @cached_property
+    def _joint(self) -> JointStarts:
+        problem = self.problem
+        return JointStarts.of(self.matched, problem.data, problem.prior, problem.sign)
+
+    def candidates(self, fit: Fit) -> tuple[FloatArray, FloatArray]:
+        """Likelihood ratios (n,) and contents (n,) of the candidates beside a ``fit``. The last
+        look is kept, since it takes long."""
+        if not self._candidates or self._candidates[-1][0] is not fit.residual:
+            self.remember(fit, self.matched.ratios(self.problem.solver, fit, self.problem.sign))
+        return self._candidates[-1][1]
+
+    def remember(self, fit: Fit, ratios: tuple[FloatArray, FloatArray]) -> None:
+        """Keep what :meth:`candidates` would compute of ``fit``."""
+        self._candidates.append((fit.residual, ratios))
+
+    @cached_property
+    def _candidates(self) -> list[tuple[FloatArray, tuple[FloatArray, FloatArray]]]:
+        """What candidates are to the residuals that have been looked at, the newest last."""
+        return []
 
 
 @dataclass(frozen=True, eq=False)
 class ForwardSelection:
     """Forward selection of the touches of one frame, with steps back where one is in the way.
+
+    The native engine does the same in one call where no exact model is asked for meanwhile.
 
     Attributes
     ----------
@@ -49,50 +84,55 @@ class ForwardSelection:
         The frame.
     matched
         Candidates for its noise.
-    least
-        Likelihood ratio, in deviations, at which a touch begins.
-    most
-        Touches that are looked for at most.
-    pace
-        How much is tried.
+    policy
+        By what it is decided.
     deficit
         What the table lacked of the last frame's touches.
     """
 
     problem: Problem
     matched: Matched
-    least: float
-    most: int
-    pace: Pace
+    policy: DetectionPolicy
     deficit: Deficit
 
-    @property
-    def question(self) -> Question:
-        """The same for a solver that searches in one call."""
-        matched = self.matched
-        candidates = matched.spots, matched.signatures, matched.squares
-        rules = Rules(self.least, HELD, _SURE, MISSHAPEN, WITHIN, NEAR)
-        limits = limits_of(self.problem.sign)
-        return Question(self.problem, candidates, limits, rules, self.pace, self.most, self.deficit)
+    def explained(self, before: FloatArray) -> Fit:
+        """The most likely touches, confirmed by the exact model; ``before`` (k, 4) are those of the
+        last frame."""
+        answer = self.problem.solver.searched(
+            self.problem, self.matched, self.policy, self.deficit, before
+        )
+        fit = self.step_by_step(before) if answer is None else answer.fit
+        if answer and answer.others:
+            self.openings.remember(fit, answer.others)
+        if answer and answer.turned_down:
+            self._turned_down.append((fit, answer.turned_down))
+        return self._confirmed(fit, before)
 
-    @cached_property
-    def openings(self) -> Openings:
-        """Where further touches may begin."""
-        return Openings(Beside(self.problem, self.matched), self.least, self.pace)
+    def _confirmed(self, fit: Fit, before: FloatArray) -> Fit:
+        """A fit by the exact model. Where touches begin beside others: with or without these, since
+        a further one may be what the table lacks of those."""
+        pace, problem = self.policy.pace, self.problem
+        exact = problem.corrected(fit, pace, pace.closing)
+        if not pace.closing or len(fit.spots) < 2 or len(fit.spots) <= len(before):
+            return exact
+        other = problem.corrected(self._again(before), pace, pace.closing)
+        return exact if self._accepts(other, exact) else other
 
-    def found(self, before: FloatArray) -> Fit:
+    def step_by_step(self, before: FloatArray) -> Fit:
         """The fit of the touches, before the exact model is asked for the last time."""
-        kept = self._pruned(self.again(before))
-        tries = self.pace.tries - (len(before) - len(kept.spots) if len(kept.spots) else 0)
+        kept = self._pruned(self._again(before))
+        most = self.policy.pace.tries
+        tries = most - (len(before) - len(kept.spots) if len(kept.spots) else 0)
         fit, tried = self._more(kept, tries)
         if tries > tried == 0:
             fit = self._fewer(fit)
-        if len(before) and _is_astray(self.pace, fit, before, in_vain=tried > 0 and fit is kept):
-            fresh, _ = self._more(self.problem.nothing(), self.pace.tries)
+        in_vain = tried > 0 and fit is kept
+        if len(before) and self.policy.is_astray(fit, before, in_vain=in_vain):
+            fresh, _ = self._more(self.problem.nothing(), most)
             fit = max(fresh, fit, key=self.problem.evidence)
         return fit
 
-    def again(self, before: FloatArray) -> Fit:
+    def _again(self, before: FloatArray) -> Fit:
         """The fit of no touches but those ``before`` (k, 4)."""
         known = range(len(before)) if len(self.problem.expected.spots) else ()
         return self._refined(before, tuple(known))
@@ -101,16 +141,16 @@ class ForwardSelection:
         """The fit that begins with the touches ``before`` (k, 4)."""
         if not len(before):
             return self.problem.nothing()
-        problem, spots = self.problem, before[: self.most]
-        fit = problem.refined(spots, self.deficit, self.pace.warm, known[: self.most])
-        return problem.corrected(fit, self.pace.rounds, self.pace.near, self.pace.tolerance)
+        pace, most = self.policy.pace, self.policy.most
+        fit = self.problem.refined(before[:most], self.deficit, pace.warm, known[:most])
+        return self.problem.corrected(fit, pace, pace.rounds)
 
     def _pruned(self, fit: Fit) -> Fit:
         """Without the spots that have faded."""
         while len(fit.spots):
             ratio = self.ratios(fit)
             weakest = int(ratio.argmin())
-            if ratio[weakest] >= HELD * self.least:
+            if self.policy.stays(ratio[weakest]):
                 return fit
             fit = self._without(fit, weakest)
         return fit
@@ -121,7 +161,7 @@ class ForwardSelection:
             return fit
         ratio = self.ratios(fit)
         weakest = int(ratio.argmin())
-        if ratio[weakest] >= (1.0 if fit.settled else _SURE) * self.least:
+        if self.policy.is_needed(fit, ratio[weakest]):
             return fit
         return max(fit, self._without(fit, weakest), key=self.problem.evidence)
 
@@ -131,65 +171,72 @@ class ForwardSelection:
     def _more(self, fit: Fit, tries: int) -> tuple[Fit, int]:
         """With further spots, while they are worth it; and how many of ``tries`` were tried."""
         best = fit
-        for tried in range(min(tries, self.most - len(fit.spots))):
-            starts, joint = self.openings.of(fit)
-            if not starts and not joint:
+        for tried in range(min(tries, self.policy.most - len(fit.spots))):
+            starts, sets = self.openings.starts(fit), self.openings.sets(fit)
+            if not starts and not sets:
                 return best, tried
-            more, open_ = self._best(starts, fit.deficit, joint), self.openings.is_open(fit)
-            least = self.openings.threshold(fit, _FAINT if open_ else 1.0)
-            worth = self.ratios(more).min() >= least
-            gain = self.problem.evidence(more) - self.problem.evidence(best)
-            odds = self.pace.rare + against(fit, more)
-            if open_:
-                odds = _FURTHER + misshapen(fit) ** 2 / 2
-            if worth and gain > odds:
+            more = self._best(starts, fit.deficit, sets)
+            if self._accepts(fit, more, best):
                 best = more
-            elif not open_ or gain < -_DETOUR:
-                self.turn_down(fit, more)
+            elif not self.policy.goes_on(fit, self.problem.gain(best, more)):
+                self._turned_down.append((fit, more))
                 return best, tried + 1
             fit = more
         return best, tries
 
+    def _accepts(self, fit: Fit, more: Fit, best: Fit | None = None) -> bool:
+        """Whether one spot ``more`` than a ``fit`` has is worth it beside the ``best`` so far."""
+        gain = self.problem.gain(best or fit, more)
+        return self.policy.accepts(fit, more, self.ratios(more).min(), gain)
+
     def proposed(self, fit: Fit) -> Fit | None:
         """One spot more than a ``fit`` has, whatever it is worth; None where nothing stands out."""
-        if not 0 < len(fit.spots) < self.most:
+        if not 0 < len(fit.spots) < self.policy.most:
             return None
         if self._turned_down and self._turned_down[-1][0] is fit:
             return self._turned_down[-1][1]
-        starts = self.openings.from_this(fit)
+        starts = self.openings.starts(fit)
         return self._best(starts, fit.deficit, []) if starts else None
-
-    def turn_down(self, fit: Fit, more: Fit) -> None:
-        """Keep what :meth:`proposed` would find beside ``fit``: ``more`` was not worth it."""
-        self._turned_down.append((fit, more))
 
     @cached_property
     def _turned_down(self) -> list[tuple[Fit, Fit]]:
-        """Fits, and one spot more beside each, the newest last."""
+        """Fits, and one spot more beside each that was not worth it, the newest last."""
         return []
 
-    def _best(self, starts: list[Start], deficit: Deficit, joint: list[FloatArray]) -> Fit:
+    def _best(self, starts: list[Start], deficit: Deficit, sets: list[FloatArray]) -> Fit:
         """The most evident of those that come out best after a glance."""
-        problem, pace = self.problem, self.pace
+        problem, pace = self.problem, self.policy.pace
         none = Deficit.none(len(deficit.change))
         fits = [problem.refined(start, deficit, pace.glance, known) for start, known in starts]
-        fits += [problem.refined(start, none, pace.glance) for start in joint]
+        fits += [problem.refined(start, none, pace.glance) for start in sets]
         fits.sort(key=lambda fit: fit.cost)
         settled = [
             fit if fit.settled else problem.refined(fit.spots, fit.deficit, pace.cold, fit.known)
             for fit in fits[: pace.finalists]
         ]
-        exact = [problem.corrected(fit, pace.rounds, pace.near, pace.tolerance) for fit in settled]
-        return max(exact, key=self.problem.evidence)
+        return max((problem.corrected(f, pace, pace.rounds) for f in settled), key=problem.evidence)
+
+    @cached_property
+    def openings(self) -> Openings:
+        """Where further touches may begin."""
+        return Openings(self.problem, self.matched, self.policy)
 
     def ratios(self, fit: Fit) -> FloatArray:
         """(k,) deviations of the noise and of residual responses by which each stands out."""
         return np.asarray(np.sqrt(self.problem.solver.standing(self.problem.left, fit)))
 
 
-def _is_astray(pace: Pace, fit: Fit, before: FloatArray, *, in_vain: bool) -> bool:
-    """Whether what was there may keep the frame from being understood: another touch stands out
-    and does not fit ``in_vain``, or, at leisure, anything has changed."""
-    if not pace.restart:
-        return in_vain
-    return len(fit.spots) != len(before) or not fit.settled
+def _starts(fit: Fit, fresh: FloatArray) -> list[Start]:
+    """The new spot beside the others; or instead of half of the nearest."""
+    starts = [(np.concatenate([fit.spots, fresh[None]]), (*fit.known, None))]
+    if len(fit.spots):
+        near = int(np.linalg.norm(fit.spots[:, :2] - fresh[:2], axis=1).argmin())
+        away = fresh[:2] - fit.spots[near, :2]
+        halves = np.tile(fit.spots[near], (2, 1))
+        reach = 0.7 * np.exp(fit.spots[near, LOG_RADIUS]) / max(np.linalg.norm(away), 1e-9)
+        halves[:, :2] += np.outer([-reach, reach], away)
+        halves[:, CONTENT] /= 2
+        halves[:, LOG_RADIUS] -= 0.3
+        instead = np.concatenate([np.delete(fit.spots, near, axis=0), halves])
+        starts.append((instead, (*less(fit.known, near), None, None)))
+    return starts

@@ -18,12 +18,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cho_factor, cho_solve, cholesky, solve_triangular
 
-from tomoskin.core import FloatArray, finished, reach
+from tomoskin.core import FloatArray, reach
 from tomoskin.model.forward import ForwardModel, State
 from tomoskin.model.mesh import Mesh
-from tomoskin.sensing.fit.anisotropy import anisotropy_slopes, directed
-from tomoskin.sensing.fit.channels import channel_errors
-from tomoskin.sensing.fit.random_field import field_modes
+from tomoskin.sensing.fit.sheet_terms import (
+    anisotropy_slopes,
+    channel_errors,
+    directed,
+    field_modes,
+)
 
 _UNEVEN = (0.01, 0.03, 0.06, 0.12, 0.24)
 """Standard deviations of log σ over a sheet that are compared."""
@@ -124,11 +127,6 @@ def fields_of(mesh: Mesh) -> list[FloatArray]:
     """(n_cells, k) modes of a field of each length: some ten milliseconds of work for a mesh."""
     breadth = math.sqrt(float(mesh.volumes.sum()))
     return [field_modes(mesh, part * breadth) for part in _LENGTHS]
-
-
-def fitted_sheet(state: State, reference: FloatArray, deviation: FloatArray | float) -> State:
-    """As :func:`fitting_sheet`, at once."""
-    return finished(fitting_sheet(state, reference, deviation))
 
 
 def fitting_sheet(

@@ -10,11 +10,10 @@ from typing import NamedTuple
 import numpy as np
 
 from tomoskin.core import FloatArray, finished
-from tomoskin.sensing.fit.candidates import Matched
-from tomoskin.sensing.fit.common_mode import Jumps
 from tomoskin.sensing.fit.excess import Channels, Excess, Gauge
+from tomoskin.sensing.fit.hypotheses import Jumps
 from tomoskin.sensing.fit.noise import Whitener
-from tomoskin.sensing.fit.refine import WhitenedTable
+from tomoskin.sensing.fit.problem import Matched, WhitenedTable
 from tomoskin.sensing.fit.spot_model import SpotModel
 
 _MASKS = 8
@@ -76,12 +75,18 @@ class Sight:
     ) -> Generator[None, None, None]:
         """Go on with other noise, or another gain, at the end of some pieces of work."""
         scale = self._model.scale * gain
-        yield from self._renewed(noise / scale[:, None] / scale, scale, excess)
+        noise = noise / scale[:, None] / scale
+        scaled = self._scaled(scale)
+        made = yield from self._making(noise, scaled, excess)
+        self.scale, self._noise = scale, noise
+        self._kept = OrderedDict({_key(scaled, excess): made})
 
     def following(self, other: Sight, excess: Excess) -> Generator[None, None, None]:
         """Make ready for frames as those of an ``other``, in pieces of work."""
         self._nuisance, self._jumps = other._nuisance, other._jumps
-        yield from self._renewed(self._noise, self.scale, excess)
+        scaled = self._scaled(self.scale)
+        made = yield from self._making(self._noise, scaled, excess)
+        self._kept = OrderedDict({_key(scaled, excess): made})
 
     def of(self, excess: Excess) -> Seen:
         """How the newest frame is seen: as the one before, where nothing has changed."""
@@ -101,16 +106,8 @@ class Sight:
         return self._kept[key]
 
     def _scaled(self, scale: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """V of the model."""
+        """Nuisance directions and jumps, in V of the model."""
         return self._nuisance / scale[:, None], self._jumps / scale[:, None]
-
-    def _renewed(
-        self, noise: FloatArray, scale: FloatArray, excess: Excess
-    ) -> Generator[None, None, None]:
-        scaled = self._scaled(scale)
-        made = yield from self._making(noise, scaled, excess)
-        self.scale, self._noise = scale, noise
-        self._kept = OrderedDict({_key(scaled, excess): made})
 
     def _making(
         self, noise: FloatArray, directions: tuple[FloatArray, FloatArray], excess: Excess

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from scipy.linalg.lapack import dposv, dtrtrs
@@ -11,24 +12,17 @@ from scipy.spatial import cKDTree
 from tomoskin.core import FloatArray
 from tomoskin.model.mesh import Mesh
 from tomoskin.sensing.fit.expectation import Expectation, Known, newcomers
+from tomoskin.sensing.fit.policy import DetectionPolicy
 from tomoskin.sensing.fit.prior import SpotPrior
-from tomoskin.sensing.fit.refine import Deficit, Fit, Limits, Problem, Question
+from tomoskin.sensing.fit.problem import RIDGE, Limits, Matched, Problem
 from tomoskin.sensing.fit.spot import CONTENT, N_PARAMETERS, X, Y
+from tomoskin.sensing.fit.spot_fit import Deficit, Fit
 from tomoskin.sensing.fit.table import ResponseTable
 
 _SETTLED = 0.05
 """Newton decrement, squared, at which a step is too small to matter: 0.22 deviations."""
 
 _LEAST_DAMPING, _MOST_DAMPING = 1e-6, 1e3
-
-DIRECTED = 0.7
-"""Standard deviation of a spot's direction (:class:`Part`) about none."""
-
-RESHAPED = 0.5
-"""Standard deviation of its shape, of the way from a tail to a bell: both are one from ours."""
-
-RIDGE = 1e-9
-"""Part of a square that keeps the equations of slopes solvable that are in proportion."""
 
 
 class SheetDomain:
@@ -65,16 +59,11 @@ class NumpySolver:
         """See :class:`Solver`; nothing."""
 
     def expanded(self, spots: FloatArray) -> FloatArray:
-        """See :class:`Solver`."""
+        """What spots do by the table; see :class:`Solver`."""
         return self.table.expanded(spots)
 
     def settled(
-        self,
-        problem: Problem,
-        spots: FloatArray,
-        deficit: Deficit,
-        most: int,
-        known: Known = (),
+        self, problem: Problem, spots: FloatArray, deficit: Deficit, most: int, known: Known = ()
     ) -> Fit:
         """See :class:`Solver`.
 
@@ -83,33 +72,37 @@ class NumpySolver:
         pull = Pull.of(self.prior, problem.expected, known or newcomers(len(spots)))
         best = self._at(problem, self._held(spots, problem.sign), deficit, pull)
         while most > 0:
-            descent = self._descended(problem, best, most, pull)
-            best = replace(best, settled=descent.settled)
-            if np.array_equal(descent.spots, best.spots):
+            moved, steps, settled = self._descended(problem, best, most, pull)
+            best = replace(best, settled=settled)
+            if np.array_equal(moved, best.spots):
                 break
-            most -= descent.steps
-            best = self._at(problem, descent.spots, deficit, pull)
-            best = replace(best, settled=_gain(best, pull) < _SETTLED)
+            most -= steps
+            best = self._at(problem, moved, deficit, pull)
+            gradient = pull.pulled(best.spots, best.gradient)
+            gain = float(gradient @ _solved(best.normal, gradient, _LEAST_DAMPING))
+            best = replace(best, settled=gain < _SETTLED)
         return best
 
-    def _descended(self, problem: Problem, fit: Fit, most: int, pull: Pull) -> FitDescent:
-        """Steps from a fit down to where its metric sees nothing to gain."""
-        metric = NuisanceMetric.of(fit.unknown)
-        gradient = pull.pulled(fit.spots, fit.gradient)
-        best, damping = Slope(fit.spots, fit.normal, gradient, fit.cost), _LEAST_DAMPING
+    def _descended(
+        self, problem: Problem, fit: Fit, most: int, pull: Pull
+    ) -> tuple[FloatArray, int, bool]:
+        """Spots where so many steps lead from a fit by its metric, these, and whether there is
+        nothing to gain."""
+        metric, best = NuisanceMetric.of(fit.unknown), Slope.of(fit, pull)
+        damping = _LEAST_DAMPING
         for steps in range(most):
             step = _solved(best.normal, best.gradient, damping)
             if best.gradient @ step < _SETTLED:
-                return FitDescent(best.spots, steps, settled=True)
+                return best.spots, steps, True
             moved = self._held(best.spots + step.reshape(-1, N_PARAMETERS), problem.sign)
             tried = self._slope(problem, metric, moved, fit.deficit, pull)
             if tried.cost < best.cost:
                 best, damping = tried, max(damping / 10, _LEAST_DAMPING)
             elif damping > _MOST_DAMPING:
-                return FitDescent(best.spots, steps, settled=True)
+                return best.spots, steps, True
             else:
                 damping = max(damping * 30, 1e-2)
-        return FitDescent(best.spots, most, settled=False)
+        return best.spots, most, False
 
     def _at(self, problem: Problem, spots: FloatArray, deficit: Deficit, pull: Pull) -> Fit:
         """The frame with these spots, as they are."""
@@ -120,8 +113,8 @@ class NumpySolver:
         directed, reshaped = parts[:, 1 + N_PARAMETERS :].swapaxes(0, 1) @ direct.T
         unknown = np.vstack([
             problem.left,
-            DIRECTED * directed,
-            RESHAPED * reshaped,
+            self.prior.directed * directed,
+            self.prior.reshaped * reshaped,
             *_within_scan(problem, spots, own),
         ])  # fmt: skip
         predicted = each.sum(axis=0) + direct @ deficit.change
@@ -162,16 +155,14 @@ class NumpySolver:
         residual = problem.data - seen[:, 0].sum(axis=0) - direct @ deficit.change
         slopes = seen[:, 1:].reshape(-1, len(residual))
         square = metric.products(np.vstack([slopes, residual]))
-        misfit = problem.rest + float(square[-1, -1])
-        gradient = pull.pulled(spots, square[:-1, -1])
-        cost = (misfit + pull.square(spots)) / 2
-        return Slope(spots, pull.normal(square), gradient, cost)
+        cost = (problem.rest + float(square[-1, -1]) + pull.square(spots)) / 2
+        return Slope(spots, pull.normal(square), pull.pulled(spots, square[:-1, -1]), cost)
 
     def _held(self, spots: FloatArray, sign: str) -> FloatArray:
         return self.prior.held(self.sheet.held(spots), sign)
 
     def judged(self, problem: Problem, fit: Fit, uneven: float) -> tuple[FloatArray, FloatArray]:
-        """See :class:`Solver`."""
+        """What the engine keeps of it; see :class:`Solver`."""
         seen = problem.seen
         change = (fit.change + fit.deficit.change) @ self.table.basis
         onto = _Beside.of(fit.unknown, fit.slopes[:0]).projected(fit.slopes)
@@ -183,28 +174,33 @@ class NumpySolver:
         covariance = scatter * fit.covariance + max(beyond, uneven**2) * (moved @ moved.T)
         return self.standing(fit.unknown[:0], fit), covariance
 
-    def searched(self, question: Question, before: FloatArray) -> None:
-        """See :class:`Solver`."""
+    def searched(
+        self,
+        problem: Problem,
+        matched: Matched,
+        policy: DetectionPolicy,
+        deficit: Deficit,
+        before: FloatArray,
+    ) -> None:
+        """See :class:`Solver`: this one goes step by step."""
 
     def standing(self, left: FloatArray, fit: Fit) -> FloatArray:
-        """See :class:`Solver`."""
+        """The minimum near ``spots``; see :class:`Solver`."""
         k = len(fit.spots)
         own = NuisanceMetric.of(left).products(np.vstack([fit.slopes, fit.each]))
-        squares = np.empty(k)
+        number, squares = np.arange(N_PARAMETERS * k), np.empty(k)
         for spot in range(k):
-            mine = N_PARAMETERS * k + spot
-            others = np.delete(
-                np.arange(N_PARAMETERS * k), np.arange(N_PARAMETERS) + N_PARAMETERS * spot
-            )
+            mine, others = N_PARAMETERS * k + spot, number[number // N_PARAMETERS != spot]
             root, scale = _even_root(own[np.ix_(others, others)])
             taken = _solved_lower(root, scale * own[others, mine])
             squares[spot] = own[mine, mine] - taken @ taken
         return np.maximum(squares, 0.0)
 
     def standing_out(
-        self, signatures: FloatArray, squares: FloatArray, fit: Fit, limits: Limits
+        self, matched: Matched, fit: Fit, limits: Limits
     ) -> tuple[FloatArray, FloatArray]:
-        """See :class:`Solver`."""
+        """The touches in one call; see :class:`Solver`."""
+        signatures, squares = matched.signatures, matched.squares
         beside = _Beside.of(fit.unknown, fit.slopes)
         clean = beside.projected(fit.residual[None])[0, : signatures.shape[1]]
         onto = np.clip(signatures @ clean, limits.low, limits.high)
@@ -216,12 +212,6 @@ class NumpySolver:
         content[chosen] = onto[chosen] / size
         ratio[chosen] = np.abs(onto[chosen]) / np.sqrt(size)
         return ratio, content
-
-
-def _gain(fit: Fit, pull: Pull) -> float:
-    """Squared Newton decrement of a fit."""
-    gradient = pull.pulled(fit.spots, fit.gradient)
-    return float(gradient @ _solved(fit.normal, gradient, _LEAST_DAMPING))
 
 
 @dataclass(frozen=True, eq=False)
@@ -298,7 +288,7 @@ class NuisanceMetric:
 
     @classmethod
     def of(cls, unknown: FloatArray) -> NuisanceMetric:
-        """Of directions (q, c)."""
+        """The metric of directions (q, c)."""
         root = np.asarray(np.linalg.cholesky(np.eye(len(unknown)) + unknown @ unknown.T))
         return cls(unknown, root, float(np.log(np.diag(root)).sum()))
 
@@ -321,14 +311,10 @@ class Slope:
     gradient: FloatArray
     cost: float
 
-
-@dataclass(frozen=True, eq=False)
-class FitDescent:
-    """Where so many ``steps`` have led; ``settled``: there is nothing to gain."""
-
-    spots: FloatArray
-    steps: int
-    settled: bool
+    @classmethod
+    def of(cls, fit: Fit, pull: Pull) -> Self:
+        """The slope where a fit stands."""
+        return cls(fit.spots, fit.normal, pull.pulled(fit.spots, fit.gradient), fit.cost)
 
 
 @dataclass(frozen=True, eq=False)
@@ -352,7 +338,7 @@ class _Beside:
         return cls(scale[:, None] * both, root)
 
     def projected(self, rows: FloatArray) -> FloatArray:
-        """(m, c) of rows (m, c)."""
+        """(m, c): what is left of rows (m, c)."""
         if not len(self.both):
             return rows
         taken = _solved_lower(self.root, self.both @ rows.T)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -200,14 +200,23 @@ class Spots:
         self._centroids = np.ascontiguousarray(mesh.centroids.T)
         self._margin = np.linalg.norm(corners - mesh.centroids[:, None], axis=2).max(axis=1)
 
+    def __eq__(self, other: object) -> bool:
+        """Whether the sheets are equal."""
+        return isinstance(other, Spots) and self.mesh.identity == other.mesh.identity
+
+    def __hash__(self) -> int:
+        """The hash of the sheet."""
+        return hash(self.mesh.identity)
+
     def change(self, spots: FloatArray) -> tuple[IntArray, FloatArray]:
         """Cells (c,) that spots (k, 4) reach together, and (c,) the change of log σ there."""
-        near = [self._near(spot) for spot in spots]
-        cells, total = self._joined(near), np.zeros(len(self.mesh.cells))
-        for spot, own in zip(spots, near, strict=True):
+        total, reached = np.zeros(len(self.mesh.cells)), np.zeros(len(self.mesh.cells), dtype=bool)
+        for spot in spots:
+            own = self._near(spot)
             square, _ = self._squares(spot, own)
             total[own] += depth_of(spot) * profile(square).mean(axis=1)
-        return cells, total[cells]
+            reached[own] = True
+        return np.flatnonzero(reached), total[reached]
 
     def part(self, spot: FloatArray) -> Part:
         """What one spot (4,) does to its cells, and how that depends on it."""
@@ -247,12 +256,6 @@ class Spots:
         limit = REACH * np.exp(spot[LOG_RADIUS]) + self._margin
         return np.flatnonzero(x * x + y * y < limit * limit)
 
-    def _joined(self, near: list[IntArray]) -> IntArray:
-        reached = np.zeros(len(self.mesh.cells), dtype=bool)
-        for own in near:
-            reached[own] = True
-        return np.flatnonzero(reached)
-
 
 class Response:
     """Exact voltages of spots on a state of the forward model, and their derivatives."""
@@ -272,7 +275,7 @@ class Response:
 
     @property
     def reference(self) -> FloatArray:
-        """(n_meas,) V without a spot."""
+        """(n_meas,) V of the sheet without a spot."""
         return np.asarray(self.state.voltages)
 
     def changes(self, sets: Sequence[FloatArray]) -> FloatArray:
@@ -280,7 +283,9 @@ class Response:
 
         By the local update of the forward model, or by a new solve where many cells change.
         """
-        pressed = [self._pressed(*self.spots.change(spots)) for spots in sets]
+        touched = [self.spots.change(spots) for spots in sets]
+        sigma = self.state.conductivity
+        pressed = [(cells, sigma[cells] * np.exp(change)) for cells, change in touched]
         return self.voltages(pressed) - self.reference
 
     def voltages(self, touches: Sequence[tuple[IntArray, FloatArray]]) -> FloatArray:
@@ -291,7 +296,11 @@ class Response:
         if few:
             out[few] = self.state.local.voltages_of([touches[k] for k in few])
         for k in many:
-            out[k] = self._solved(*touches[k]).voltages
+            reach()
+            cells, sigma = touches[k]
+            conductivity = self.state.conductivity.copy()
+            conductivity[cells] = sigma
+            out[k] = self.state.model.at(conductivity).voltages
         return out
 
     @cached_property
@@ -313,17 +322,11 @@ class Response:
         )
         return along - across, one - other
 
-    def jacobian(self, spots: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Change (n_meas,) V of spots (k, 4), and its derivatives (n_meas, 4k) by each column.
-
-        The fields of the pressed sheet give both, by reciprocity, whatever the number of spots.
-        """
-        return self.expanded(spots)[:2]
-
     def expanded(self, spots: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """As :meth:`jacobian`, and (n_meas, 2k) V: derivatives by direction and shape of each spot.
+        """Change (n_meas,) V of spots (k, 4), its derivatives (n_meas, 4k) by each column, and
+        (n_meas, 2k) V: derivatives by direction and shape of each spot; see :class:`Part`.
 
-        See :class:`Part`.
+        The fields of the pressed sheet give all, by reciprocity, whatever the number of spots.
         """
         parts = [self.spots.part(spot) for spot in spots]
         change = np.zeros(len(self.state.conductivity))
@@ -334,20 +337,6 @@ class Response:
         slopes = answers[:, :N_PARAMETERS].reshape(-1, answers.shape[2]).T
         nuisances = answers[:, N_PARAMETERS:].reshape(-1, answers.shape[2]).T
         return pressed.voltages - self.reference, slopes, nuisances
-
-    def _solved(self, cells: IntArray, sigma: FloatArray) -> State:
-        reach()
-        conductivity = self.state.conductivity.copy()
-        conductivity[cells] = sigma
-        return self.state.model.at(conductivity)
-
-    def each(self, spots: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:
-        """:meth:`jacobian` of each of ``spots`` (n, 4), alone on the sheet."""
-        for spot in spots:
-            yield self.jacobian(spot[None])
-
-    def _pressed(self, cells: IntArray, change: FloatArray) -> tuple[IntArray, FloatArray]:
-        return cells, self.state.conductivity[cells] * np.exp(change)
 
 
 def _answers(pressed: State, part: Part) -> FloatArray:

@@ -14,10 +14,10 @@ from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.skin import Skin
 from tomoskin.sensing.fit.candidates import Candidates, footprints_of
-from tomoskin.sensing.fit.certificate import Certificate, Reduced
+from tomoskin.sensing.fit.certificate import Reduced
 from tomoskin.sensing.fit.native import NativeSolver
 from tomoskin.sensing.fit.prior import SpotPrior
-from tomoskin.sensing.fit.refine import Solver
+from tomoskin.sensing.fit.problem import Solver
 from tomoskin.sensing.fit.sheet import fields_of, fitting_sheet
 from tomoskin.sensing.fit.solver import NumpySolver, SheetDomain
 from tomoskin.sensing.fit.spot import Footprints, Response
@@ -26,21 +26,6 @@ from tomoskin.sensing.fit.tabulate import Tabulation, kept_tabulation
 
 _CELLS = 1500
 """Of the mesh that spots are fitted on: their profile is smooth, and a frame is quick."""
-
-
-@dataclass(frozen=True, eq=False)
-class Adapted:
-    """What an even sheet's model became for an uneven one.
-
-    Attributes
-    ----------
-    table, certificate, candidates
-        See :class:`ResponseTable`, :class:`Certificate` and :class:`Candidates`.
-    """
-
-    table: ResponseTable
-    certificate: Certificate
-    candidates: Candidates
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,8 +43,6 @@ class SpotModel:
     scale
         (n_meas,) 1/V by which the model's changes become difference data; ones where these are
         in volts.
-    adapted
-        Of an uneven sheet; None: what there is is made for this one.
     even
         The model that an uneven sheet's began from; None where this is it.
     """
@@ -68,7 +51,6 @@ class SpotModel:
     prior: SpotPrior
     sign: str
     scale: FloatArray
-    adapted: Adapted | None = None
     even: SpotModel | None = None
 
     @classmethod
@@ -94,8 +76,6 @@ class SpotModel:
     @cached_property
     def candidates(self) -> Candidates:
         """Where touches are looked for."""
-        if self.adapted is not None:
-            return self.adapted.candidates
         return Candidates.of(self.response, self.prior)
 
     @cached_property
@@ -106,14 +86,12 @@ class SpotModel:
     @cached_property
     def solver(self) -> Solver:
         """What fits spots by a table of what one does."""
-        made = self.tabulation if self.adapted is None else self.adapted
-        return _solver(self.response, made.table, self.prior)
+        return _solver(self.response, self.tabulation.table, self.prior)
 
     @cached_property
     def reduced(self) -> Reduced:
         """What stands for the exact model on this sheet."""
-        made = self.tabulation if self.adapted is None else self.adapted
-        return Reduced.of(self.response, made.certificate, self.prior)
+        return finished(Reduced.making(self.response, self.tabulation.certificate, self.prior))
 
     def warm_up(self) -> None:
         """Do what takes seconds the first time, and half a second later on, before frames come."""
@@ -123,10 +101,6 @@ class SpotModel:
     def changes(self, spots: FloatArray) -> FloatArray:
         """(k, n_meas) V that each of ``spots`` (k, 4) alone adds to the reference, by the table."""
         return np.asarray(self.solver.expanded(spots)[:, 0] @ self.solver.table.basis)
-
-    def fitted_to(self, reference: FloatArray, deviation: FloatArray | float = 0.0) -> SpotModel:
-        """As :meth:`fitting`, at once."""
-        return finished(self.fitting(reference, deviation))
 
     def fitting(
         self, reference: FloatArray, deviation: FloatArray | float = 0.0
@@ -146,12 +120,12 @@ class SpotModel:
         scale = self.scale
         if (scale != 1.0).any():
             scale = 1 / np.abs(response.reference)
-        adapted = Adapted(table, certificate, candidates)
-        made = replace(self, response=response, scale=scale, adapted=adapted, even=self)
+        made = replace(self, response=response, scale=scale, even=self)
         yield
-        made.__dict__["reduced"] = yield from Reduced.making(response, certificate, self.prior)
+        reduced = yield from Reduced.making(response, certificate, self.prior)
         yield
-        _ = made.solver
+        solver = _solver(response, table, self.prior)
+        vars(made).update(candidates=candidates, reduced=reduced, solver=solver)
         table.__dict__["typical"] = yield from table.typifying()
         return made
 

@@ -79,7 +79,7 @@ class PositionGrid:
 
     @property
     def points(self) -> FloatArray:
-        """(n, 2) m, y fastest."""
+        """(n, 2) m of the grid, y fastest."""
         x, y = (o + self.step * np.arange(n) for o, n in zip(self.origin, self.shape, strict=True))
         return np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
 
@@ -167,7 +167,7 @@ class ResponseTable:
 
     @cached_property
     def _depths(self) -> FloatArray:
-        """See :func:`through`."""
+        """The polynomial of the depth, see :func:`through`."""
         return through(self.nodes)
 
     @cached_property

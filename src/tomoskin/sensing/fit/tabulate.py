@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Generator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import pairwise, product
 from typing import Self
@@ -73,8 +73,9 @@ class Lattice:
     feet: Footprints
 
     @classmethod
+    @lru_cache(maxsize=16)
     def of(cls, spots: Spots, grid: PositionGrid, radius: float) -> Self:
-        """On the sheet of ``spots``, of ``radius`` m."""
+        """On the sheet of ``spots``, of ``radius`` m; equal sheets of a process share one."""
         points = grid.points
         apart, _ = cKDTree(spots.mesh.centroids).query(points)
         needed = np.flatnonzero(apart < PADDING * math.sqrt(2) * grid.step)
@@ -101,26 +102,6 @@ class Lattice:
         ends = [slice(*pair) for pair in pairwise(feet.starts)]
         changed = response.voltages([(feet.cells[e], sigma[e]) for e in ends])
         return np.asarray((changed - response.reference)[self.nearest])
-
-
-def lattice_of(spots: Spots, grid: PositionGrid, radius: float) -> Lattice:
-    """That of :meth:`Lattice.of`; equal sheets of a process share one."""
-    return _shared(_Site(spots.mesh.identity, grid, radius, spots))
-
-
-@dataclass(frozen=True)
-class _Site:
-    """What a lattice depends on: its sheet is that of the mesh's identity."""
-
-    mesh: str
-    grid: PositionGrid
-    radius: float
-    spots: Spots = field(compare=False)
-
-
-@lru_cache(maxsize=16)
-def _shared(site: _Site) -> Lattice:
-    return Lattice.of(site.spots, site.grid, site.radius)
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +131,7 @@ class Tabulation:
         sampled, parts = [], []
         for log_radius, grid in zip(log_radii, grids, strict=True):
             reach()
-            lattice = lattice_of(response.spots, grid, math.exp(log_radius))
+            lattice = Lattice.of(response.spots, grid, math.exp(log_radius))
             samples, part = _sampled(response, lattice, nodes)
             sampled.append(samples)
             parts.append(part)
@@ -170,7 +151,7 @@ class Tabulation:
         return cls(response, table, arrays["parts"], Certificate.unpacked(arrays))
 
     def packed(self) -> Arrays:
-        """What takes long to compute."""
+        """The arrays that take long to compute."""
         table = self.table
         return {
             "values": table.values,
@@ -209,7 +190,7 @@ class Tabulation:
         """The spots of the table: half a second of work, for :meth:`adapted`."""
         spots, table = self.response.spots, self.table
         return [
-            lattice_of(spots, grid, math.exp(log_radius))
+            Lattice.of(spots, grid, math.exp(log_radius))
             for log_radius, grid in zip(table.log_radii, table.grids, strict=True)
         ]
 

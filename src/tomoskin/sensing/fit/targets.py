@@ -51,7 +51,7 @@ class Blocks:
 
     @classmethod
     def of(cls, scan: Scan) -> Self:
-        """Of the rows of a scan."""
+        """The blocks of the rows of a scan."""
         drive, n = scan.sample_drive[scan.plus], len(scan.drives)
         members = [np.flatnonzero(drive == d) for d in range(n)]
         samples = [np.flatnonzero(scan.sample_drive == d) for d in range(n)]

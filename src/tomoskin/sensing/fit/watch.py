@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -10,42 +9,21 @@ from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray
 from tomoskin.model.pattern import Pattern
-from tomoskin.sensing.fit.candidates import Matched
 from tomoskin.sensing.fit.excess import Channels, Excess, Gauge
-from tomoskin.sensing.fit.refine import Fit, Problem, Solver
-from tomoskin.sensing.fit.search import SpotDetections
+from tomoskin.sensing.fit.policy import (
+    DetectionPolicy,
+    is_like_touch,
+    leaves_much,
+    lifted,
+    looks_again,
+    may_be_found,
+    may_be_lifted,
+    may_be_noise,
+    stands_as_rise,
+)
+from tomoskin.sensing.fit.problem import Matched, Problem, Solver
 from tomoskin.sensing.fit.spot import CONTENT
-
-_EXPLAINS = 0.3
-"""Part of what is beyond noise: a candidate that explains as much may be a touch not yet found."""
-
-_YOUNG = 3
-"""Frames of a touch in which what it does not explain is held for noise; later it is the error of
-its model."""
-
-_STANDS = 600
-"""Frames for which a change of the sign that touches do not have is no part of the idle skin."""
-
-_CHANCE = 6.0
-"""Deviations by which the squares of a residual must be too many to be more noise."""
-
-_LIFTED = 1.0
-"""A press has been lifted, or the sheet been raised, where a change of the sign that touches do not
-have stands out by so many thresholds."""
-
-_CLEAR = 1.5
-"""Thresholds by which such a change stands out beside touches."""
-
-_ASTRAY = 1.0
-"""Squares of the threshold from which what touches leave of a frame is looked at for it."""
-
-_LOOKS = 4
-"""Frames in a row that are looked at so; later those whose number is a power of two."""
-
-_REMAINS = 0.5
-"""Part of what touches of the skin's sign leave beyond noise that may still be left with both."""
-
-_SIGNS = {"decrease": -1.0, "increase": 1.0, "both": 0.0}
+from tomoskin.sensing.fit.spot_fit import Fit
 
 
 class FrameWatch:
@@ -55,8 +33,8 @@ class FrameWatch:
     ----------
     pattern
         Of the rows.
-    sign, least
-        Of the skin's touches, and deviations at which one begins.
+    policy
+        By what it is decided.
 
     Attributes
     ----------
@@ -69,11 +47,11 @@ class FrameWatch:
         lifted, though it may be too faint to be found: it is no noise to be learnt.
     """
 
-    def __init__(self, pattern: Pattern, sign: str, least: float) -> None:
+    def __init__(self, pattern: Pattern, policy: DetectionPolicy) -> None:
         self.channels = Channels.of(pattern)
         self.excess = Excess.none(self.channels)
         self.like_touch = False
-        self._sign, self._least = sign, least
+        self._policy = policy
         self._usual = np.full(len(self.channels.names), np.inf)
         self._last: FloatArray | None = None
         self._lifted: FloatArray | None = None
@@ -100,15 +78,14 @@ class FrameWatch:
         The skin's; "both" where a press has been lifted that was there when the reference was
         taken, or all round it there would seem to be touches.
         """
-        if self._sign == "both" or self.wrong(self._before).any():
+        policy = self._policy
+        if policy.sign == "both" or self.wrong(self._before).any():
             return "both"
-        rows = len(problem.seen.full)
-        if len(self._before) or problem.square < rows + self._least**2:
-            return self._sign
+        if len(self._before) or not may_be_lifted(policy, problem.square, len(problem.seen.full)):
+            return policy.sign
         ratio, content = matched.ratios(problem.solver, problem.nothing(), "both")
         best = int(ratio.argmax())
-        away = self._is_wrong(content[best])
-        return "both" if away and ratio[best] > _LIFTED * self._least else self._sign
+        return "both" if lifted(policy, ratio[best], content[best]) else policy.sign
 
     def puzzled(self, problem: Problem, fit: Fit) -> bool:
         """Whether touches leave so much of a frame unexplained that some of it may be of the sign
@@ -121,33 +98,23 @@ class FrameWatch:
             return False
         if len(fit.spots) > len(self._before) + 1:
             return True
-        if fit.misfit - fit.degrees < _ASTRAY * self._least**2:
+        if not leaves_much(self._policy, fit):
             return False
         self._astray = True
-        seen = self._in_vain
-        if not seen and problem.reach:  # as a rule it is a touch that began within the scan
+        if not self._in_vain and problem.reach:  # as a rule it is a touch that began in the scan
             return False
-        return seen < _LOOKS or seen.bit_count() == 1
-
-    def turns(self, both: SpotDetections, fit: Fit) -> bool:
-        """Whether touches of ``both`` signs explain what those of a ``fit`` leave: some clearly are
-        not of the skin's sign, and little is left then. Where much is, more touches come."""
-        wrong = self.wrong(both.fit.spots)
-        clear = bool((both.ratio[wrong] > _CLEAR * self._least).any())
-        left = both.fit.misfit - both.fit.degrees
-        return clear and left < _REMAINS * (fit.misfit - fit.degrees)
+        return looks_again(self._in_vain)
 
     def unexplained(self, solver: Solver, fit: Fit, matched: Matched) -> float:
         """Variance of what is left of a frame before which there was no touch for long.
 
         1 where it is not beyond chance, or where further touches may still be found in it.
         """
-        variance = fit.misfit / fit.degrees
-        if self._age >= _YOUNG or variance < 1 + _CHANCE * math.sqrt(2 / fit.degrees):
+        if not may_be_noise(fit, self._age):
             return 1.0
-        ratio, _ = matched.ratios(solver, fit, self._sign)
-        goes_on = ratio.max() ** 2 > _EXPLAINS * (fit.misfit - fit.degrees)
-        return 1.0 if len(fit.spots) > len(self._before) and goes_on else variance
+        ratio, _ = matched.ratios(solver, fit, self._policy.sign)
+        goes_on = len(fit.spots) > len(self._before) and may_be_found(fit, ratio.max())
+        return 1.0 if goes_on else fit.misfit / fit.degrees
 
     def end(self, solver: Solver, fit: Fit, matched: Matched, times: float) -> None:
         """Take what a frame was explained with, in so many times the noise that was known."""
@@ -160,25 +127,18 @@ class FrameWatch:
             self._lifted = spots[np.abs(spots[:, CONTENT]).argmax(), :2]
         self._raised = 0 if self._lifted is None else self._raised + 1
         self.like_touch = bool(len(fit.spots))
-        beyond = fit.misfit - fit.degrees
-        if beyond > 0 and not self.like_touch:
+        if fit.beyond > 0 and not self.like_touch:
             ratio, _ = matched.ratios(solver, fit, "both")
-            self.like_touch = bool(ratio.max() ** 2 > max(self._least**2, _EXPLAINS * beyond))
+            self.like_touch = is_like_touch(self._policy, fit, ratio.max())
 
     def wrong(self, spots: FloatArray) -> NDArray[np.bool_]:
         """(k,) whether each of ``spots`` (k, 4) is not of the skin's sign."""
-        return np.asarray(self._is_wrong(spots[:, CONTENT]))
-
-    def _is_wrong(self, content: FloatArray) -> NDArray[np.bool_]:
-        return np.asarray(content * _SIGNS[self._sign] < 0)
+        return self._policy.is_wrong(spots[:, CONTENT])
 
     @property
     def rises(self) -> bool:
-        """Whether the newest frames show a change of the sign that touches do not have.
-
-        Not where it stands for long: a faint press may have become part of the reference.
-        """
-        return _YOUNG <= self._raised < _STANDS
+        """Whether the newest frames show a change of the sign that touches do not have."""
+        return stands_as_rise(self._raised)
 
     @property
     def problem(self) -> str | None:

@@ -38,7 +38,7 @@ class Region:
 
     @classmethod
     def of(cls, skin: Skin) -> Self:
-        """The skin's outline."""
+        """The region within a skin's outline."""
         rim = skin.outline
         return cls(rim.polyline(rim.length / _CORNERS))
 
@@ -74,7 +74,7 @@ class Region:
 
     @cached_property
     def centre(self) -> FloatArray:
-        """(2,) m centroid."""
+        """(2,) m, the centroid of the polygon."""
         return _centroid(self.outline)
 
     @cached_property
@@ -87,7 +87,7 @@ class Region:
         return np.asarray((xy - self.centre) / self.unit)
 
     def metres(self, positions: FloatArray) -> FloatArray:
-        """The reverse."""
+        """Positions in m of those in the locator's own unit."""
         return np.asarray(self.centre + self.unit * positions)
 
     def holds(self, xy: FloatArray) -> NDArray[np.bool_]:

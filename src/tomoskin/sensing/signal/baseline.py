@@ -10,9 +10,8 @@ from functools import cached_property
 import numpy as np
 
 from tomoskin.core import FloatArray
-from tomoskin.sensing.signal.common_mode import CommonMode
 from tomoskin.sensing.signal.health import Mask
-from tomoskin.sensing.signal.idle import Idle
+from tomoskin.sensing.signal.idle import CommonMode, Idle
 from tomoskin.sensing.signal.reference import Reference
 
 SLOWEST = 60.0
@@ -78,7 +77,7 @@ class BaselineState:
 
     @cached_property
     def noise(self) -> float:
-        """V, rms of the rows."""
+        """The noise of one frame, V, rms of the rows."""
         return _rms(self.deviation)
 
     @cached_property
@@ -239,7 +238,7 @@ class Baseline:
 
     @property
     def state(self) -> BaselineState:
-        """How it is now."""
+        """The state of the baseline by now."""
         return BaselineState(
             self.start,
             self.mean,

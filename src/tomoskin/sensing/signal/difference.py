@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import DataError, FloatArray, IntArray
+from tomoskin.core import DataError, FloatArray
 
 DIFFERENCES = ("plain", "normalised")
 
@@ -86,32 +86,6 @@ class Consecutive:
         change = None if self._last is None else difference(values, self._last, self.kind)
         self._last = np.array(values)
         return change
-
-
-def at_one_time(previous: FloatArray, current: FloatArray, drive_index: IntArray) -> FloatArray:
-    """Rows of a scan as they would have been read together, when its first drive was.
-
-    Drives follow each other while the sheet moves; each row is interpolated linearly between
-    the two scans (Yerworth & Bayford 2013).
-
-    Parameters
-    ----------
-    previous, current
-        (n_meas,) V of two consecutive scans.
-    drive_index
-        (n_meas,) drive of each row, ``Pattern.drive_index``.
-
-    Raises
-    ------
-    DataError
-        When the shapes differ.
-    """
-    if not previous.shape == current.shape == drive_index.shape:
-        raise DataError(
-            f"expected two scans of {drive_index.shape}, got {previous.shape} and {current.shape}"
-        )
-    late = drive_index / (drive_index.max() + 1)
-    return np.asarray(current - late * (current - previous))
 
 
 def in_phase(

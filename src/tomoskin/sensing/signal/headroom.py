@@ -84,7 +84,7 @@ class Headroom:
         )
 
     def figures(self) -> dict[str, float]:
-        """The same for programs, V."""
+        """The same figures for programs, V."""
         return {
             "drive_v": float(self.drive.max()),
             "supply_v": FIGURES.compliance,

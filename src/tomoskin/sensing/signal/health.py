@@ -35,7 +35,7 @@ class ElectrodeHealth:
 
     @property
     def text(self) -> str:
-        """In words: "E5 is open: …"."""
+        """The electrode in words: "E5 is open: …"."""
         return f"E{self.electrode + 1} is {self.state}: {self.reason}"
 
 
@@ -60,7 +60,7 @@ class Health:
 
     @property
     def sick(self) -> tuple[ElectrodeHealth, ...]:
-        """Those that are not good."""
+        """The electrodes that are not good."""
         return tuple(e for e in self.electrodes if e.state != "good")
 
     @property
@@ -79,7 +79,7 @@ class Roles:
 
     @classmethod
     def of(cls, pattern: Pattern) -> Self:
-        """Of a pattern's rows."""
+        """The roles that a pattern's rows give."""
         each = np.arange(pattern.n_electrodes)[:, None, None]
         return cls((pattern.drive == each).any(axis=2), (pattern.measure == each).any(axis=2))
 

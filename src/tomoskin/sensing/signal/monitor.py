@@ -10,8 +10,12 @@ from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, IntArray
 from tomoskin.model.pattern import Pattern, Scan
-from tomoskin.sensing.signal.equal_readings import EqualReadings
-from tomoskin.sensing.signal.evidence import Groups, Reciprocity, sign_limit, unchanged
+from tomoskin.sensing.signal.evidence import (
+    EqualReadings,
+    Groups,
+    Reciprocity,
+    sign_limit,
+)
 from tomoskin.sensing.signal.health import ElectrodeHealth, Health, Mask, Roles
 from tomoskin.sensing.signal.reference import Reference
 
@@ -51,6 +55,132 @@ _OFFSET = 170
 """Looks over which the reciprocity error at rest is followed."""
 
 
+class ReciprocityWatch:
+    """Looks for electrodes whose reciprocity wavers by more than the noise.
+
+    Parameters
+    ----------
+    pairs
+        Rows that exchange driven and measuring pair.
+    start, noise
+        (n_meas,) V that the untouched skin reads, and its noise.
+    usable
+        (n_meas,) bool.
+    """
+
+    def __init__(
+        self, pairs: Reciprocity, start: FloatArray, noise: FloatArray, usable: Mask
+    ) -> None:
+        self._pairs, self._start, self._deviation = pairs, start, pairs.deviation(noise)
+        self._rest = pairs.error(start)
+        self._used = usable[pairs.first] & usable[pairs.second] & np.isfinite(self._deviation)
+        self._squared, self._shift = np.ones(len(self._rest)), np.zeros(len(self._rest))
+        self._last: FloatArray | None = None
+        self._causes: dict[int, ElectrodeHealth] = {}
+        self.looks = 0
+
+    def push(self, values: FloatArray, off: Mask) -> dict[int, ElectrodeHealth]:
+        """Those of a frame, (n_meas,) V without the rows that are ``off``."""
+        self.looks += 1
+        if self.looks % _EVERY or not self._used.any():
+            return self._causes
+        last, self._last = self._last, values
+        if last is None:
+            return {}
+        self._average(values, last, off)
+        self._causes = {}
+        if (self._pairs.mean @ self._squared).max() >= 1.0 + _LOUD / 2:
+            excess = self._pairs.excess(self._squared)
+            limit = max(_LOUD, 4.0 * float(np.median(excess)))
+            for e in np.flatnonzero(excess > limit).tolist():
+                self._blame(e, float(excess[e]))
+        return self._causes
+
+    def _average(self, values: FloatArray, last: FloatArray, off: Mask) -> None:
+        pairs, use = self._pairs, self._used
+        error = pairs.error(values) - self._rest
+        squared = pairs.squared(error, self._deviation, values - last, values - self._start)
+        if off.any():
+            use = use & ~(off[pairs.first] | off[pairs.second])
+        np.copyto(squared, self._squared, where=~use)
+        np.copyto(error, 0.0, where=~use)
+        self._squared += (squared - self._squared) / _WINDOW
+        self._shift += (error / self._deviation - self._shift) / _WINDOW
+        self._rest += np.clip(error, -self._deviation, self._deviation) / _OFFSET
+
+    def _blame(self, electrode: int, excess: float) -> None:
+        steady = float(self._pairs.mean[electrode] @ np.minimum(self._shift**2, 25.0))
+        times = f"{np.sqrt(1 + excess):.1f} times the noise at rest"
+        state, reason = "noisy", f"its reciprocity error fluctuates by {times}"
+        if steady > _STEADY * excess:
+            if excess <= _BIASED:
+                return
+            state, reason = "inconsistent", f"its reciprocity error is {times}"
+        self._causes[electrode] = ElectrodeHealth(electrode, state, reason)
+
+
+class SampleWatch:
+    """Looks for electrodes whose samples stand still while the others' go on.
+
+    Parameters
+    ----------
+    scan
+        The samples of ``n`` electrodes.
+    """
+
+    def __init__(self, scan: Scan, n: int) -> None:
+        each = (scan.sample_electrode == np.arange(n)[:, None]).astype(float)
+        rows = np.concatenate([each, np.ones((1, scan.n_samples))])
+        # averages over each electrode's samples; the last, over all
+        self._members = rows / np.maximum(rows.sum(axis=1), 1.0)[:, None]
+        self._still = np.zeros(n)
+        self._last: NDArray[np.uint16] | None = None
+
+    def push(self, samples: NDArray[np.uint16] | None) -> dict[int, ElectrodeHealth]:
+        """Those of a frame, (n_samples,) counts."""
+        last, self._last = self._last, samples
+        if samples is None or last is None:
+            return {}
+        share = np.asarray(self._members @ (samples == last).astype(float))
+        alone = share[:-1] > 1.0 - 1e-9
+        if share[-1] > 0.5 or not alone.any():
+            self._still[:] = 0.0
+            return {}
+        self._still = np.where(alone, self._still + 1, 0.0)
+        count = 1.0 / np.maximum(self._members[:-1].max(axis=1), 1e-9)
+        chance = np.log(max(share[-1], 0.05)) * count * self._still
+        return {
+            e: ElectrodeHealth(e, "stuck", f"its {round(count[e])} samples do not change")
+            for e in np.flatnonzero(chance < np.log(_FROZEN)).tolist()
+        }
+
+
+class Debounce:
+    """What electrodes are blamed for in frames → states that last; ``sick`` are those that are not
+    good."""
+
+    def __init__(self, n: int) -> None:
+        self.sick: dict[int, ElectrodeHealth] = {}
+        self._blamed, self._cleared = np.zeros(n, int), np.zeros(n, int)
+
+    def push(self, causes: dict[int, ElectrodeHealth], time: float) -> None:
+        """Take the ``causes`` of a frame at ``time`` s."""
+        for e in range(len(self._blamed)):
+            here = e in causes
+            self._blamed[e] = self._blamed[e] + 1 if here else 0
+            self._cleared[e] = 0 if here else self._cleared[e] + 1
+            if here and self._blamed[e] >= ENTER:
+                now, before = causes[e], self.sick.get(e)
+                if before is None or before.state != now.state:
+                    self.sick[e] = replace(now, since=time)
+            elif e in self.sick and self._cleared[e] >= LEAVE:
+                del self.sick[e]
+
+    def rest(self) -> None:
+        """Take a frame in which nobody is blamed, and nobody was."""
+        self._blamed[:] = 0
+
+
 class Monitor:
     """Watches the electrodes of one skin after a reference.
 
@@ -83,41 +213,26 @@ class Monitor:
         rank: IntArray | None = None,
         most_own: float = np.inf,
     ) -> None:
-        n = pattern.n_electrodes
-        self._roles = Roles.of(pattern)
+        n, rest = pattern.n_electrodes, reference.mean
         noise = _noise_of(reference, model)
-        self._unusable = unusable | _silent(pattern, reference.mean, noise, model, unusable)
+        self._pattern, self._roles, self._most_own = pattern, Roles.of(pattern), most_own
+        self._unusable = self._silent = unusable | _silent(pattern, rest, noise, model, unusable)
         usable = ~self._unusable
-        self._groups = Groups.of(pattern, reference.mean, noise, usable)
-        self._pattern = pattern
+        self._groups = Groups.of(pattern, rest, noise, usable)
         order = np.arange(n) if rank is None else rank
-        self._sign, limit = sign_limit(pattern, reference.mean, noise, order)
+        self._sign, limit = sign_limit(pattern, rest, noise, order)
         self._least = np.where(usable, -limit, -np.inf)
-        self._start, self._silent = reference.mean, self._unusable
-        self._reciprocity = Reciprocity.of(pattern)
-        self._deviation = self._reciprocity.deviation(noise)
-        self._rest = self._reciprocity.error(reference.mean)
-        usable_pairs = usable[self._reciprocity.first] & usable[self._reciprocity.second]
-        self._paired = usable_pairs & np.isfinite(self._deviation)
-        self._squared = np.ones(len(self._rest))
-        self._shift = np.zeros(len(self._rest))
-        self._members = _averages(scan, n)
+        self._pairs = Reciprocity.of(pattern)
+        self._reciprocity = ReciprocityWatch(self._pairs, rest, noise, usable)
+        self._samples = None if scan is None else SampleWatch(scan, n)
         self._equal = None if scan is None else EqualReadings.of(scan, n)
         self._unreached: dict[int, ElectrodeHealth] = {}
-        self._pairs_left = bool(self._paired.any())
-        self._looks, self._wavers = 0, dict[int, ElectrodeHealth]()
-        self._still = np.zeros(n)
-        self._last: FloatArray | None = None
-        self._last_samples: NDArray[np.uint16] | None = None
-        self._most_own = most_own
-        self._blamed, self._cleared = np.zeros(n, int), np.zeros(n, int)
+        self._states = Debounce(n)
         self._good = tuple(ElectrodeHealth(e) for e in range(n))
-        self._sick: dict[int, ElectrodeHealth] = {}
         self._well = Health(self._good, self._unusable, np.zeros(n, bool))
-        self._explained_key: tuple[bytes, bytes] | None = None
-        self._explained: dict[int, ElectrodeHealth] = {}
-        self._masked_for: object = None
-        self._masks = (self._unusable, np.zeros(n, bool))
+        # what was concluded of the last frame: as a rule the next one is like it
+        self._explained: tuple[object, dict[int, ElectrodeHealth]] = None, {}
+        self._masks: tuple[object, tuple[Mask, Mask]] = None, (self._unusable, np.zeros(n, bool))
 
     def push(
         self,
@@ -134,40 +249,39 @@ class Monitor:
         off = railed | self._unusable
         bad = off | (self._sign * values < self._least)
         dead = self._groups.dead(values, off)
-        loud = self._loud(values, off)
-        stuck = self._stuck(samples)
-        offset = self._offset(own)
-        if samples is not None and self._equal is not None and self._looks % _ALIKE == 1:
-            self._unreached = self._equal(samples, values, self._reciprocity)
-        seen = self._sick or self._unreached or offset or loud or stuck
-        if not (seen or bad.any() or dead.any()):
-            self._blamed[:] = 0
+        causes = self._offset(own) | self._reciprocity.push(values, off | self._silent)
+        if self._samples is not None:
+            causes |= self._samples.push(samples)
+        if samples is not None and self._equal and self._reciprocity.looks % _ALIKE == 1:
+            self._unreached = self._equal(samples, values, self._pairs)
+        if not (self._states.sick or self._unreached or causes or bad.any() or dead.any()):
+            self._states.rest()
             self._silent = self._unusable
             return self._well
-        return self._judged(bad, railed, dead, offset | loud | stuck, time)
+        return self._judged(bad, railed, dead, causes, time)
 
     def _judged(
-        self, bad: Mask, railed: Mask, dead: Mask, more: dict[int, ElectrodeHealth], time: float
+        self, bad: Mask, railed: Mask, dead: Mask, causes: dict[int, ElectrodeHealth], time: float
     ) -> Health:
         self._silent = dead[: self._groups.n_drives][self._pattern.drive_index]
         bad |= self._silent
         key = (bad.tobytes(), dead.tobytes())
-        if key != self._explained_key:
-            self._explained_key, self._explained = key, self._explain(bad, railed, dead)
+        if key != self._explained[0]:
+            self._explained = key, self._explain(bad, railed, dead)
         driven = {  # two that touch each other make the drive between them silent
             electrode: health
             for electrode, health in self._unreached.items()
             if not self._silent[self._roles.drives[electrode]].any()
         }
-        causes = more | self._explained | driven
-        self._debounce(causes, time)
-        blamed = (causes | self._sick).items()
-        states = {e: h.state for e, h in blamed if h.state != "offset"}
-        if (key, states) != self._masked_for:
-            self._masked_for = (key, states)
-            self._masks = _masks(self._pattern, self._roles, bad, states, self._unusable)
-        electrodes = tuple(self._sick.get(e, good) for e, good in enumerate(self._good))
-        return Health(electrodes, *self._masks)
+        causes = causes | self._explained[1] | driven
+        self._states.push(causes, time)
+        sick = self._states.sick
+        states = {e: h.state for e, h in (causes | sick).items() if h.state != "offset"}
+        if (key, states) != self._masks[0]:
+            masks = _masks(self._pattern, self._roles, bad, states, self._unusable)
+            self._masks = (key, states), masks
+        electrodes = tuple(sick.get(e, good) for e, good in enumerate(self._good))
+        return Health(electrodes, *self._masks[1])
 
     def _explain(self, bad: Mask, railed: Mask, dead: Mask) -> dict[int, ElectrodeHealth]:
         """Electrodes that explain what is not as it should be in rows, drives and pairs."""
@@ -181,66 +295,12 @@ class Monitor:
                 causes[b] = ElectrodeHealth(b, "short", _short_text(a))
         return causes
 
-    def _debounce(self, causes: dict[int, ElectrodeHealth], time: float) -> None:
-        for e in range(len(self._good)):
-            here = e in causes
-            self._blamed[e] = self._blamed[e] + 1 if here else 0
-            self._cleared[e] = 0 if here else self._cleared[e] + 1
-            if here and self._blamed[e] >= ENTER:
-                now, before = causes[e], self._sick.get(e)
-                if before is None or before.state != now.state:
-                    self._sick[e] = replace(now, since=time)
-            elif e in self._sick and self._cleared[e] >= LEAVE:
-                del self._sick[e]
-
     def _reason(self, electrode: int, state: str, railed: Mask) -> str:
         reads, drives = self._roles.reads[electrode], self._roles.drives[electrode]
         at_rail = f"{int((reads & railed).sum())} of {int(reads.sum())} readings are at a rail"
         if state == "railed":
             return at_rail
         return f"no current in any of its {int(drives.sum())} driven rows, and {at_rail}"
-
-    def _loud(self, values: FloatArray, off: Mask) -> dict[int, ElectrodeHealth]:
-        """Electrodes whose reciprocity wavers by more than the noise."""
-        self._looks += 1
-        if self._looks % _EVERY or not self._pairs_left:
-            return self._wavers
-        last, self._last = self._last, values
-        if last is None:
-            return {}
-        pairs = self._reciprocity
-        error = pairs.error(values) - self._rest
-        squared = pairs.squared(error, self._deviation, values - last, values - self._start)
-        use = self._paired
-        if self._silent.any() or off.any():
-            off = off | self._silent
-            use = use & ~(off[pairs.first] | off[pairs.second])
-        np.copyto(squared, self._squared, where=~use)
-        np.copyto(error, 0.0, where=~use)
-        self._squared += (squared - self._squared) / _WINDOW
-        self._shift += (error / self._deviation - self._shift) / _WINDOW
-        self._rest += np.clip(error, -self._deviation, self._deviation) / _OFFSET
-        if (pairs.mean @ self._squared).max() < 1.0 + _LOUD / 2:
-            self._wavers = {}
-            return {}
-        excess = pairs.excess(self._squared)
-        limit = max(_LOUD, 4.0 * float(np.median(excess)))
-        loud = [(e, float(excess[e])) for e in np.flatnonzero(excess > limit).tolist()]
-        self._wavers = {e: h for e, much in loud if (h := self._wavering(e, much))}
-        return self._wavers
-
-    def _wavering(self, electrode: int, excess: float) -> ElectrodeHealth | None:
-        steady = float(self._reciprocity.mean[electrode] @ np.minimum(self._shift**2, 25.0))
-        times = f"{np.sqrt(1 + excess):.1f} times the noise"
-        if steady <= _STEADY * excess:
-            return ElectrodeHealth(
-                electrode, "noisy", f"its reciprocity error fluctuates by {times} at rest"
-            )
-        if excess <= _BIASED:
-            return None
-        return ElectrodeHealth(
-            electrode, "inconsistent", f"its reciprocity error is {times} at rest"
-        )
 
     def _offset(self, own: FloatArray | None) -> dict[int, ElectrodeHealth]:
         """Electrodes with a voltage of their own that takes up much of the converter's range."""
@@ -255,24 +315,6 @@ class Monitor:
                 "polarises or has another temperature; the alternating drive takes that out",
             )
             for e in np.flatnonzero(np.abs(away) > self._most_own).tolist()
-        }
-
-    def _stuck(self, samples: NDArray[np.uint16] | None) -> dict[int, ElectrodeHealth]:
-        """Electrodes whose samples stand still while the others' go on."""
-        last, self._last_samples = self._last_samples, samples
-        if samples is None or last is None or self._members is None:
-            return {}
-        share = unchanged(samples, last, self._members)
-        alone = share[:-1] > 1.0 - 1e-9
-        if share[-1] > 0.5 or not alone.any():
-            self._still[:] = 0.0
-            return {}
-        self._still = np.where(alone, self._still + 1, 0.0)
-        count = 1.0 / np.maximum(self._members[:-1].max(axis=1), 1e-9)
-        chance = np.log(max(share[-1], 0.05)) * count * self._still
-        return {
-            e: ElectrodeHealth(e, "stuck", f"its {round(count[e])} samples do not change")
-            for e in np.flatnonzero(chance < np.log(_FROZEN)).tolist()
         }
 
 
@@ -321,11 +363,3 @@ def _silent(
     groups = Groups.of(pattern, scale * model, noise, usable)
     dead = groups.dead(rest, unusable)[: groups.n_drives]
     return np.asarray(dead[pattern.drive_index])
-
-
-def _averages(scan: Scan | None, n: int) -> FloatArray | None:
-    if scan is None:
-        return None
-    each = (scan.sample_electrode == np.arange(n)[:, None]).astype(float)
-    rows = np.concatenate([each, np.ones((1, scan.n_samples))])
-    return np.asarray(rows / np.maximum(rows.sum(axis=1), 1.0)[:, None])

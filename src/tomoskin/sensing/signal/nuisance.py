@@ -69,7 +69,7 @@ class NuisanceSubspace:
 
     @property
     def count(self) -> int:
-        """Number of directions."""
+        """How many directions there are."""
         return int(self.directions.shape[1])
 
     def __call__(self, dv: FloatArray) -> FloatArray:

@@ -91,7 +91,7 @@ class Recording:
             _check(self.labels.shape, (n_frames, 2), "xy_m", self.source)
 
     def __len__(self) -> int:
-        """Number of frames."""
+        """How many frames there are in it."""
         return len(self.voltages)
 
     def part(self, start: int, stop: int) -> Recording:

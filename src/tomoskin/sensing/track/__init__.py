@@ -1,23 +1,26 @@
-"""Readings of successive frames → touches that keep their identity, and what happens to them."""
+"""Detections of successive frames → touches that keep their identity, and what happens to them."""
 
 from tomoskin.sensing.track.event import TouchEvent
-from tomoskin.sensing.track.motion import HELD, STILL, TrackSettings
+from tomoskin.sensing.track.motion import STILL, TrackSettings
+from tomoskin.sensing.track.policy import HELD, RESIDUAL
 from tomoskin.sensing.track.sliding import FingerTracker, SlideCorrection
-from tomoskin.sensing.track.spans import Span, touch_spans
 from tomoskin.sensing.track.touch_table import (
     ELAPSED,
+    Span,
     TouchedFrame,
     columns_of,
     force_values,
     has_forces,
     touch_columns,
     touch_rows,
+    touch_spans,
 )
 from tomoskin.sensing.track.tracker import Tracker
 
 __all__ = [
     "ELAPSED",
     "HELD",
+    "RESIDUAL",
     "STILL",
     "FingerTracker",
     "SlideCorrection",

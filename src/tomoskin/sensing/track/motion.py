@@ -8,10 +8,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 from tomoskin.core import Detection
-
-HELD = 0.6
-"""Part of the signal-to-noise ratio of an onset above which a touch goes on: between the two it
-neither begins nor ends."""
+from tomoskin.sensing.track.policy import HELD
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,9 +43,6 @@ class TrackSettings:
 STILL = TrackSettings(still=True)
 """For frames that do not follow each other in time: each shows what it holds."""
 
-
-GATE = 16.0
-"""Squared Mahalanobis distance beyond which a detection is of another touch: one in 3,000."""
 
 _UNKNOWN = 0.004
 """Deviation of a detection whose noise is unknown, m."""

@@ -1,4 +1,4 @@
-"""Where a touch is held to be: its detections, each as far as its strength bears it out."""
+"""Where a touch is held to be and how strong it is, each detection as far as it bears it out."""
 
 from __future__ import annotations
 
@@ -8,11 +8,64 @@ from typing import Self
 
 from tomoskin.core import Detection
 from tomoskin.sensing.track.motion import region_radius
+from tomoskin.sensing.track.policy import RESIDUAL
+
+# Deviations are those of fits to the moving plant, seeds 1 to 3 (docs/theory/tracking.md).
+
+NOISE = 0.15
+"""Of the logarithm of a content from frame to frame."""
+
+ELSEWHERE = 0.10
+"""Of the difference that another position makes: the sheet is uneven."""
+
+_WALK = 0.03
+"""Variance by which a finger's force changes it in a second."""
+
+
+@dataclass(frozen=True, slots=True)
+class TouchStrength:
+    """``mean`` of the logarithm of a touch's content, and its ``variance``."""
+
+    mean: float
+    variance: float
+
+    @classmethod
+    def of(cls, detection: Detection) -> Self:
+        """The strength as one frame shows it."""
+        return cls(log_content(detection), NOISE**2)
+
+    def after(self, detection: Detection, seconds: float) -> Self:
+        """With one frame more, some ``seconds`` later (Kalman 1960)."""
+        before = self.variance + _WALK * seconds
+        gain = before / (before + NOISE**2)
+        mean = self.mean + gain * (log_content(detection) - self.mean)
+        return type(self)(mean, (1 - gain) * before)
+
+    def log_likelihood(self, other: TouchStrength) -> float:
+        """Of being that of the same touch as ``other``, elsewhere."""
+        variance = self.variance + other.variance + ELSEWHERE**2
+        return -0.5 * ((self.mean - other.mean) ** 2 / variance + math.log(variance))
+
+    def plus(self, other: TouchStrength) -> TouchStrength:
+        """Of two touches that are seen as one: contents add up."""
+        mean = math.log(math.exp(self.mean) + math.exp(other.mean))
+        share = 1 / (1 + math.exp(other.mean - self.mean))
+        variance = share**2 * self.variance + (1 - share) ** 2 * other.variance
+        return TouchStrength(mean, variance)
+
+
+def content_of(detection: Detection) -> float:
+    """Its peak times its area: what it changes, whatever stands beside it."""
+    return abs(detection.peak) * detection.area
+
+
+def log_content(detection: Detection) -> float:
+    """Logarithm of the size of the peak times the area; 0 where it has none."""
+    content = content_of(detection)
+    return math.log(content) if content > 0 else 0.0
+
 
 # Chosen on the twin's seeds 101 to 103 (docs/theory/tracking.md).
-
-_RECOVERY = 1.0
-"""Seconds in which a sheet recovers: for so long it responds to what no longer presses."""
 
 _DIFFUSION = 5e-4
 """Variance along each axis by which a touch may move in a second that tells nothing of it, m²."""
@@ -70,7 +123,7 @@ class Position:
         region, and moves the position as far as a Kalman filter (1960) lets it.
         """
         since = max(time - self.time, 0.0)
-        strength = max(size, self.strength * math.exp(-since / _RECOVERY))
+        strength = max(size, self.strength * math.exp(-since / RESIDUAL.recovery))
         unseen, region = self.unseen + _DIFFUSION * since, region_radius(detection) ** 2
         astray = region * (strength / size - 1.0) ** 2 if size > 0 else math.inf
         trust = unseen / (unseen + astray) if astray > 0 else 1.0

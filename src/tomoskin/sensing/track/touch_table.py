@@ -1,15 +1,61 @@
-"""Touches as a table: one row a touch, SI units."""
+"""Touches as tables, SI units: one row a touch and frame, or each touch once."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import Force, Touch
 from tomoskin.model.mesh import Plane, Surface
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """A touch from its first frame to its last, s.
+
+    ``x``, ``y`` (m) and ``peak`` (in the image's unit) are those of the frame in which it is
+    strongest, if possible one in which it is not merged with another.
+    """
+
+    id: int
+    kind: str
+    begin: float
+    end: float
+    x: float
+    y: float
+    peak: float
+
+
+def touch_spans(frames: Iterable[tuple[float, tuple[Touch, ...]]]) -> tuple[Span, ...]:
+    """The touches in (time, touches) of frames, by their beginning.
+
+    A number that is given again, after another start, is another touch. One that is merged with
+    others goes on in what stands for it.
+    """
+    found: dict[tuple[int, float], tuple[float, float, Touch]] = {}
+    since: dict[int, float] = {}
+    for time, touches in frames:
+        for touch in touches:
+            since[touch.id] = touch.since
+            for number in touch.merged or (touch.id,):
+                key = number, since.setdefault(number, touch.since)
+                begin, _, best = found.get(key, (time, time, touch))
+                found[key] = begin, time, max(best, touch, key=_weight)
+    spans = (
+        Span(number, best.kind, begin, end, r.x, r.y, r.peak)
+        for (number, _), (begin, end, best) in found.items()
+        for r in [best.detection]
+    )
+    return tuple(sorted(spans, key=lambda span: (span.begin, span.id)))
+
+
+def _weight(touch: Touch) -> tuple[bool, float]:
+    return not touch.merged, abs(touch.detection.peak)
+
 
 COLUMNS = (
     *("frame", "time_s", "id", "x_m", "y_m", "sd_x_m", "sd_y_m"),
@@ -52,9 +98,14 @@ def touch_rows(
     on = _curved(surface)
     for frame, time, touches in frames:
         for touch in touches:
-            more = force_values(touch.detection.force) if forces else ()
-            last = () if begun is None else (time - begun,)
-            yield _row(frame, time, touch) + more + _in_space(touch, on) + last
+            d, number = touch.detection, -1 if frame is None else frame
+            row: tuple[Value, ...] = (number, time, touch.id, d.x, d.y, d.sd_x, d.sd_y)
+            row += (d.area, d.peak, touch.said)
+            if forces:
+                row += force_values(d.force)
+            if on is not None:
+                row += tuple(on.point([[d.x, d.y]])[0].tolist())
+            yield row if begun is None else (*row, time - begun)
 
 
 def touch_columns(
@@ -80,12 +131,6 @@ def _curved(surface: Surface | None) -> Surface | None:
     return None if isinstance(surface, Plane) else surface
 
 
-def _row(frame: int | None, time: float, touch: Touch) -> tuple[Value, ...]:
-    d = touch.detection
-    number = -1 if frame is None else frame
-    return (number, time, touch.id, d.x, d.y, d.sd_x, d.sd_y, d.area, d.peak, touch.said)
-
-
 def has_forces(frames: Iterable[TouchedFrame]) -> bool:
     """Whether a touch of any frame has a force."""
     return any(t.detection.force is not None for *_, touches in frames for t in touches)
@@ -96,9 +141,3 @@ def force_values(force: Force | None) -> tuple[float, float, float, str]:
     if force is None:
         return (math.nan, math.nan, math.nan, "")
     return (force.newtons, force.low, force.high, force.state)
-
-
-def _in_space(touch: Touch, surface: Surface | None) -> tuple[Value, ...]:
-    if surface is None:
-        return ()
-    return tuple(surface.point([[touch.detection.x, touch.detection.y]])[0].tolist())

@@ -6,18 +6,31 @@ import math
 from dataclasses import dataclass, field
 
 from tomoskin.core import Detection
-from tomoskin.sensing.track.merging import Alone, MergedFinger
 from tomoskin.sensing.track.motion import TrackState, region_radius
-from tomoskin.sensing.track.position import Position
-from tomoskin.sensing.track.strength import TouchStrength, content_of
-
-_STEP = 0.012
-"""A touch that slides leaves a footprint every so many metres."""
+from tomoskin.sensing.track.policy import RESIDUAL
+from tomoskin.sensing.track.position import Position, TouchStrength, content_of
 
 _MOST_FOOTPRINTS = 40
 _STRONG = 0.5
 _FRESH = 1.0
 """Seconds for which the strength of a touch that has come out of a merged one tells who it is."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Alone:
+    """A touch as it was when last seen by itself, at the device's ``time`` s."""
+
+    state: TrackState
+    strength: TouchStrength
+    time: float
+
+
+@dataclass(eq=False, slots=True)
+class MergedFinger:
+    """One finger, as far as frames told it from others: its number, and how it was ``alone``."""
+
+    key: int
+    alone: Alone | None = None
 
 
 @dataclass(slots=True)
@@ -60,6 +73,8 @@ class Trace:
         for a press that slid leaves a residual response anywhere along its way.
     held
         Where it is held to be.
+    ahead
+        Where it is expected in the frame that comes.
     """
 
     detection: Detection
@@ -81,9 +96,10 @@ class Trace:
     strength: TouchStrength = field(init=False)
     fresh: TouchStrength = field(init=False)
     held: Position = field(init=False)
+    ahead: TrackState = field(init=False)
 
     def __post_init__(self) -> None:
-        """Leave the first footprint."""
+        """Begin with what the first detection shows."""
         self.strong = self.since
         self.strength = self.fresh = TouchStrength.of(self.detection)
         self.held = Position.of(self.detection, content_of(self.detection), self.since)
@@ -101,7 +117,7 @@ class Trace:
 
     @property
     def sign(self) -> float:
-        """Of its peak."""
+        """The sign of its peak: 1 or −1."""
         return sign_of(self.detection)
 
     @property
@@ -110,10 +126,10 @@ class Trace:
         return self.held.of_detection(self.detection)
 
     def alone(self, time: float) -> Alone:
-        """As it is now."""
+        """The touch as it is now, by itself."""
         return Alone(self.state, self.strength, time)
 
-    def see(self, detection: Detection, time: float, seconds: float, *, still: bool) -> None:
+    def take(self, detection: Detection, time: float, seconds: float, *, still: bool) -> None:
         """Take the detection of this frame, ``seconds`` after the frame before; ``still``: the last
         ones say nothing of it."""
         self.detection = detection
@@ -141,19 +157,19 @@ class Trace:
         self._step()
 
     def absorb(self, other: Trace) -> None:
-        """Stand for ``other`` too."""
+        """Stand for the fingers of ``other`` too."""
         self.members += other.members
         self.footprints = [*other.footprints, *self.footprints][-_MOST_FOOTPRINTS:]
 
     def _step(self) -> None:
         x, y, size = self.detection.x, self.detection.y, size_of(self.detection)
         feet = self.footprints
-        if not feet or (x - feet[-1].x) ** 2 + (y - feet[-1].y) ** 2 >= _STEP**2:
+        if not feet or (x - feet[-1].x) ** 2 + (y - feet[-1].y) ** 2 >= RESIDUAL.spacing**2:
             feet.append(Footprint(x, y, size))
             del feet[:-_MOST_FOOTPRINTS]
         elif size > feet[-1].top:
             feet[-1].top = size
-        reach = max(region_radius(self.detection), _STEP) ** 2
+        reach = max(region_radius(self.detection), RESIDUAL.spacing) ** 2
         near = [foot.top for foot in feet if (foot.x - x) ** 2 + (foot.y - y) ** 2 <= reach]
         self.top = max(near, default=feet[-1].top)
 
@@ -165,5 +181,5 @@ def size_of(detection: Detection) -> float:
 
 
 def sign_of(detection: Detection) -> float:
-    """1 or −1."""
+    """1 where it raises the conductivity, else −1."""
     return -1.0 if detection.peak < 0 else 1.0

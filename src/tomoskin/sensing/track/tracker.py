@@ -5,11 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from tomoskin.core import Detection, Touch
-from tomoskin.sensing.track import existence
-from tomoskin.sensing.track.clock import TrackClock
-from tomoskin.sensing.track.event import Happening, TouchEvent
-from tomoskin.sensing.track.ledger import IdentityLedger
-from tomoskin.sensing.track.meetings import (
+from tomoskin.sensing.track import policy
+from tomoskin.sensing.track.association import (
+    FrameOfTouches,
+    ObservedDetection,
+    associate,
+    follow,
+)
+from tomoskin.sensing.track.event import Happening, TouchEvent, TrackClock
+from tomoskin.sensing.track.identity import IdentityLedger
+from tomoskin.sensing.track.merging import (
     divide,
     merge,
     met_by,
@@ -17,11 +22,9 @@ from tomoskin.sensing.track.meetings import (
     sibling_of,
     weigh_meetings,
 )
-from tomoskin.sensing.track.merging import Alone, MergedFinger
 from tomoskin.sensing.track.motion import TrackSettings, begin
-from tomoskin.sensing.track.pairing import FrameOfTouches, expected, miss, pairs_of, see
 from tomoskin.sensing.track.residual import ResidualResponses, is_residual
-from tomoskin.sensing.track.trace import Trace
+from tomoskin.sensing.track.trace import Alone, MergedFinger, Trace
 
 
 class Tracker:
@@ -88,18 +91,17 @@ class Tracker:
     def _follow(self, frame: FrameOfTouches) -> None:
         """One frame: who is where, who has begun, ended, met and parted."""
         traces, now = list(self._traces), self._clock.now
-        states = expected(traces, frame)
-        found = pairs_of(traces, states, frame)
-        fresh = len(found.pairs) < len(frame.detections)
+        found = associate(traces, frame)
+        fresh = len(found.pairs) < len(frame.observed)
         beside = {m.key: t.alone(now) for t in traces if fresh and t.reported for m in t.members}
-        miss(traces, states, found, frame)
-        see(traces, states, found, frame)
+        follow(traces, found, frame)
         weigh_meetings(traces)
-        for index, detection in enumerate(frame.detections):
-            if index in found.pairs or detection.weak or detection.snr < self.settings.snr:
+        for index, observed in enumerate(frame.observed):
+            detection = observed.detection
+            if index in found.pairs or not policy.may_begin(detection, self.settings.snr):
                 continue
             if not self._residuals.explain(detection, now, self._traces):
-                self._begin(index, frame, beside)
+                self._begin(observed, frame, beside)
         for i, k, odds in found.exchanges:  # while both were seen
             one, other = traces[i], traces[k]
             if one.reported and other.reported and not self.settings.still:
@@ -110,12 +112,14 @@ class Tracker:
         self._settle()
         self._ledger.judge(self._traces)
 
-    def _begin(self, index: int, frame: FrameOfTouches, beside: dict[int, Alone]) -> None:
+    def _begin(
+        self, observed: ObservedDetection, frame: FrameOfTouches, beside: dict[int, Alone]
+    ) -> None:
         self._keys += 1
-        detection = frame.detections[index]
+        detection = observed.detection
         others = any(trace.reported and trace.missing is None for trace in self._traces)
-        odds = existence.first(detection, self.settings.snr, frame.strongest if others else 0.0)
-        state = begin(frame.seen[index].position, self.settings)
+        odds = policy.initiated(detection, self.settings.snr, frame.strongest if others else 0.0)
+        state = begin(observed.position, self.settings)
         clock = self._clock
         trace = Trace(detection, state, clock.now, clock.host, odds, [MergedFinger(self._keys)])
         trace.beside = beside
@@ -143,7 +147,7 @@ class Tracker:
             self._traces.remove(trace)
             return
         seconds = self._clock.now - trace.since
-        if trace.odds < existence.BEGUN or not existence.placed(trace.detection, seconds):
+        if not policy.is_reported(trace.odds, trace.detection, seconds):
             return
         if self._residuals.explain(trace.detection, self._clock.now, self._traces):
             self._traces.remove(trace)
@@ -175,8 +179,8 @@ class Tracker:
     def _lose(self, trace: Trace) -> None:
         """Of one that is missing: it has met another, or has been lifted, or is waited for."""
         odds, carrier = met_by(trace, self._traces)
-        over = self.settings.still or trace.odds < existence.ENDED
-        if carrier is not None and (odds > existence.MET or (over and odds > 0)):
+        over = self.settings.still or policy.is_deleted(trace.odds)
+        if carrier is not None and policy.has_met(odds, deleted=over):
             self._traces.remove(trace)
             merge(carrier, trace, self._clock.now)
             self._report("merge", carrier)

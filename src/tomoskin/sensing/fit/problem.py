@@ -1,22 +1,23 @@
-"""What explains a frame, and the frame that is to be explained."""
+"""The frame that is to be explained, and what a solver does for it."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Generator
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
-from typing import Any, Protocol
+from functools import cached_property
+from typing import Any, Protocol, Self
 
 import numpy as np
 
-from tomoskin.core import FloatArray, finished, reach
+from tomoskin.core import FloatArray, reach
 from tomoskin.sensing.fit.certificate import Reduced
 from tomoskin.sensing.fit.expectation import Expectation, Known
 from tomoskin.sensing.fit.noise import Whitener
-from tomoskin.sensing.fit.pace import Pace
+from tomoskin.sensing.fit.policy import FAINTEST, USEFUL, DetectionPolicy, Pace
 from tomoskin.sensing.fit.prior import SpotPrior
-from tomoskin.sensing.fit.spot import CONTENT, LOG_RADIUS, N_PARAMETERS, Response
+from tomoskin.sensing.fit.spot import CONTENT, N_PARAMETERS, Response
+from tomoskin.sensing.fit.spot_fit import Deficit, Fit
 from tomoskin.sensing.fit.table import ABREAST, ResponseTable
 
 _CERTAIN = 10.0
@@ -31,119 +32,11 @@ _UNSEEN = 0.1
 _CLEAR = 1e-10
 """Part of the largest square above which an axis is one to ten digits."""
 
-_FAVOURS = math.log(200)
-"""Logarithm of the odds from which one explanation is favoured."""
-
 _EXACT = 0.1
 """Deviations by which the exact model may differ from what a fit was made with."""
 
-
-@dataclass(frozen=True, eq=False)
-class Deficit:
-    """What a table lacks, as the exact model has it: a small part that changes slowly.
-
-    Attributes
-    ----------
-    spots
-        (k, 4) for which the exact model was solved.
-    change
-        (rank,) V by which it differs from the table, in the table's basis.
-    """
-
-    spots: FloatArray
-    change: FloatArray
-
-    @classmethod
-    def none(cls, rank: int) -> Deficit:
-        """Before the exact model is solved."""
-        return cls(np.zeros((0, N_PARAMETERS)), np.zeros(rank))
-
-    def holds_for(self, spots: FloatArray, part: float) -> bool:
-        """Whether as many ``spots`` (k, 4) are where they were, as wide and as strong, but for a
-        ``part`` of radius and content."""
-        if len(spots) != len(self.spots):
-            return False
-        return all(map(partial(_alike, part), spots.tolist(), self.spots.tolist()))
-
-
-def _alike(part: float, spot: list[float], other: list[float]) -> bool:
-    """Whether a ``spot`` is where the other one was, but for a ``part`` of that."""
-    x, y, log_radius, content = (here - there for here, there in zip(spot, other, strict=True))
-    near = math.hypot(x, y) <= part * math.exp(other[LOG_RADIUS])
-    return near and abs(log_radius) <= part and abs(content) <= part * abs(other[CONTENT])
-
-
-@dataclass(frozen=True, eq=False)
-class Fit:
-    """Spots that explain a frame. Unknown amplitudes along some directions are integrated out.
-
-    Attributes
-    ----------
-    spots
-        (k, 4), see :mod:`tomoskin.sensing.fit.spot`.
-    deficit
-        What the table lacks of these spots.
-    change
-        (rank,) V that all of them change by the table, in its basis.
-    each, predicted
-        (k, c) what each spot does to the whitened data, and (c,) what all do together.
-    residual
-        (c,) whitened data less what all do.
-    slopes
-        (4k, c) derivatives of the whitened model.
-    unknown
-        (q, c) directions, each as long as its amplitude's deviation.
-    normal
-        (4k, 4k) inverse of the covariance: JC⁻¹Jᵀ and the prior; C = 1 + unknownᵀ unknown.
-    gradient
-        (4k,) JC⁻¹ residual.
-    misfit
-        residualᵀ C⁻¹ residual: about as many as it has entries where the model is right.
-    log_size
-        Half the logarithm of the determinant of C.
-    cost
-        Half the misfit and the squares of the prior.
-    degrees
-        Degrees of freedom of the residual.
-    settled
-        Whether the steps towards it came to an end.
-    known
-        Who each spot is; nobody at all: all are newcomers.
-    """
-
-    spots: FloatArray
-    deficit: Deficit
-    change: FloatArray
-    each: FloatArray
-    predicted: FloatArray
-    residual: FloatArray
-    slopes: FloatArray
-    unknown: FloatArray
-    normal: FloatArray
-    gradient: FloatArray
-    misfit: float
-    log_size: float
-    cost: float
-    degrees: int
-    settled: bool = True
-    known: Known = ()
-
-    @cached_property
-    def covariance(self) -> FloatArray:
-        """(4k, 4k) of all parameters, by the curvature at the minimum."""
-        scale = 1 / np.sqrt(np.diag(self.normal))
-        even = np.linalg.inv(self.normal * scale[:, None] * scale)
-        return np.asarray(even * scale[:, None] * scale)
-
-    def log_evidence(self, prior: SpotPrior, expected: Expectation) -> float:
-        """Logarithm of ∫ likelihood · prior by Laplace's method (MacKay 2003, eq. 28.5).
-
-        Up to what all fits of the same data have in common.
-        """
-        n = len(self.normal)
-        sign, log_det = np.linalg.slogdet(self.normal) if n else (1.0, 0.0)
-        volume = (n * math.log(2 * math.pi) - log_det) / 2 if sign > 0 else -np.inf
-        return volume - self.cost - self.log_size + prior.log_most(self.known, expected)
+RIDGE = 1e-9
+"""Part of a square that keeps the equations of slopes solvable that are in proportion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,23 +70,18 @@ class WhitenedTable:
     timed: FloatArray
 
     @classmethod
-    def of(cls, solver: Solver, whiten: Whitener, times: FloatArray) -> WhitenedTable:
-        """``times`` (n_meas,) of the measurements about the middle of the scan."""
-        return finished(cls.making(solver, whiten, times, np.zeros((len(times), 0))))
-
-    @classmethod
     def making(
         cls, solver: Solver, whiten: Whitener, times: FloatArray, jumps: FloatArray
     ) -> Generator[None, None, WhitenedTable]:
-        """As :meth:`of`, a piece of work between two yields; the axes hold ``jumps`` (n_meas, j)
-        as well."""
+        """A piece of work between two yields; ``times`` (n_meas,) of the measurements about the
+        middle of the scan; the axes hold ``jumps`` (n_meas, j) as well."""
         full, table = whiten.matrix, solver.table
         direct, timed = full @ table.basis.T, full @ (times[:, None] * table.basis.T)
         yield
         axes = _axes(direct @ table.typical, least=1)
         yield
         others = np.hstack([timed @ table.typical, full @ jumps])
-        more = _axes(_less(others, axes), least=0)
+        more = _axes(others - axes @ (axes.T @ others), least=0)
         yield
         both, narrow = np.column_stack([axes, more]), axes.shape[1]
         direct = both.T @ direct
@@ -236,16 +124,12 @@ def _axes(typical: FloatArray, least: int) -> FloatArray:
     return np.asarray(typical @ (vectors[:, first:] / np.sqrt(square[first:])))
 
 
-def _less(columns: FloatArray, axes: FloatArray) -> FloatArray:
-    return np.asarray(columns - axes @ (axes.T @ columns))
-
-
 class Solver(Protocol):
     """The arithmetic of a fit by a table."""
 
     @property
     def table(self) -> ResponseTable:
-        """What one spot does."""
+        """The table of what one spot does."""
         ...
 
     def keep(
@@ -259,12 +143,7 @@ class Solver(Protocol):
         ...
 
     def settled(
-        self,
-        problem: Problem,
-        spots: FloatArray,
-        deficit: Deficit,
-        most: int,
-        known: Known = (),
+        self, problem: Problem, spots: FloatArray, deficit: Deficit, most: int, known: Known = ()
     ) -> Fit:
         """The minimum of the cost near ``spots`` (k, 4), after at most so many steps; nobody
         ``known``: all are newcomers.
@@ -280,10 +159,14 @@ class Solver(Protocol):
         ...
 
     def standing_out(
-        self, signatures: FloatArray, squares: FloatArray, fit: Fit, limits: Limits
+        self, matched: Matched, fit: Fit, limits: Limits
     ) -> tuple[FloatArray, FloatArray]:
-        """See :meth:`tomoskin.sensing.fit.candidates.Matched.ratios`; of ``signatures``
-        (n, narrow) with ``squares`` (n,)."""
+        """(n,) likelihood ratio of each candidate, and (n,) its most likely content.
+
+        The ratio is the square root of twice its logarithm: deviations by which the candidate
+        stands out (GLRT; Kay 1998, section 7.6.2, for a linear model), after what the spots of
+        ``fit`` could take up.
+        """
         ...
 
     def judged(self, problem: Problem, fit: Fit, uneven: float) -> tuple[FloatArray, FloatArray]:
@@ -297,11 +180,18 @@ class Solver(Protocol):
         """
         ...
 
-    def searched(self, question: Question, before: FloatArray) -> Answer | None:
+    def searched(
+        self,
+        problem: Problem,
+        matched: Matched,
+        policy: DetectionPolicy,
+        deficit: Deficit,
+        before: FloatArray,
+    ) -> Answer | None:
         """What :class:`~tomoskin.sensing.fit.selection.ForwardSelection` finds, in one call.
 
-        ``before`` (k, 4) are the touches of the last frame. None where this solver cannot do it at
-        that pace.
+        ``before`` (k, 4) are the touches of the last frame, and ``deficit`` is what the table
+        lacked of them. None where this solver cannot do it at that pace.
         """
         ...
 
@@ -328,57 +218,49 @@ class Limits:
         Deviations of the noise below which a candidate is none.
     useful
         Part of a candidate's square that the spots of a fit must leave of it.
+    ridge
+        See :data:`RIDGE`.
     """
 
     low: float
     high: float
-    least: float
-    useful: float
+    least: float = FAINTEST
+    useful: float = USEFUL
+    ridge: float = RIDGE
+
+    @classmethod
+    def of(cls, sign: str) -> Self:
+        """For touches of this ``sign``."""
+        low = 0.0 if sign == "increase" else -math.inf
+        return cls(low, 0.0 if sign == "decrease" else math.inf)
 
 
-@dataclass(frozen=True, slots=True)
-class Rules:
-    """What counts as a touch.
+@dataclass(frozen=True, eq=False)
+class Matched:
+    """Candidates, their whitened signatures (n, narrow), and (n,) the squares of these."""
 
-    Attributes
-    ----------
-    least
-        Likelihood ratio, in deviations, at which one begins.
-    held
-        Part of that at which one stays.
-    sure
-        Times that ratio from which no frame is explained better without the touch.
-    misshapen
-        Part of what touches change that a wrong profile may leave: no evidence of another one.
-    within, near
-        Radii within which there is no room for another one, and within which one may stand for
-        what the profile does not say.
-    """
+    spots: FloatArray
+    signatures: FloatArray
+    squares: FloatArray
 
-    least: float
-    held: float
-    sure: float
-    misshapen: float
-    within: float
-    near: float
+    @classmethod
+    def of(cls, spots: FloatArray, signatures: FloatArray) -> Self:
+        """Spots (n, 4) of these signatures (n, narrow)."""
+        return cls(spots, signatures, np.einsum("nr,nr->n", signatures, signatures))
 
+    def louder(self, times: float) -> Self:
+        """The same in so many times the noise's variance."""
+        return self.of(self.spots, self.signatures / math.sqrt(times))
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Question:
-    """What is looked for in one frame.
+    def ratios(self, solver: Solver, fit: Fit, sign: str) -> tuple[FloatArray, FloatArray]:
+        """See :meth:`Solver.standing_out`; for touches of this ``sign``."""
+        return solver.standing_out(self, fit, Limits.of(sign))
 
-    ``candidates`` are spots (n, 4) of content 1, their whitened signatures (n, narrow) and the
-    squares (n,) of these; ``most`` touches are looked for; ``deficit``: what the table lacked of
-    the last frame's.
-    """
-
-    problem: Problem
-    candidates: tuple[FloatArray, FloatArray, FloatArray]
-    limits: Limits
-    rules: Rules
-    pace: Pace
-    most: int
-    deficit: Deficit
+    def spot(self, number: int, content: FloatArray) -> FloatArray:
+        """(4,) candidate ``number`` with its content of ``contents`` (n,)."""
+        chosen = self.spots[number].copy()
+        chosen[CONTENT] = content[number]
+        return np.asarray(chosen)
 
 
 @dataclass(frozen=True, eq=False)
@@ -407,12 +289,17 @@ class Problem:
 
     @property
     def square(self) -> float:
-        """Of all whitened data."""
+        """The square of all whitened data."""
         return float(self.data @ self.data) + self.rest
 
     @property
+    def depths(self) -> tuple[float, float]:
+        """Least and largest depth of a spot."""
+        return self.prior.depths(self.sign)
+
+    @property
     def solver(self) -> Solver:
-        """What fits spots."""
+        """The solver that fits spots to this frame."""
         return self.seen.solver
 
     def nothing(self) -> Fit:
@@ -421,17 +308,17 @@ class Problem:
         return self.solver.settled(self, none, Deficit.none(len(self.solver.table.basis)), 0)
 
     def refined(self, spots: FloatArray, deficit: Deficit, most: int, known: Known = ()) -> Fit:
-        """See :meth:`Solver.settled`."""
+        """The best fit near ``spots``, see :meth:`Solver.settled`."""
         return self.solver.settled(self, spots, deficit, most, known)
 
-    def corrected(self, fit: Fit, rounds: int, near: float, tolerance: float) -> Fit:
+    def corrected(self, fit: Fit, pace: Pace, rounds: int) -> Fit:
         """The fit with what the table lacks at its spots, so many rounds at most, and not where
-        that is there for spots as ``near``.
+        that is there for spots as near.
 
-        The exact model says what that is, or what stands for it to a ``tolerance`` as
-        :class:`Pace` has it. A single faint spot is left as it is: what its table lacks is below
-        the noise.
+        The exact model says what that is, or what stands for it to a tolerance, as ``pace`` has
+        both. A single faint spot is left as it is: what its table lacks is below the noise.
         """
+        near, tolerance = pace.near, pace.tolerance
         if not rounds or not len(fit.spots) or fit.deficit.holds_for(fit.spots, near):
             return fit
         if len(fit.spots) == 1 and np.linalg.norm(fit.each) < _CERTAIN:
@@ -467,6 +354,6 @@ class Problem:
         """See :meth:`Fit.log_evidence`."""
         return fit.log_evidence(self.prior, self.expected)
 
-    def favours(self, one: Fit, other: Fit) -> bool:
-        """Whether the frame speaks for one explanation against another, by odds of 200."""
-        return self.evidence(one) - self.evidence(other) > _FAVOURS
+    def gain(self, fit: Fit, other: Fit) -> float:
+        """What the evidence of the ``other`` fit has more."""
+        return self.evidence(other) - self.evidence(fit)

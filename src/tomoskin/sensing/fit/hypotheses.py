@@ -1,4 +1,7 @@
-"""Touches, or a jump of the common mode: which of the two explains a frame.
+"""Explanations between which frames decide: one touch more, a jump of the common mode.
+
+A frame alone often leaves it open whether two fingers press or three. Each frame is an independent
+test between the two, once it is known where either has the touches (Wald 1945).
 
 The common mode is what all voltages have in common, as a gain or a supply. As a rule it moves by
 parts in 10⁴, which the covariance of the noise holds. Now and then it jumps by any amount.
@@ -14,22 +17,108 @@ from functools import cached_property
 import numpy as np
 
 from tomoskin.core import FloatArray
-from tomoskin.sensing.fit.openings import misshapen
-from tomoskin.sensing.fit.refine import Fit, Problem
-from tomoskin.sensing.fit.rival import Rival
-from tomoskin.sensing.fit.search import SpotDetections
+from tomoskin.sensing.fit.detections import SpotDetections, judged
+from tomoskin.sensing.fit.expectation import Expectation, newcomers
+from tomoskin.sensing.fit.policy import (
+    ELSEWHERE,
+    SUDDEN,
+    SURE,
+    DetectionPolicy,
+    begins_rival,
+    drops_rival,
+    elects_rival,
+    is_no_jump,
+    may_have_jumped,
+)
+from tomoskin.sensing.fit.problem import Problem
+from tomoskin.sensing.fit.selection import ForwardSelection
+from tomoskin.sensing.fit.spot_fit import Fit
 
-_SUDDEN = 1.0
-"""Logarithm of how much more often the common mode jumps than a touch begins."""
+GoingOn = Callable[[SpotDetections], Expectation]
+"""What is expected of the touches of one frame in the next."""
 
-_SURE = 8.0
-"""Logarithm of the odds from which frames have decided between the two."""
 
-_LEAVES = 5.0
-"""Deviations left along a jump, from which the common mode may have jumped."""
+@dataclass(frozen=True, eq=False)
+class Rival:
+    """Touches that may explain the last frames, one more than were found in them.
 
-_USUAL = 3.0
-"""Deviations along a jump within which the common mode is where it is expected."""
+    Attributes
+    ----------
+    detected
+        In the newest frame.
+    odds
+        Logarithm of those for them against what was found.
+    """
+
+    detected: SpotDetections
+    odds: float
+
+
+def challenged(
+    selection: ForwardSelection, found: SpotDetections, rival: Rival | None, going_on: GoingOn
+) -> tuple[SpotDetections, Rival | None]:
+    """What explains a frame, if not what was ``found`` in it; and the rival in the next one.
+
+    A rival wins as soon as the frames speak for it, where each of its touches stands out as one
+    that stays does, at a place of its own. What a wrong profile of those that were found may leave
+    is no evidence: it would say the same in every frame.
+    """
+    policy = selection.policy
+    if rival is not None and _is_beside(rival, found.fit):
+        fit, gain = _followed(selection, found.fit, rival, going_on)
+        odds = rival.odds + gain - policy.against(found.fit, fit)
+    else:
+        proposed, gain = _proposed(selection, found.fit)
+        if proposed is None or not begins_rival(gain):
+            return found, None
+        fit, odds = proposed, gain - policy.against(found.fit, proposed) - policy.pace.rare
+    if drops_rival(odds):
+        return found, None
+    fit = replace(fit, known=newcomers(len(fit.spots)))  # of what was found
+    detected = judged(selection, fit)
+    if elects_rival(policy, found.fit, selection.ratios(fit).min(), odds):
+        return detected, None
+    return found, Rival(detected, odds)
+
+
+def _is_beside(rival: Rival, found: Fit) -> bool:
+    """Whether what was found goes on, so that the rival does too."""
+    return None not in found.known and len(rival.detected.fit.spots) == len(found.spots) + 1
+
+
+def _followed(
+    selection: ForwardSelection, found: Fit, rival: Rival, going_on: GoingOn
+) -> tuple[Fit, float]:
+    """The rival in a further frame, and the logarithm of the odds that this gives."""
+    pace, before = selection.policy.pace, rival.detected.fit
+    problem = replace(selection.problem, expected=going_on(rival.detected))
+    known = tuple(range(len(problem.expected.spots)))
+    fit = problem.refined(before.spots, before.deficit, pace.warm, known)
+    fit = problem.corrected(fit, pace, pace.closing)
+    return fit, problem.evidence(fit) - selection.problem.evidence(found)
+
+
+def _proposed(selection: ForwardSelection, found: Fit) -> tuple[Fit | None, float]:
+    """The best that has one spot more than was found, and what it is worth."""
+    best, most = None, -math.inf
+    for fit in (selection.proposed(found), _beside_expected(selection, found)):
+        evidence = -math.inf if fit is None else selection.problem.evidence(fit)
+        if evidence > most:
+            best, most = fit, evidence
+    return best, most - selection.problem.evidence(found) if best else most
+
+
+def _beside_expected(selection: ForwardSelection, found: Fit) -> Fit | None:
+    """One spot beside those that are expected, where these may have left their places in vain."""
+    expected = selection.problem.expected
+    away = expected.away(found.spots, found.known)
+    if len(found.spots) != len(expected.spots) or away < ELSEWHERE:
+        return None
+    known = tuple(range(len(expected.spots)))
+    return selection.proposed(
+        selection.problem.refined(expected.spots, selection.deficit, 0, known)
+    )
+
 
 _FAINT = 0.3
 """Deviations of the noise below which it does not matter where the common mode has moved."""
@@ -106,7 +195,7 @@ class Jumps:
 
     @cached_property
     def _kept(self) -> list[Jumps]:
-        """The last of :meth:`beside`."""
+        """The jumps that :meth:`beside` gave last."""
         return []
 
     @cached_property
@@ -139,59 +228,61 @@ class CommonModeJump:
         What it has jumped by, in deviations of a jump.
     """
 
-    odds: float = -_SUDDEN
+    odds: float = -SUDDEN
     proven: int = 0
     rest: float = 0.0
     jumped: bool = False
     size: float = 0.0
 
     def decided(
-        self, usual: Problem, jumps: Jumps, least: float, explain: Callable[[Problem], Explained]
+        self,
+        usual: Problem,
+        jumps: Jumps,
+        policy: DetectionPolicy,
+        explain: Callable[[Problem], Explained],
     ) -> tuple[Explained, CommonModeJump]:
-        """What explains a frame, ``usual`` or with ``jumps``.
-
-        A touch stands out by ``least`` deviations.
-        """
+        """What explains a frame, ``usual`` or with ``jumps``."""
         if not len(jumps.rows):
             return explain(usual), self
         jumps = jumps.beside(usual.left)
         if self.jumped:
             explained = explain(jumps.free(usual))
-            return explained, self._after_jump(jumps, explained[0].fit)
+            return explained, self._after_jump(jumps, explained[0].fit, policy)
         explained = explain(usual)
         fit = explained[0].fit
         count, (rest, _) = len(fit.spots), jumps.along(fit.residual)
-        if self._is_clear(usual, fit, rest, jumps, least):
+        if self._is_clear(usual, fit, rest, jumps, policy):
             return explained, CommonModeJump(proven=count, rest=rest) if count else _NONE
         other = explain(jumps.free(usual))
         beside, size = jumps.along(other[0].fit.residual)
-        if abs(beside) < math.hypot(_USUAL, misshapen(other[0].fit)):  # there is none
+        if is_no_jump(policy, beside, other[0].fit):
             return explained, CommonModeJump(proven=count, rest=rest)
-        gain = usual.evidence(fit) - usual.evidence(other[0].fit)
-        odds = self.odds + float(np.clip(gain, -2 * _SURE, 2 * _SURE))
+        gain = usual.gain(other[0].fit, fit)
+        odds = self.odds + float(np.clip(gain, -2 * SURE, 2 * SURE))
         if odds > 0:
-            proven = count if odds > _SURE else min(self.proven, count)
+            proven = count if odds > SURE else min(self.proven, count)
             return explained, CommonModeJump(odds, proven, rest)
-        return other, CommonModeJump(odds, jumped=odds < -_SURE, size=size)
+        return other, CommonModeJump(odds, jumped=odds < -SURE, size=size)
 
-    def _is_clear(self, usual: Problem, fit: Fit, rest: float, jumps: Jumps, least: float) -> bool:
+    def _is_clear(
+        self, usual: Problem, fit: Fit, rest: float, jumps: Jumps, policy: DetectionPolicy
+    ) -> bool:
         """Whether no jump explains the frame as the touches of a ``fit`` do, which leave ``rest``
         deviations along it: as much as before, and they stand out whatever the jump."""
-        moved = abs(rest - self.rest)
-        if moved > _LEAVES and moved > math.hypot(_LEAVES, misshapen(fit)):
+        if may_have_jumped(policy, abs(rest - self.rest), fit):
             return False
         if len(fit.spots) <= self.proven:
             return True
         free = jumps.free(usual)
         again = free.refined(fit.spots, fit.deficit, _STEPS, fit.known)
-        return bool(free.solver.standing(free.left, again).min() > least**2)
+        return bool(free.solver.standing(free.left, again).min() > policy.least**2)
 
-    def _after_jump(self, jumps: Jumps, fit: Fit) -> CommonModeJump:
+    def _after_jump(self, jumps: Jumps, fit: Fit, policy: DetectionPolicy) -> CommonModeJump:
         """After a further frame: over where the common mode is as it was, and nothing touches."""
         rest, size = jumps.along(fit.residual)
-        if len(fit.spots) or abs(rest) > _USUAL:
-            return replace(self, size=max(self.size, size, key=abs))
-        return _NONE
+        if is_no_jump(policy, rest) and not len(fit.spots):
+            return _NONE
+        return replace(self, size=max(self.size, size, key=abs))
 
 
 _NONE = CommonModeJump()

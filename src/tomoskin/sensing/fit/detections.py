@@ -1,20 +1,21 @@
-"""The touches of a frame: found, confirmed by the exact model, and how sure each one is."""
+"""What explains a frame, and how sure each touch in it is."""
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import FloatArray, reach
-from tomoskin.sensing.fit.openings import against
-from tomoskin.sensing.fit.refine import Fit
+from tomoskin.core import FloatArray, IntArray, reach
+from tomoskin.model.mesh import Mesh
+from tomoskin.sensing.fit.policy import are_distinct
 from tomoskin.sensing.fit.selection import ForwardSelection
 from tomoskin.sensing.fit.spot import CONTENT, LOG_RADIUS, N_PARAMETERS
-
-_DOUBTFUL = 0.8
-"""Part of the ratio at which a touch begins; above it, another touch beside one is possible."""
+from tomoskin.sensing.fit.spot_fit import Fit
 
 _UNEVEN = 0.08
 """Part by which each row answers a touch otherwise than the model's, at the least: a sheet is
@@ -46,31 +47,6 @@ class SpotDetections:
     close: NDArray[np.bool_]
 
 
-def search(selection: ForwardSelection, before: FloatArray) -> SpotDetections:
-    """Touches of the frame of ``selection``; ``before`` (k, 4) are those of the last one."""
-    answer = selection.problem.solver.searched(selection.question, before)
-    fit = selection.found(before) if answer is None else answer.fit
-    if answer and answer.others:
-        selection.openings.beside.remember(fit, answer.others)
-    if answer and answer.turned_down:
-        selection.turn_down(fit, answer.turned_down)
-    return judged(selection, _confirmed(selection, fit, before))
-
-
-def _confirmed(selection: ForwardSelection, fit: Fit, before: FloatArray) -> Fit:
-    """A fit by the exact model. Where touches begin beside others: with or without these, since
-    a further one may be what the table lacks of those."""
-    pace, problem = selection.pace, selection.problem
-    exact = problem.corrected(fit, pace.closing, pace.near, pace.tolerance)
-    if not pace.closing or len(fit.spots) < 2 or len(fit.spots) <= len(before):
-        return exact
-    fewer = selection.again(before)
-    other = problem.corrected(fewer, pace.closing, pace.near, pace.tolerance)
-    worth = selection.ratios(exact).min() >= selection.openings.threshold(other, 1.0)
-    gain = problem.evidence(exact) - problem.evidence(other)
-    return exact if worth and gain > pace.rare + against(other, exact) else other
-
-
 def judged(selection: ForwardSelection, fit: Fit) -> SpotDetections:
     """How sure each touch of a fit is."""
     if not len(fit.spots):
@@ -86,8 +62,8 @@ def judged(selection: ForwardSelection, fit: Fit) -> SpotDetections:
 
 def _close(selection: ForwardSelection, fit: Fit) -> NDArray[np.bool_]:
     """Where a candidate within a radius of a spot stands out nearly enough."""
-    ratio, _ = selection.openings.beside.ratios(fit)
-    doubtful = selection.matched.spots[ratio > selection.openings.threshold(fit, _DOUBTFUL), :2]
+    ratio, _ = selection.openings.candidates(fit)
+    doubtful = selection.matched.spots[ratio > selection.policy.close(fit), :2]
     if not len(doubtful):
         return np.zeros(len(fit.spots), dtype=bool)
     apart = np.linalg.norm(fit.spots[:, None, :2] - doubtful, axis=2).min(axis=1)
@@ -95,20 +71,20 @@ def _close(selection: ForwardSelection, fit: Fit) -> NDArray[np.bool_]:
 
 
 def joined(detected: SpotDetections) -> SpotDetections:
-    """The same with each two touches as one whose positions are not distinct (2 deviations)."""
+    """The same with each two touches as one whose positions are not distinct."""
     places = detected.fit.spots[:, :2].tolist()
     variance = detected.covariance.diagonal().tolist()
     for i in range(len(places)):
         for j in range(i + 1, len(places)):
             x, y = (one - other for one, other in zip(places[i], places[j], strict=True))
             both = sum(variance[4 * k] + variance[4 * k + 1] for k in (i, j))
-            if x * x + y * y > 8 * both:  # no direction has more than all
+            if are_distinct(x * x + y * y, 2 * both):  # no direction has more than all
                 continue
             away = np.array([x, y])
             pick = [4 * i, 4 * i + 1, 4 * j, 4 * j + 1]
             block = detected.covariance[np.ix_(pick, pick)]
             turn = np.concatenate([away, -away])
-            if (away @ away) ** 2 < 4 * (turn @ block @ turn):
+            if not are_distinct((away @ away) ** 2, turn @ block @ turn):
                 return joined(_merged(detected, i, j))
     return detected
 
@@ -136,3 +112,45 @@ def _merged(detected: SpotDetections, i: int, j: int) -> SpotDetections:
     close[i] = True
     kept = replace(fit, spots=spots[keep])
     return SpotDetections(kept, ratio[keep], fresh[keep], covariance, close[keep])
+
+
+_MARGIN = 1 + 1e-9
+"""Rounding of a radius."""
+
+
+@dataclass(frozen=True, eq=False)
+class CellDiscs:
+    """Cells along the x axis: a disc meets few of them.
+
+    Attributes
+    ----------
+    cells
+        (n,) their numbers.
+    middles
+        (n,) m, x + iy.
+    """
+
+    cells: IntArray
+    middles: NDArray[np.complex128]
+
+    @classmethod
+    def of(cls, mesh: Mesh) -> Self:
+        """The cells of a mesh, along its x axis."""
+        x, y = mesh.centroids.T
+        order = np.argsort(x, kind="stable")
+        return cls(order, (x + 1j * y)[order])
+
+    def within(self, x: float, y: float, radius: float) -> IntArray:
+        """(m,) those whose middles are no farther than ``radius`` m from ``x``, ``y`` m, or the
+        nearest one."""
+        along, reach = self._along, radius * _MARGIN
+        near = slice(bisect_left(along, x - reach), bisect_left(along, x + reach))
+        found = np.abs(self.middles[near] - complex(x, y)) <= radius
+        if found.any():
+            return np.asarray(self.cells[near].compress(found))
+        away = np.abs(self.middles - complex(x, y))
+        return np.asarray(self.cells[away == away.min()])
+
+    @cached_property
+    def _along(self) -> list[float]:
+        return list(map(float, self.middles.real))
