@@ -1,8 +1,9 @@
 /** The state as a word, what someone must act on, and the figures of the top line. */
 
 import { duration, fixed } from "./format";
-import type { ClassReading, Scene, Status } from "./protocol";
+
 import type { LinkState } from "./socket";
+import type { ClassReading, Scene, State } from "./wire";
 
 export interface Warning {
   readonly text: string;
@@ -38,7 +39,7 @@ function disconnected(link: LinkState & { phase: "lost" }, now: number, age: num
 }
 
 /** The state of a source that is connected. */
-function stateOf(status: Status, old: boolean): readonly [word: string, remark: string] {
+function stateOf(status: State, old: boolean): readonly [word: string, remark: string] {
   const { paused, reference, replay, running, recording } = status;
   if (replay?.ended) return ["At the end", ""];
   if (paused) return ["Paused", ""];
@@ -52,7 +53,7 @@ function stateOf(status: Status, old: boolean): readonly [word: string, remark: 
 }
 
 /** What someone must act on; the server's own sentence first. */
-function warningsOf(status: Status, age: number | null): Warning[] {
+function warningsOf(status: State, age: number | null): Warning[] {
   const { baseline, calibration, paused, problem, replay, running, sick } = status;
   const found = problem ? [warning(problem)] : [];
   if (!running && !replay?.ended && !problem) found.push(warning("No frames come from the source"));
@@ -74,7 +75,7 @@ function warningsOf(status: Status, age: number | null): Warning[] {
 export function headline(
   link: LinkState,
   scene: Scene | null,
-  status: Status | null,
+  status: State | null,
   now: number,
   age: number | null,
 ): Headline {
@@ -93,7 +94,7 @@ export interface Fact {
 }
 
 /** The figures of the top line. */
-export function facts(status: Status | null): Fact[] {
+export function facts(status: State | null): Fact[] {
   if (!status) return [];
   const lost = status.dropped + status.corrupt + status.gaps;
   const { age_s: age } = status.reference;
@@ -128,13 +129,13 @@ export function facts(status: Status | null): Fact[] {
 }
 
 /** Alpha of the images and what chose it. */
-export function alpha(status: Status): string {
+export function alpha(status: State): string {
   const by = status.rule === "hand" ? "by hand" : status.rule;
   return `${Number(status.alpha.toPrecision(2))} (${by})`;
 }
 
 /** The same in full, for a tooltip. */
-export function alphaInFull(status: Status): string {
+export function alphaInFull(status: State): string {
   const by = status.rule === "hand" ? "set by hand" : `chosen by the rule ${status.rule}`;
   return `Weight of the prior, ${status.alpha.toPrecision(4)}, ${by}`;
 }

@@ -1,14 +1,17 @@
 import { describe, expect, it } from "vitest";
-import type { Scene, Status } from "../src/protocol";
+import type { Scene, State } from "../src/wire";
 import { backOff, socketAddress } from "../src/socket";
 import { alpha, alphaInFull, classInWords, facts, headline } from "../src/words";
 
 const scene = { source: "twin of textile-disc-8" } as Scene;
-const status: Status = {
+const status: State = {
   type: "state",
   running: true,
   paused: false,
   fps: 124.6,
+  frames: 900,
+  sinks: [],
+  bend: null,
   dropped: 1,
   corrupt: 2,
   gaps: 3,
@@ -32,9 +35,9 @@ const status: Status = {
 };
 const open = { phase: "open" } as const;
 
-const words = (...[next, age]: readonly [Partial<Status>, (number | null)?]) =>
+const words = (...[next, age]: readonly [Partial<State>, (number | null)?]) =>
   headline(open, scene, { ...status, ...next }, 10, age ?? 0.1);
-const texts = (next: Partial<Status>, age?: number) => words(next, age).warnings.map(({ text }) => text);
+const texts = (next: Partial<State>, age?: number) => words(next, age).warnings.map(({ text }) => text);
 
 describe("the headline", () => {
   it("is one calm word while all is well", () => {

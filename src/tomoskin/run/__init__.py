@@ -17,7 +17,7 @@ from tomoskin.run.marker import ReplaySource
 from tomoskin.run.robot_run import Member, RobotRun
 from tomoskin.run.runner import Runner
 from tomoskin.run.simulate import Simulated, simulate
-from tomoskin.run.status import Status
+from tomoskin.run.status import ReplayStatus, Status
 from tomoskin.run.twin_control import way_to_bend
 from tomoskin.run.twin_requests import MAX_FORCE, SetPose, SetPresses, SetTwin, StrictRequest
 
@@ -27,6 +27,7 @@ __all__ = [
     "CheckFinding",
     "Member",
     "ReplaySource",
+    "ReplayStatus",
     "RobotRun",
     "Runner",
     "SetMade",

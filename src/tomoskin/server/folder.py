@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 
+from msgspec.structs import replace
+
 from tomoskin.core import DataError, write_text
+from tomoskin.server.page_messages import FileEntry
+from tomoskin.server.requests import MOST_NOTES, NAME, STEM
 
 KINDS = {
     ".mcap": "session",
@@ -26,37 +30,8 @@ SESSION = ".mcap"
 
 MOST_FILES = 200
 
-NAME = r"[A-Za-z0-9][A-Za-z0-9._-]{0,119}"
-"""Of a file that a page may ask for: no folder, nothing hidden."""
-
-STEM = r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}"
-"""The same without its ending."""
-
-
 NOTES = ".notes.txt"
 """What a person wrote about a session stands beside it, under its stem and this ending."""
-
-MOST_NOTES = 4000
-"""Letters of it."""
-
-
-@dataclass(frozen=True, slots=True)
-class FileEntry:
-    """A file: name, kind, size in bytes, when it was last written (s since 1970), notes on it."""
-
-    name: str
-    kind: str
-    size: int
-    written: float
-    notes: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class Listing:
-    """Files that are handed out, the newest first, and how many others of their kinds there are."""
-
-    files: tuple[FileEntry, ...]
-    others: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,8 +40,9 @@ class Folder:
 
     path: Path
 
-    def list_files(self) -> Listing:
-        """At most :data:`MOST_FILES`; those with names that no page may ask for are counted.
+    def list_files(self) -> tuple[tuple[FileEntry, ...], int]:
+        """At most :data:`MOST_FILES`, the newest first, and how many others of their kinds are not
+        handed out: too many, or with names that no page may ask for.
 
         Raises DataError where the folder cannot be read.
         """
@@ -79,15 +55,21 @@ class Folder:
                     others += 1
                     continue
                 about = path.stat()
-                kind = KINDS[path.suffix]
-                entries.append(FileEntry(path.name, kind, about.st_size, about.st_mtime))
+                entries.append(
+                    FileEntry(
+                        name=path.name,
+                        kind=KINDS[path.suffix],
+                        size=about.st_size,
+                        written=about.st_mtime,
+                    )
+                )
         except OSError as error:
             raise DataError(
                 f"cannot be read: {error.strerror}", where="the session folder"
             ) from error
         newest = sorted(entries, key=lambda file: -file.written)
         listed = tuple(replace(file, notes=self._notes(file)) for file in newest[:MOST_FILES])
-        return Listing(listed, others + len(newest[MOST_FILES:]))
+        return listed, others + len(newest[MOST_FILES:])
 
     def _notes(self, file: FileEntry) -> str:
         path = self._notes_path(file.name)

@@ -14,11 +14,12 @@ from tomoskin.files.session import read_timeline
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, colour_limit
 from tomoskin.run import Runner, commands
-from tomoskin.server import page_messages
+from tomoskin.server import views
 from tomoskin.server.frames import NewestFrame
+from tomoskin.server.page_messages import EventNote, Message, PlayedTimeline, Scale, Scene
 from tomoskin.server.requests import Request
 from tomoskin.server.run_handlers import run_handlers
-from tomoskin.server.task import Handler, Handlers, Listener, Tasks, beside
+from tomoskin.server.task import Handler, Handlers, Listener, Tasks, during
 
 MAX_PAGES = 16
 """Pages that are served at once."""
@@ -56,23 +57,31 @@ class Hub:
         self.opener: Callable[[Skin], Transport] | None = None
         self.frame, self.tasks = NewestFrame(runner), Tasks()
         self._handlers: dict[type, Handler] = {}
-        self._greetings: list[Callable[[], Sequence[str]]] = []
+        self._greetings: list[Callable[[], Sequence[Message]]] = []
+        self._farewells: list[Callable[[Listener], None]] = []
         self._pages: set[Listener] = set()
         self._wake_is_due = False
         self._next_event = 0
-        self._timeline = ""
-        self._past: deque[str] = deque(maxlen=_FIRST_EVENTS)
-        self._limit, self._scene = limit, ""
+        self._timeline: PlayedTimeline | None = None
+        self._past: deque[EventNote] = deque(maxlen=_FIRST_EVENTS)
+        self._limit = limit
+        self._scene: Scene | None = None
         self.serve(run_handlers(runner, self.folder, self.tasks))
 
     def serve(
-        self, handlers: Handlers, greeting: Callable[[], Sequence[str]] | None = None
+        self,
+        handlers: Handlers,
+        greeting: Callable[[], Sequence[Message]] = tuple,
+        farewell: Callable[[Listener], None] = lambda _: None,
     ) -> None:
-        """Answer these requests too, before the first page comes; ``greeting``: messages for a
-        new page, and for all where the runner has another skin or source."""
+        """Answer these requests too, before the first page comes.
+
+        ``greeting``: messages for a new page, and for all where the runner has another skin or
+        source; ``farewell``: called with a page that has gone.
+        """
         self._handlers.update(handlers)
-        if greeting is not None:
-            self._greetings.append(greeting)
+        self._greetings.append(greeting)
+        self._farewells.append(farewell)
 
     @contextlib.asynccontextmanager
     async def running(self) -> AsyncIterator[None]:
@@ -84,7 +93,7 @@ class Hub:
                 self._wake_is_due = True
                 loop.call_soon_threadsafe(self._wake)
 
-        async with beside(self._tick()):
+        async with during(self._tick()):
             self._read_timeline()
             with self.runner.audience.watch(announce):
                 yield
@@ -95,9 +104,8 @@ class Hub:
             return False
         self._pages.add(page)
         timeline = [self._timeline] if self._timeline else []
-        now = page_messages.state(self.runner.status())
-        for text in (self._scene_text(), now, *timeline, *self._greeting(), *self._past):
-            page.post(text)
+        for message in (*self._now(), *timeline, *self._greeting(), *self._past):
+            page.post(message.json)
         return True
 
     def leave(self, page: Listener, why: str = "") -> None:
@@ -105,6 +113,8 @@ class Hub:
         self._pages.discard(page)
         self.runner.submit(commands.HoldPresses(page, ()))
         self.runner.latency.forget(page)
+        for farewell in self._farewells:
+            farewell(page)
         if why:
             self.runner.say("page-dropped", why)
 
@@ -115,37 +125,35 @@ class Hub:
             raise WireError(f"{type(request).__name__} is not possible on this page")
         handler(page, request)
 
-    def tell(self, texts: Sequence[str]) -> None:
-        """Send ``texts`` to every page."""
-        for page in self._pages:
-            for text in texts:
+    def tell(self, *messages: Message) -> None:
+        """Send ``messages`` to every page."""
+        for text in [message.json for message in messages]:
+            for page in self._pages:
                 page.post(text)
 
     def show(self) -> None:
         """Tell every page that the runner has another skin or source."""
-        self._limit, self._scene = colour_limit(self.runner.prepared), ""
-        self._timeline = ""
-        now = page_messages.state(self.runner.status())
-        self.tell([self._scene_text(), now, *self._greeting()])
+        self._limit, self._scene = colour_limit(self.runner.prepared), None
+        self._timeline = None
+        self.tell(*self._now(), *self._greeting())
         self._read_timeline()
 
     def rescale(self, prepared: Prepared, limit: float) -> None:
         """Tell every page that pictures have another scale and unit from now on."""
-        self._limit, self._scene = limit, ""
-        self.tell([page_messages.scale(prepared, limit)])
+        self._limit, self._scene = limit, None
+        self.tell(Scale(limit=limit, unit=prepared.operator.unit))
 
-    def _greeting(self) -> list[str]:
-        return [text for greeting in self._greetings for text in greeting()]
+    def _greeting(self) -> list[Message]:
+        return [message for greeting in self._greetings for message in greeting()]
 
-    def _scene_text(self) -> str:
-        """The scene, made when the first page asks for it."""
-        if not self._scene:
-            runner = self.runner
-            source, pressable = runner.status().source, runner.twin.pressable
-            self._scene = page_messages.scene(
-                runner.prepared, source, limit=self._limit, pressable=pressable
+    def _now(self) -> tuple[Message, Message]:
+        """The scene, made when it is first asked for, and the state."""
+        runner, status = self.runner, self.runner.status()
+        if self._scene is None:
+            self._scene = views.scene(
+                runner.prepared, status.source, limit=self._limit, pressable=runner.twin.pressable
             )
-        return self._scene
+        return self._scene, views.state(status)
 
     def _read_timeline(self) -> None:
         """Of a replay: tell every page what happened in the recording, once that has been read."""
@@ -158,8 +166,8 @@ class Hub:
         except DataError as error:
             self.runner.say("no-timeline", f"the events of the recording cannot be shown: {error}")
             return
-        self._timeline = page_messages.timeline(timeline)
-        self.tell([self._timeline])
+        self._timeline = views.timeline(timeline)
+        self.tell(self._timeline)
 
     def _wake(self) -> None:
         self._wake_is_due = False
@@ -169,7 +177,7 @@ class Hub:
     async def _tick(self) -> None:
         while True:
             self._next_event, happened = self.runner.events.since(self._next_event)
-            news = [page_messages.event(event) for event in happened]
+            news = [views.event(event) for event in happened]
             self._past.extend(news)
-            self.tell([*news, page_messages.state(self.runner.status())])
+            self.tell(*news, views.state(self.runner.status()))
             await asyncio.sleep(_STATE_PERIOD)

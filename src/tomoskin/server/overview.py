@@ -14,12 +14,21 @@ import numpy as np
 from tomoskin import __version__
 from tomoskin.core import FloatArray, WireError, encode_json
 from tomoskin.model.robot import PlacedSkin, Pose, Robot
-from tomoskin.run import RobotRun, Runner, Status, commands
+from tomoskin.run import RobotRun, Runner, commands
 from tomoskin.run.sinks import Moment, Naming, Stream, contacts_of
-from tomoskin.server.page_messages import finite, flat, text_of
+from tomoskin.server.page_messages import (
+    PlacedShape,
+    RobotScene,
+    RobotState,
+    RobotTouches,
+    SkinState,
+    SpaceTouch,
+    TouchesOfSkin,
+)
 from tomoskin.server.requests import Request, SetRecording
 from tomoskin.server.run_handlers import FILE_NAME
-from tomoskin.server.task import Listener, Tasks, beside
+from tomoskin.server.task import Listener, Tasks, during
+from tomoskin.server.views import flat
 
 PERIOD = 1 / 20
 """Seconds between two looks at the touches."""
@@ -47,25 +56,25 @@ class NewestTouches:
     def renew(self) -> None:
         """Make it of the newest results; the same object where nothing has changed."""
         skins = {n: self._touches(n, r) for n, r in self._run.runners.items() if r.newest}
-        made = encode_json({"skins": skins})
+        made = encode_json(RobotTouches(skins=skins))
         if made != self._made:
             self._made = made
 
-    def _touches(self, name: str, runner: Runner) -> dict[str, Any]:
+    def _touches(self, name: str, runner: Runner) -> TouchesOfSkin:
         assert runner.newest is not None
         moment = Moment.of(runner.newest.result, with_image=False)
-        found, pose = contacts_of(self._streams[name], moment), self._poses[name]
+        pose = self._poses[name]
         touches = [
-            {
-                "id": contact.touch.id,
-                "position": _rounded(pose(np.array([contact.position]))[0]),
-                "normal": _rounded(pose.rotation @ contact.normal),
-                "peak": contact.touch.detection.peak,
-                "force": contact.force,
-            }
-            for contact in found
+            SpaceTouch(
+                id=contact.touch.id,
+                position=_rounded(pose(np.array([contact.position]))[0]),
+                normal=_rounded(pose.rotation @ contact.normal),
+                peak=contact.touch.detection.peak,
+                force=contact.force,
+            )
+            for contact in contacts_of(self._streams[name], moment)
         ]
-        return {"valid": moment.valid, "touches": touches}
+        return TouchesOfSkin(valid=moment.valid, touches=touches)
 
 
 class Overview:
@@ -94,7 +103,7 @@ class Overview:
     @contextlib.asynccontextmanager
     async def running(self) -> AsyncIterator[None]:
         """Look at the runs while the block lasts."""
-        async with beside(self._tick()):
+        async with during(self._tick()):
             yield
 
     def join(self, page: Listener) -> bool:
@@ -103,8 +112,8 @@ class Overview:
             return False
         self._pages.add(page)
         self.frame.renew()  # while nobody looked it was not
-        page.post(self._scene)
-        page.post(states(self.run))
+        page.post(self._scene.json)
+        page.post(states(self.run).json)
         return True
 
     def leave(self, page: Listener, why: str = "") -> None:
@@ -135,8 +144,9 @@ class Overview:
         return record
 
     def _tell(self) -> None:
+        text = states(self.run).json
         for page in self._pages:
-            page.post(states(self.run))
+            page.post(text)
 
     async def _tick(self) -> None:
         count = 0
@@ -151,7 +161,7 @@ class Overview:
             await asyncio.sleep(PERIOD)
 
 
-def scene(robot: Robot, streams: Mapping[str, Stream], poses: Mapping[str, Pose]) -> str:
+def scene(robot: Robot, streams: Mapping[str, Stream], poses: Mapping[str, Pose]) -> RobotScene:
     """Skins and links in the frame of the robot's root, m; coordinates lie flat as x0, y0, z0, …
 
     Where a link is shown by its shape no bone is, and what cannot be shown is said.
@@ -162,8 +172,7 @@ def scene(robot: Robot, streams: Mapping[str, Stream], poses: Mapping[str, Pose]
     links = (solids[n].triangles.reshape(-1, 3) for n in shown)
     corners = [urdf.pose(n)(points) for n, points in zip(shown, links, strict=True)] if urdf else []
     undrawn = [f"{link}: {why}" for link, solid in solids.items() for why in solid.problems]
-    return text_of(
-        type="robot",
+    return RobotScene(
         name=robot.name,
         bones=flat(urdf.bones(without=shown)) if urdf else [],
         links=_rounded(np.concatenate([np.zeros((0, 3)), *corners]).ravel()),
@@ -173,37 +182,27 @@ def scene(robot: Robot, streams: Mapping[str, Stream], poses: Mapping[str, Pose]
     )
 
 
-def _skin(skin: PlacedSkin, stream: Stream, pose: Pose) -> dict[str, Any]:
+def _skin(skin: PlacedSkin, stream: Stream, pose: Pose) -> PlacedShape:
     corners = np.zeros((0, 3)) if stream.corners is None else stream.corners.reshape(-1, 3)
-    return {
-        "name": skin.name,
-        "frame": Naming().of_skin(stream).frame_id,
-        "source": skin.source,
-        "corners": _rounded(pose(corners).ravel()),
-    }
+    frame = Naming().of_skin(stream).frame_id
+    return PlacedShape.of(skin, frame=frame, corners=_rounded(pose(corners).ravel()))
 
 
-def states(run: RobotRun) -> str:
+def states(run: RobotRun) -> RobotState:
     """The state of each skin, in words."""
-    skins = {name: _state(status) for name, status in run.statuses().items()}
-    recording = None if run.recording is None else run.recording.name
-    return text_of(type="robot-state", skins=skins, recording=recording)
-
-
-def _state(status: Status) -> dict[str, Any]:
-    return {
-        "running": status.running,
-        "ready": status.reference.ready,
-        "fps": status.fps,
-        "frames": status.frames,
-        "lost": status.dropped + status.gaps,
-        "p99_ms": finite(1e3 * status.p99),
-        "problem": status.problem,
-        "text": status.text,
+    skins = {
+        name: SkinState.of(
+            status,
+            ready=status.reference.ready,
+            lost=status.dropped + status.gaps,
+            p99_ms=1e3 * status.p99,
+        )
+        for name, status in run.statuses().items()
     }
+    recording = None if run.recording is None else run.recording.name
+    return RobotState(skins=skins, recording=recording)
 
 
-def _rounded(values: FloatArray) -> list[float]:
+def _rounded(values: FloatArray) -> Any:
     """To 0.01 mm, which nobody sees."""
-    rounded: list[float] = np.round(values, 5).tolist()
-    return rounded
+    return np.round(values, 5).tolist()

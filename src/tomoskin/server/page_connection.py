@@ -10,7 +10,7 @@ from typing import Protocol
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from tomoskin.core import TomoskinError, WireError
-from tomoskin.server import page_messages
+from tomoskin.server.page_messages import Refusal
 from tomoskin.server.requests import Request, decode_request
 from tomoskin.server.task import Listener
 
@@ -103,7 +103,7 @@ class Page:
                 raise WireError("expected text, got a binary message")
             self._host.obey(self, decode_request(text))
         except TomoskinError as error:
-            self.post(page_messages.error(str(error)))
+            self.post(Refusal(message=str(error)).json)
 
     async def _write(self) -> None:
         loop = asyncio.get_running_loop()

@@ -12,10 +12,18 @@ from msgspec import Meta
 
 from tomoskin.core import WireError
 from tomoskin.run import SetPose, SetPresses, SetTwin, StrictRequest, commands
-from tomoskin.server.folder import MOST_NOTES, NAME, STEM
 
 MAX_REQUEST = 32_768
 """Longest request, bytes: a pattern of some thousand rows, written out."""
+
+NAME = r"[A-Za-z0-9][A-Za-z0-9._-]{0,119}"
+"""Of a file that a page may ask for: no folder, nothing hidden."""
+
+STEM = r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}"
+"""The same without its ending."""
+
+MOST_NOTES = 4000
+"""Letters of the notes on a session."""
 
 FileName = Annotated[str, Meta(pattern=rf"^{NAME}\Z")]
 """Of a file in the session folder: no folder, nothing hidden; ``server/folder.py`` looks again."""
@@ -26,6 +34,8 @@ Stem = Annotated[str, Meta(pattern=rf"^{STEM}\Z")]
 Format = Literal["touches", "csv", "npz", "mat", "h5", "parquet", "png", "gif"]
 
 FlowKind = Literal["touch", "mapping", "force", "rub"]
+
+Unit = Literal["N", "g", "kg"]
 
 Calibrated = Literal["touch", "force"]
 """What a calibration that a page can choose is of."""
@@ -152,6 +162,12 @@ class BeginFlow(StrictRequest, frozen=True, tag="flow_begin"):
     kind: FlowKind
 
 
+class ShowFlow(StrictRequest, frozen=True, tag="flow_show"):
+    """This page shows the flow, or hides it: while no page shows it, it is paused."""
+
+    on: bool
+
+
 class UndoPress(StrictRequest, frozen=True, tag="flow_undo"):
     """Remove the last press."""
 
@@ -166,7 +182,7 @@ class SetWeight(StrictRequest, frozen=True, tag="flow_weight"):
     """What lies on the skin, or comes next; ``sure``: an unusual weight is meant as it is said."""
 
     value: Annotated[float, Meta(gt=0, le=1e6)]
-    unit: Literal["N", "g", "kg"]
+    unit: Unit
     sure: bool = False
 
 
@@ -227,6 +243,7 @@ FlowRequest = (
     | ListSources
     | Connect
     | BeginFlow
+    | ShowFlow
     | UndoPress
     | DeletePress
     | SetWeight

@@ -1,10 +1,10 @@
 /** What ends every flow: leaving it, or a name for what was learnt. */
 
-import { signal } from "@preact/signals";
+import { type Signal, signal } from "@preact/signals";
 import { send } from "../state";
 import { flow, type FlowKind } from "./model";
 
-const names: Readonly<Record<FlowKind, ReturnType<typeof signal<string>>>> = {
+const names: Readonly<Record<FlowKind, Signal<string>>> = {
   mapping: signal("mapped"),
   touch: signal("touch"),
   rub: signal("rubbed"),
@@ -49,7 +49,7 @@ export function Keep({ kind }: { kind: FlowKind }) {
 
 /** What is wrong with what was pressed, in words. */
 export function Remarks() {
-  const remarks = flow.value.figures?.remarks ?? [];
+  const remarks = flow.value.figures.remarks ?? [];
   return (
     <>
       {remarks.map((remark) => (

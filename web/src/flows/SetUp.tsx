@@ -154,9 +154,9 @@ const PHASES: Partial<Record<Phase, string>> = {
 };
 
 function Going({ kind }: { kind: FlowKind }) {
-  const { phase = "rest", effort, presses = [], text, thinking, figures } = flow.value;
+  const { phase, effort, presses, text, thinking, figures } = flow.value;
   const taken = `${presses.length} press${presses.length === 1 ? "" : "es"} recorded`;
-  const doubtful = figures?.doubtful ?? [];
+  const doubtful = figures.doubtful ?? [];
   return (
     <>
       <p class="lead" role="status" data-testid="phase">
@@ -167,7 +167,7 @@ function Going({ kind }: { kind: FlowKind }) {
         {thinking ? ", computing…" : ""}
       </p>
       <p data-testid="flow-text">{text}</p>
-      {kind === "mapping" && figures?.probability !== undefined && (
+      {kind === "mapping" && figures.probability !== undefined && (
         <progress value={figures.probability} max={1} aria-label="How sure the answer is" />
       )}
       {doubtful.length > 0 && (
@@ -180,7 +180,7 @@ function Going({ kind }: { kind: FlowKind }) {
         {presses.map(([x, y], k) => (
           <li key={k} class={doubtful.includes(k) ? "doubtful" : ""}>
             x {millimetres(x, 0)}, y {millimetres(y, 0)} mm
-            {figures?.errors_mm?.[k] !== undefined && (
+            {figures.errors_mm?.[k] !== undefined && (
               <span class="small"> missed by {figures.errors_mm[k].toFixed(0)} mm</span>
             )}
           </li>

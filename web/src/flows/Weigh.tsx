@@ -4,7 +4,10 @@ import { effect, signal } from "@preact/signals";
 import { fixed, millimetres } from "../format";
 import { hand, scene, send } from "../state";
 import { Keep, Leave, Remarks } from "./Keep";
-import { flow, type Phase, type Unit, type Weight } from "./model";
+import type { WeightNow } from "../wire";
+import { flow, type Phase } from "./model";
+
+type Unit = WeightNow["unit"];
 
 const PHASES: Partial<Record<Phase, string>> = {
   rest: "Lift everything off the skin",
@@ -19,7 +22,7 @@ const UNITS: readonly Unit[] = ["g", "kg", "N"];
 const value = signal("");
 const unit = signal<Unit>("g");
 
-const setWeight = (weight: Pick<Weight, "value" | "unit">, sure = false): void =>
+const setWeight = (weight: Pick<WeightNow, "value" | "unit">, sure = false): void =>
   send({ type: "flow_weight", value: weight.value, unit: weight.unit, sure });
 
 /** On a simulated skin a press of this page is the weight that lies there. */
@@ -33,7 +36,7 @@ effect(() => {
 });
 
 /** What is wrong with this weight on a simulated skin, in words. */
-function tooHeavy(weight: Weight): string | null {
+function tooHeavy(weight: WeightNow): string | null {
   const most = scene.value?.probe.max_force_n ?? Infinity;
   if (!scene.value?.pressable || weight.newtons <= most) return null;
   return `The simulated skin is pressed with at most ${fixed(most, 0)} N: choose a smaller weight.`;
@@ -107,16 +110,16 @@ function missed(error: number | undefined): string {
 }
 
 function Recorded() {
-  const { presses = [], weights = [], figures } = flow.value;
+  const { presses, weights, figures } = flow.value;
   return (
     <ol class="placements" aria-label="Placements recorded">
       {presses.map(([x, y], k) => (
-        <li key={k} class={figures?.doubtful?.includes(k) ? "doubtful" : ""} data-testid="placement">
+        <li key={k} class={figures.doubtful?.includes(k) ? "doubtful" : ""} data-testid="placement">
           <span>
             {k + 1}. {weights[k]}
             <span class="small">
               {" "}
-              at {millimetres(x, 0)}, {millimetres(y, 0)} mm{missed(figures?.errors?.[k])}
+              at {millimetres(x, 0)}, {millimetres(y, 0)} mm{missed(figures.errors?.[k])}
             </span>
           </span>
           <button
@@ -134,7 +137,7 @@ function Recorded() {
 }
 
 export function Weigh() {
-  const { phase = "rest", presses = [], weight, text, thinking } = flow.value;
+  const { phase, presses, weight, text, thinking } = flow.value;
   const heavy = weight && tooHeavy(weight);
   return (
     <>
