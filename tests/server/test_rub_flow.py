@@ -157,7 +157,7 @@ def test_known_positions_are_taken_beside_the_rubbing(rubber):
     fields = flow.now()
     assert fields.presses == [first]
     assert fields.dot != first
-    assert fields.rubbed["touches"] == 20, "a press at the dot is no rubbing"
+    assert fields.rubbed.touches == 20, "a press at the dot is no rubbing"
     flow.answers[UndoPress](UndoPress())
     assert flow.now().presses == []
     flow.answers[AskPoint](AskPoint(on=False))

@@ -3,7 +3,7 @@
 import { duration, fixed } from "./format";
 
 import type { LinkState } from "./socket";
-import type { ClassReading, Scene, State } from "./wire";
+import type { ClassReading, FlowNow, Scene, State } from "./wire";
 
 export interface Warning {
   readonly text: string;
@@ -71,6 +71,20 @@ function warningsOf(status: State, age: number | null): Warning[] {
   return found;
 }
 
+const TEACHING = { touch: "touch", rub: "touch", force: "forces", mapping: "channels" } as const;
+
+/** A guided flow, in place of the calm word of a live skin; any other word stays. */
+function withFlow(word: string, remark: string, flow: FlowNow | null): readonly [word: string, remark: string] {
+  if (!flow?.kind) return [word, remark];
+  const name = TEACHING[flow.kind];
+  const count = flow.rubbed ? `${flow.rubbed.touches} touches` : `${flow.presses.length} recorded`;
+  const said = flow.paused
+    ? `Teaching ${name} is paused, ${count}: open Set up to go on or to leave it`
+    : `Teaching ${name}: ${count}`;
+  if (word !== "Live") return [word, remark || said];
+  return [flow.paused ? "Teaching paused" : `Teaching ${name}`, said];
+}
+
 /** What the top line says. `age`: seconds since the last frame, null before the first. */
 export function headline(
   link: LinkState,
@@ -78,10 +92,11 @@ export function headline(
   status: State | null,
   now: number,
   age: number | null,
+  flow: FlowNow | null = null,
 ): Headline {
   if (link.phase === "lost") return disconnected(link, now, age);
   if (link.phase === "connecting" || !scene || !status) return calm("Connecting");
-  const [word, remark] = stateOf(status, age !== null && age > OLD);
+  const [word, remark] = withFlow(...stateOf(status, age !== null && age > OLD), flow);
   return { word, remark, warnings: warningsOf(status, age) };
 }
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import tomllib
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
@@ -26,7 +27,13 @@ KINDS = {
 }
 """What is listed and handed out, by the ending of its name."""
 
-SESSION = ".mcap"
+SESSION, SKIN = ".mcap", ".toml"
+
+_OF_SKINS = {"outline", "electrodes"}
+"""Sections that every skin file has."""
+
+_MOST_SETTINGS = 1 << 20
+"""Bytes of a file of settings that is looked into."""
 
 MOST_FILES = 200
 
@@ -50,6 +57,8 @@ class Folder:
         try:
             for path in self.path.iterdir():
                 if path.suffix not in KINDS or not path.is_file() or path.is_symlink():
+                    continue
+                if path.suffix == SKIN and not _is_skin(path, or_robot=True):
                     continue
                 if not _is_offered(path.name):
                     others += 1
@@ -126,8 +135,8 @@ class Folder:
 
     def skins(self) -> list[str]:
         """Stems of the skin files that a page may ask for, in the order of the alphabet."""
-        stems = (path.stem for path in self.path.glob("*.toml"))
-        return sorted(stem for stem in stems if re.fullmatch(STEM, stem))[:MOST_FILES]
+        named = (path for path in self.path.glob(f"*{SKIN}") if re.fullmatch(STEM, path.stem))
+        return sorted(path.stem for path in named if _is_skin(path))[:MOST_FILES]
 
     def existing(self, name: str, *endings: str) -> Path:
         """A file of this folder by its name; DataError where there is none that may be had."""
@@ -151,6 +160,18 @@ class Folder:
         if not _is_offered(name):
             raise DataError(f"expected the name of a file, without a folder, got {repr(name)[:80]}")
         return name
+
+
+def _is_skin(path: Path, *, or_robot: bool = False) -> bool:
+    """Whether a TOML file has the sections of a skin, or those of a robot."""
+    try:
+        if path.stat().st_size > _MOST_SETTINGS:
+            return False
+        document = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return False
+    is_robot = isinstance(document.get("skin"), list)
+    return _OF_SKINS <= document.keys() or (or_robot and is_robot)
 
 
 def _is_offered(name: str) -> bool:

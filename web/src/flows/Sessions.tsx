@@ -2,7 +2,7 @@
 
 import { signal, useSignal } from "@preact/signals";
 import { addDrawer, whenOpened } from "../drawers";
-import { send, status } from "../state";
+import { say, send, status } from "../state";
 import { bytes, day } from "./format";
 import type { ExportSession, FileEntry } from "../wire";
 import { askFiles, calibrations, exported, files } from "./model";
@@ -134,7 +134,14 @@ function Session({ file }: { file: FileEntry }) {
         {file.notes && <p class="noted">{file.notes}</p>}
       </div>
       <div class="does">
-        <button type="button" disabled={recorded} onClick={() => send({ type: "open", name })}>
+        <button
+          type="button"
+          disabled={recorded}
+          onClick={() => {
+            say(`Opening ${name}`);
+            send({ type: "open", name });
+          }}
+        >
           Play
         </button>
         <button

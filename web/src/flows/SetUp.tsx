@@ -1,24 +1,22 @@
 /** The drawer that sets a skin up: the board, the reference, the wires, the touch, the force. */
 
-import { signal } from "@preact/signals";
 import { takeReference } from "../commands";
 import { addDrawer, whenOpened } from "../drawers";
 import { duration, millimetres } from "../format";
 import { send, status } from "../state";
 import { InUse } from "./Calibrations";
 import { Keep, Leave } from "./Keep";
-import { askFiles, askSources, flow, type FlowKind, type Phase, sources } from "./model";
+import { askFiles, askSources, flow, type FlowKind, type Phase, sources, type Step, step, stepOf } from "./model";
 import { Rub } from "./Rub";
 import { Weigh } from "./Weigh";
 
-type Step = "board" | "mapping" | "touch" | "force";
 const STEPS: readonly (readonly [Step, string])[] = [
   ["board", "1 Board"],
   ["mapping", "2 Channels"],
   ["touch", "3 Touch"],
   ["force", "4 Force"],
 ];
-const step = signal<Step>("board");
+
 function Identity() {
   const found = sources.value;
   const board = found?.board;
@@ -231,7 +229,7 @@ function Guided({ kinds }: { kinds: readonly Teaching[] }) {
 
 function View() {
   const shown = step.value;
-  const going = flow.value.kind === "rub" ? "touch" : flow.value.kind;
+  const going = flow.value.kind && stepOf(flow.value.kind);
   return (
     <div class="flow">
       <div class="steps" role="group" aria-label="Steps">
@@ -263,6 +261,8 @@ whenOpened("setup", () => {
     askFiles();
   };
   ask();
+  const { kind } = flow.peek();
+  if (kind) step.value = stepOf(kind);
   window.clearInterval(timer);
   timer = window.setInterval(() => {
     if (document.querySelector("[data-testid=drawer-setup]")) ask();

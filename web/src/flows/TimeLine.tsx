@@ -190,7 +190,8 @@ function PlayButtons() {
 
 export function TimeLine() {
   const of = lineOf.value;
-  if (of === null && !marking.value) return null;
+  // Its room is there from the start: the sheet must not move under a finger.
+  if (of === null && !marking.value) return <div class="timeline" aria-hidden="true" />;
   const end = of === "replay" ? ` of ${clock(duration.value)}` : "";
   return (
     <section class="timeline" data-testid="timeline" aria-label="Time line">

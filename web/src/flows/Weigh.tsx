@@ -25,10 +25,18 @@ const unit = signal<Unit>("g");
 const setWeight = (weight: Pick<WeightNow, "value" | "unit">, sure = false): void =>
   send({ type: "flow_weight", value: weight.value, unit: weight.unit, sure });
 
+/** A page that comes later has the weight in its field too. */
+effect(() => {
+  const { weight } = flow.value;
+  if (!weight || value.peek()) return;
+  value.value = String(weight.value);
+  unit.value = weight.unit;
+});
+
 /** On a simulated skin a press of this page is the weight that lies there. */
 effect(() => {
-  const { kind, weight } = flow.value;
-  const weighed = kind === "force" && scene.value?.pressable && weight ? weight : null;
+  const { kind, weight, paused } = flow.value;
+  const weighed = kind === "force" && !paused && scene.value?.pressable && weight ? weight : null;
   const { probe } = hand.peek();
   if (!weighed && probe.grows) return;
   const force = weighed ? Math.min(weighed.newtons, probe.maxForce) : probe.force;

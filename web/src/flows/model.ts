@@ -1,7 +1,8 @@
 /** What the server says of files, sources, guided presses and the line of time. */
 
 import { computed, effect, signal } from "@preact/signals";
-import { now, onMessage, say, scene, send, shown, status } from "../state";
+import { opened } from "../drawers";
+import { link, now, onMessage, say, scene, send, shown, status } from "../state";
 import type { Calibrations, Files, FlowNow, PlayedTimeline, Sources, Tick, TouchSpan } from "../wire";
 
 export type FlowKind = NonNullable<FlowNow["kind"]>;
@@ -141,6 +142,25 @@ export const allSpans = computed(() =>
 
 export const askFiles = (): void => send({ type: "files" });
 export const askSources = (): void => send({ type: "sources" });
+
+export type Step = "board" | "mapping" | "touch" | "force";
+
+/** The step that the set-up drawer shows. */
+export const step = signal<Step>("board");
+
+/** The step that a flow belongs to. */
+export const stepOf = (kind: FlowKind): Step => (kind === "rub" ? "touch" : kind);
+
+const going = computed(() => flow.value.kind);
+
+/** Whether this page shows the flow: the server records nothing while no page does. */
+const shows = computed(() => {
+  const kind = going.value;
+  return kind !== null && opened.value?.id === "setup" && step.value === stepOf(kind);
+});
+effect(() => {
+  if (link.value.phase === "open" && going.value) send({ type: "flow_show", on: shows.value });
+});
 
 /** The dot of the flow, where there is one. */
 export const dot = computed(() => (scene.value && flow.value.kind ? (flow.value.dot ?? null) : null));

@@ -1,6 +1,7 @@
 /** The top line: the state as a word, the skin, what happens or what to act on, the figures. */
 
 import { signal } from "@preact/signals";
+import { flow } from "../flows/model";
 import { doing, progress, settings } from "../settings/model";
 import { connection, link, newest, notice, now, scene, send, status } from "../state";
 import { facts, headline, type Warning } from "../words";
@@ -71,7 +72,7 @@ function Remark({ text }: { readonly text: string }) {
 }
 
 export function TopLine() {
-  const { word, remark, warnings } = headline(link.value, scene.value, status.value, now.value, age());
+  const { word, remark, warnings } = headline(link.value, scene.value, status.value, now.value, age(), flow.value);
   const lost = link.value.phase === "lost";
   const act = warnings.length > 0;
   return (
