@@ -19,7 +19,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
 from tomoskin.model.skin import Skin
-from tomoskin.server.requests import Request
+from tomoskin.server.requests import REQUEST
 from trials import HANG, MEMORY, Tally, mutated
 
 SKIN = "textile-disc-8"
@@ -34,7 +34,7 @@ _SEED = 1
 def ask(count: int, folder: Path) -> Tally:
     """What becomes of ``count`` requests; even ones follow the schema, odd ones are damaged."""
     tally = Tally("requests")
-    schema = inspect.type_info(Request)
+    schema = inspect.type_info(REQUEST)
     with _live(folder) as (process, address, errors):
         page = Page(address)
         for first in range(0, count, BATCH):

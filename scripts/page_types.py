@@ -9,7 +9,7 @@ import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 from msgspec import inspect
@@ -28,7 +28,7 @@ _UNNAMED = ("magic", "pad", "reserved")
 
 def types() -> str:
     """Return the whole module."""
-    sent = get_args(requests.Request)
+    sent = requests.REQUESTS
     unions = {
         "ServerMessage": page_messages.PAGE_MESSAGES,
         "RobotMessage": page_messages.ROBOT_MESSAGES,

@@ -6,10 +6,10 @@ import { History } from "./history";
 import { emptyHand, type Hand } from "./presses";
 import { prepareTopology } from "./sheet/topology";
 import { Connection, type LinkState, socketAddress } from "./socket";
-import type { PageRequest, Scene, ServerMessage, State } from "./wire";
+import type { PageRequest, Scene, ServerMessage, RunState } from "./wire";
 
 export const scene = signal<Scene | null>(null);
-export const status = signal<State | null>(null);
+export const status = signal<RunState | null>(null);
 export const link = signal<LinkState>({ phase: "connecting" });
 /** A sentence that the server just said, cleared after some seconds. */
 export const notice = signal<string | null>(null);

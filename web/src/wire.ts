@@ -61,7 +61,7 @@ export interface Scale {
 }
 
 /** One look at the runner. */
-export interface State {
+export interface RunState {
   readonly type: "state";
   readonly running: boolean;
   readonly paused: boolean;
@@ -72,7 +72,7 @@ export interface State {
   readonly gaps: number;
   readonly p50_ms: number | null;
   readonly p99_ms: number | null;
-  readonly stages: readonly Stage[];
+  readonly stages: readonly StageNow[];
   readonly slowest: readonly SlowFrame[];
   readonly reference: ReferenceNow;
   readonly baseline: BaselineNow | null;
@@ -92,7 +92,7 @@ export interface State {
 }
 
 /** How long one stage takes. */
-export interface Stage {
+export interface StageNow {
   readonly name: string;
   readonly p50_ms: number | null;
   readonly p99_ms: number | null;
@@ -253,7 +253,7 @@ export interface Sources {
   readonly sources: readonly Offer[];
   readonly current: string;
   readonly host_protocol: string;
-  readonly board: BoardIdentity | null;
+  readonly board: BoardNow | null;
   readonly problem: string | null;
 }
 
@@ -264,7 +264,7 @@ export interface Offer {
 }
 
 /** What the board says that it is; ``name`` is empty before protocol 1.2. */
-export interface BoardIdentity {
+export interface BoardNow {
   readonly name: string;
   readonly firmware: string;
   readonly protocol: string;
@@ -491,41 +491,6 @@ export interface SkinState {
   readonly text: string;
 }
 
-/** The next frames become the reference. */
-export interface TakeReference {
-  readonly type: "reference";
-}
-
-/** Hold the picture, or let it go on; frames are read and left out meanwhile. */
-export interface SetPause {
-  readonly type: "pause";
-  readonly on: boolean;
-}
-
-/** Record to a new file in the server's folder, or end the recording. */
-export interface SetRecording {
-  readonly type: "record";
-  readonly on: boolean;
-}
-
-/** The map of what the data cannot tell, with the electrodes and the alpha of the moment. */
-export interface AskUnresolved {
-  readonly type: "unresolved";
-}
-
-/** A remark on the picture of this moment; goes into the recording as well. */
-export interface Note {
-  readonly type: "note";
-  readonly text: string;
-}
-
-/** How long the page took of late from a frame's arrival to the end of drawing it, s. */
-export interface Painted {
-  readonly type: "painted";
-  readonly p50_s: number;
-  readonly p99_s: number;
-}
-
 /** All presses that this page holds now. */
 export interface SetPresses {
   readonly type: "presses";
@@ -572,6 +537,23 @@ export interface StretchRequest {
   readonly axis?: number;
 }
 
+/** The next frames become the reference. */
+export interface TakeReference {
+  readonly type: "reference";
+}
+
+/** Hold the picture, or let it go on; frames are read and left out meanwhile. */
+export interface SetPause {
+  readonly type: "pause";
+  readonly on: boolean;
+}
+
+/** A remark on the picture of this moment; goes into the recording as well. */
+export interface Note {
+  readonly type: "note";
+  readonly text: string;
+}
+
 /** Play the recording from so many seconds after its first frame on. */
 export interface Seek {
   readonly type: "seek";
@@ -593,6 +575,24 @@ export interface SetSpeed {
 export interface SetLoop {
   readonly type: "loop";
   readonly on: boolean;
+}
+
+/** Record to a new file in the server's folder, or end the recording. */
+export interface SetRecording {
+  readonly type: "record";
+  readonly on: boolean;
+}
+
+/** The map of what the data cannot tell, with the electrodes and the alpha of the moment. */
+export interface AskUnresolved {
+  readonly type: "unresolved";
+}
+
+/** How long the page took of late from a frame's arrival to the end of drawing it, s. */
+export interface Painted {
+  readonly type: "painted";
+  readonly p50_s: number;
+  readonly p99_s: number;
 }
 
 /** Other values of the skin's keys, by section; the skin's schema says what each may be. */
@@ -772,7 +772,7 @@ export interface SpaceTouch {
 export type ServerMessage =
   | Scene
   | Scale
-  | State
+  | RunState
   | EventNote
   | Refusal
   | UnresolvedMap
@@ -796,19 +796,19 @@ export type RobotMessage =
   | Refusal;
 
 export type PageRequest =
-  | TakeReference
-  | SetPause
-  | SetRecording
-  | AskUnresolved
-  | Note
-  | Painted
   | SetPresses
   | SetTwin
   | SetPose
+  | TakeReference
+  | SetPause
+  | Note
   | Seek
   | StepReplay
   | SetSpeed
   | SetLoop
+  | SetRecording
+  | AskUnresolved
+  | Painted
   | SetSettings
   | UndoSettings
   | RedoSettings

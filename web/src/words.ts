@@ -3,7 +3,7 @@
 import { duration, fixed } from "./format";
 
 import type { LinkState } from "./socket";
-import type { ClassReading, FlowNow, Scene, State } from "./wire";
+import type { ClassReading, FlowNow, Scene, RunState } from "./wire";
 
 export interface Warning {
   readonly text: string;
@@ -39,7 +39,7 @@ function disconnected(link: LinkState & { phase: "lost" }, now: number, age: num
 }
 
 /** The state of a source that is connected. */
-function stateOf(status: State, old: boolean): readonly [word: string, remark: string] {
+function stateOf(status: RunState, old: boolean): readonly [word: string, remark: string] {
   const { paused, reference, replay, running, recording } = status;
   if (replay?.ended) return ["At the end", ""];
   if (paused) return ["Paused", ""];
@@ -53,7 +53,7 @@ function stateOf(status: State, old: boolean): readonly [word: string, remark: s
 }
 
 /** What someone must act on; the server's own sentence first. */
-function warningsOf(status: State, age: number | null): Warning[] {
+function warningsOf(status: RunState, age: number | null): Warning[] {
   const { baseline, calibration, paused, problem, replay, running, sick } = status;
   const found = problem ? [warning(problem)] : [];
   if (!running && !replay?.ended && !problem) found.push(warning("No frames come from the source"));
@@ -89,7 +89,7 @@ function withFlow(word: string, remark: string, flow: FlowNow | null): readonly 
 export function headline(
   link: LinkState,
   scene: Scene | null,
-  status: State | null,
+  status: RunState | null,
   now: number,
   age: number | null,
   flow: FlowNow | null = null,
@@ -109,7 +109,7 @@ export interface Fact {
 }
 
 /** The figures of the top line. */
-export function facts(status: State | null): Fact[] {
+export function facts(status: RunState | null): Fact[] {
   if (!status) return [];
   const lost = status.dropped + status.corrupt + status.gaps;
   const { age_s: age } = status.reference;
@@ -144,13 +144,13 @@ export function facts(status: State | null): Fact[] {
 }
 
 /** Alpha of the images and what chose it. */
-export function alpha(status: State): string {
+export function alpha(status: RunState): string {
   const by = status.rule === "hand" ? "by hand" : status.rule;
   return `${Number(status.alpha.toPrecision(2))} (${by})`;
 }
 
 /** The same in full, for a tooltip. */
-export function alphaInFull(status: State): string {
+export function alphaInFull(status: RunState): string {
   const by = status.rule === "hand" ? "set by hand" : `chosen by the rule ${status.rule}`;
   return `Weight of the prior, ${status.alpha.toPrecision(4)}, ${by}`;
 }

@@ -171,7 +171,7 @@ def _is_skin(path: Path, *, or_robot: bool = False) -> bool:
     except (OSError, ValueError):
         return False
     is_robot = isinstance(document.get("skin"), list)
-    return _OF_SKINS <= document.keys() or (or_robot and is_robot)
+    return document.keys() >= _OF_SKINS or (or_robot and is_robot)
 
 
 def _is_offered(name: str) -> bool:

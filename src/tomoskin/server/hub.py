@@ -13,23 +13,20 @@ from tomoskin.core import DataError, WireError
 from tomoskin.files.session import read_timeline
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, colour_limit
-from tomoskin.run import Runner, commands
+from tomoskin.run import Runner, StrictRequest, commands
 from tomoskin.server import views
 from tomoskin.server.frames import NewestFrame
+from tomoskin.server.page_connection import Host
 from tomoskin.server.page_messages import EventNote, Message, PlayedTimeline, Scale, Scene
-from tomoskin.server.requests import Request
 from tomoskin.server.run_handlers import run_handlers
 from tomoskin.server.task import Handler, Handlers, Listener, Tasks, during
-
-MAX_PAGES = 16
-"""Pages that are served at once."""
 
 _STATE_PERIOD = 0.25
 _FIRST_EVENTS = 20
 """Events of the past that a new page is sent."""
 
 
-class Hub:
+class Hub(Host):
     """The pages of one runner; lives in the event loop.
 
     Parameters
@@ -52,6 +49,7 @@ class Hub:
     """
 
     def __init__(self, runner: Runner, *, limit: float, folder: Path | None = None) -> None:
+        super().__init__()
         self.runner = runner
         self.folder = folder or Path()
         self.opener: Callable[[Skin], Transport] | None = None
@@ -59,7 +57,6 @@ class Hub:
         self._handlers: dict[type, Handler] = {}
         self._greetings: list[Callable[[], Sequence[Message]]] = []
         self._farewells: list[Callable[[Listener], None]] = []
-        self._pages: set[Listener] = set()
         self._wake_is_due = False
         self._next_event = 0
         self._timeline: PlayedTimeline | None = None
@@ -98,19 +95,14 @@ class Hub:
             with self.runner.audience.watch(announce):
                 yield
 
-    def join(self, page: Listener) -> bool:
-        """Serve ``page`` from now on; False where there are too many."""
-        if len(self._pages) >= MAX_PAGES:
-            return False
-        self._pages.add(page)
+    def first(self) -> list[Message]:
+        """Scene and state, what happened, and what the handlers greet with."""
         timeline = [self._timeline] if self._timeline else []
-        for message in (*self._now(), *timeline, *self._greeting(), *self._past):
-            page.post(message.json)
-        return True
+        return [*self._now(), *timeline, *self._greeting(), *self._past]
 
     def leave(self, page: Listener, why: str = "") -> None:
         """Serve ``page`` no longer, and lift what it pressed."""
-        self._pages.discard(page)
+        super().leave(page)
         self.runner.submit(commands.HoldPresses(page, ()))
         self.runner.latency.forget(page)
         for farewell in self._farewells:
@@ -118,18 +110,12 @@ class Hub:
         if why:
             self.runner.say("page-dropped", why)
 
-    def obey(self, page: Listener, request: Request) -> None:
+    def obey(self, page: Listener, request: StrictRequest) -> None:
         """Do what a page asks. Raises WireError where that cannot be."""
         handler = self._handlers.get(type(request))
         if handler is None:
             raise WireError(f"{type(request).__name__} is not possible on this page")
         handler(page, request)
-
-    def tell(self, *messages: Message) -> None:
-        """Send ``messages`` to every page."""
-        for text in [message.json for message in messages]:
-            for page in self._pages:
-                page.post(text)
 
     def show(self) -> None:
         """Tell every page that the runner has another skin or source."""
@@ -171,8 +157,7 @@ class Hub:
 
     def _wake(self) -> None:
         self._wake_is_due = False
-        for page in self._pages:
-            page.wake()
+        self.wake()
 
     async def _tick(self) -> None:
         while True:

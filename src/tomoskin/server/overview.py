@@ -14,8 +14,9 @@ import numpy as np
 from tomoskin import __version__
 from tomoskin.core import FloatArray, WireError, encode_json
 from tomoskin.model.robot import PlacedSkin, Pose, Robot
-from tomoskin.run import RobotRun, Runner, commands
+from tomoskin.run import RobotRun, Runner, StrictRequest, commands
 from tomoskin.run.sinks import Moment, Naming, Stream, contacts_of
+from tomoskin.server.page_connection import Host
 from tomoskin.server.page_messages import (
     PlacedShape,
     RobotScene,
@@ -25,7 +26,7 @@ from tomoskin.server.page_messages import (
     SpaceTouch,
     TouchesOfSkin,
 )
-from tomoskin.server.requests import Request, SetRecording
+from tomoskin.server.requests import SetRecording
 from tomoskin.server.run_handlers import FILE_NAME
 from tomoskin.server.task import Listener, Tasks, during
 from tomoskin.server.views import flat
@@ -35,8 +36,6 @@ PERIOD = 1 / 20
 
 _STATES = 5
 """So many looks, and all states are sent."""
-
-MAX_PAGES = 16
 
 
 class NewestTouches:
@@ -77,7 +76,7 @@ class NewestTouches:
         return TouchesOfSkin(valid=moment.valid, touches=touches)
 
 
-class Overview:
+class Overview(Host):
     """What the pages of the whole robot are told, and may ask; lives in the event loop.
 
     Parameters
@@ -89,15 +88,15 @@ class Overview:
     """
 
     def __init__(self, robot: Robot, run: RobotRun, folder: Path) -> None:
+        super().__init__()
         self.run, self.folder = run, folder
         self._tasks = Tasks()
-        self._pages: set[Listener] = set()
         placed = {skin.name: skin for skin in robot.skins}
         streams = {
             n: Stream.of(r.prepared, n, 0.0, placed[n].place) for n, r in run.runners.items()
         }
         poses = {n: robot.link_pose(placed[n].place) for n in run.runners}
-        self.frame = NewestTouches(run, streams, poses)
+        self.frame = self._touches = NewestTouches(run, streams, poses)
         self._scene = scene(robot, streams, poses)
 
     @contextlib.asynccontextmanager
@@ -106,24 +105,19 @@ class Overview:
         async with during(self._tick()):
             yield
 
-    def join(self, page: Listener) -> bool:
-        """Serve ``page`` from now on; False where there are too many."""
-        if len(self._pages) >= MAX_PAGES:
-            return False
-        self._pages.add(page)
-        self.frame.renew()  # while nobody looked it was not
-        page.post(self._scene.json)
-        page.post(states(self.run).json)
-        return True
+    def first(self) -> tuple[RobotScene, RobotState]:
+        """The robot, and how its skins are doing."""
+        self._touches.renew()  # while nobody looked it was not
+        return self._scene, states(self.run)
 
     def leave(self, page: Listener, why: str = "") -> None:
         """Stop serving ``page``."""
-        self._pages.discard(page)
+        super().leave(page)
         if why:
             for runner in self.run.runners.values():
                 runner.say("page-dropped", why)
 
-    def obey(self, page: Listener, request: Request) -> None:
+    def obey(self, page: Listener, request: StrictRequest) -> None:
         """Do what a page asks of all skins. Raises WireError where that cannot be."""
         match request:
             case commands.TakeReference():
@@ -144,19 +138,16 @@ class Overview:
         return record
 
     def _tell(self) -> None:
-        text = states(self.run).json
-        for page in self._pages:
-            page.post(text)
+        self.tell(states(self.run))
 
     async def _tick(self) -> None:
         count = 0
         while True:
-            if self._pages:
-                self.frame.renew()
+            if self.pages:
+                self._touches.renew()
                 if count % _STATES == 0:
                     self._tell()
-                for page in self._pages:
-                    page.wake()
+                self.wake()
             count += 1
             await asyncio.sleep(PERIOD)
 

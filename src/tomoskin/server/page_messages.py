@@ -22,7 +22,7 @@ Point = tuple[float, float]
 Flat = list[float]
 
 
-class Part(msgspec.Struct, frozen=True, kw_only=True):
+class MessagePart(msgspec.Struct, frozen=True, kw_only=True):
     """A part of a message."""
 
     @classmethod
@@ -32,7 +32,7 @@ class Part(msgspec.Struct, frozen=True, kw_only=True):
         return cls(**own, **more)
 
 
-class Message(Part, frozen=True, kw_only=True):
+class Message(MessagePart, frozen=True, kw_only=True):
     """A message to a page."""
 
     @property
@@ -44,7 +44,7 @@ class Message(Part, frozen=True, kw_only=True):
 # The skin, and how the run is doing.
 
 
-class SkinName(Part, frozen=True):
+class SkinName(MessagePart, frozen=True):
     """The skin, by what its file says."""
 
     name: str
@@ -52,7 +52,7 @@ class SkinName(Part, frozen=True):
     source: str
 
 
-class Electrode(Part, frozen=True):
+class Electrode(MessagePart, frozen=True):
     """An electrode: its centre, its name, and the mesh points along its arc."""
 
     x: float
@@ -61,7 +61,7 @@ class Electrode(Part, frozen=True):
     points: list[int]
 
 
-class PatternRows(Part, frozen=True):
+class PatternRows(MessagePart, frozen=True):
     """Source, sink and plus, minus of each measurement, flat."""
 
     name: str
@@ -71,7 +71,7 @@ class PatternRows(Part, frozen=True):
     measure: list[int]
 
 
-class ProbeSizes(Part, frozen=True):
+class ProbeSizes(MessagePart, frozen=True):
     """What a press from the page is at first, and at most."""
 
     radius_m: float
@@ -108,7 +108,7 @@ class Scale(Message, frozen=True, tag="scale"):
     unit: str
 
 
-class ReferenceNow(Part, frozen=True):
+class ReferenceNow(MessagePart, frozen=True):
     """How far the reference is, and how old it has become."""
 
     frames: int
@@ -117,7 +117,7 @@ class ReferenceNow(Part, frozen=True):
     ready: bool
 
 
-class BaselineNow(Part, frozen=True):
+class BaselineNow(MessagePart, frozen=True):
     """Drift since the reference as a part of it, how long it is held, and why it is stale."""
 
     drift: float | None
@@ -126,7 +126,7 @@ class BaselineNow(Part, frozen=True):
     stale: str | None
 
 
-class Stage(Part, frozen=True):
+class StageNow(MessagePart, frozen=True):
     """How long one stage takes."""
 
     name: str
@@ -134,7 +134,7 @@ class Stage(Part, frozen=True):
     p99_ms: float | None
 
 
-class SlowFrame(Part, frozen=True):
+class SlowFrame(MessagePart, frozen=True):
     """A slow frame: what it took its time for, in words."""
 
     sequence: int
@@ -142,7 +142,7 @@ class SlowFrame(Part, frozen=True):
     text: str
 
 
-class BendNow(Part, frozen=True):
+class BendNow(MessagePart, frozen=True):
     """How the sheet is bent, as ``tomoskin image --json`` says it."""
 
     angle_rad: float
@@ -151,7 +151,7 @@ class BendNow(Part, frozen=True):
     state: str
 
 
-class CalibrationNow(Part, frozen=True):
+class CalibrationNow(MessagePart, frozen=True):
     """How touches fit the calibration that locates them; ``broken``: someone must act."""
 
     well: bool
@@ -159,7 +159,7 @@ class CalibrationNow(Part, frozen=True):
     findings: tuple[str, ...]
 
 
-class Sick(Part, frozen=True):
+class Sick(MessagePart, frozen=True):
     """An electrode that is not good, and why, in words."""
 
     electrode: int
@@ -168,7 +168,7 @@ class Sick(Part, frozen=True):
     since_s: float | None
 
 
-class State(Message, frozen=True, tag="state"):
+class RunState(Message, frozen=True, tag="state"):
     """One look at the runner.
 
     ``stages``: from the sample to the page; ``slowest``: the slowest frame first; ``rule``: what
@@ -185,7 +185,7 @@ class State(Message, frozen=True, tag="state"):
     gaps: int
     p50_ms: float | None
     p99_ms: float | None
-    stages: list[Stage]
+    stages: list[StageNow]
     slowest: list[SlowFrame]
     reference: ReferenceNow
     baseline: BaselineNow | None
@@ -226,14 +226,14 @@ class UnresolvedMap(Message, frozen=True, tag="unresolved"):
     problem: str
 
 
-class Tick(Part, frozen=True):
+class Tick(MessagePart, frozen=True):
     """A moment of a recording, from its first frame, and what happened."""
 
     time_s: float
     text: str
 
 
-class TimedEvent(Part, frozen=True):
+class TimedEvent(MessagePart, frozen=True):
     """An event of a recording."""
 
     time_s: float
@@ -241,7 +241,7 @@ class TimedEvent(Part, frozen=True):
     text: str
 
 
-class TouchSpan(Part, frozen=True):
+class TouchSpan(MessagePart, frozen=True):
     """A touch of a recording, and when it was there."""
 
     id: int
@@ -262,7 +262,7 @@ class PlayedTimeline(Message, frozen=True, tag="timeline"):
 # Files, sources, calibrations.
 
 
-class FileEntry(Part, frozen=True):
+class FileEntry(MessagePart, frozen=True):
     """A file: size in bytes, when it was last written (s since 1970), notes on it."""
 
     name: str
@@ -289,14 +289,14 @@ class Exported(Message, frozen=True, tag="exported"):
     name: str
 
 
-class Offer(Part, frozen=True):
+class Offer(MessagePart, frozen=True):
     """A source that a page may choose: what opens it, and in words what it is."""
 
     id: str
     text: str
 
 
-class BoardIdentity(Part, frozen=True):
+class BoardNow(MessagePart, frozen=True):
     """What the board says that it is; ``name`` is empty before protocol 1.2."""
 
     name: str
@@ -314,7 +314,7 @@ class Sources(Message, frozen=True, tag="sources"):
     sources: list[Offer]
     current: str
     host_protocol: str
-    board: BoardIdentity | None
+    board: BoardNow | None
     problem: str | None
 
 
@@ -334,7 +334,7 @@ class Calibrations(Message, frozen=True, tag="calibrations"):
 Phase = Literal["rest", "press", "hold", "release", "several", "name", "rub"]
 
 
-class WeightNow(Part, frozen=True):
+class WeightNow(MessagePart, frozen=True):
     """A weight, in the unit in which it was given, in newtons, and in words."""
 
     value: float
@@ -343,7 +343,7 @@ class WeightNow(Part, frozen=True):
     text: str
 
 
-class RubbedNow(Part, frozen=True):
+class RubbedNow(MessagePart, frozen=True):
     """What was rubbed so far.
 
     ``places`` are the positions of the map, ``covered`` how many touches lay near each, and
@@ -359,7 +359,7 @@ class RubbedNow(Part, frozen=True):
     near_m: float
 
 
-class Figures(Part, frozen=True, omit_defaults=True):
+class Figures(MessagePart, frozen=True, omit_defaults=True):
     """Numbers of an estimate, as far as its flow has them."""
 
     errors_mm: Flat | None = None
@@ -404,7 +404,7 @@ class FlowNow(Message, frozen=True, tag="flow"):
 # Settings.
 
 
-class KindForm(Part, frozen=True, omit_defaults=True):
+class KindForm(MessagePart, frozen=True, omit_defaults=True):
     """What a value may be, for a form; ``names`` and ``inner`` are of the columns of rows."""
 
     form: Literal["choice", "number", "quantity", "rows", "text"]
@@ -416,14 +416,14 @@ class KindForm(Part, frozen=True, omit_defaults=True):
     inner: KindForm | None = None
 
 
-class Condition(Part, frozen=True):
+class Condition(MessagePart, frozen=True):
     """One of these ``words`` as the value of another key."""
 
     key: str
     words: tuple[str, ...]
 
 
-class KeyForm(Part, frozen=True):
+class KeyForm(MessagePart, frozen=True):
     """One key of a section.
 
     ``expected``: what a value must be, in words; ``when``: beside what it may stand;
@@ -441,7 +441,7 @@ class KeyForm(Part, frozen=True):
     locked: bool
 
 
-class SectionForm(Part, frozen=True):
+class SectionForm(MessagePart, frozen=True):
     """One section of a skin file."""
 
     name: str
@@ -500,7 +500,7 @@ class PatternTable(Message, frozen=True, tag="pattern"):
 # The twin.
 
 
-class TwinBend(Part, frozen=True):
+class TwinBend(MessagePart, frozen=True):
     """By ``angle`` rad, over a strip of ``length`` along ``axis``, rad from x, ``offset`` m off."""
 
     angle: float
@@ -509,7 +509,7 @@ class TwinBend(Part, frozen=True):
     offset: float
 
 
-class TwinStretch(Part, frozen=True):
+class TwinStretch(MessagePart, frozen=True):
     """Relative elongations along ``axis``, rad from x, and across it."""
 
     along: float
@@ -542,7 +542,7 @@ class TwinRefused(Message, frozen=True, tag="twin_refused"):
 # A robot.
 
 
-class PlacedShape(Part, frozen=True):
+class PlacedShape(MessagePart, frozen=True):
     """A skin on a robot: the frame of its touches, and the corners of its triangles."""
 
     name: str
@@ -566,7 +566,7 @@ class RobotScene(Message, frozen=True, tag="robot"):
     version: str
 
 
-class SkinState(Part, frozen=True):
+class SkinState(MessagePart, frozen=True):
     """How one skin of a robot is doing."""
 
     running: bool
@@ -586,7 +586,7 @@ class RobotState(Message, frozen=True, tag="robot-state"):
     recording: str | None
 
 
-class SpaceTouch(Part, frozen=True):
+class SpaceTouch(MessagePart, frozen=True):
     """A touch in the frame of the robot's root; ``force`` N, null where nothing gives it."""
 
     id: int
@@ -596,21 +596,21 @@ class SpaceTouch(Part, frozen=True):
     force: float | None
 
 
-class TouchesOfSkin(Part, frozen=True):
+class TouchesOfSkin(MessagePart, frozen=True):
     """The touches on one skin, and whether its data can be relied on."""
 
     valid: bool
     touches: list[SpaceTouch]
 
 
-class RobotTouches(Part, frozen=True):
+class RobotTouches(MessagePart, frozen=True):
     """The newest touches on each skin of a robot; sent as JSON in bytes, the newest only."""
 
     skins: dict[str, TouchesOfSkin]
 
 
 PAGE_MESSAGES = (
-    *(Scene, Scale, State, EventNote, Refusal, UnresolvedMap, PlayedTimeline),
+    *(Scene, Scale, RunState, EventNote, Refusal, UnresolvedMap, PlayedTimeline),
     *(Files, Exported, Sources, Calibrations, FlowNow),
     *(SchemaForm, Settings, Progress, SettingRefused, PatternTable, TwinState, TwinRefused),
 )

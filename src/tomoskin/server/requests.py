@@ -5,13 +5,15 @@ Requests that are commands to the run stand in ``run/commands.py`` and ``run/twi
 
 from __future__ import annotations
 
+from functools import reduce
+from operator import or_
 from typing import Annotated, Literal
 
 import msgspec
 from msgspec import Meta
 
 from tomoskin.core import WireError
-from tomoskin.run import SetPose, SetPresses, SetTwin, StrictRequest, commands
+from tomoskin.run import StrictRequest
 
 MAX_REQUEST = 32_768
 """Longest request, bytes: a pattern of some thousand rows, written out."""
@@ -217,50 +219,16 @@ class UseCalibration(StrictRequest, frozen=True, tag="calibration"):
     of: Calibrated = "touch"
 
 
-RunRequest = (
-    commands.TakeReference
-    | commands.SetPause
-    | SetRecording
-    | AskUnresolved
-    | commands.Note
-    | Painted
-    | SetPresses
-    | SetTwin
-    | SetPose
-    | commands.ReplayCommand
-)
+REQUESTS = tuple(kind for kind in StrictRequest.__subclasses__() if kind.__struct_config__.tag)
+"""All that a page may ask: every request of these modules that has a type of its own."""
 
-SettingsRequest = SetSettings | UndoSettings | RedoSettings | SaveSkin | LoadSkin | AskPattern
+REQUEST = reduce(or_, REQUESTS)
+"""Any of them, as a type."""
 
-FlowRequest = (
-    ListFiles
-    | OpenSession
-    | GoLive
-    | ExportSession
-    | RenameSession
-    | DeleteSession
-    | Annotate
-    | ListSources
-    | Connect
-    | BeginFlow
-    | ShowFlow
-    | UndoPress
-    | DeletePress
-    | SetWeight
-    | AskPoint
-    | LearnFlow
-    | StopLearning
-    | EndFlow
-    | KeepFlow
-    | UseCalibration
-)
-
-Request = RunRequest | SettingsRequest | FlowRequest
-
-_DECODER: msgspec.json.Decoder[Request] = msgspec.json.Decoder(Request)
+_DECODER: msgspec.json.Decoder[StrictRequest] = msgspec.json.Decoder(REQUEST)
 
 
-def decode_request(data: str | bytes) -> Request:
+def decode_request(data: str | bytes) -> StrictRequest:
     """One request from a page's message.
 
     Raises

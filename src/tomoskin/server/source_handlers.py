@@ -14,7 +14,7 @@ from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared
 from tomoskin.run import commands
 from tomoskin.server.hub import Hub
-from tomoskin.server.page_messages import BoardIdentity, Offer, Sources
+from tomoskin.server.page_messages import BoardNow, Offer, Sources
 from tomoskin.server.requests import Connect, ListSources
 from tomoskin.server.task import Listener
 from tomoskin.twin.emulator import BOARDS, DEFAULT
@@ -123,8 +123,8 @@ class SourceHandlers:
         )
 
 
-def _identity(info: Info, name: str) -> BoardIdentity:
-    return BoardIdentity.of(
+def _identity(info: Info, name: str) -> BoardNow:
+    return BoardNow.of(
         info,
         name=name,
         firmware=".".join(map(str, info.firmware)),

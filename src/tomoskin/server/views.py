@@ -53,15 +53,15 @@ def scene(prepared: Prepared, source: str, *, limit: float, pressable: bool) -> 
     )
 
 
-def state(status: Status) -> to_page.State:
+def state(status: Status) -> to_page.RunState:
     """One look at the runner."""
     reference, baseline, bend = status.reference, status.reference.baseline, status.bend
-    return to_page.State.of(
+    return to_page.RunState.of(
         status,
         p50_ms=1e3 * status.p50,
         p99_ms=1e3 * status.p99,
         stages=[
-            to_page.Stage(name=stage.name, p50_ms=1e3 * stage.p50, p99_ms=1e3 * stage.p99)
+            to_page.StageNow(name=stage.name, p50_ms=1e3 * stage.p50, p99_ms=1e3 * stage.p99)
             for stage in status.stages
         ],
         slowest=[

@@ -1,7 +1,7 @@
 /** The drawer of the session folder: what was recorded, played again, taken along. */
 
 import { signal, useSignal } from "@preact/signals";
-import { addDrawer, whenOpened } from "../drawers";
+import { addDrawer, whileOpened } from "../drawers";
 import { say, send, status } from "../state";
 import { bytes, day } from "./format";
 import type { ExportSession, FileEntry } from "../wire";
@@ -241,13 +241,4 @@ function View() {
 
 addDrawer({ id: "sessions", label: "Sessions", key: "S", title: "Recordings: play, export, download, rename, delete, write notes", View });
 
-const OFTEN = 1000;
-let timer = 0;
-whenOpened("sessions", () => {
-  askFiles();
-  window.clearInterval(timer);
-  timer = window.setInterval(() => {
-    if (document.querySelector("[data-testid=drawer-sessions]")) askFiles();
-    else window.clearInterval(timer);
-  }, OFTEN);
-});
+whileOpened("sessions", 1000, askFiles);

@@ -1,7 +1,7 @@
 /** The drawer that sets a skin up: the board, the reference, the wires, the touch, the force. */
 
 import { takeReference } from "../commands";
-import { addDrawer, whenOpened } from "../drawers";
+import { addDrawer, whileOpened } from "../drawers";
 import { duration, millimetres } from "../format";
 import { send, status } from "../state";
 import { InUse } from "./Calibrations";
@@ -174,16 +174,6 @@ function Going({ kind }: { kind: FlowKind }) {
           {doubtful.map((row) => row + 1).join(", ")} do not fit the others: the position may be wrong.
         </p>
       )}
-      <ol class="presses" aria-label="Presses recorded">
-        {presses.map(([x, y], k) => (
-          <li key={k} class={doubtful.includes(k) ? "doubtful" : ""}>
-            x {millimetres(x, 0)}, y {millimetres(y, 0)} mm
-            {figures.errors_mm?.[k] !== undefined && (
-              <span class="small"> missed by {figures.errors_mm[k].toFixed(0)} mm</span>
-            )}
-          </li>
-        ))}
-      </ol>
       <div class="does">
         <button
           type="button"
@@ -196,6 +186,16 @@ function Going({ kind }: { kind: FlowKind }) {
         <Leave />
       </div>
       <Keep kind={kind} />
+      <ol class="presses" aria-label="Presses recorded">
+        {presses.map(([x, y], k) => (
+          <li key={k} class={doubtful.includes(k) ? "doubtful" : ""}>
+            x {millimetres(x, 0)}, y {millimetres(y, 0)} mm
+            {figures.errors_mm?.[k] !== undefined && (
+              <span class="small"> missed by {figures.errors_mm[k].toFixed(0)} mm</span>
+            )}
+          </li>
+        ))}
+      </ol>
     </>
   );
 }
@@ -253,19 +253,11 @@ function View() {
 
 addDrawer({ id: "setup", label: "Set up", key: "U", title: "Board, reference, channel mapping, touch, force", View });
 
-const OFTEN = 2000;
-let timer = 0;
-whenOpened("setup", () => {
-  const ask = () => {
-    askSources();
-    askFiles();
-  };
-  ask();
+whileOpened("setup", 2000, () => {
+  askSources();
+  askFiles();
+});
+whileOpened("setup", null, () => {
   const { kind } = flow.peek();
   if (kind) step.value = stepOf(kind);
-  window.clearInterval(timer);
-  timer = window.setInterval(() => {
-    if (document.querySelector("[data-testid=drawer-setup]")) ask();
-    else window.clearInterval(timer);
-  }, OFTEN);
 });

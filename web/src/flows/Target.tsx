@@ -35,9 +35,9 @@ function Covered({ view, rubbed }: { view: View; rubbed: RubbedNow }) {
 }
 
 export function Target({ view }: { view: View }) {
-  const { phase, presses, rubbed } = flow.value;
+  const { phase, presses, rubbed, paused } = flow.value;
   const place = dot.value;
-  if (!place && !rubbed) return null;
+  if (paused || (!place && !rubbed)) return null;
   const [x, y] = place ? toPixels(view, ...place) : [0, 0];
   return (
     <svg class={`target ${phase}`} width={view.width} height={view.height} aria-hidden="true" data-testid="dot">

@@ -41,6 +41,9 @@ function Skin() {
   );
 }
 
+/** The name of the skin on its robot, whose page is two folders up; null where it stands alone. */
+const part = /\/skin\/([^/]+)\/$/.exec(window.location.pathname)?.[1] ?? null;
+
 /** The first warning on one line; it opens the list of all. */
 function Warnings({ warnings }: { readonly warnings: readonly Warning[] }) {
   const more = warnings.length - 1;
@@ -85,6 +88,11 @@ export function TopLine() {
         <span class="lamp" aria-hidden="true" />
         <strong>{word}</strong>
       </p>
+      {part !== null && (
+        <a class="button" href="../../" title="All skins of the robot" data-testid="robot">
+          ‹ {decodeURIComponent(part)}
+        </a>
+      )}
       <Skin />
       {act ? <Warnings warnings={warnings} /> : <Remark text={remark} />}
       {lost && (

@@ -164,7 +164,7 @@ export function Touches() {
             <Teaching />
           </div>
         ) : (
-          <table class={touches.some(({ force }) => force) && !asChange.value ? "felt" : ""}>
+          <table>
             <thead>
               <tr>
                 <th scope="col">
