@@ -46,7 +46,8 @@ def site(prepared, folder):
 def as_it_was(site, prepared):
     """What a test has learnt serves no other."""
     yield
-    site.runner.ask(commands.Change(prepared))
+    opener = partial(open_source, "twin:fast", prepared.skin)
+    site.runner.ask(commands.Change(prepared, opener))
 
 
 def looks_right(opened, name):

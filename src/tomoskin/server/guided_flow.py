@@ -6,7 +6,7 @@ import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -26,6 +26,20 @@ of 51), and all others, since a finger does not press half a sheet."""
 
 _APART = 0.12
 """A dot is no nearer to a press than this, in radii of the sheet: it would tell nothing new."""
+
+
+Effort = Literal["softly", "hard"]
+EFFORTS: tuple[Effort, ...] = ("softly", "hard")
+"""How a press is asked for, in turn: presses of one force teach that force alone."""
+
+
+@dataclass(frozen=True, eq=False)
+class GuidedPress:
+    """One press: the place m, the change (n_meas,) V that it made, and how it was asked for."""
+
+    place: Point
+    dv: FloatArray
+    effort: Effort | None = None
 
 
 @dataclass(frozen=True, eq=False)

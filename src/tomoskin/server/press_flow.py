@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -20,27 +19,14 @@ from tomoskin.learning import (
 from tomoskin.pipeline import FrameResult, Prepared, prepare
 from tomoskin.run import Runner, commands
 from tomoskin.server.folder import Folder
-from tomoskin.server.guided_flow import Dots, Estimate, GuidedFlow
-from tomoskin.server.page_messages import Figures, Point
+from tomoskin.server.guided_flow import EFFORTS, Dots, Effort, Estimate, GuidedFlow, GuidedPress
+from tomoskin.server.page_messages import Figures
 from tomoskin.server.press_taker import PressTaker
 from tomoskin.server.requests import UndoPress
-
-Effort = Literal["softly", "hard"]
-EFFORTS: tuple[Effort, ...] = ("softly", "hard")
-"""How a press is asked for, in turn: presses of one force teach that force alone."""
 
 _FEWEST_TOUCH, _FEWEST_MAPPING = 6, 3
 _FIRST = 10
 """So many presses fill the sheet; from then on a locator says where the next tells most."""
-
-
-@dataclass(frozen=True, eq=False)
-class GuidedPress:
-    """One press: the place m, the change (n_meas,) V that it made, and how it was asked for."""
-
-    place: Point
-    dv: FloatArray
-    effort: Effort | None = None
 
 
 def estimate_touch(prepared: Prepared, presses: Sequence[GuidedPress]) -> Estimate:

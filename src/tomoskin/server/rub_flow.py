@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from tomoskin.core import DataError, FloatArray, WireError, reach
 from tomoskin.learning import TOUCH, Rubbing, quiet_electrodes
 from tomoskin.pipeline import FrameResult, Prepared
 from tomoskin.sensing.segment import Region
-from tomoskin.server.guided_flow import Dots, Estimate, GuidedFlow
+from tomoskin.server.guided_flow import Dots, Estimate, GuidedFlow, GuidedPress
 from tomoskin.server.page_messages import Figures, Point, RubbedNow
 from tomoskin.server.press_taker import OFTEN, PressTaker
 from tomoskin.server.requests import AskPoint, LearnFlow, StopLearning, UndoPress
@@ -152,14 +152,6 @@ class RubbedTouches:
         return Rubbed(dv, self._covered, self._several, self._frames, quiet)
 
 
-@dataclass(frozen=True, eq=False)
-class _Point:
-    """A press at a known position m, and its change (n_meas,) V."""
-
-    xy: Point
-    dv: FloatArray = field(repr=False)
-
-
 class RubFlow(GuidedFlow):
     """What was rubbed so far; see :class:`GuidedFlow`. It learns when it is asked to.
 
@@ -175,7 +167,7 @@ class RubFlow(GuidedFlow):
         super().__init__("rub", prepared)
         self._touches = RubbedTouches(prepared)
         self.rubbed = self._touches.now()
-        self.points: list[_Point] = []
+        self.points: list[GuidedPress] = []
         self.answers = {
             AskPoint: lambda request: self._ask(on=request.on),
             UndoPress: lambda _: self._undo(),
@@ -198,7 +190,7 @@ class RubFlow(GuidedFlow):
             dv = taker.push(result.host_time, result.voltages)
             moved = taker.phase != phase
         if dv is not None and self._dot is not None:
-            self.points.append(_Point(self._dot, dv))
+            self.points.append(GuidedPress(self._dot, dv))
             self._dot = self._next_dot()
         elif not moved and 0 <= result.host_time - self._shown < _PERIOD:
             return None
@@ -212,7 +204,7 @@ class RubFlow(GuidedFlow):
             self._taker.restart()
 
     def _next_dot(self) -> Point:
-        return self._dots.next([point.xy for point in self.points], None)
+        return self._dots.next([point.place for point in self.points], None)
 
     def _ask(self, *, on: bool) -> bool:
         self._taker = PressTaker.of(self.prepared) if on else None
@@ -248,7 +240,7 @@ class RubFlow(GuidedFlow):
         dv = np.concatenate([[point.dv for point in points], rubbed.dv]) if points else rubbed.dv
         xy = np.full((len(dv), 2), np.nan)
         for number, point in enumerate(points):
-            xy[number] = point.xy
+            xy[number] = point.place
         answer = Rubbing.of(dv, self.prepared.skin, xy)
         if not answer.holds:
             raise DataError("; ".join(answer.findings))
@@ -272,7 +264,7 @@ class RubFlow(GuidedFlow):
         return {
             "phase": "rub" if self._taker is None else self._taker.phase,
             "dot": self._dot,
-            "presses": [point.xy for point in self.points],
+            "presses": [point.place for point in self.points],
             "stage": self.stage,
             "rubbed": RubbedNow.of(
                 rubbed,

@@ -4,6 +4,7 @@ import { takeReference } from "../commands";
 import { addDrawer, whileOpened } from "../drawers";
 import { duration, millimetres } from "../format";
 import { send, status } from "../state";
+import type { FlowNow } from "../wire";
 import { InUse } from "./Calibrations";
 import { Keep, Leave } from "./Keep";
 import { askFiles, askSources, flow, type FlowKind, type Phase, sources, type Step, step, stepOf } from "./model";
@@ -151,14 +152,21 @@ const PHASES: Partial<Record<Phase, string>> = {
   release: "Recorded. Let go",
 };
 
+/** What is to be done now. */
+function lead({ phase, effort, ready }: FlowNow): string | undefined {
+  if (phase !== "press") return PHASES[phase];
+  if (effort) return `Press ${effort} where the dot is`;
+  return ready ? "Save it, or press where the dot is" : PHASES.press;
+}
+
 function Going({ kind }: { kind: FlowKind }) {
-  const { phase, effort, presses, text, thinking, figures } = flow.value;
+  const { presses, text, thinking, figures } = flow.value;
   const taken = `${presses.length} press${presses.length === 1 ? "" : "es"} recorded`;
   const doubtful = figures.doubtful ?? [];
   return (
     <>
       <p class="lead" role="status" data-testid="phase">
-        {phase === "press" && effort ? `Press ${effort} where the dot is` : PHASES[phase]}
+        {lead(flow.value)}
       </p>
       <p data-testid="taken">
         {taken}
