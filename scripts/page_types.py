@@ -15,12 +15,12 @@ import numpy as np
 from msgspec import inspect
 
 from tomoskin.run import StrictRequest
-from tomoskin.server import frames, page_messages, requests
+from tomoskin.server import frames, page_messages, requests, settings_messages
 
 TYPES = Path(__file__).resolve().parent.parent / "web" / "src" / "wire.ts"
 _HEAD = """\
 /** What goes between the page and its server. Made by scripts/page_types.py from page_messages.py,
- * requests.py and frames.py of src/tomoskin/server, which say what each field is: change those. */
+ * settings_messages.py, requests.py and frames.py of src/tomoskin/server: change those. */
 """
 _GETTERS = {"u1": "Uint8", "u2": "Uint16", "u4": "Uint32", "f4": "Float32", "f8": "Float64"}
 _UNNAMED = ("magic", "pad", "reserved")
@@ -29,12 +29,13 @@ _UNNAMED = ("magic", "pad", "reserved")
 def types() -> str:
     """Return the whole module."""
     sent = requests.REQUESTS
+    to_skin = (*page_messages.PAGE_MESSAGES, *settings_messages.SETTINGS_MESSAGES)
     unions = {
-        "ServerMessage": page_messages.PAGE_MESSAGES,
+        "ServerMessage": to_skin,
         "RobotMessage": page_messages.ROBOT_MESSAGES,
         "PageRequest": sent,
     }
-    roots = [*page_messages.PAGE_MESSAGES, *page_messages.ROBOT_MESSAGES, *sent]
+    roots = [*to_skin, *page_messages.ROBOT_MESSAGES, *sent]
     made: dict[str, str] = {}
     for info in inspect.multi_type_info([*roots, page_messages.RobotTouches]):
         _type(info, made)

@@ -46,8 +46,7 @@ def site(prepared, folder):
 def as_it_was(site, prepared):
     """What a test has learnt serves no other."""
     yield
-    opener = partial(open_source, "twin:fast", prepared.skin)
-    site.runner.ask(commands.Change(prepared, opener))
+    site.runner.ask(commands.Change(prepared))
 
 
 def looks_right(opened, name):
@@ -106,11 +105,15 @@ def test_a_kept_press_is_on_the_twin_after_its_pattern_has_changed(opened, site)
     opened.page.mouse.up()
     opened.page.keyboard.up("Shift")
     with site.connect() as socket:
-        Page(socket).ask("settings", changes={"drive": {"pattern": "opposite"}})
-    opened.page.wait_for_function("name => window.tomoskin.scene.pattern.name !== name", arg=before)
-    opened.until("last?.truths.length === 1")
-    opened.page.keyboard.press("Escape")
-    opened.until("last?.truths.length === 0")
+        page = Page(socket)
+        page.ask("settings", changes={"drive": {"pattern": "opposite"}})
+        page.told("scene", lambda m: m["pattern"]["name"] != before)
+        page.told("settings", lambda m: not m["busy"])
+        opened.until("last?.truths.length === 1")
+        opened.page.keyboard.press("Escape")
+        opened.until("last?.truths.length === 0")
+        page.ask("undo")
+        page.told("scene", lambda m: m["pattern"]["name"] == before)
 
 
 def lay(opened, newtons, place, done):
@@ -223,7 +226,7 @@ def test_a_rubbed_skin_is_learnt_and_used(rubbed, folder):
     assert len(TOUCH.read(folder / "rubbed.npz").model.presses) >= 150
 
 
-def test_a_flow_whose_drawer_is_closed_is_paused_and_named(opened, folder):
+def test_a_flow_whose_drawer_is_closed_is_paused_and_named(opened):
     opened.test_id("open-setup").click()
     opened.test_id("step-force").click()
     opened.test_id("flow-begin").click()

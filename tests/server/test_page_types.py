@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tomoskin.server import frames, page_messages
+from tomoskin.server import frames, page_messages, settings_messages
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -26,7 +26,7 @@ def test_the_types_are_not_stale(script):
 
 def test_they_hold_every_message_and_request(script):
     made = script.types()
-    for message in page_messages.PAGE_MESSAGES:
+    for message in (*page_messages.PAGE_MESSAGES, *settings_messages.SETTINGS_MESSAGES):
         assert f"export interface {message.__name__} {{\n  readonly type: " in made
     assert '  readonly type: "flow_weight";' in made
     assert "  readonly sure?: boolean;" in made

@@ -23,7 +23,7 @@ from tomoskin.model.skin import (
     ValueKind,
     Whole,
 )
-from tomoskin.server.page_messages import (
+from tomoskin.server.settings_messages import (
     Condition,
     KeyForm,
     KindForm,

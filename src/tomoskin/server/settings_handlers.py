@@ -26,7 +26,7 @@ from tomoskin.pipeline import Prepared, colour_limit, prepare, tuned_image
 from tomoskin.run import Runner, commands
 from tomoskin.server.folder import Folder
 from tomoskin.server.hub import Hub
-from tomoskin.server.page_messages import Message, Progress, Settings, StageName
+from tomoskin.server.page_messages import Message
 from tomoskin.server.requests import (
     AskPattern,
     LoadSkin,
@@ -36,6 +36,7 @@ from tomoskin.server.requests import (
     UndoSettings,
 )
 from tomoskin.server.settings_form import altered, refusal, schema, table_of
+from tomoskin.server.settings_messages import Progress, Settings, StageName
 from tomoskin.server.task import Listener
 
 STAGES = get_args(StageName)
