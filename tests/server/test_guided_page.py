@@ -251,4 +251,5 @@ def test_a_flow_whose_drawer_is_closed_is_paused_and_named(opened):
     assert opened.test_id("weight").input_value() == "2"
     assert opened.test_id("weight-unit").input_value() == "N"
     opened.test_id("flow-end").click()
+    opened.test_id("flow-end").filter(has_text="Forget all of it").click()
     opened.test_id("state").filter(has_text="Live").wait_for()

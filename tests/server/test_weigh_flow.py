@@ -166,6 +166,23 @@ def test_weights_that_contradict_and_one_spot_are_said_in_the_words_of_the_comma
         flow.estimated(contradicting)
 
 
+def test_a_placement_that_is_refused_says_why(flow):
+    flow, bench = flow
+    set_weight(flow, 4.0)
+    bench.lift()
+    assert not bench.lay(4.0, frames=5)
+    bench.lift()
+    assert "lifted before it had lain still" in flow.now().text
+    bench.number += 1
+    for k in range(90):
+        bench.show(touch(bench.number, 4.0, 1e-3 * k))
+    assert "it still moves" in flow.now().text
+    assert not flow.examples()
+    bench.lift()
+    assert bench.lay(4.0)
+    assert "recorded" not in flow.now().text
+
+
 def test_grams_taken_for_newtons_are_asked_about(flow):
     flow, _ = flow
     set_weight(flow, 200.0)

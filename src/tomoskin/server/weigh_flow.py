@@ -33,6 +33,12 @@ _SLIDES = 3e-3
 _GONE = 3
 """Frames without a touch after which nothing lies there."""
 
+_PATIENCE = 3.0
+"""Seconds of lying there after which it is said why nothing is recorded."""
+
+_EARLY = "Not recorded: it was lifted before it had lain still for 0.6 s. Let it lie."
+_MOVES = "Not recorded yet: it still moves or sinks in. Let it lie, or lift it and lay it on again."
+
 
 @dataclass(frozen=True, eq=False)
 class Placement:
@@ -58,6 +64,7 @@ class PlacementTaker:
 
     def __init__(self) -> None:
         self.phase: Phase = "rest"
+        self.hint = ""
         self._rows: list[tuple[float, Detection]] = []
         self._id = 0
         self._empty = 0
@@ -67,6 +74,8 @@ class PlacementTaker:
         if not touches:
             self._empty += 1
             if self._empty >= _GONE:
+                if self.phase != "press":
+                    self.hint = _EARLY if self.phase == "hold" else ""
                 self.phase = "press"
                 self._rows.clear()
             return None
@@ -80,7 +89,8 @@ class PlacementTaker:
         return self._alone(time, touches[0])
 
     def _alone(self, time: float, touch: Touch) -> Placement | None:
-        self.phase = "hold"
+        if self.phase != "hold":
+            self.phase, self.hint = "hold", ""
         if touch.id != self._id:
             self._id = touch.id
             self._rows.clear()
@@ -89,8 +99,10 @@ class PlacementTaker:
         self._rows.append((time, touch.detection))
         still = self._still()
         if still is None:
+            if time - self._rows[0][0] > _PATIENCE:
+                self.hint = _MOVES
             return None
-        self.phase = "release"
+        self.phase, self.hint = "release", ""
         times, detections = zip(*self._rows, strict=True)
         self._rows.clear()
         return Placement(detections, np.array(times), still)
@@ -153,10 +165,11 @@ class WeighFlow(GuidedFlow):
 
     def see(self, result: FrameResult) -> bool | None:
         """Take a placement, or say that a phase has begun."""
-        before = self._taker.phase
-        placement = self._taker.push(result.host_time, result.touches)
+        taker = self._taker
+        before = taker.phase, taker.hint
+        placement = taker.push(result.host_time, result.touches)
         if placement is None:
-            return None if self._taker.phase == before else False
+            return None if before == (taker.phase, taker.hint) else False
         self._waiting = placement
         return self._record()
 
@@ -213,7 +226,8 @@ class WeighFlow(GuidedFlow):
     def details(self) -> dict[str, Any]:
         """See :class:`GuidedFlow`."""
         places = [one.placement.xy for one in self.weighed]
-        return {
+        hint = {"text": self._taker.hint} if self._taker.hint else {}
+        return hint | {
             "phase": "name" if self._waiting else self._taker.phase,
             "dot": self._dots.next(places, self.estimate),
             "presses": places,

@@ -11,10 +11,21 @@ const names: Readonly<Record<FlowKind, Signal<string>>> = {
   force: signal("force"),
 };
 
+/** How much was recorded when leaving was asked for; null: it was not. */
+const asked = signal<number | null>(null);
+
+/** Leave the flow; asked for twice where something was recorded, since that is forgotten. */
 export function Leave() {
+  const { presses, rubbed } = flow.value;
+  const count = presses.length + (rubbed?.touches ?? 0);
+  const sure = count > 0 && asked.value === count;
+  const leave = () => {
+    asked.value = sure ? null : count;
+    if (sure || count === 0) send({ type: "flow_end" });
+  };
   return (
-    <button type="button" data-testid="flow-end" onClick={() => send({ type: "flow_end" })}>
-      Leave
+    <button type="button" data-testid="flow-end" onClick={leave}>
+      {sure ? "Forget all of it" : "Leave"}
     </button>
   );
 }
