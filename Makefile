@@ -45,15 +45,14 @@ fuzz: dev  ## ten million mutated streams through the parsers of board and host;
 bench: native  ## all in one table, beside plain scipy and, where it is installed, pyEIT; three minutes
 	@$(VENV)/bin/tomoskin bench $(ARGS)
 
-soak: native  ## an hour of a bad day, compressed: faults, a sleeping page, a hanging sink
-	@$(VENV)/bin/tomoskin bench soak $(ARGS)
+soak: dev  ## an hour of a bad day, compressed: faults, a sleeping page, a hanging sink
+	@SOAK_MINUTES=60 $(PY) -m pytest -n 0 -m "" tests/run/test_soak.py $(ARGS)
 
 bench-docs: native page  ## measure the table of all and the forward engine again into docs/benchmarks.md; ten minutes
 	@$(PIP) install --require-hashes --requirement requirements/bench.txt  # pyEIT has no wheel
 	@$(PY) scripts/native.py reference
 	@$(VENV)/bin/tomoskin bench --into docs/benchmarks.md
 	@$(VENV)/bin/tomoskin bench forward --into docs/benchmarks.md
-	@$(VENV)/bin/tomoskin bench forward_large --into docs/benchmarks.md
 
 docs: dev $(VENV)/.docs  ## the documentation, in build/docs; a warning is an error
 	@$(PY) -m sphinx --quiet --fail-on-warning --keep-going docs build/docs
@@ -156,7 +155,7 @@ lock-uv:
 lock-runtime:
 	@$(COMPILE) pyproject.toml --extra plot requirements/build.in -o requirements/runtime.txt
 lock-dev:
-	@$(COMPILE) pyproject.toml --extra mesh --extra plot --extra parquet --extra hdf5 --extra foxglove --extra mqtt --extra lsl --extra zenoh --extra ros2 --extra cluster requirements/dev.in -c requirements/runtime.txt -o requirements/dev.txt
+	@$(COMPILE) pyproject.toml --extra mesh --extra plot --extra parquet --extra hdf5 --extra foxglove --extra mqtt --extra lsl --extra ros2 --extra cluster requirements/dev.in -c requirements/runtime.txt -o requirements/dev.txt
 lock-docs:
 	@$(COMPILE) requirements/docs.in -c requirements/dev.txt -o requirements/docs.txt
 lock-bench:

@@ -3,25 +3,24 @@
 from __future__ import annotations
 
 import math
-import sys
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from report import Report
-from tomoskin.core import Detection, FloatArray, Frame
+from bench_rig import drawn, gap
+from report import Floats, Report, mm, progress, rms, table
+from tomoskin.core import Detection, Frame
 from tomoskin.learning import BENDS, BendExamples, BendModel, Differences, FrameView, JointReference
 from tomoskin.model.mesh import Cylinder, Hinge
-from tomoskin.pipeline import FrameResult, Pipeline
+from tomoskin.pipeline import Pipeline
 from tomoskin.pipeline.finding import finding, voltage_covariance
 from tomoskin.pipeline.nuisance import JUMP
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
 from tomoskin.sensing.signal import Reference
 from tomoskin.twin import Bent, Pose, Press
-from touch_fit import HOLD, Lab, drawn
+from touch_lab import HOLD, TwinLab
 
 SEEDS = (11, 12, 13)
 SHEETS = {"ideal": "no memory, no hysteresis", "textile": "all of the textile preset"}
@@ -53,49 +52,24 @@ BETWEEN = (7.0, 22.0, 37.0, 52.0)
 """Degrees at which references were taken, and at which touches are looked for by them."""
 
 
-def run(data: Path | None) -> tuple[Report, ...]:
-    """No recordings are needed: the twin is the truth."""
-    del data
-    return reports(tuple(SHEETS), SEEDS)
-
-
-def reports(sheets: Sequence[str], seeds: Sequence[int]) -> tuple[Report, ...]:
-    """Both tables; how far it is goes to stderr, a line for each twin."""
-    benches = {sheet: [_told(Bench(sheet, seed)) for seed in seeds] for sheet in sheets}
-    return (
-        Report(
-            "touches on a bent sheet, textile-disc-16: median error, mm",
-            ("sheet", "flat", "on 70 mm", "on 40 mm", "joint, own reference", "by its angle"),
-            tuple(_static_row(sheet, found) for sheet, found in benches.items()),
-            (
-                f"{REST / 60:.0f} minutes after wrapping (radii), a reference before each touch",
-                f"joint: a strip of {1e3 * STRIP:.0f} mm, references recorded at "
-                f"{', '.join(f'{a:.0f}' for a in JOINT)}°, up and down, touches between, the "
-                "bends' directions taken out too",
-                f"seeds {', '.join(map(str, seeds))}, chosen on 1 to 3; {TOUCHES} touches each",
-            ),
-        ),
-        Report(
-            f"while the sheet bends between 0 and {FARTHEST:.0f}° along that strip",
-            (
-                "sheet",
-                "touch, mm, median",
-                "95 %",
-                "without taking bends out",
-                "angle, °, median",
-                "rms",
-                "beside a touch, rms",
-                "states right",
-            ),
-            tuple(_moving_row(sheet, found) for sheet, found in benches.items()),
-            (
-                f"learnt from one recording of three bends and back, {LEARNT} frames, after one "
-                f"bend and a rest; then {MOVING * STEP:.0f} s of frames, {1 / STEP:.0f}/s, through "
-                f"the live pipeline, touched for {ON * STEP:g} of every {EVERY * STEP:g} s",
-                "states: idle, bend, touch and both, a bend from 3° on; these and places "
-                f"{SETTLED * STEP:g} s after a touch began or ended; a radius where none is found",
-            ),
-        ),
+def run() -> Iterator[Report]:
+    benches = {f"{s}: {SHEETS[s]}": [Bench(s, seed) for seed in SEEDS] for s in SHEETS}
+    yield table(
+        "touches on a bent sheet, textile-disc-16: median error, mm",
+        ({"sheet": sheet} | _static(some) for sheet, some in benches.items()),
+        f"{REST / 60:.0f} minutes after wrapping (radii), a reference before each touch",
+        f"joint: a strip of {1e3 * STRIP:.0f} mm, references recorded at "
+        f"{', '.join(f'{a:.0f}' for a in JOINT)}°, up and down, touches between, the "
+        "bends' directions taken out too",
+        f"seeds {', '.join(map(str, SEEDS))}, chosen on 1 to 3; {TOUCHES} touches each",
+    )
+    yield table(
+        f"while the sheet bends between 0 and {FARTHEST:.0f}° along that strip",
+        ({"sheet": sheet} | _moving(some) for sheet, some in benches.items()),
+        f"learnt from one recording of three bends and back, {LEARNT} frames, after one "
+        f"bend and a rest; then {MOVING * STEP:.0f} s of frames, {1 / STEP:.0f}/s, through "
+        f"the live pipeline, touched for {ON * STEP:g} of every {EVERY * STEP:g} s",
+        "states: idle, bend, touch and both, a bend from 3° on; a radius where none is found",
     )
 
 
@@ -125,9 +99,8 @@ class Bench:
     """One twin, and all that is measured on it; the sheet is never renewed."""
 
     def __init__(self, preset: str, seed: int) -> None:
-        began = time.monotonic()
-        self.name = f"{preset}, seed {seed}"
-        self.lab = Lab("textile-disc-16", preset, seed)
+        progress(f"{preset}, seed {seed}")
+        self.lab = TwinLab("textile-disc-16", preset, seed)
         self.random = np.random.default_rng(seed)
         self.lab.board.sheet.renew()
         self.errors = {"flat": self.static(())}
@@ -139,7 +112,6 @@ class Bench:
         for millimetres in (70, 40):
             self.errors[f"{millimetres}"] = self.static((Bent(Cylinder(1e-3 * millimetres)),))
         self.errors["own"], self.errors["joint"] = self.jointed()
-        self.taken = time.monotonic() - began
 
     def frame(self, presses: Sequence[Press], pose: Pose, after: float) -> Frame:
         """One frame ``after`` s more."""
@@ -147,14 +119,13 @@ class Bench:
         lab.board.sheet.set_presses(tuple(presses))
         lab.board.sheet.set_pose(pose)
         lab.time += after
-        ticks = round(lab.time * lab.skin.readout.tick_rate)
-        return Frame(0, ticks, lab.time, 1, 0, 0, lab.board.sample(lab.table, lab.time))
+        return lab.rig.at(lab.time)
 
-    def volts(self, presses: Sequence[Press] = (), pose: Pose = ()) -> FloatArray:
+    def volts(self, presses: Sequence[Press] = (), pose: Pose = ()) -> Floats:
         """(n_meas,) V, one hold later."""
         return self.lab.prepared.readout(self.frame(presses, pose, HOLD)).values
 
-    def frames(self, count: int, pose: Pose = ()) -> FloatArray:
+    def frames(self, count: int, pose: Pose = ()) -> Floats:
         """(count, n_meas) V that nothing touches."""
         return np.array([self.volts((), pose) for _ in range(count)])
 
@@ -163,21 +134,19 @@ class Bench:
         self.frame((), pose, REST)
         return Reference.of(self.frames(IDLE, pose))
 
-    def finder(self, reference: Reference) -> Callable[[FloatArray, FloatArray], list[Detection]]:
+    def finder(self, reference: Reference) -> Callable[[Floats, Floats], list[Detection]]:
         """What finds touches in V less the reference, beside directions that say nothing."""
         found = finding(self.lab.prepared, reference)
         image = self.lab.image
         n_meas = self.lab.prepared.pattern.n_meas
         none, excluded = np.zeros((n_meas, 0)), np.zeros(n_meas, bool)
         jumps = JUMP * reference.mean[:, None]
-        return lambda dv, blind: found.push(
-            FrameView(
-                0.0,
-                image(dv),
-                None,
-                Differences(dv, blind, dv, blind, jumps, dv, none, dv, excluded),
-            )
-        )
+
+        def find(dv: Floats, blind: Floats) -> list[Detection]:
+            differences = Differences(dv, blind, dv, blind, jumps, dv, none, dv, excluded)
+            return found.push(FrameView(0.0, image(dv), None, differences))
+
+        return find
 
     def static(self, pose: Pose) -> list[float]:
         """Errors of touches on a sheet that is held so, a reference taken before each of them."""
@@ -186,7 +155,7 @@ class Bench:
         for _ in range(TOUCHES):
             reference, press = Reference.of(self.frames(IDLE, pose)), drawn(self.random, 1)
             change = self.volts(press, pose) - reference.mean
-            readings = self.finder(reference)(change, self.model.directions[:, :0])
+            readings = self.finder(reference)(change, np.zeros((len(change), 0)))
             found.append(missed(readings, press))
             self.volts((), pose)
         return found
@@ -200,7 +169,7 @@ class Bench:
                 angles.append(math.radians(angle))
                 times.append(self.lab.time)
         axis = np.full(len(rows), math.pi / 2)
-        examples = BendExamples.of(np.array(rows), angles, axis, times)
+        examples = BendExamples.checked(np.array(rows), angles, axis, times)
         return BendModel.learn(examples, voltage_covariance(self.lab.prepared, self.flat))
 
     def moved(self) -> Found:
@@ -210,7 +179,7 @@ class Bench:
         self.frame((), (), REST)
         for _ in range(REFERENCE_FRAMES):
             pipeline.push(self.frame((), (), STEP))
-        plain = Plain(self)
+        plain, none = self.finder(self.flat), np.zeros((len(self.flat.mean), 0))
         for k in range(MOVING):
             if k % EVERY == 0:
                 press = drawn(self.random, 1)
@@ -226,7 +195,8 @@ class Bench:
             if on and steady:
                 out.places.append(missed(readings, press))
                 if len(out.places) % PLAIN == 0:
-                    out.plain.append(missed(plain(result), press))
+                    change = result.voltages - result.reference
+                    out.plain.append(missed(plain(change, none), press))
             if steady and (angle >= 3.0 or angle < 0.1):
                 bent, both = angle >= 3.0, "bend and touch"
                 wanted = (both if on else "bend") if bent else ("touch" if on else "idle")
@@ -260,60 +230,30 @@ class Bench:
         return errors
 
 
-class Plain:
-    """Finds touches without taking bends out, in what a pipeline reads."""
-
-    def __init__(self, bench: Bench) -> None:
-        self._find = bench.finder(bench.flat)
-
-    def __call__(self, result: FrameResult) -> list[Detection]:
-        """Of one frame."""
-        none = np.zeros((len(result.reference), 0))
-        return self._find(result.voltages - result.reference, none)
-
-
 def missed(readings: Sequence[Detection], press: Sequence[Press]) -> float:
     """M from the press to the strongest touch that was found; a radius of the skin where none."""
-    if not readings:
-        return 0.1
-    return math.hypot(readings[0].x - press[0].x, readings[0].y - press[0].y)
+    return gap(readings[0], press[0]) if readings else 0.1
 
 
-def _told(bench: Bench) -> Bench:
-    """The same, when what it found has been said."""
-    medians = ", ".join(f"{k} {1e3 * float(np.median(v)):.2f}" for k, v in bench.errors.items())
-    moving = ", ".join(_moving_row("moving", [bench])[1:])
-    print(f"bend {bench.name}: {bench.taken:.0f} s; {medians}; {moving}", file=sys.stderr)
-    return bench
+def _static(benches: Sequence[Bench]) -> dict[str, float]:
+    columns = {"flat": "flat", "on 70 mm": "70", "on 40 mm": "40", "joint, own reference": "own",
+               "by its angle": "joint"}  # fmt: skip
+    errors = {name: [b.errors[key] for b in benches] for name, key in columns.items()}
+    return {name: mm(np.median(np.concatenate(some)))[0] for name, some in errors.items()}
 
 
-def _static_row(sheet: str, benches: Sequence[Bench]) -> tuple[str, ...]:
-    medians = [
-        1e3 * float(np.median(np.concatenate([b.errors[key] for b in benches])))
-        for key in ("flat", "70", "40", "own", "joint")
-    ]
-    return (f"{sheet}: {SHEETS[sheet]}", *(f"{value:.2f}" for value in medians))
-
-
-def _moving_row(sheet: str, benches: Sequence[Bench]) -> tuple[str, ...]:
-    def all_of(name: str) -> FloatArray:
+def _moving(benches: Sequence[Bench]) -> dict[str, Any]:
+    def all_of(name: str) -> Floats:
         return np.concatenate([getattr(b.moving, name) for b in benches])
 
-    places, plain = 1e3 * all_of("places"), 1e3 * all_of("plain")
-    free, touched = np.degrees(all_of("free")), np.degrees(all_of("touched"))
-    both = np.abs(np.concatenate([free, touched]))
-    numbers = (
-        np.median(places),
-        np.percentile(places, 95),
-        np.median(plain),
-        np.median(both),
-        np.sqrt(np.mean(both**2)),
-        np.sqrt(np.mean(touched**2)),
-    )
-    right = 100 * float(np.mean(all_of("right")))
-    return (sheet, *(f"{value:.2f}" for value in numbers), f"{right:.1f} %")
-
-
-if __name__ == "__main__":
-    # One piece of it: python benchmarks/bend.py textile 11 12
-    reports(sys.argv[1:2], [int(seed) for seed in sys.argv[2:]])
+    places, free, touched = all_of("places"), all_of("free"), all_of("touched")
+    both = np.degrees(np.abs(np.concatenate([free, touched])))
+    return {
+        "touch, mm, median": mm(np.median(places))[0],
+        "95 %": mm(np.percentile(places, 95))[0],
+        "without taking bends out": mm(np.median(all_of("plain")))[0],
+        "angle, °, median": round(float(np.median(both)), 2),
+        "rms": round(rms(both), 2),
+        "beside a touch, rms": round(rms(np.degrees(touched)), 2),
+        "states right": f"{100 * float(np.mean(all_of('right'))):.1f} %",
+    }

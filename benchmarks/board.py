@@ -1,116 +1,142 @@
-"""A long run of the real firmware in the emulator: values, sequence and switches are looked at."""
+"""Real firmware of both boards in emulators: values, sequence, alternating drive."""
 
 from __future__ import annotations
 
 import json
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from report import Report
-from tomoskin.board.source import Link, ScanSettings, SerialTransport, Timing
+from bench_rig import Rig
+from report import Floats, Report, rms, table
+from tomoskin.board.source import BOARDS, Link, ScanSettings, SerialTransport, Timing
 from tomoskin.core import Frame
 from tomoskin.model.pattern import Pattern, Scan
-from tomoskin.twin.emulator import (
-    BoardProcess,
-    Front,
-    SkinMemory,
-    build_pico_programs,
-    build_programs,
-)
+from tomoskin.model.skin import Skin
+from tomoskin.sensing.signal import FIGURES, Readout
+from tomoskin.twin.emulator import BoardProcess, Front, OwnVoltages, SkinMemory, programs_of
 
-FRAMES = 100_000
-PICO_FRAMES = 2_000
-"""Of each case; ``board_long`` has more."""
-PICO_CASES = ((8, 84e-6), (8, 36e-6), (16, 84e-6), (16, 36e-6), (32, 84e-6), (32, 36e-6))
-"""Electrodes, and the slowest and the fastest settling that the decks give, s."""
-# electrodes, conversions summed: one conversion a sample is sent packed
+FRAMES, PICO_FRAMES, CHOPPED_FRAMES = 100_000, 2_000, 100
+"""Of a case of the Mega, of the Pico, and with alternating drive."""
+
 CASES = ((8, 1), (8, 4))
-SETTLING = 200e-6
-_STAR = Front(0.1, 1e9, 1.0, 0.0, 5.0, 1024.0, 0.0)
-_PICO_STAR = Front(0.1, 1e9, 1.0, 0.0, 3.3, 4096.0, 0.0)
+"""Electrodes and conversions summed: one conversion a sample is sent packed."""
+
+PICO_CASES = tuple((n, settling) for n in (8, 16, 32) for settling in (84e-6, 36e-6))
+"""Electrodes, and the slowest and the fastest settling that the decks give, s."""
+
+SETTLING = {"mega": 200e-6, "pico": 84e-6}
+FREQUENCIES = (
+    ("mega", 8, (0, 150, 300, 700)),
+    ("mega", 16, (0, 75, 300)),
+    ("pico", 8, (0, 200, 1000, 2500, 3300)),
+    ("pico", 16, (0, 200, 1000, 2000)),
+)
+"""Boards, electrodes and Hz of the alternation; 0: direct."""
+
+SECONDS, SEED, TICKS = 60.0, 3, 250e3
+OVERSAMPLING = 16
+"""Conversions of 10 bits a sample with alternating drive; of 12 bits a quarter."""
+
+GAIN, REFERENCE, CURRENT, ARM = 35.0, 5.0, 0.1, 0.01
+"""V; A; electrode e stands at the end of (1 + e) times so many Ω."""
 
 
-def run(data: Path | None) -> tuple[Report, ...]:
-    """Run every case; ``data`` is not needed."""
-    del data
-    return (
-        Report(
-            f"{FRAMES:,} frames of the ELF under simavr",
-            (
-                "electrodes",
-                "oversampling",
-                "frames",
-                "wrong",
-                "lost",
-                "corrupt",
-                "resets",
-                "times real",
-            ),
-            tuple(_ran(*case) for case in CASES),
-            (
-                f"settling {SETTLING * 1e6:g} us, prescaler 64, 1 Mbaud, adjacent; a star of "
-                "resistors, so that each sample is known to the last bit",
-                "wrong: frames with any sample or flag other than expected; resets: the host was "
-                "too slow for the heartbeat of a board several times faster than real time",
-            ),
-        ),
-        pico_report(PICO_FRAMES, PICO_CASES),
+def run() -> Iterator[Report]:
+    yield table(
+        f"{FRAMES:,} frames of the ELF under simavr",
+        (_ran("mega", n, SETTLING["mega"], times, FRAMES) for n, times in CASES),
+        f"settling {SETTLING['mega'] * 1e6:g} us, prescaler 64, 1 Mbaud, adjacent; a star of "
+        "resistors, so that each sample is known to the last bit",
+        "wrong: any sample or flag other than expected; resets: the host was too slow",
     )
+    yield _on_pico(PICO_CASES, PICO_FRAMES)
 
 
-def pico_report(frames: int, cases: Sequence[tuple[int, float]]) -> Report:
-    """So many frames of each case of electrodes and settling."""
-    return Report(
+def run_long() -> Iterator[Report]:
+    """100,000 frames of the Pico's image in its emulator: two minutes or more."""
+    yield _on_pico(PICO_CASES[:1], FRAMES)
+
+
+def _on_pico(cases: Sequence[tuple[int, float]], frames: int) -> Report:
+    return table(
         f"{frames:,} frames of the Pico's image under rp2040js",
-        (
-            "electrodes",
-            "settling, us",
-            "frames/s",
-            "wrong",
-            "lost",
-            "jitter, ns",
-            "processor",
-            "times real",
-        ),
-        tuple(_ran_pico(*case, frames) for case in cases),
-        (
-            "adjacent, four conversions of 12 bits a sample, dead time 5 us; frames/s by the "
-            "board's own clock",
-            "jitter: by which the instant of one and the same conversion moves against the "
-            "beginning of its drive, at most; processor: share of the time that it is awake",
-        ),
+        (_ran("pico", n, settling, 4, frames) for n, settling in cases),
+        "adjacent, four conversions of 12 bits a sample, dead time 5 us; frames/s by the "
+        "board's own clock",
+        "jitter: of a conversion's instant in its drive, at most; processor: time awake",
     )
 
 
-def _ran_pico(electrodes: int, settling: float, frames: int) -> tuple[object, ...]:
-    scan = Scan.of(Pattern.adjacent(electrodes))
-    settings = ScanSettings(4, settling, current_limit=0.1, adc_bits=12)
-    wanted = _expected(scan, _PICO_STAR, 4)
+@contextmanager
+def _emulated(
+    board: str, front: Front, arms: Floats, link: Callable[[SerialTransport], Link],
+    own: Floats | None = None,
+) -> Iterator[tuple[Link, Path]]:  # fmt: skip
+    """A linked board before a star of resistors, and the file in which its emulator counts."""
     with tempfile.TemporaryDirectory() as folder:
-        seen_at = Path(folder) / "watch"
-        arms = np.diag(np.arange(1.0, electrodes + 1))
-        memory = SkinMemory(Path(folder) / "skin", _PICO_STAR, arms)
-        programs = build_pico_programs()
-        board = BoardProcess(programs, memory.path, _PICO_STAR.current, "-f", "-w", str(seen_at))
-        patient = Timing(answer=5.0, silence=60.0)  # its time goes slower than the host's
-        with Link(SerialTransport(board.port), scan, settings, timing=patient) as link:
-            link.connect()
-            before, began = json.loads(seen_at.read_text()), time.monotonic()
-            _, wrong, _, ticks = _watched(link, wanted, frames)
-            after, took = json.loads(seen_at.read_text()), time.monotonic() - began
-            lost = link.frames.lost
-        board.close()
+        watch = Path(folder) / "watch"
+        voltages = {} if own is None else {"own": OwnVoltages(own)}
+        memory = SkinMemory(Path(folder) / "skin", front, np.diag(arms), **voltages)
+        counts = ("-w", str(watch)) if board == "pico" else ()
+        process = BoardProcess(programs_of(board), memory.path, front.current, "-f", *counts)
+        with link(SerialTransport(process.port)) as linked:
+            yield linked, watch
+        process.close()
         memory.close()
-    assert not board.last_words, board.last_words
-    awake = (after["busy"] - before["busy"]) / (after["now"] - before["now"])
-    rate = (frames - 1) / (ticks / 250e3)
-    name = f"{settling * 1e6:.0f}"
-    shares = f"{after['jitter']:.0f}", f"{100 * awake:.0f} %", f"{ticks / 250e3 / took:.2f}"
-    return electrodes, name, f"{rate:.0f}", wrong, lost, *shares
+    assert not process.last_words, process.last_words
+
+
+def _ran(
+    board: str, electrodes: int, settling: float, oversampling: int, count: int
+) -> dict[str, Any]:
+    scan, kind = Scan.of(Pattern.adjacent(electrodes)), BOARDS[board]
+    volts, bits = {"mega": 5.0, "pico": 3.3}[board], kind.adc_bits
+    settings = ScanSettings(oversampling, settling, current_limit=0.1, adc_bits=bits)
+    front = Front(0.1, 1e9, 1.0, 0.0, volts, float(1 << bits), 0.0)
+    # emulated time runs faster than the host's on a Mega, so must the heartbeat; slower on a Pico
+    timing = Timing(ping=0.02) if board == "mega" else Timing(answer=5.0, silence=60.0)
+    wanted, seen = _expected(scan, front, oversampling), Seen()
+    with _emulated(
+        board, front, np.arange(1.0, electrodes + 1), partial(_linked, scan, settings, timing)
+    ) as (link, watch):
+        link.connect()
+        before, began = _counted(watch), time.monotonic()
+        seen.watch(link, wanted, count)
+        after, took = _counted(watch), time.monotonic() - began
+        lost, corrupt = link.frames.lost, link.counters.corrupt
+    seconds = (seen.last - seen.first) / TICKS
+    row = {
+        "electrodes": electrodes,
+        "settling, us": f"{1e6 * settling:.0f}",
+        "oversampling": oversampling,
+        "frames/s": f"{(seen.frames - 1) / seconds:.1f}",
+        "wrong": seen.wrong,
+        "lost": lost,
+        "corrupt": corrupt,
+        "resets": seen.resets,
+        "times real": f"{seconds / took:.2f}",
+    }
+    if board == "pico":
+        awake = (after["busy"] - before["busy"]) / (after["now"] - before["now"])
+        row |= {"jitter, ns": f"{after['jitter']:.0f}", "processor": f"{100 * awake:.0f} %"}
+    return row
+
+
+def _linked(scan: Scan, settings: ScanSettings, timing: Timing, transport: SerialTransport) -> Link:
+    return Link(transport, scan, settings, timing=timing)
+
+
+def _counted(watch: Path) -> dict[str, float]:
+    counted: dict[str, float] = json.loads(watch.read_text()) if watch.exists() else {}
+    return counted
 
 
 def _expected(scan: Scan, front: Front, oversampling: int) -> np.ndarray:
@@ -122,37 +148,111 @@ def _expected(scan: Scan, front: Front, oversampling: int) -> np.ndarray:
     return counts
 
 
-def _ran(electrodes: int, oversampling: int) -> tuple[object, ...]:
-    scan = Scan.of(Pattern.adjacent(electrodes))
-    settings = ScanSettings(oversampling, SETTLING, current_limit=0.1, adc_bits=10)
-    arms = np.arange(1.0, electrodes + 1)
-    wanted = _expected(scan, _STAR, oversampling)
-    with tempfile.TemporaryDirectory() as folder:
-        memory = SkinMemory(Path(folder) / "skin", _STAR, np.diag(arms))
-        board = BoardProcess(build_programs(), memory.path, _STAR.current, "-f")
-        began = time.monotonic()
-        # emulated time runs faster than the host's: so must the heartbeat
-        with Link(SerialTransport(board.port), scan, settings, timing=Timing(ping=0.02)) as link:
-            seen, wrong, resets, ticks = _watched(link, wanted, FRAMES)
-            lost, corrupt = link.frames.lost, link.counters.corrupt
-        took = time.monotonic() - began
-        board.close()
-        memory.close()
-    assert not board.last_words, board.last_words
-    speed = f"{ticks / 250e3 / took:.1f}"
-    return electrodes, oversampling, f"{seen:,}", wrong, lost, corrupt, resets, speed
+@dataclass
+class Seen:
+    """Frames, those that are wrong, fresh starts of the board, ticks of the first and the last."""
 
+    frames: int = 0
+    wrong: int = 0
+    resets: int = 0
+    first: int = 0
+    last: int = 0
 
-def _watched(link: Link, wanted: np.ndarray, count: int) -> tuple[int, int, int, int]:
-    """Frames seen, those that are wrong, fresh starts of the board, ticks from first to last."""
-    seen = wrong = resets = first = last = 0
-    while seen < count:
-        for item in link.poll(0.05):
-            if isinstance(item, Frame):
+    def watch(self, link: Link, wanted: np.ndarray, count: int) -> None:
+        """Look at so many frames."""
+        while self.frames < count:
+            for item in link.poll(0.05):
+                if not isinstance(item, Frame):
+                    self.resets += item.kind == "reset"
+                    continue
                 right = np.array_equal(item.samples, wanted)
-                wrong += not (right and item.flags == (item.sequence == 0))
-                first, last = (first if seen else item.ticks), item.ticks
-                seen += 1
-            else:
-                resets += item.kind == "reset"
-    return seen, wrong, resets, last - first
+                self.wrong += not (right and item.flags == (item.sequence == 0))
+                self.first, self.last = (self.first if self.frames else item.ticks), item.ticks
+                self.frames += 1
+
+
+def run_chopped() -> Iterator[Report]:
+    """Direct and alternating drive: frames a second and noise of both boards, drift of the twin."""
+    cases = ((b, n, f) for b, n, frequencies in FREQUENCIES for f in frequencies)
+    yield table(
+        f"{CHOPPED_FRAMES} frames of both boards' real firmware",
+        (_chopped(*case, CHOPPED_FRAMES) for case in cases),
+        f"adjacent, {OVERSAMPLING} conversions of 10 bits or {OVERSAMPLING // 4} of 12; "
+        "settling 200 us (Mega) and 84 us (Pico), dead time 5 us; frames/s by the board's "
+        "own clock",
+        "noise: standard deviation of a row, of which the converter has 0.7 LSB of 10 "
+        "bits; electrodes have a voltage of their own of 2 mV (standard deviation): offset "
+        "seen is what the rows show of it, root mean square against none",
+    )
+    yield table(
+        f"{SECONDS:.0f} s of the twin: a gel with 8 electrodes that polarise, untouched",
+        (_drifted(m, kind) for m in ("direct", "chopped") for kind in ("ideal", "polarising")),
+        "200 mm disc, 200 ohm/sq, 1 mA, adjacent; preset hydrogel, whose temperature "
+        f"drifts by itself; seed {SEED}",
+        "noise: from frame to frame; drift: of the mean of a second, first to last; rms of rows",
+    )
+
+
+def _chopped(board: str, electrodes: int, frequency: int, count: int) -> dict[str, Any]:
+    own, case = np.random.default_rng(SEED).normal(0, 2e-3, electrodes), (board, frequency)
+    quiet, _, _ = _rows(*case, np.zeros(electrodes), noise=0.0, count=3)
+    still, _, _ = _rows(*case, own, noise=0.0, count=3)
+    noisy, rate, periods = _rows(*case, own, noise=FIGURES.noise, count=count)
+    return {
+        "board": BOARDS[board].text,
+        "electrodes": electrodes,
+        "drive": f"{frequency} Hz" if frequency else "direct",
+        "periods": periods or "",
+        "frames/s": f"{rate:.1f}",
+        "noise, uV": f"{1e6 * np.sqrt(np.mean(noisy.var(axis=0, ddof=1))):.0f}",
+        "offset seen, uV": f"{1e6 * rms(still[-1] - quiet[-1]):.0f}",
+    }
+
+
+def _rows(
+    board: str, frequency: int, own: Floats, noise: float, count: int
+) -> tuple[Floats, float, int]:
+    """(count, n_meas) V of an emulated board, its frames/s, and the periods of a drive."""
+    scan, bits = Scan.of(Pattern.adjacent(len(own))), BOARDS[board].adc_bits
+    finer = 1 << bits - 10
+    settings = ScanSettings(
+        OVERSAMPLING // finer, SETTLING[board], CURRENT, bits, chop_frequency=frequency
+    )
+    front = Front(CURRENT, 1e9, GAIN, 0.5, REFERENCE, float(1 << bits), noise * finer)
+    arms, frames = ARM * np.arange(1.0, len(own) + 1), list[Frame]()
+    to = partial(_linked, scan, settings, Timing(ping=0.02))
+    with _emulated(board, front, arms, to, own) as (link, _):
+        while len(frames) < count:
+            frames += [item for item in link.poll(0.05) if isinstance(item, Frame)]
+        mode = link.configuration.mode
+    samples = np.array([frame.samples for frame in frames[:count]], dtype=float)
+    last, first = frames[count - 1], frames[0]
+    rate = (last.sequence - first.sequence) / ((last.ticks - first.ticks) / TICKS)
+    per_count = REFERENCE / (1024 * GAIN * OVERSAMPLING)
+    rows = (samples[:, scan.plus] - samples[:, scan.minus]) * per_count
+    return rows, rate, mode.periods if mode else 0
+
+
+def _drifted(mode: str, electrodes: str) -> dict[str, Any]:
+    drive = {"current": "1 mA", "mode": mode}
+    skin = Skin.load("textile-disc-8").altered(
+        {
+            "material": {"sheet_resistance": "200 ohm/sq"},
+            "drive": drive | ({"chop_frequency": "0.3 kHz"} if mode == "chopped" else {}),
+            "readout": {"gain": 4, "offset": "1 V", "settling": "500 us"},
+            "twin": {"preset": "hydrogel", "electrodes": electrodes},
+        }
+    )
+    rig, readout = Rig(skin, "hydrogel", SEED), Readout.of(Scan.of(skin.pattern()), skin.readout)
+    voltages = [readout(rig.at(float(t))) for t in np.arange(0.0, SECONDS, rig.interval)]
+    assert not any(v.railed.any() for v in voltages)
+    values, second = np.array([v.values for v in voltages]), round(1 / rig.interval)
+    moved = values[-second:].mean(axis=0) - values[:second].mean(axis=0)
+    return {
+        "drive": "0.3 kHz" if mode == "chopped" else "direct",
+        "electrodes": electrodes,
+        "frames/s": f"{1 / rig.interval:.1f}",
+        "noise, uV": f"{1e6 * np.diff(values, axis=0).std() / np.sqrt(2):.0f}",
+        "drift, uV": f"{1e6 * rms(moved):.0f}",
+        "signal, uV": f"{1e6 * rms(values):.0f}",
+    }

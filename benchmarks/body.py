@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Iterator
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 
-from from_examples import load_example
-from report import Report
+from bench_rig import load_example
+from report import Report, mm, table
 
 SEEDS = (11, 12, 13)
 PLACEMENTS = 100
@@ -19,37 +19,25 @@ WITHIN = 8e-3
 POLARISED = (0.0, 0.5e-3, 1e-3, 2e-3, 4e-3)
 
 
-def run(data: Path | None) -> tuple[Report, ...]:
-    """Both tables; no recording is needed."""
-    del data
-    return palpation(), face()
-
-
-def palpation() -> Report:
-    """Two balls of 10 and 8 mm, ``PLACEMENTS`` times over three twins."""
-    example = load_example("fig62_palpation")
-    rows = [(effect, *_felt(example, effect)) for effect in EFFECTS]
-    return Report(
+def run() -> Iterator[Report]:
+    seeds = f"seeds {', '.join(map(str, SEEDS))}"
+    palpation, face = load_example("fig62_palpation"), load_example("fig64_face")
+    yield table(
         "two stiff balls under a plate",
-        (
-            "change of conductivity per compression",
-            "placements",
-            "both within 8 mm",
-            "and no third",
-            "10 mm: median, mm",
-            "8 mm: median, mm",
-            "8 mm: p95, mm",
-        ),
-        tuple(rows),
-        (
-            f"places even over ±{1e3 * REACH:g} mm, at least {1e3 * APART:g} mm apart; "
-            f"seeds {', '.join(map(str, SEEDS))} in turn",
-            "10-bit read-out, 64 readings a sample, means of 40 frames; known weight ± 2 %",
-        ),
+        (_felt(palpation, effect) for effect in EFFECTS),
+        f"places even over ±{1e3 * REACH:g} mm, at least {1e3 * APART:g} mm apart; {seeds} in turn",
+        "10-bit read-out, 64 readings a sample, means of 40 frames; known weight ± 2 %",
+    )
+    yield table(
+        "six expressions of a face",
+        _expressions(face),
+        f"{seeds}: {face.LEARNT} sessions learnt, {face.ASKED} asked, {face.RUNS} runs each; "
+        "electrodes put on anew each time",
     )
 
 
-def _felt(example: ModuleType, effect: float) -> tuple[Any, ...]:
+def _felt(example: ModuleType, effect: float) -> dict[str, Any]:
+    """Two balls of 10 and 8 mm, ``PLACEMENTS`` times over three twins."""
     beds = [example.Bed(seed, effect) for seed in SEEDS]
     palpation = example.Palpation(beds[0].skin)
     away, count = [], []
@@ -60,16 +48,16 @@ def _felt(example: ModuleType, effect: float) -> tuple[Any, ...]:
         away.append(example.errors(found, balls))
         count.append(len(found))
     both = (np.array(away) < WITHIN).all(axis=1)
-    only = both & (np.array(count) == len(balls))
-    large, small = 1e3 * np.array(away).T
-    return (
-        PLACEMENTS,
-        f"{both.mean():.0%}",
-        f"{only.mean():.0%}",
-        round(float(np.median(large)), 1),
-        round(float(np.median(small)), 1),
-        round(float(np.percentile(small, 95)), 1),
-    )
+    large, small = np.array(away).T
+    return {
+        "change of conductivity per compression": effect,
+        "placements": PLACEMENTS,
+        "both within 8 mm": f"{both.mean():.0%}",
+        "and no third": f"{(both & (np.array(count) == len(balls))).mean():.0%}",
+        "10 mm: median, mm": mm(np.median(large), digits=1)[0],
+        "8 mm: median, mm": mm(np.median(small), digits=1)[0],
+        "8 mm: p95, mm": mm(np.percentile(small, 95), digits=1)[0],
+    }
 
 
 def _placed(example: ModuleType, random: np.random.Generator) -> tuple[Any, ...]:
@@ -80,28 +68,19 @@ def _placed(example: ModuleType, random: np.random.Generator) -> tuple[Any, ...]
             return example.between(*one, example.LARGE), example.between(*other, example.SMALL)
 
 
-def face() -> Report:
+def _expressions(example: ModuleType) -> Iterator[dict[str, Any]]:
     """Runs through six expressions, by what direct current suffers from its electrodes."""
-    example = load_example("fig64_face")
     all_sessions = [(seed, example.sessions_of(seed)) for seed in SEEDS]
-    rows = []
-    for polarised in POLARISED:
-        example.POLARISED = polarised
-        name = f"direct, {1e3 * polarised:g} mV on each reading"
-        rows.append((name, *_told(example, all_sessions, direct=True)))
-    rows.append(("complex", *_told(example, all_sessions, direct=False)))
-    return Report(
-        "six expressions of a face",
-        ("data", "runs", "right", "runs with 5 of 6", *example.NAMES),
-        tuple(rows),
-        (
-            f"seeds {', '.join(map(str, SEEDS))}: {example.LEARNT} sessions learnt, "
-            f"{example.ASKED} asked, {example.RUNS} runs each; electrodes put on anew each time",
-        ),
-    )
-
-
-def _told(example: ModuleType, all_sessions: list[Any], *, direct: bool) -> tuple[Any, ...]:
-    right = np.concatenate([example.told(s, seed, direct=direct) for seed, s in all_sessions])
-    each = (f"{part:.0%}" for part in right.mean(axis=0))
-    return len(right), f"{right.mean():.1%}", f"{example.whole_runs(right):.0%}", *each
+    for polarised in (*POLARISED, None):
+        direct = polarised is not None
+        if direct:
+            example.POLARISED = polarised
+        name = f"direct, {1e3 * polarised:g} mV on each reading" if direct else "complex"
+        right = np.concatenate([example.told(s, seed, direct=direct) for seed, s in all_sessions])
+        yield {
+            "data": name,
+            "runs": len(right),
+            "right": f"{right.mean():.1%}",
+            "runs with 5 of 6": f"{example.whole_runs(right):.0%}",
+            **{n: f"{p:.0%}" for n, p in zip(example.NAMES, right.mean(axis=0), strict=True)},
+        }

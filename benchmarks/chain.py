@@ -11,13 +11,13 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from report import Report, progress
-from served import served
+from bench_rig import served
+from report import Report, progress, table
 from tomoskin.board.source import SerialTransport
 from tomoskin.core import FloatArray
 from tomoskin.files.session import SessionReader
@@ -54,40 +54,44 @@ with connect(sys.argv[1], max_size=None) as page:
 """
 
 
-@dataclass
-class Seen:
-    """Sequence number, host time and time of call of each frame's contacts."""
-
-    rows: list[tuple[int, float, float]] = field(default_factory=list)
-    touches: int = 0
-
-    def take(self, contacts: Contacts) -> None:
-        """Called with the contacts of each frame."""
-        self.rows.append((contacts.sequence, contacts.host_time, time.monotonic()))
-        self.touches += len(contacts.touches)
+def run() -> Iterator[Report]:
+    yield measured(SECONDS)
 
 
-def run(data: Path | None) -> tuple[Report, ...]:
-    """A minute; ``data`` is not needed."""
-    del data
-    return (measured(SECONDS),)
+def run_long() -> Iterator[Report]:
+    """The same as chain, for ten minutes."""
+    yield measured(10 * SECONDS)
 
 
 def measured(seconds: float) -> Report:
     """The whole chain for ``seconds`` after the reference."""
-    skin = Skin.load(SKIN).altered({"readout": {"settling": SETTLING}})
-    prepared = prepare(skin)
+    prepared = prepare(Skin.load(SKIN).altered({"readout": {"settling": SETTLING}}))
     progress("tables of the fit")
     prepared.warm_up()
     progress(f"{seconds:.0f} s")
     with tempfile.TemporaryDirectory() as folder:
-        return _report(prepared, Path(folder), seconds)
+        row, touches = _ran(prepared, Path(folder), seconds)
+    return table(
+        f"{seconds:.0f} s of frames to touches, page and recording",
+        [row],
+        f"firmware with a Pico's timing on a pty; presses that go round; {SKIN}, seed {SEED}",
+        "read → touches: from a frame's bytes to the call of a function of the same program; "
+        f"promised: 99 of 100 within {PROMISED:g} ms",
+        f"{touches:,} touches; load of the machine {os.getloadavg()[0]:.0f}",
+    )
 
 
-def _report(prepared: Prepared, folder: Path, seconds: float) -> Report:
-    seen, file = Seen(), folder / "chain.mcap"
+def _ran(prepared: Prepared, folder: Path, seconds: float) -> tuple[dict[str, Any], int]:
+    """A row, and how many touches there were."""
+    calls: list[tuple[int, float, float, int]] = []
+
+    def take(contacts: Contacts) -> None:
+        now, touches = time.monotonic(), len(contacts.touches)
+        calls.append((contacts.sequence, contacts.host_time, now, touches))
+
+    file = folder / "chain.mcap"
     with board(prepared.skin, folder) as port:
-        runner = Runner(prepared, lambda: SerialTransport(port), sinks=[ContactListener(seen.take)])
+        runner = Runner(prepared, lambda: SerialTransport(port), sinks=[ContactListener(take)])
         runner.ask(commands.Record(file))
         runner.start()
         with page(runner):
@@ -97,51 +101,28 @@ def _report(prepared: Prepared, folder: Path, seconds: float) -> Report:
             used = (time.process_time() - began) / (time.monotonic() - before)
             status = runner.status()
         runner.stop()
-    session = SessionReader(file)
+    rate, rows = prepared.skin.readout.tick_rate, np.array(calls)
     frames = np.array(
-        [(m.frame.sequence, m.frame.host_time, m.frame.ticks) for m in session.frames()]
+        [
+            (item.frame.sequence, item.frame.host_time, item.frame.ticks / rate)
+            for item in SessionReader(file).frames()
+        ]
     )
-    ages = _ages(frames, np.array(seen.rows), before, prepared.skin.readout.tick_rate)
-    rate = (len(frames) - 1) / (np.ptp(frames[:, 2]) / prepared.skin.readout.tick_rate)
-    lost = int(frames[-1, 0] - frames[0, 0]) + 1 - len(frames)
-    steady = frames[:, 1] > before
-    without = int(steady.sum()) - int((np.array(seen.rows)[:, 1] > before).sum())
-    early = len(frames) - len(seen.rows) - without
-    row = (
-        prepared.pattern.n_electrodes, f"{rate:.0f}", len(frames), lost, status.corrupt,
-        early, without, *(f"{1e3 * p:.2f}" for p in ages), f"{PROMISED:g}", f"{100 * used:.0f} %",
-    )  # fmt: skip
-    columns = (
-        *("electrodes", "frames/s", "recorded", "lost", "corrupt"),
-        *("without touches: first seconds", "later", "read → touches: p50, ms", "p99", "longest"),
-        *("by the board's clock: p50", "p99", "promised", "of one core"),
-    )
-    return Report(
-        f"{seconds:.0f} s of frames to touches, page and recording", columns, (row,),
-        (
-            "the portable firmware as a process with the timing of a Pico, on a pty; presses that "
-            f"go round, one, two and none in turn; {SKIN}, seed {SEED}",
-            "read → touches: from a frame's bytes to the call of a function of the same program; "
-            "by the board's clock: the way through the pty and all waiting too",
-            "of one core: processor time of the program, which also serves a page; the board and "
-            "the page's reader run on another",
-            f"{seen.touches:,} touches; load of the machine {os.getloadavg()[0]:.0f}",
-        ),
-    )  # fmt: skip
-
-
-def _ages(frames: FloatArray, rows: FloatArray, since: float, rate: float) -> tuple[float, ...]:
-    """p50, p99 and longest from reading; p50 and p99 from the board's clock, s."""
-    rows = rows[rows[:, 1] > since]
-    sent = dict(zip(frames[:, 0].astype(int).tolist(), frames[:, 2] / rate, strict=True))
-    offset = float((frames[:, 1] - frames[:, 2] / rate)[frames[:, 1] > since].min())
-    by_board = rows[:, 2] - offset - np.array([sent[int(number)] for number in rows[:, 0]])
-    read = rows[:, 2] - rows[:, 1]
-    return (
-        *(float(p) for p in np.percentile(read, (50, 99))),
-        float(read.max()),
-        *(float(p) for p in np.percentile(by_board, (50, 99))),
-    )
+    read = (rows[:, 2] - rows[:, 1])[rows[:, 1] > before]
+    without = int((frames[:, 1] > before).sum()) - int((rows[:, 1] > before).sum())
+    return {
+        "electrodes": prepared.pattern.n_electrodes,
+        "frames/s": f"{(len(frames) - 1) / np.ptp(frames[:, 2]):.0f}",
+        "recorded": len(frames),
+        "lost": int(frames[-1, 0] - frames[0, 0]) + 1 - len(frames),
+        "corrupt": status.corrupt,
+        "without touches: first seconds": len(frames) - len(rows) - without,
+        "later": without,
+        "read → touches: p50, ms": f"{1e3 * np.median(read):.2f}",
+        "p99": f"{1e3 * np.percentile(read, 99):.2f}",
+        "longest": f"{1e3 * read.max():.2f}",
+        "of one core": f"{100 * used:.0f} %",
+    }, int(rows[:, 3].sum())
 
 
 @contextmanager

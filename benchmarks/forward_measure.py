@@ -1,30 +1,99 @@
-"""One case of the forward benchmarks, measured."""
+"""Meshes of the forward benchmarks, and one of them measured."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
 from importlib import import_module
 from importlib.util import find_spec
+from multiprocessing import get_context
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-import forward_peer
-from forward_cases import PATTERN, Case, medians
-from forward_peak import peaks
-from forward_script import Script
+import forward_others as others
+from forward_others import Script
+from report import medians
 from tomoskin.core import FloatArray, IntArray
 from tomoskin.imaging import OneStep
 from tomoskin.model.forward import ForwardModel, State
-from tomoskin.model.mesh import Mesh
+from tomoskin.model.mesh import Disc, ElectrodeArc, Mesh, cylinder, triangulate
+from tomoskin.model.pattern import Pattern
 
-ALPHA = 1e-3
-AGREE = 1e-9
-SECONDS = 4.0
+ELECTRODES, RADIUS = 16, 0.1
+CONTACT = {2: 1e-3, 3: 1e-4}
+"""Contact impedance, Ω·m on a sheet and Ω·m² on a volume."""
+
+PATTERN = Pattern.adjacent(ELECTRODES)
+ALPHA, AGREE, SECONDS = 1e-3, 1e-9, 4.0
 TOUCH, MANY = 150, 64
 MOST_SET_UP = 300_000
 """Cells; the operator of more would not fit the memory of many a machine."""
+
+_STATUS = Path("/proc/self/status")
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A mesh under the name of its size."""
+
+    name: str
+    mesh: Mesh
+
+    @property
+    def contact_impedance(self) -> float:
+        """Ω·m or Ω·m²."""
+        return CONTACT[self.mesh.dimension]
+
+
+def disc(name: str, cells: int) -> Case:
+    """Triangles from the mesher."""
+    around = 2 * np.pi * RADIUS / ELECTRODES
+    arcs = [ElectrodeArc.around(k * around, around / 2) for k in range(ELECTRODES)]
+    return Case(name, triangulate(Disc(RADIUS), arcs, cells))
+
+
+def tank(name: str, cells: int, layers: int) -> Case:
+    """Tetrahedra of a cylinder with a ring of electrodes."""
+    mesh = cylinder(
+        RADIUS,
+        RADIUS,
+        count=ELECTRODES,
+        width=0.02,
+        bottom=0.04,
+        top=0.06,
+        cells=cells,
+        layers=layers,
+    )
+    return Case(name, mesh)
+
+
+def refined(mesh: Mesh) -> Mesh:
+    """Four triangles for each, two edges for each of an electrode."""
+    n, cells = len(mesh.points), mesh.cells
+    ends = np.concatenate([cells[:, [0, 1]], cells[:, [1, 2]], cells[:, [2, 0]]])
+    keys, place = np.unique(_keys(ends, n), return_inverse=True)
+    ab, bc, ca = n + place.reshape(3, -1)
+    a, b, c = cells.T
+    parts = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+    electrodes = []
+    for facets in mesh.electrodes:
+        middle = n + np.searchsorted(keys, _keys(facets, n))
+        halves = [(facets[:, 0], middle), (middle, facets[:, 1])]
+        electrodes.append(np.concatenate([np.column_stack(half) for half in halves]))
+    middles = mesh.points[np.column_stack([keys // n, keys % n])].mean(axis=1)
+    return Mesh(
+        np.concatenate([mesh.points, middles]),
+        np.concatenate([np.column_stack(part) for part in parts]),
+        tuple(electrodes),
+    )
+
+
+def _keys(edges: IntArray, n: int) -> IntArray:
+    low, high = np.sort(edges, axis=1).T
+    return low * n + high
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +123,7 @@ def measure(case: Case, *, script: bool = True, peer: str = "") -> Measured:
     if len(case.mesh.cells) <= MOST_SET_UP:
         times |= medians({"set-up": lambda: set_up(case)}, SECONDS / 2)
     times |= medians({"model": lambda: _model(case)}, SECONDS / 2)
-    if forward_peer.INSTALLED:
+    if others.INSTALLED:
         times |= _against_peer(model, sigma, peer)
     return Measured(case, model.assembly.n_unknowns, times, peaks(case))
 
@@ -132,7 +201,7 @@ def _agree(other: FloatArray, own: FloatArray, whose: str) -> None:
 
 
 def _against_peer(model: ForwardModel, sigma: FloatArray, which: str) -> dict[str, float]:
-    peer = forward_peer.Peer(model.mesh, model.pattern)
+    peer = others.Peer(model.mesh, model.pattern)
     peer.prepare()
     calls = {
         "peer forward": lambda: peer.forward(sigma),
@@ -186,3 +255,24 @@ def _touches(case: Case) -> list[tuple[IntArray, FloatArray]]:
     places[0] = 0.03, 0.02
     gaps = (np.linalg.norm(case.mesh.centroids - place, axis=1) for place in places)
     return [(np.argsort(gap)[:TOUCH], np.full(TOUCH, 0.8)) for gap in gaps]
+
+
+def peaks(case: Case) -> dict[str, float]:
+    """MB above a fresh process with its mesh: after ``forward``, after ``jacobian`` too."""
+    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+        return pool.submit(_peaks, case).result() if _STATUS.exists() else {}
+
+
+def _peaks(case: Case) -> dict[str, float]:
+    Path("/proc/self/clear_refs").write_text("5", encoding="ascii")  # the check of the mesh
+    base = _kilobytes("VmRSS")
+    state = ForwardModel(case.mesh, PATTERN, case.contact_impedance).at(1.0)
+    assert state.solution.residual < 1e-6
+    forward = _kilobytes("VmHWM")
+    assert np.isfinite(state.jacobian[:, 0]).all()
+    return {"forward": (forward - base) / 1e3, "jacobian": (_kilobytes("VmHWM") - base) / 1e3}
+
+
+def _kilobytes(name: str) -> float:
+    lines = _STATUS.read_text(encoding="ascii").splitlines()
+    return float(next(line for line in lines if line.startswith(name)).split()[1])

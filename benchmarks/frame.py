@@ -5,84 +5,81 @@ from __future__ import annotations
 import gc
 import time
 import tracemalloc
-from pathlib import Path
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from forward_cases import clock
-from report import Report
+from bench_rig import Rig
+from report import Report, clock, progress, table
 from tomoskin.board.source import Link, ScanSettings
 from tomoskin.board.wire import Decoder, encode
-from tomoskin.core import Frame
+from tomoskin.core import FloatArray, Frame
+from tomoskin.model.pattern import Pattern, Scan
+from tomoskin.model.robot import Place
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Pipeline, Prepared, prepare
+from tomoskin.run.sinks import Contacts, Stream
 from tomoskin.twin import Press, open_twin
 
-CASES = (
-    ("textile-disc-8", 660),
-    ("textile-disc-8", 3000),
-    ("textile-disc-16", 660),
-    ("textile-disc-16", 3000),
-)
-TIME_CONSTANTS = ("0 s", "0.2 s")
+SKINS, CELLS, TIME_CONSTANTS = ("textile-disc-8", "textile-disc-16"), (660, 3000), ("0 s", "0.2 s")
 BY_FIT = (1, 2, 3)
 IDLE, PRESSED, REPEATS, FIT_REPEATS = 30, 60, 40, 10
-SETTLED = 20
-SEED = 1
-COLUMNS = (
-    *("touches by", "presses", "electrodes", "triangles", "rows", "filter s", "bytes"),
-    *("p50 ms", "p99 ms", "max ms", "touches", "growth B/frame"),
+SETTLED, SEED = 20, 1
+
+SEVERAL, BOARDS, SEVERAL_SEED = "textile-disc-16", 8, 11
+RATE, PROMISED = 100.0, 5.0
+"""Frames/s of each board, and ms from bytes to touches, 99 of 100."""
+
+RATES = (10.0, 20.0, 30.0, 40.0, 50.0, 75.0, 100.0)
+CYCLE = (200, 200, 100, 100)
+"""Frames with no, one, two and no presses."""
+
+BOTH = (
+    Press(0.02, 0.01, force=4.0, radius=0.012),
+    Press(-0.03, 0.01, force=4.0, radius=0.012),
 )
 
 
-def run(data: Path | None) -> tuple[Report, ...]:
-    """Time every case; ``data`` is not needed."""
-    del data
+def run() -> Iterator[Report]:
     rows = []
-    for name, cells in CASES:
+    for name, cells in ((name, cells) for name in SKINS for cells in CELLS):
         skin = Skin.load(name).altered({"mesh": {"cells": cells}})
         for filtered in TIME_CONSTANTS:
             rows.append(row(prepare(skin.altered({"inverse": {"time_constant": filtered}}))))
         fitted = prepare(skin.altered({"touch": {"method": "fit"}}))
         rows += [row(fitted, FIT_REPEATS, presses) for presses in BY_FIT]
-    table = Report(
+    yield table(
         "bytes in → touches out",
-        COLUMNS,
-        tuple(rows),
-        (
-            f"{PRESSED * REPEATS} frames, {PRESSED * FIT_REPEATS} by fit, with presses of a twin "
-            f"that go round by 5 mm a frame, seed {SEED}",
-            f"{clock()[1]} of each",
-            "decode, voltages, difference, touches by image or fit, tracking",
-            "a picture that nobody looks at is not computed",
-            "filter: the time constant of the Kalman filter over frames, 0 without it",
-            "growth: allocated memory that stays, per frame",
-        ),
+        rows,
+        f"{PRESSED * REPEATS} frames, {PRESSED * FIT_REPEATS} by fit, with presses of a twin "
+        f"that go round by 5 mm a frame, seed {SEED}",
+        "filter: the time constant of the Kalman filter over frames; growth: memory that stays",
     )
-    return (table,)
 
 
-def row(prepared: Prepared, repeats: int = REPEATS, presses: int = 2) -> tuple[object, ...]:
-    """Values under ``COLUMNS``."""
+def row(prepared: Prepared, repeats: int = REPEATS, presses: int = 2) -> dict[str, Any]:
+    """One case."""
     idle, pressed = _chunks(prepared, presses)
     prepared.warm_up()
     decoder, pipeline = Decoder(), Pipeline(prepared)
     taken, touches = _taken(decoder, pipeline, idle, pressed, repeats)
     p50, p99 = 1e3 * np.percentile(taken, (50, 99))
-    return (
-        prepared.skin.touch.method,
-        presses,
-        prepared.pattern.n_electrodes,
-        len(prepared.mesh.cells),
-        prepared.pattern.n_meas,
-        prepared.skin.inverse.time_constant,
-        len(pressed[0]),
-        round(p50, 3),
-        round(p99, 3),
-        round(1e3 * max(taken), 3),
-        round(touches / len(taken), 2),
-        round(_growth(decoder, pipeline, pressed), 1),
-    )
+    return {
+        "touches by": prepared.skin.touch.method,
+        "presses": presses,
+        "electrodes": prepared.pattern.n_electrodes,
+        "triangles": len(prepared.mesh.cells),
+        "rows": prepared.pattern.n_meas,
+        "filter s": prepared.skin.inverse.time_constant,
+        "bytes": len(pressed[0]),
+        "p50 ms": round(p50, 3),
+        "p99 ms": round(p99, 3),
+        "max ms": round(1e3 * max(taken), 3),
+        "touches": round(touches / len(taken), 2),
+        "growth B/frame": round(_growth(decoder, pipeline, pressed), 1),
+    }
 
 
 def p50(prepared: Prepared, repeats: int) -> float:
@@ -101,11 +98,10 @@ def _taken(
         _one(decoder, pipeline, chunk)
     gc.collect()
     taken, touches = [], 0
-    for _ in range(repeats):
-        for chunk in pressed:
-            start = now()
-            touches += _one(decoder, pipeline, chunk)
-            taken.append(now() - start)
+    for chunk in pressed * repeats:
+        start = now()
+        touches += _one(decoder, pipeline, chunk)
+        taken.append(now() - start)
     return taken, touches
 
 
@@ -120,13 +116,11 @@ def _one(decoder: Decoder, pipeline: Pipeline, chunk: bytes) -> int:
 
 def _growth(decoder: Decoder, pipeline: Pipeline, chunks: list[bytes]) -> float:
     tracemalloc.start()
-    for _ in range(SETTLED):  # histories of some hundred frames fill
-        for chunk in chunks:
-            _one(decoder, pipeline, chunk)
+    for chunk in chunks * SETTLED:  # histories of some hundred frames fill
+        _one(decoder, pipeline, chunk)
     before, _ = tracemalloc.get_traced_memory()
-    for _ in range(5):
-        for chunk in chunks:
-            _one(decoder, pipeline, chunk)
+    for chunk in chunks * 5:
+        _one(decoder, pipeline, chunk)
     after, _ = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     return (after - before) / (5 * len(chunks))
@@ -135,19 +129,13 @@ def _growth(decoder: Decoder, pipeline: Pipeline, chunks: list[bytes]) -> float:
 def _chunks(prepared: Prepared, presses: int) -> tuple[list[bytes], list[bytes]]:
     """Encoded frames of an idle twin, then of one with so many presses that circle."""
     transport = open_twin(f"fast,seed={SEED}", prepared.skin)
-    settings = ScanSettings.of(prepared.skin)
-    with Link(transport, prepared.scan, settings) as link:
+    with Link(transport, prepared.scan, ScanSettings.of(prepared.skin)) as link:
         idle = _take(link, IDLE)
         pressed = []
         for step in range(PRESSED):
             turns = step / PRESSED + np.arange(presses) / presses
-            places = 0.05 * np.exp(2j * np.pi * turns)
-            transport.set_presses(
-                tuple(
-                    Press(x=float(at.real), y=float(at.imag), force=4.0, radius=0.012)
-                    for at in places
-                )
-            )
+            places = (0.05 * np.exp(2j * np.pi * turns)).tolist()
+            transport.set_presses(tuple(Press(p.real, p.imag, 4.0, 0.012) for p in places))
             pressed += _take(link, 2)[1:]
     return idle, pressed
 
@@ -155,5 +143,152 @@ def _chunks(prepared: Prepared, presses: int) -> tuple[list[bytes], list[bytes]]
 def _take(link: Link, count: int) -> list[bytes]:
     frames: list[Frame] = []
     while len(frames) < count:
-        frames += [found for found in link.poll(1.0) if isinstance(found, Frame)]
+        frames += [item for item in link.poll(1.0) if isinstance(item, Frame)]
     return [encode(frame) for frame in frames[:count]]
+
+
+def run_several() -> Iterator[Report]:
+    """Eight skins in one program: what a frame costs, and whether every touch is on time."""
+    prepared = prepare(Skin.load(SEVERAL))
+    prepared.warm_up()
+    progress("processor time")
+    parts = processor_times(prepared, frames_of(prepared))
+    costs = parts.sum(axis=1)
+    yield table("processor time of a frame, ms", _costs(parts))
+    yield table(
+        f"{BOARDS} skins of 16 electrodes on one core that does nothing else",
+        ({"frames/s a board": f"{rate:g}"} | queued(costs, rate) for rate in RATES),
+        "from a frame's bytes to its contacts: processor times of the frames as they were "
+        f"measured, and the wait for the frames of the others in a queue; promised: {PROMISED} "
+        "ms",
+    )
+
+
+def _costs(parts: FloatArray) -> Iterator[dict[str, Any]]:
+    """What a frame costs with none, one and two presses, and what of it is not the pipeline."""
+    ends = np.cumsum(CYCLE)
+    spans = zip(("none", "one", "two", "none again"), ends - CYCLE, ends, strict=True)
+    for presses, first, last in spans:
+        whole = 1e3 * parts[first:last].sum(axis=1)
+        around = 1e3 * (parts[first:last, 0] + parts[first:last, 2])
+        yield {
+            "presses": presses,
+            "median": f"{np.median(whole):.2f}",
+            "mean": f"{whole.mean():.2f}",
+            "99 of 100": f"{np.percentile(whole, 99):.2f}",
+            "of it decoding and contacts": f"{np.median(around):.2f}",
+        }
+
+
+def frames_of(prepared: Prepared) -> list[Frame]:
+    """A cycle of frames of the twin, presses and none."""
+    rig, frames = Rig(prepared.skin, "textile", SEVERAL_SEED), list[Frame]()
+    for presses, count in zip(((), BOTH[:1], BOTH, ()), CYCLE, strict=True):
+        rig.board.sheet.set_presses(presses)
+        frames += [rig.at((len(frames) + k) / RATE) for k in range(count)]
+    return frames
+
+
+def processor_times(prepared: Prepared, frames: Sequence[Frame]) -> FloatArray:
+    """(n, 3) s for each frame to be decoded, to become touches, and these contacts.
+
+    In a second cycle, when the sheet and the alpha are found.
+    """
+    pipeline, decoder, times = Pipeline(prepared), Decoder(), []
+    stream = Stream.of(prepared, "skin", 0.0, Place("skin"))
+    for number in range(2 * len(frames)):
+        ticks = round(number / RATE * prepared.skin.readout.tick_rate)
+        data = encode(replace(frames[number % len(frames)], sequence=number, ticks=ticks))
+        marks = [time.thread_time()]
+        (frame,) = decoder.feed(data, number / RATE)
+        assert isinstance(frame, Frame)
+        marks.append(time.thread_time())
+        result = pipeline.push(frame)
+        marks.append(time.thread_time())
+        if result is not None:
+            _ = Contacts.of(stream, result).touches
+        marks.append(time.thread_time())
+        times.append(np.diff(marks))
+    return np.array(times[len(frames) :])
+
+
+def queued(costs: FloatArray, rate: float, seconds: float = 60.0) -> dict[str, str]:
+    """Load, and percentiles of the ages alone and beside a board that floods."""
+    random = np.random.default_rng(SEVERAL_SEED)
+    beats = np.arange(int(seconds * rate)) / rate
+    arrivals = np.sort(np.concatenate([beats + random.random() / rate for _ in range(BOARDS)]))
+    work = random.choice(costs, len(arrivals))
+    load = BOARDS * rate * float(costs.mean())
+    row = {"of one core, %": f"{100 * load:.0f}"}
+    if load >= 1:
+        return row
+    flood = random.choice(costs, int(seconds / costs.min()))
+    for name, other in (("", None), ("beside a flooding one: ", flood)):
+        median, p99 = 1e3 * np.percentile(ages_of(arrivals, work, other), (50, 99))
+        row |= {f"{name}median, ms": f"{median:.1f}", f"{name}99 of 100, ms": f"{p99:.1f}"}
+    return row
+
+
+def ages_of(arrivals: FloatArray, work: FloatArray, flood: FloatArray | None = None) -> FloatArray:
+    """(n,) s from each frame's arrival to the end of its ``work``, in turns (Lindley 1952).
+
+    ``flood``: frames of one more board, which asks for a turn as soon as it has had one.
+    """
+    ages, free, asked, count = np.empty(len(arrivals)), 0.0, 0.0, 0
+    for k, (came, takes) in enumerate(zip(arrivals, work, strict=True)):
+        while flood is not None and asked <= came:
+            free = asked = max(free, asked) + flood[count]
+            count += 1
+        free = max(free, came) + takes
+        ages[k] = free - came
+    return ages
+
+
+BAUD, READ = 1_000_000, 4096
+"""Bits a second, and bytes that a read brings at most, as from a serial port."""
+
+STREAMED, DECODINGS = 20_000, 5
+
+
+def run_wire() -> Iterator[Report]:
+    """How fast a host decodes frames, against the fastest stream that a board can send."""
+    rows = [wire_row(n, packed) for n in (8, 16) for packed in (False, True)]
+    yield table(
+        "decoding a stream of frames",
+        rows,
+        f"best of {DECODINGS} over {STREAMED} frames in reads of {READ} bytes, {clock()[1]}, "
+        f"seed {SEED}; samples of one conversion, in 16 or packed in 10 bits",
+        f"line: what {BAUD / 1e6:g} Mbaud can carry at 10 bits a byte, more than any scan of "
+        "the board fills",
+    )
+
+
+def wire_row(electrodes: int, packed: bool) -> dict[str, Any]:
+    """One case."""
+    random = np.random.default_rng(SEED)
+    n = Scan.of(Pattern.adjacent(electrodes)).n_samples
+    counts = random.integers(0, 1024, (STREAMED, n)).astype(np.uint16)
+    frames = [Frame(k, 1000 * k, 0.0, 7, 0, 0, counts[k]) for k in range(STREAMED)]
+    stream = b"".join(encode(f, packed=packed) for f in frames)
+    reads = [stream[at : at + READ] for at in range(0, len(stream), READ)]
+    rate = STREAMED / min(_seconds(reads) for _ in range(DECODINGS))
+    size = len(stream) / STREAMED
+    line = BAUD / 10 / size
+    return {
+        "electrodes": electrodes,
+        "samples": f"{n} of {'10 bits' if packed else '16 bits'}",
+        "bytes": round(size),
+        "line frames/s": round(line),
+        "decoded frames/s": round(rate),
+        "times": round(rate / line),
+    }
+
+
+def _seconds(reads: list[bytes]) -> float:
+    decoder, (now, _) = Decoder(), clock()
+    began = now()
+    for data in reads:
+        decoder.feed(data, 0.0)
+    took = now() - began
+    assert decoder.counters.messages == STREAMED
+    return took

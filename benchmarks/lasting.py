@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 import force as weighing
-from report import Report, progress
+from bench_rig import Rig, gap, nearest
+from report import Floats, Report, progress, table
 from tomoskin.board.source import Link, ScanSettings, Transport
 from tomoskin.core import Frame, Touch, VirtualClock
 from tomoskin.learning import FORCE
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import FrameResult, Pipeline, Prepared, prepare
+from tomoskin.run.board_memory import Trial
 from tomoskin.twin import Press, TwinSettings, make_twin
 
 SEEDS = (11,)
@@ -32,48 +34,39 @@ WARMING = 5.0
 """K by which the sheet warms up in the hour, beside its own wandering: 0.38 % of all a kelvin."""
 
 RADIUS, SPREAD = 0.012, 0.05
-COLUMNS = (
-    *("skin", "method", "N", "seed", "frames", "frames reported, %", "longest gap, s"),
-    *("identities", "frames with another touch, %", "error at first, mm", "at the end, mm"),
-    *("strength at the end, %", "gone after, s", "N at first", "N at the end"),
-)
+
+RESTARTED, RESTARTED_SEEDS = ("textile-disc-8", "textile-disc-16"), range(11, 23)
+"""Nothing here was chosen on these seeds either."""
+
+PAUSES = ((60.0, 0.1), (600.0, 0.5), (3600.0, 3.0), (3600.0, -5.0))
+"""Seconds between two runs, and K by which the sheet warms up meanwhile."""
+
+KEPT, FRAMES, FORCE_BEFORE = 60, 60, 5.0
+VERDICTS = {True: "holds", False: "renewed", None: "touched"}
+
+Seen = tuple[float, tuple[Touch, ...]]
+"""A frame: seconds since the press, or since it was lifted, and the touches in it."""
 
 
-@dataclass(frozen=True)
-class Seen:
-    """A frame: seconds since the press, and the touches in it."""
-
-    time: float
-    touches: tuple[Touch, ...]
-
-
-def run(data: Path | None) -> tuple[Report, ...]:
-    """Hold every press; ``data`` is not needed."""
-    del data
+def run() -> Iterator[Report]:
     rows = []
-    for skin, method in CASES:
-        prepared = prepare(_slow(Skin.load(skin), method))
+    for name, method in CASES:
+        changes = {"touch": {"method": method}, "readout": {"settling": SETTLING}}
+        prepared = prepare(Skin.load(name).altered(changes))
         for seed in SEEDS:
             weighed = _weighing(prepared, seed) if method == "fit" else prepared
             for force in FORCES:
-                progress(f"{skin}, {method}, {force:g} N, seed {seed}")
+                progress(f"{name}, {method}, {force:g} N, seed {seed}")
                 place = np.random.default_rng(seed).uniform(-SPREAD, SPREAD, 2)
-                held, after = seen(weighed, place, force, seed)
-                rows.append((skin, method, force, seed, *judged(held, after, place)))
-    return (
-        Report(
-            f"a press held for {HOUR / 60:.0f} minutes while the sheet warms up by {WARMING:g} K",
-            COLUMNS,
-            tuple(rows),
-            ("preset textile (creep, a wandering temperature, wear), time of the twin; "
-             "frames are counted from the onset",
-             "forces: medians of the first and of the last minute; calibrated by presses of 2 s"),
-        ),
-    )  # fmt: skip
-
-
-def _slow(skin: Skin, method: str) -> Skin:
-    return skin.altered({"touch": {"method": method}, "readout": {"settling": SETTLING}})
+                case = {"skin": name, "method": method, "N": force, "seed": seed}
+                rows.append(case | judged(*seen(weighed, place, force, seed), place))
+    yield table(
+        f"a press held for {HOUR / 60:.0f} minutes while the sheet warms up by {WARMING:g} K",
+        rows,
+        "preset textile (creep, a wandering temperature, wear), time of the twin; "
+        "frames are counted from the onset",
+        "forces: medians of the first and of the last minute; calibrated by presses of 2 s",
+    )
 
 
 def _weighing(prepared: Prepared, seed: int) -> Prepared:
@@ -84,7 +77,7 @@ def _weighing(prepared: Prepared, seed: int) -> Prepared:
 
 
 def seen(
-    prepared: Prepared, place: np.ndarray, force: float, seed: int, hold: float = HOUR
+    prepared: Prepared, place: Floats, force: float, seed: int, hold: float = HOUR
 ) -> tuple[list[Seen], list[Seen]]:
     """Frames while a press is held, and after it is lifted."""
     clock = VirtualClock()
@@ -96,66 +89,110 @@ def seen(
         if 0 <= time < hold:
             if not twin.presses:
                 twin.set_presses((press,))
-            held.append(Seen(time, result.touches))
+            held.append((time, result.touches))
             due = WARMING * time / hold
             twin.sheet.warm(due - warmed)
             warmed = due
         elif time >= hold:
             if twin.presses:
                 twin.set_presses(())
-            after.append(Seen(time - hold, result.touches))
+            after.append((time - hold, result.touches))
     return held, after
 
 
 def _results(
     twin: Transport, prepared: Prepared, clock: VirtualClock, seconds: float
 ) -> Iterator[FrameResult]:
-    pipeline = Pipeline(prepared)
-    settings = ScanSettings.of(prepared.skin)
+    pipeline, settings = Pipeline(prepared), ScanSettings.of(prepared.skin)
     with Link(twin, prepared.scan, settings, clock=clock.now) as link:
         while True:
             for item in link.poll(0.5):
-                if not isinstance(item, Frame):
-                    continue
-                if (result := pipeline.push(item)) is None:
-                    continue
-                if result.host_time > seconds:
+                result = pipeline.push(item) if isinstance(item, Frame) else None
+                if result is not None and result.host_time > seconds:
                     return
-                yield result
+                if result is not None:
+                    yield result
 
 
-def judged(held: Sequence[Seen], after: Sequence[Seen], place: np.ndarray) -> tuple[object, ...]:
+def judged(held: Sequence[Seen], after: Sequence[Seen], place: Floats) -> dict[str, Any]:
     """What stands in a row, from the frames on in which it was first reported."""
-    begun = next((n for n, frame in enumerate(held) if frame.touches), len(held))
+    begun = next((n for n, (_, touches) in enumerate(held) if touches), len(held))
     frames = held[begun:]
     if not frames:
-        return (0, *(None,) * (len(COLUMNS) - 5))
-    near = [_nearest(frame, place) for frame in frames]
-    times = [frame.time for frame, touch in zip(frames, near, strict=True) if touch is not None]
-    gaps = np.diff([*times, held[-1].time])
-    beside = np.mean([len(frame.touches) > 1 for frame in frames])
-    errors = [np.nan if t is None else 1e3 * _away(t, place) for t in near]
-    strength = [np.nan if t is None else abs(t.detection.peak) for t in near]
-    forces = [t.detection.force.newtons for t in near if t is not None and t.detection.force]
+        return {"frames": 0}
+    near = [(time, nearest(touches, place)) for time, touches in frames]
+    found = [touch for _, touch in near if touch is not None]
+    gaps = np.diff([*(time for time, touch in near if touch is not None), held[-1][0]])
+    errors = [np.nan if t is None else 1e3 * gap(t, place) for _, t in near]
+    strength = [np.nan if t is None else abs(t.detection.peak) for _, t in near]
+    forces = [t.detection.force.newtons for t in found if t.detection.force]
     few = max(1, len(frames) // 60)
-    gone = next((f.time for f in after if not f.touches), None)
-    return (
-        len(frames),
-        f"{100 * np.mean([t is not None for t in near]):.2f}",
-        f"{gaps.max():.1f}",
-        len({t.id for t in near if t is not None}),
-        f"{100 * beside:.2f}",
-        f"{np.nanmedian(errors[:few]):.1f}",
-        f"{np.nanmedian(errors[-few:]):.1f}",
-        f"{100 * np.nanmedian(strength[-few:]) / np.nanmedian(strength[:few]):.0f}",
-        "never" if gone is None else f"{gone:.1f}",
-        *(f"{np.median(some):.2f}" if some else None for some in (forces[:few], forces[-few:])),
-    )
+    gone = next((time for time, touches in after if not touches), None)
+    first, last = (slice(few), slice(-few, None))
+    grown = np.nanmedian(strength[last]) / np.nanmedian(strength[first])
+    return {
+        "frames": len(frames),
+        "frames reported, %": f"{100 * len(found) / len(frames):.2f}",
+        "longest gap, s": f"{gaps.max():.1f}",
+        "identities": len({t.id for t in found}),
+        "frames with another touch, %": f"{100 * np.mean([len(t) > 1 for _, t in frames]):.2f}",
+        "error at first, mm": f"{np.nanmedian(errors[first]):.1f}",
+        "at the end, mm": f"{np.nanmedian(errors[last]):.1f}",
+        "strength at the end, %": f"{100 * grown:.0f}",
+        "gone after, s": "never" if gone is None else f"{gone:.1f}",
+        "N at first": f"{np.median(forces[first]):.2f}" if forces else None,
+        "N at the end": f"{np.median(forces[last]):.2f}" if forces else None,
+    }
 
 
-def _nearest(frame: Seen, place: np.ndarray) -> Touch | None:
-    return min(frame.touches, key=lambda touch: _away(touch, place), default=None)
+def run_restarted() -> Iterator[Report]:
+    """A program that is started again: does its last reference hold, and show a press?"""
+    rows = []
+    for name in RESTARTED:
+        prepared = prepare(Skin.load(name))
+        for (pause, warmer), force in ((p, f) for p in PAUSES for f in (0.0, FORCE_BEFORE)):
+            progress(f"{name}, {pause:g} s, {warmer:+g} K, {force:g} N")
+            ends = [_again(prepared, pause, warmer, force, s) for s in RESTARTED_SEEDS]
+            verdicts, counts, errors = zip(*ends, strict=True)
+            case = {"skin": name, "pause, s": pause, "warmer, K": warmer, "press": f"{force:g} N"}
+            case |= {verdict: verdicts.count(verdict) for verdict in VERDICTS.values()}
+            known = [error for error in errors if np.isfinite(error)]
+            error = f"{np.median(known):.1f}" if known else "–"
+            rows.append(case | {"touches, at most": max(counts), "error, mm": error})
+    seeds = f"seeds {RESTARTED_SEEDS[0]} to {RESTARTED_SEEDS[-1]}"
+    note = f"preset textile, {seeds}; the press stands before the start"
+    yield table("started again after a pause", rows, note)
 
 
-def _away(touch: Touch, place: np.ndarray) -> float:
-    return float(np.hypot(touch.detection.x - place[0], touch.detection.y - place[1]))
+def _again(
+    prepared: Prepared, pause: float, warmer: float, force: float, seed: int
+) -> tuple[str, int, float]:
+    """Verdict, touches in the last frame, and mm from the press to the nearest of them."""
+    x, y = np.random.default_rng(seed).uniform(-SPREAD, SPREAD, 2).tolist()
+    press = (Press(x, y, force=force, radius=RADIUS),) if force else ()
+    trial, verdict, last = Trial(0.0), None, None
+    for last in _restarted(prepared, pause, warmer, press, seed):
+        verdict = trial.push(last) if verdict is None else verdict
+    assert last is not None
+    near = nearest(last.touches, (x, y)) if force else None
+    error = np.nan if near is None else 1e3 * gap(near, (x, y))
+    return VERDICTS[verdict], len(last.touches), error
+
+
+def _restarted(
+    prepared: Prepared, pause: float, warmer: float, presses: tuple[Press, ...], seed: int
+) -> Iterator[FrameResult]:
+    """Results of the second run, which begins with the last frames of the first."""
+    rig = Rig(prepared.skin, "textile", seed)
+    begun, rate = KEPT * rig.interval + pause, prepared.skin.readout.tick_rate
+    kept = [rig.frame() for _ in range(KEPT)]
+    rig.board.sheet.warm(warmer)
+    rig.board.sheet.set_presses(presses)
+    pipeline = Pipeline(prepared)
+    for number, frame in enumerate(kept):
+        pipeline.push(replace(frame, host_time=begun - 1e-3 * (KEPT - number)))
+    for number in range(FRAMES):
+        since = number * rig.interval
+        frame = replace(rig.at(begun + since), sequence=number, ticks=round(since * rate))
+        if (result := pipeline.push(frame)) is not None:
+            yield result

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 from pathlib import Path
@@ -13,7 +13,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from report import Report, progress
+from bench_rig import INSIDE_90, evenly
+from report import Floats, Report, progress, table
 from tomoskin import Locator, Skin
 from tomoskin.board.source import ScanSettings
 from tomoskin.core import Frame
@@ -24,8 +25,6 @@ from tomoskin.model.pattern import Scan
 from tomoskin.sensing.segment import Region
 from tomoskin.sensing.signal import Readout
 from tomoskin.twin import Press, Stretched, TwinElectronics, TwinSettings, TwinSkin, table_of
-
-Floats = NDArray[np.float64]
 
 SKIN, SEEDS = "textile-disc-8", (71, 72)
 LEARNT, LABELS, RUBBED, ASKED = 60, 10, 200, 60
@@ -143,35 +142,26 @@ class Month:
     health: CalibrationHealth
 
 
-def unhelped(locator: Locator, _skin: Worn, _rng: np.random.Generator) -> Locator:
-    """No labels: the calibration of the first day."""
-    return locator
-
-
 def labelled(locator: Locator, skin: Worn, rng: np.random.Generator) -> Locator:
     """Some presses at known positions."""
     xy, forces = touches(locator.region, LABELS, rng)
     return locator.updated(skin(xy, forces), xy)
 
 
-def rubbed(locator: Locator, skin: Worn, rng: np.random.Generator) -> Locator:
-    """Touches everywhere, without labels."""
-    return locator.in_session(skin(*touches(locator.region, RUBBED, rng)))
-
-
 LIVES: dict[str, tuple[Callable[[Locator, Worn, np.random.Generator], Locator], bool]] = {
-    "no labels": (unhelped, False),
+    "no labels": (lambda locator, _skin, _rng: locator, False),
     f"{LABELS} presses a month": (labelled, True),
-    "rubbed each month": (rubbed, False),
+    "rubbed each month": (
+        lambda locator, skin, rng: locator.in_session(skin(*touches(locator.region, RUBBED, rng))),
+        False,
+    ),
 }
 """What is done each month; and whether to the calibration of the month before, or the first."""
 
 
 def touches(region: Region, n: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
     """Positions (n, 2) m and forces (n,) N."""
-    radius, angle = REACH * np.sqrt(rng.random(n)), 2 * np.pi * rng.random(n)
-    xy = region.metres(np.column_stack([radius * np.cos(angle), radius * np.sin(angle)]))
-    return xy, rng.uniform(*FORCES, n)
+    return region.metres(evenly(rng, n, REACH)), rng.uniform(*FORCES, n)
 
 
 def lived(seed: int, conditions: Sequence[Condition]) -> dict[str, list[Month]]:
@@ -201,34 +191,23 @@ def worth(locator: Locator, dv: Floats, xy: Floats) -> Month:
     far = np.einsum("ni,nij,nj->n", off, np.linalg.inv(covariances), off)
     size = np.sqrt(np.trace(covariances, axis1=1, axis2=2) / 2)
     unknown = size > UNSURE * locator.region.unit
-    return Month(np.linalg.norm(off, axis=1), far < 4.605, unknown, watch.health)
+    return Month(np.linalg.norm(off, axis=1), far < INSIDE_90, unknown, watch.health)
 
 
-def run(data: Path | None) -> tuple[Report, ...]:
-    """Live ``MONTHS`` months with each seed; ``data`` is not needed."""
-    del data
-    return (table([lived(seed, life()) for seed in SEEDS]),)
-
-
-def table(lives: Sequence[dict[str, list[Month]]]) -> Report:
-    """Means over each stretch between two events."""
-    rows = []
+def run() -> Iterator[Report]:
+    lives, rows = [lived(seed, life()) for seed in SEEDS], []
     for event, months in groupby(life(), key=lambda condition: condition.event):
         numbers = [condition.month for condition in months]
-        cells = [_cell([one[name][n] for one in lives for n in numbers]) for name in LIVES]
-        rows.append((event, f"{numbers[0]} to {numbers[-1]}", *cells))
-    return Report(
+        cells = {name: _cell([one[name][n] for one in lives for n in numbers]) for name in LIVES}
+        rows.append({"condition": event, "months": f"{numbers[0]} to {numbers[-1]}"} | cells)
+    yield table(
         f"{MONTHS / 12:g} years of {SKIN}",
-        ("condition", "months", *LIVES),
-        tuple(rows),
-        (
-            "mean error in mm, part of the presses in the 90 % ellipses, part of them unknown "
-            f"(deviation over {UNSURE:g} radii), part of the months in which the page "
-            "says that the calibration fits badly",
-            f"{LEARNT} presses learnt on the first day, {ASKED} others asked a month, "
-            f"{FORCES[0]:g} to {FORCES[1]:g} N; seeds {' and '.join(map(str, SEEDS))}; preset "
-            "textile",
-        ),
+        rows,
+        "mean error in mm, part of the presses in the 90 % ellipses, part of them unknown "
+        f"(deviation over {UNSURE:g} radii), part of the months in which the page "
+        "says that the calibration fits badly",
+        f"{LEARNT} presses learnt on the first day, {ASKED} others asked a month, "
+        f"{FORCES[0]:g} to {FORCES[1]:g} N; seeds {SEEDS}; preset textile",
     )
 
 

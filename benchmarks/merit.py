@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from pathlib import Path
+from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
 
-from report import Report
+from report import Report, mm, table
 from tomoskin.imaging import (
     Greit,
     LinearProblem,
     Merit,
-    OneStep,
-    Smoother,
     Spectrum,
     Targets,
-    Temporal,
     along,
     figures,
     noise_figure,
@@ -29,35 +26,17 @@ from tomoskin.model.skin import Skin
 SKINS = ("textile-disc-8", "textile-disc-16", "textile-square-16", "tank-16")
 FIGURES = (1.0, 1.5)  # below 1.2 no NOSER of the tank has one
 CELLS, TRAINED_ON, TESTED_ON = 900, 3600, 6000
-LAG = 5
 
 
-def run(data: Path | None) -> tuple[Report, ...]:
-    """Compare on every built-in skin, and time the filter; ``data`` is not needed."""
-    del data
-    rows = [row for name in SKINS for figure in FIGURES for row in _pair(name, figure)]
-    merit = Report(
+def run() -> Iterator[Report]:
+    yield table(
         "figures of merit, mean over the targets",
-        (
-            "skin",
-            "operator",
-            "noise figure",
-            "amplitude sd/mean",
-            "off mm",
-            "resolution",
-            "deformation",
-            "ringing",
-            "made in s",
-        ),
-        tuple(rows),
-        (
-            "10 targets from the centre to an electrode, 10 to the middle between two, "
-            "radius 2 % of the extent, contrast −10 %",
-            f"image {CELLS} cells, training {TRAINED_ON}, test {TESTED_ON}: three meshes",
-            "deformation and resolution: Adler et al. 2009; off: distance from the target",
-        ),
+        (row for name in SKINS for figure in FIGURES for row in _pair(name, figure)),
+        "10 targets from the centre to an electrode, 10 to the middle between two, "
+        "radius 2 % of the extent, contrast −10 %",
+        f"image {CELLS} cells, training {TRAINED_ON}, test {TESTED_ON}: three meshes",
+        "deformation and resolution: Adler et al. 2009; off: distance from the target",
     )
-    return merit, _filters()
 
 
 def _model(name: str, cells: int) -> ForwardModel:
@@ -79,37 +58,25 @@ def _targets(name: str, image: ForwardModel) -> Targets:
     )
 
 
-def _pair(name: str, figure: float) -> list[tuple[object, ...]]:
+def _pair(name: str, figure: float) -> list[dict[str, Any]]:
     skin, image = Skin.load(name), _model(name, CELLS)
-    targets = _targets(name, image)
-    start = time.perf_counter()
-    greit = Greit(
-        image,
-        simulated_on=_model(name, TRAINED_ON),
-        conductivity=skin.conductivity,
-        difference=skin.inverse.difference,
-        noise_figure=figure,
-    )
+    targets, start = _targets(name, image), time.perf_counter()
+    about = {"conductivity": skin.conductivity, "difference": skin.inverse.difference}
+    greit = Greit(image, simulated_on=_model(name, TRAINED_ON), noise_figure=figure, **about)
     taken = time.perf_counter() - start
-    trained = figures(greit, targets)
-    start = time.perf_counter()
-    spectrum = Spectrum.of(
-        LinearProblem.of(
-            image, "noser", conductivity=skin.conductivity, difference=skin.inverse.difference
-        )
-    )
-    middle = targets.dv[0]
+    trained, start = figures(greit, targets), time.perf_counter()
+    spectrum = Spectrum.of(LinearProblem.of(image, "noser", **about))
 
     def excess(decade: float) -> float:
         matrix = spectrum.operator(10.0**decade).matrix
-        return noise_figure(matrix, image.mesh.volumes, middle) - trained.noise_figure
+        return noise_figure(matrix, image.mesh.volumes, targets.dv[0]) - trained.noise_figure
 
     alpha = _crossing(excess, np.log10(spectrum.alphas))
+    rows = [_row(name, "greit", trained, taken)]
     if alpha is None:
-        return [_row(name, "greit", trained, taken), (name, "noser: no alpha", *(7 * ["-"]))]
+        return [*rows, {"skin": name, "operator": "noser: no alpha"}]
     noser = figures(spectrum.operator(alpha), targets)
-    spent = time.perf_counter() - start
-    return [_row(name, "noser", noser, spent), _row(name, "greit", trained, taken)]
+    return [_row(name, "noser", noser, time.perf_counter() - start), *rows]
 
 
 def _crossing(excess: Callable[[float], float], decades: np.ndarray) -> float | None:
@@ -122,46 +89,15 @@ def _crossing(excess: Callable[[float], float], decades: np.ndarray) -> float | 
     return None
 
 
-def _row(name: str, operator: str, m: Merit, seconds: float) -> tuple[object, ...]:
-    spread = float(m.amplitude.std() / m.amplitude.mean())
-    figures = (m.resolution, m.deformation, m.ringing)
-    return (
-        name,
-        operator,
-        round(m.noise_figure, 2),
-        round(spread, 3),
-        round(1e3 * float(m.offset.mean()), 2),
-        *(round(float(x.mean()), 3) for x in figures),
-        round(seconds, 2),
-    )
-
-
-def _filters() -> Report:
-    skin = Skin.load("textile-disc-16").altered({"mesh": {"cells": 3000}})
-    model = ForwardModel(skin.mesh(), skin.pattern(), skin.contact_impedance, skin.current)
-    operator = OneStep(model, alpha=0.1, conductivity=skin.conductivity)
-    data = np.random.default_rng(0).normal(0.0, 1e-5, (500, model.pattern.n_meas))
-    start = time.perf_counter()
-    temporal = Temporal(operator, 0.2)
-    made = 1e3 * (time.perf_counter() - start)
-    smoother = Smoother(temporal.modes, 0.2, LAG)
-    cases = {
-        "operator, double": lambda dv, _: operator(dv),
-        "operator, single": lambda dv, _: operator.quick(dv),
-        "Kalman filter": temporal.push,
-        f"smoother, lag {LAG}": smoother.push,
+def _row(name: str, operator: str, m: Merit, seconds: float) -> dict[str, Any]:
+    return {
+        "skin": name,
+        "operator": operator,
+        "noise figure": round(m.noise_figure, 2),
+        "amplitude sd/mean": round(float(m.amplitude.std() / m.amplitude.mean()), 3),
+        "off mm": mm(m.offset.mean())[0],
+        "resolution": round(float(m.resolution.mean()), 3),
+        "deformation": round(float(m.deformation.mean()), 3),
+        "ringing": round(float(m.ringing.mean()), 3),
+        "made in s": round(seconds, 2),
     }
-    rows = tuple((name, *_times(step, data)) for name, step in cases.items())
-    notes = (f"{len(data)} frames; the filter's modes were made in {made:.0f} ms, once",)
-    title = f"one frame, {len(model.mesh.cells)} triangles, {model.pattern.n_meas} rows"
-    return Report(title, ("step", "p50 ms", "p99 ms"), rows, notes)
-
-
-def _times(step: Callable[[np.ndarray, float], object], data: np.ndarray) -> tuple[float, float]:
-    taken = []
-    for number, dv in enumerate(data):
-        start = time.perf_counter()
-        step(dv, 0.01 * number)
-        taken.append(1e3 * (time.perf_counter() - start))
-    p50, p99 = np.percentile(taken, (50, 99))
-    return round(float(p50), 3), round(float(p99), 3)

@@ -3,20 +3,146 @@
 from __future__ import annotations
 
 import gzip
+import shutil
 import statistics
+import threading
 import time
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
+import numpy as np
 from threadpoolctl import threadpool_limits
 
-from page_stream import chromium, heap, opened, streaming
-from report import Report
+from bench_rig import served
+from report import Report, table
+from tomoskin.core import Detection, Image, Touch
 from tomoskin.model.skin import Skin
-from tomoskin.pipeline import Prepared, colour_limit, prepare
+from tomoskin.pipeline import FrameResult, Prepared, colour_limit, prepare
+from tomoskin.run import Runner, Snapshot
 from tomoskin.server import STATIC
+
+_FLAGS = Path(__file__).resolve().parents[1] / "scripts" / "chromium.flags"
+ARGUMENTS = tuple(_FLAGS.read_text(encoding="utf-8").split())
+STEPS = 64
+"""Pictures that are made beforehand and then shown in turn."""
+
+
+class Stream(Runner):
+    """Results as fast as asked: two touches that go round in noise."""
+
+    def __init__(self, prepared: Prepared, rate: float) -> None:
+        """``rate`` in results per second; nothing is opened."""
+        super().__init__(prepared, lambda: None)  # type: ignore[arg-type, return-value]
+        self._ending, self.made = threading.Event(), 0
+        self._shown: Snapshot | None = None
+        self._announces: list[Callable[[], None]] = []
+        self._period = 1 / rate
+        self._pictures = [_picture(prepared, step) for step in range(STEPS)]
+        self._worker = threading.Thread(target=self._make, daemon=True)
+        self._worker.start()
+
+    @property
+    def newest(self) -> Snapshot | None:
+        """What was made last."""
+        return self._shown
+
+    @contextmanager
+    def watch(self, announce: Callable[[], None]) -> Iterator[None]:
+        """Call it at each result."""
+        self._announces.append(announce)
+        yield
+        self._announces.remove(announce)
+
+    def end(self) -> None:
+        """Make no more."""
+        self._ending.set()
+        self._worker.join()
+
+    def _make(self) -> None:
+        due = time.monotonic()
+        while not self._ending.is_set():
+            now = time.monotonic()
+            self.made += 1
+            picture = self._pictures[self.made % STEPS]
+            self._shown = Snapshot(
+                replace(picture, sequence=self.made, host_time=now), (), 1e-3, now
+            )
+            for announce in tuple(self._announces):
+                announce()
+            due = max(due + self._period, now - 1)
+            time.sleep(max(due - time.monotonic(), 0.0))
+
+
+def _picture(prepared: Prepared, step: int) -> FrameResult:
+    mesh, reference = prepared.mesh, prepared.operator.reference
+    noise = np.random.default_rng(step % 16).standard_normal(len(mesh.cells))
+    return FrameResult(
+        sequence=0,
+        host_time=0.0,
+        ready=True,
+        has_image=True,
+        image=Image(1e-3 * noise, "S", mesh.identity),
+        voltages=reference,
+        reference=reference,
+        touches=tuple(_touch(mesh.centroids, k, step) for k in range(2)),
+        left_out=0,
+    )
+
+
+def _touch(places: np.ndarray, number: int, step: int) -> Touch:
+    angle = 2 * np.pi * step / STEPS + 3 * number
+    x, y = 0.05 * np.cos(angle), 0.05 * np.sin(angle)
+    near = np.flatnonzero(np.hypot(*(places - (x, y)).T) < 0.02)
+    reading = Detection(x, y, 1e-3, 2e-3, 1e-3, -0.1, near, cov_xy=1e-6)
+    return Touch(id=number + 1, since=0.0, detection=reading, kind="decrease")
+
+
+@contextmanager
+def streaming(prepared: Prepared, rate: float) -> Iterator[tuple[Stream, str]]:
+    """A stream and its page's address while the block lasts."""
+    stream = Stream(prepared, rate)
+    try:
+        with served(stream) as policy:
+            yield stream, policy.address
+    finally:
+        stream.end()
+
+
+@contextmanager
+def chromium() -> Iterator[Any]:
+    """A browser that draws in software."""
+    from playwright.sync_api import sync_playwright
+
+    program = shutil.which("chromium") or shutil.which("google-chrome")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=program, args=list(ARGUMENTS))
+        yield browser
+        browser.close()
+
+
+@contextmanager
+def opened(browser: Any, address: str) -> Iterator[Any]:
+    """A page with nothing in any cache, when it has drawn its first picture."""
+    with browser.new_context(viewport={"width": 1280, "height": 720}) as context:
+        page = context.new_page()
+        page.goto(address)
+        page.wait_for_function("() => window.tomoskin?.ready")
+        yield page
+
+
+def heap(page: Any) -> float:
+    """Bytes that the page's scripts hold after a collection."""
+    devtools = page.context.new_cdp_session(page)
+    for _ in range(2):
+        devtools.send("HeapProfiler.collectGarbage")
+    used = devtools.send("Runtime.getHeapUsage")["usedSize"]
+    devtools.detach()
+    return float(used)
+
 
 CORES = 2
 """A browser and a server: what every machine that shows a page has."""
@@ -25,11 +151,8 @@ CELLS = {3000: 2, 50_000: 6}
 """Triangles, and what scripting may cost a displayed frame, ms."""
 
 RATE = 1000.0
-OPENINGS = 7
-SECONDS = 6.0
-PAGES = 5
+OPENINGS, SECONDS, PAGES, REPEATS = 7, 6.0, 5, 7
 FILLED, WATCHED = 10.0, 40.0
-REPEATS = 7
 BUSY = "() => { const end = performance.now() + 3000; while (performance.now() < end); }"
 COUNT = "window.tomoskin.frames"
 LOOK = "[window.tomoskin.frames, window.tomoskin.scripting, performance.now()]"
@@ -42,93 +165,85 @@ CHANGES: dict[str, dict[str, dict[str, Any]]] = {
     "electrode width": {"electrodes": {"width": "12 mm"}},
     "mesh, 2500 triangles": {"mesh": {"cells": 2500}},
 }
-Rows = list[tuple[Any, ...]]
+Measurements = Iterator[tuple[str, Any, str]]
 
 
-def run(data: Path | None) -> tuple[Report, ...]:
-    """Measure on the loopback; ``data`` is not needed."""
-    del data
-    return _page(), _settings()
-
-
-def _page() -> Report:
-    rows: Rows = [("bundle, kB gzipped", _bundle(), "≤ 120")]
-    with chromium() as browser:
-        for cells, most in CELLS.items():
-            begun = time.process_time()
-            prepared = prepare(_skin(cells))
-            rows += [
-                (f"prepared, s of processor, {cells}", round(time.process_time() - begun, 1), "")
-            ]
-            rows += _ready(browser, prepared, cells)
-            rows += _watched(browser, prepared, cells, most)
-            if cells == min(CELLS):
-                rows += _several(browser, prepared)
+def run() -> Iterator[Report]:
     notes = (
         f"Results made by no source, {RATE:.0f}/s (for the first picture 100/s); Chromium draws in "
         "software (SwiftShader).",
         "Ready: from the navigation to the end of drawing the first picture, by the page's clock; "
         f"median and worst of {OPENINGS} with empty caches. Beside it a page of text of the same "
         "server in the same browser.",
-        "Scripting: arrival, decoding, marks, numbers and calls to WebGL, per displayed frame.",
         f"Memory: used heap after collection over {WATCHED:.0f} s, once all that the page keeps "
-        "for ten seconds is there; an hour: tomoskin bench page_hour.",
+        "for ten seconds is there.",
     )
-    return Report("page", ("what", "measured", "promised"), tuple(rows), notes)
+    settings = table(
+        "page: settings made ready, ms, textile-disc-8 at 3,000 triangles",
+        _changed(),
+        "The picture goes on meanwhile; the source is opened anew after the last two.",
+    )
+    page = Report("page", ("what", "measured", "promised"), tuple(_measured()), notes)
+    yield page
+    yield settings
+
+
+def _measured() -> Measurements:
+    parts = (p for p in STATIC.rglob("*") if p.suffix in {".js", ".css", ".html", ".svg"})
+    bundle = sum(len(gzip.compress(part.read_bytes())) for part in parts)
+    yield "bundle, kB gzipped", round(bundle / 1e3, 1), "≤ 120"
+    with chromium() as browser:
+        for cells, most in CELLS.items():
+            begun = time.process_time()
+            prepared = prepare(_skin(cells))
+            took = round(time.process_time() - begun, 1)
+            yield f"prepared, s of processor, {cells}", took, ""
+            yield from _ready(browser, prepared, cells)
+            yield from _watched(browser, prepared, cells, most)
+            if cells == min(CELLS):
+                yield from _several(browser, prepared)
 
 
 def _skin(cells: int) -> Skin:
     return Skin.load("textile-disc-8").altered({"mesh": {"cells": cells}})
 
 
-def _bundle() -> float:
-    parts = (p for p in STATIC.rglob("*") if p.suffix in {".js", ".css", ".html", ".svg"})
-    return round(sum(len(gzip.compress(part.read_bytes())) for part in parts) / 1e3, 1)
-
-
-def _ready(browser: Any, prepared: Prepared, cells: int) -> Rows:
+def _ready(browser: Any, prepared: Prepared, cells: int) -> Measurements:
     """The first picture, and the first sign of a page with nothing but text."""
-    found, floors = [], []
+    ready, floors = [], []
     with streaming(prepared, 100.0) as (_, address):
         for _ in range(OPENINGS):
             with opened(browser, address) as page:
-                found.append(page.evaluate("window.tomoskin.ready") / 1e3)
+                ready.append(page.evaluate("window.tomoskin.ready") / 1e3)
                 page.goto(f"{urlsplit(address)._replace(path='/status').geturl()}")
                 page.wait_for_function(f"() => {FLOOR}")
                 floors.append(page.evaluate(FLOOR) / 1e3)
     promised = "< 1" if cells == min(CELLS) else ""
-    return [
-        (f"ready, s, {cells} triangles: median", round(statistics.median(found), 2), promised),
-        (f"ready, s, {cells} triangles: worst", round(max(found), 2), promised),
-        (f"a page of text instead, s, {cells}: median", round(statistics.median(floors), 2), ""),
-    ]
+    yield f"ready, s, {cells} triangles: median", round(statistics.median(ready), 2), promised
+    yield f"ready, s, {cells} triangles: worst", round(max(ready), 2), promised
+    yield f"a page of text instead, s, {cells}: median", round(statistics.median(floors), 2), ""
 
 
-def _watched(browser: Any, prepared: Prepared, cells: int, most: int) -> Rows:
+def _watched(browser: Any, prepared: Prepared, cells: int, most: int) -> Measurements:
     with streaming(prepared, RATE) as (stream, address), opened(browser, address) as page:
         page.wait_for_timeout(3e3)
         frames, cost, then = page.evaluate(LOOK)
         page.wait_for_timeout(1e3 * SECONDS)
         frames2, cost2, now = page.evaluate(LOOK)
-        seen = frames2 - frames
+        shown = frames2 - frames
         page.wait_for_timeout(1e3 * FILLED)
         before, first = heap(page), page.evaluate(COUNT)
         page.wait_for_timeout(1e3 * WATCHED)
         grown, streamed = heap(page) - before, page.evaluate(COUNT) - first
         painted = {s.name: s for s in stream.latency.stages()}["paint"]
-    return [
-        (f"scripting per frame, ms, {cells}", round(1e3 * (cost2 - cost) / seen, 2), f"≤ {most}"),
-        (f"arrival to drawn, ms, {cells}: median, p99", _pair(painted), ""),
-        (f"frames/s shown, {cells}", round(1e3 * seen / (now - then), 1), "≤ 60"),
-        (f"memory gained over {streamed} frames, kB, {cells}", round(grown / 1e3), "none"),
-    ]
+    yield f"scripting per frame, ms, {cells}", round(1e3 * (cost2 - cost) / shown, 2), f"≤ {most}"
+    pair = f"{1e3 * painted.p50:.1f}, {1e3 * painted.p99:.1f}"
+    yield f"arrival to drawn, ms, {cells}: median, p99", pair, ""
+    yield f"frames/s shown, {cells}", round(1e3 * shown / (now - then), 1), "≤ 60"
+    yield f"memory gained over {streamed} frames, kB, {cells}", round(grown / 1e3), "none"
 
 
-def _pair(stage: Any) -> str:
-    return f"{1e3 * stage.p50:.1f}, {1e3 * stage.p99:.1f}"
-
-
-def _several(browser: Any, prepared: Prepared) -> Rows:
+def _several(browser: Any, prepared: Prepared) -> Measurements:
     """Five pages, one of them stalled for three seconds; and a client that stops reading."""
     from websockets.sync.client import connect
 
@@ -141,13 +256,11 @@ def _several(browser: Any, prepared: Prepared) -> Rows:
         asleep = at._replace(scheme="ws", path="/ws").geturl()
         stack.enter_context(connect(asleep, origin=f"http://{at.netloc}", max_queue=1))
         beside, still = _shown(pages, stream)
-    return [
-        (f"results/s in, {PAGES} pages", round(results), f"{RATE:.0f}"),
-        (f"frames/s on the slowest of {PAGES}", round(min(shown), 1), ""),
-        ("the same after one was stalled for 3 s", round(min(stalled), 1), ""),
-        ("results/s in beside a client that stops reading", round(still), f"{RATE:.0f}"),
-        ("frames/s on the slowest page beside it", round(min(beside), 1), ""),
-    ]
+    yield f"results/s in, {PAGES} pages", round(results), f"{RATE:.0f}"
+    yield f"frames/s on the slowest of {PAGES}", round(min(shown), 1), ""
+    yield "the same after one was stalled for 3 s", round(min(stalled), 1), ""
+    yield "results/s in beside a client that stops reading", round(still), f"{RATE:.0f}"
+    yield "frames/s on the slowest page beside it", round(min(beside), 1), ""
 
 
 def _shown(pages: list[Any], stream: Any) -> tuple[list[float], float]:
@@ -160,28 +273,19 @@ def _shown(pages: list[Any], stream: Any) -> tuple[list[float], float]:
     return [count / seconds for count in shown], (stream.made - made) / seconds
 
 
-def _settings() -> Report:
-    with threadpool_limits(1):  # as while a source runs
-        rows = _changed(prepare(_skin(3000)))
-    return Report(
-        "page: settings made ready, ms, textile-disc-8 at 3,000 triangles",
-        ("change", "median", "worst", "promised"),
-        tuple(rows),
-        ("The picture goes on meanwhile; the source is opened anew after the last two.",),
-    )
-
-
-def _changed(prepared: Prepared) -> Rows:
-    rows: Rows = []
+def _changed() -> Iterator[Mapping[str, Any]]:
+    prepared = prepare(_skin(3000))
     for name, change in CHANGES.items():
-        skin = prepared.skin.altered(change)
-        times = []
+        skin, times = prepared.skin.altered(change), []
         for _ in range(REPEATS):
             fresh = skin.altered({})
             start = time.perf_counter()
-            made = prepare(fresh, prepared)
-            colour_limit(made)
+            with threadpool_limits(1):  # as while a source runs
+                colour_limit(prepare(fresh, prepared))
             times.append(1e3 * (time.perf_counter() - start))
-        promised = "< 150" if name in ("alpha by hand", "threshold", "prior") else ""
-        rows.append((name, round(statistics.median(times), 1), round(max(times), 1), promised))
-    return rows
+        yield {
+            "change": name,
+            "median": round(statistics.median(times), 1),
+            "worst": round(max(times), 1),
+            "promised": "< 150" if name in ("alpha by hand", "threshold", "prior") else "",
+        }

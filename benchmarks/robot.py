@@ -2,32 +2,26 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Iterator
 
-from from_examples import load_example
-from report import Report, progress
+from bench_rig import load_example
+from report import Report, progress, table
 from tomoskin.model.skin import Skin
 
 SKINS = ("textile-disc-8", "textile-disc-16")
 PRESSES, SEED = 30, 11
-COLUMNS = (
-    *("skin", "presses", "answered", "one scan", "bytes to contacts", "contact to command"),
-    *("the slowest", "promised"),
-)
 
 
-def run(data: Path | None) -> tuple[Report, ...]:
-    """Press the skins of ``examples/reflex.py``; ``data`` is not needed."""
-    del data
+def run() -> Iterator[Report]:
     reflex, rows = load_example("reflex"), []
     for name in SKINS:
         progress(name)
-        found = reflex.measured(Skin.load(name), PRESSES, SEED)
-        promised = f"{found['one scan, ms'] + 5:.1f}"
-        counted = [found.pop(key) for key in ("presses", "answered")]
-        rows.append((name, *counted, *(f"{value:.1f}" for value in found.values()), promised))
-    notes = (
-        "ms, medians; promised: one scan and 5 ms",
+        row = reflex.measured(Skin.load(name), PRESSES, SEED)
+        promised = {"promised": round(row["one scan, ms"] + 5, 1)}
+        rows.append({"skin": name} | {k: round(v, 1) for k, v in row.items()} | promised)
+    yield table(
+        "a reflex",
+        rows,
+        "medians; promised: one scan and 5 ms",
         "a touch without doubt is reported in the first frame that shows it, else in the second",
     )
-    return (Report("a reflex", COLUMNS, tuple(rows), notes),)

@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-import tempfile
 import time
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from bench_rig import scan_time, stage
 from life import Condition, Worn, touches
-from locator import SHARED, Set, held, mean_error, plain
-from report import Report, progress
-from sliding import LEAD, SPEED, START, Way, stage
+from locator import Set, held, mean_error, plain
+from report import Report, progress, recordings, table
+from sliding import LEAD, SPEED, START, Way, recorded
 from tomoskin import Skin
-from tomoskin.core import DataError
-from tomoskin.files.session import SessionReader
 from tomoskin.learning import Rubbing
-from tomoskin.run import simulate
 from tomoskin.sensing.segment import Region
-from tomoskin.sensing.signal import Readout
-from tomoskin.twin import Script
 
 SKINS = {
     "eskin_varsens16/noPattern": (258, "clockwise"),
@@ -47,12 +43,10 @@ UNTOUCHED = 0.1
 """Seconds before the onset up to which frames are untouched."""
 
 
-def run(data: Path | None) -> tuple[Report, ...]:
+def run(data: Path | None) -> Iterator[Report]:
     """Rub the public sets in ``data``, by default those beside the checkout."""
-    data = data or SHARED
-    if not data.is_dir():
-        raise DataError("expected the public recordings", where=str(data), hint="--data FOLDER")
-    return _public(data), _slid()
+    yield _public(recordings(data))
+    yield _slid()
 
 
 def _public(data: Path) -> Report:
@@ -64,17 +58,15 @@ def _public(data: Path) -> Report:
         touched, asked = known.at(order[:TOUCHED]), known.at(order[-ASKED:])
         alone = plain(touched.dv[:PLAIN], touched.xy[:PLAIN], asked.dv)
         error = 1e3 * np.linalg.norm(alone - asked.xy, axis=1).mean()
-        learnt = (_rubbed(touched, asked, labelled) for labelled in LABELS)
-        rows.append((Path(name).name, *learnt, round(float(error), 1)))
-    return Report(
+        learnt = {f"{n} labels": _rubbed(touched, asked, n) for n in LABELS}
+        alone_text = {f"plain process, {PLAIN} labels alone": round(float(error), 1)}
+        rows.append({"skin": Path(name).name} | learnt | alone_text)
+    return table(
         "rubbed, not pressed",
-        ("skin", *(f"{n} labels" for n in LABELS), f"plain process, {PLAIN} labels alone"),
-        tuple(rows),
-        (
-            "mean error in mm, part in the 90 % ellipses, s of processor to learn",
-            f"{TOUCHED} touches, {ASKED} others asked, seed {SEED}; settings chosen on the "
-            "first two skins",
-        ),
+        rows,
+        "mean error in mm, part in the 90 % ellipses, s of processor to learn",
+        f"{TOUCHED} touches, {ASKED} others asked, seed {SEED}; settings chosen on the first two "
+        "skins",
     )
 
 
@@ -91,42 +83,31 @@ def _slid() -> Report:
             np.vstack([few.dv, slid.dv]), skin, np.vstack([few.xy, unknown])
         ).locator()
         locator, behind = found.locator(), slid.at(slice(None, None, 10))
-        scores = [(one, which) for one in (locator, both) for which in (asked, behind)]
-        rows.append((seed, *(f"{mean_error(*s):.1f}, {held(*s):.0%}" for s in scores)))
-    return Report(
+        row: dict[str, object] = {"seed": seed}
+        for name, one in (("no labels", locator), (f"{LABELS[1]} labels", both)):
+            for what, which in (("presses", asked), ("frames that slide", behind)):
+                row[f"{name}: {what}"] = f"{mean_error(one, which):.1f}, {held(one, which):.0%}"
+        rows.append(row)
+    return table(
         f"a finger that slides on {SLID} of the twin",
-        (
-            *("seed", "no labels: presses", "frames that slide"),
-            *(f"{LABELS[1]} labels: presses", "frames that slide"),
-        ),
-        tuple(rows),
-        (
-            "mean error in mm, part in the 90 % ellipses; friction drags the sheet behind a "
-            "finger that slides, and the positions are the sheet's",
-            f"{SECONDS:g} s at {1e3 * SPEED:g} mm/s from corner to corner, one force of "
-            f"{FORCES[0]:g} to {FORCES[1]:g} N; {PRESSES} presses of 2 to 6 N; preset textile; "
-            "settings chosen on seeds 1 to 3",
-        ),
+        rows,
+        "mean error in mm, part in the 90 % ellipses",
+        f"{SECONDS:g} s at {1e3 * SPEED:g} mm/s from corner to corner, one force of "
+        f"{FORCES[0]:g} to {FORCES[1]:g} N; {PRESSES} presses of 2 to 6 N; preset textile; "
+        "settings chosen on seeds 1 to 3",
     )
 
 
 def _slide(seed: int) -> Set:
     """Frames less the untouched ones before, and where the finger was in the middle of each."""
-    prepared, scan_time = stage(ELECTRODES)
-    skin, readout = prepared.skin, Readout.of(prepared.scan, prepared.skin.readout)
+    prepared = stage(ELECTRODES)
+    skin = prepared.skin
     force = float(np.random.default_rng((seed, 999)).uniform(*FORCES))
     way = replace(Way.drawn(seed, 0, SECONDS, WITHIN), force=force)
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "run.mcap"
-        script = Script.from_toml(way.script("textile", "slide"))
-        simulate(script, skin, path, seed=seed, advance=lambda _, __: None)
-        with SessionReader(path) as session:
-            frames = [
-                (item.frame.host_time, readout(item.frame).values) for item in session.frames()
-            ]
-    times = np.array([time for time, _ in frames])
-    since = times - times[0] - LEAD - START + scan_time / 2
-    volts = np.array([values for _, values in frames])
+    frames, _ = recorded(prepared, way, "textile", "slide", seed)
+    times = np.array([frame.host_time for frame in frames])
+    since = times - times[0] - LEAD - START + scan_time(prepared) / 2
+    volts = np.array([prepared.readout(frame).values for frame in frames])
     slid = (since > 0) & (since < way.end)
     xy = np.array([way.at(time) for time in since[slid]])
     return Set(volts[slid] - volts[since < -UNTOUCHED].mean(axis=0), xy, skin.pattern(), skin)

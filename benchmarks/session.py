@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-import os
 import statistics
 import tempfile
 import threading
 import time
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from report import Report
+from report import Report, resident, table
 from tomoskin.board.wire import encode
-from tomoskin.core import Frame
+from tomoskin.core import Capacity, Frame, Worker
 from tomoskin.files.exports import write_parquet
 from tomoskin.files.session import (
     Mark,
@@ -26,10 +27,8 @@ from tomoskin.files.session import (
 )
 from tomoskin.model.pattern import Scan
 from tomoskin.model.skin import Skin
-from tomoskin.run.sinks import Capacity, Worker
 
-SKIN = "textile-disc-16"
-RATE = 1000.0
+SKIN, RATE = "textile-disc-16", 1000.0
 LONG, PACED = 600, 20
 """Seconds recorded: as fast as they are written, and at their own rate."""
 
@@ -37,16 +36,12 @@ HOUR, HOUR_RATE = 3600, 100.0
 SEED, SEEKS = 1, 40
 MOST_WAITING = 64 << 20
 """Bytes that may wait for the disk, as in a run."""
-RECORDED = ("seconds", "frames/s", "MB", "% of a core", "growth MB", "left out")
-OPENED = ("frames", "MB", "open ms", "open and seek ms", "worst ms")
-_BATCH = 200
-_KINDS = 500
-"""Different frames; they are sent again and again with new numbers and times."""
+
+_BATCH, _KINDS = 200, 500
+"""Frames put at once where they are not paced; different frames, which come again and again."""
 
 
-def run(data: Path | None) -> tuple[Report, ...]:
-    """Time every case; ``data`` is not needed."""
-    del data
+def run() -> Iterator[Report]:
     skin = Skin.load(SKIN)
     frames = frames_of(skin)
     with tempfile.TemporaryDirectory() as folder:
@@ -57,30 +52,26 @@ def run(data: Path | None) -> tuple[Report, ...]:
         )
         (place / "long.mcap").unlink()
         hour = of_length(place / "hour.mcap", skin, frames, HOUR)
-        found = opened(hour, HOUR)
-        exported = _exported(hour, place / "hour.parquet")
-    size = encode(frames[0]), Scan.of(skin.pattern()).n_samples
-    return (
-        Report(
-            "recording raw bytes and frames beside a pipeline",
-            RECORDED,
-            rows,
-            (
-                f"{SKIN}: {size[1]} samples, {len(size[0])} bytes a frame, seed {SEED}",
-                "processor time of both threads by the seconds recorded; growth of the process",
-                "the first row is not paced: what is written in one batch waits for the disk",
-            ),
-        ),
-        Report(
-            "a session of one hour",
-            (*OPENED, "Parquet s", "Parquet MB"),
-            ((*found, *exported),),
-            (f"{HOUR_RATE:.0f} frames/s of {SKIN}, {SEEKS} random places, seed {SEED}",),
-        ),
+        row = opened(hour, HOUR) | _exported(hour, place / "hour.parquet")
+    yield _recorded(*rows)
+    yield table(
+        "a session of one hour",
+        [row],
+        f"{HOUR_RATE:.0f} frames/s of {SKIN}, {SEEKS} random places, seed {SEED}",
+    )
+
+
+def _recorded(*rows: dict[str, Any]) -> Report:
+    return table(
+        "recording raw bytes and frames beside a pipeline",
+        rows,
+        f"{SKIN}, seed {SEED}; processor time of the whole process, which also makes the frames, "
+        "by the seconds recorded; growth of the process",
     )
 
 
 def frames_of(skin: Skin) -> list[Frame]:
+    """Frames to be sent again and again with new numbers and times."""
     rng = np.random.default_rng(SEED)
     n = Scan.of(skin.pattern()).n_samples
     samples = rng.integers(200, 3000, (_KINDS, n)).astype("<u2")
@@ -88,40 +79,40 @@ def frames_of(skin: Skin) -> list[Frame]:
 
 
 def _at(frames: list[Frame], number: int, rate: float) -> Frame:
-    frame = frames[number % _KINDS]
-    return replace(
-        frame, sequence=number, ticks=round(number * 16e6 / rate), host_time=number / rate
-    )
+    ticks, seconds = round(number * 16e6 / rate), number / rate
+    return replace(frames[number % _KINDS], sequence=number, ticks=ticks, host_time=seconds)
 
 
 def recorded(
     path: Path, skin: Skin, frames: list[Frame], seconds: int, *, paced: bool
-) -> tuple[object, ...]:
-    """Values under ``RECORDED``; ``paced``: as the frames come, not as fast as they are written."""
+) -> dict[str, Any]:
+    """One case; ``paced``: as the frames come, not as fast as they are written."""
     raw = [encode(frame) for frame in frames]
     nothing = threading.Event()
     recorder = Recorder(path, lambda: SessionWriter(path, skin), None, lambda *_: None)
     worker = Worker(recorder, Capacity(MOST_WAITING, "oldest"), lambda *_: None)
     worker.start()
     _feed(worker, frames, raw, range(_BATCH))  # warm
-    memory, processor, begun = _resident(), time.process_time(), time.monotonic()
-    for start in range(_BATCH, int(seconds * RATE), _BATCH if not paced else 1):
-        count = _BATCH if not paced else 1
+    memory, processor, begun = resident(), time.process_time(), time.monotonic()
+    count = 1 if paced else _BATCH
+    for start in range(_BATCH, int(seconds * RATE), count):
         _feed(worker, frames, raw, range(start, start + count))
         if paced:
-            ahead = start / RATE - (time.monotonic() - begun)
-            if ahead > 0:
-                nothing.wait(ahead)
-        else:
-            while worker.taken < 2 * (start + count):
-                nothing.wait(1e-3)
-    used = time.process_time() - processor
-    grown = _resident() - memory
+            nothing.wait(max(start / RATE - (time.monotonic() - begun), 0.0))
+        while not paced and worker.taken < 2 * (start + count):
+            nothing.wait(1e-3)
+    used, grown = time.process_time() - processor, resident() - memory
     worker.end()
     worker.join()
-    size = path.stat().st_size / 1e6
-    share = round(100 * used / seconds, 1)
-    return seconds, round(RATE), round(size), share, round(grown, 1), worker.left_out
+    return {
+        "seconds": seconds,
+        "paced": "yes" if paced else "no",
+        "frames/s": round(RATE),
+        "MB": round(path.stat().st_size / 1e6),
+        "% of a core": round(100 * used / seconds, 1),
+        "growth MB": round(grown, 1),
+        "left out": worker.left_out,
+    }
 
 
 def _feed(worker: Worker[Recorder], frames: list[Frame], raw: list[bytes], numbers: range) -> None:
@@ -142,31 +133,28 @@ def of_length(path: Path, skin: Skin, frames: list[Frame], seconds: int) -> Path
     return path
 
 
-def opened(path: Path, seconds: int) -> tuple[object, ...]:
-    """Values under ``OPENED``, of a session of ``seconds``."""
-    rng = np.random.default_rng(SEED)
-    first_look, sought = [], []
-    for place in rng.uniform(0, seconds - 1, SEEKS):
+def opened(path: Path, seconds: int) -> dict[str, Any]:
+    """How long it takes to open a session of ``seconds`` and to seek in it."""
+    opening, sought = [], []
+    for place in np.random.default_rng(SEED).uniform(0, seconds - 1, SEEKS):
         start = time.perf_counter()
         with SessionReader(path) as session:
-            first_look.append(time.perf_counter() - start)
+            opening.append(1e3 * (time.perf_counter() - start))
             first = next(session.frames(since=place)).frame
-            sought.append(time.perf_counter() - start)
+            sought.append(1e3 * (time.perf_counter() - start))
         assert abs(first.host_time - place) <= 1 / HOUR_RATE
-    times = [1e3 * value for value in (statistics.median(first_look), statistics.median(sought))]
-    worst = 1e3 * max(sought)
-    size = round(path.stat().st_size / 1e6)
-    return int(seconds * HOUR_RATE), size, *(round(t, 1) for t in (*times, worst))
+    return {
+        "frames": int(seconds * HOUR_RATE),
+        "MB": round(path.stat().st_size / 1e6),
+        "open ms": round(statistics.median(opening), 1),
+        "open and seek ms": round(statistics.median(sought), 1),
+        "worst ms": round(max(sought), 1),
+    }
 
 
-def _exported(path: Path, target: Path) -> tuple[object, ...]:
+def _exported(path: Path, target: Path) -> dict[str, Any]:
     start = time.perf_counter()
     with SessionReader(path) as session:
         write_parquet(target, session, lambda _done, _total: None)
-    return round(time.perf_counter() - start, 1), round(target.stat().st_size / 1e6)
-
-
-def _resident() -> float:
-    """Resident memory, MB."""
-    pages = int(Path("/proc/self/statm").read_text().split()[1])
-    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+    taken = time.perf_counter() - start
+    return {"Parquet s": round(taken, 1), "Parquet MB": round(target.stat().st_size / 1e6)}

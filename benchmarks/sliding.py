@@ -5,18 +5,16 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from report import Report, progress
-from tomoskin.board.source import Configuration, ScanSettings
-from tomoskin.core import Touch
+from bench_rig import evenly, scan_time, stage
+from report import Floats, Report, mm, progress, table
+from tomoskin.core import Frame, Touch
 from tomoskin.files.session import SessionReader, tick_rate
-from tomoskin.model.skin import Skin
-from tomoskin.pipeline import Pipeline, Prepared, prepare
+from tomoskin.pipeline import Pipeline, Prepared
 from tomoskin.run import simulate
 from tomoskin.sensing.track import SlideCorrection
 from tomoskin.twin import Script
@@ -26,20 +24,12 @@ SEEDS = (11, 12, 13)
 
 RUNS, ELECTRODES = 2, (16, 8)
 SPEED, SECONDS, LEAST_WAY, WITHIN = 0.06, 3.0, 0.03, 0.07
-LAG = 0.011
-LAGS = (0.0, LAG / 2, LAG, 2 * LAG)
+LAGS = (0.0, 0.0055, 0.011, 0.022)
 START, RAMP, LEAD = 0.5, 0.1, 3.0
 STRAIGHT = 0.3
 """Seconds after a corner, or after the onset, that do not count as straight on."""
 
-CASES = (
-    ("slides", "textile"),
-    ("slides", "ideal"),
-    ("rolls", "textile"),
-    ("rolls", "ideal"),
-)
-
-Floats = NDArray[np.float64]
+CASES = [(motion, preset) for motion in ("slides", "rolls") for preset in ("textile", "ideal")]
 
 
 @dataclass(frozen=True)
@@ -54,9 +44,9 @@ class Way:
         """From corner to corner at one speed, evenly ``within`` m of the middle of the skin."""
         random = np.random.default_rng((seed, number))
         force = float(random.uniform(2, 6))
-        corners = [(0.0, *_somewhere(random, within))]
+        corners = [(0.0, *evenly(random, 1, within)[0])]
         while corners[-1][0] < seconds:
-            x, y = _somewhere(random, within)
+            x, y = evenly(random, 1, within)[0]
             time, *last = corners[-1]
             length = float(np.hypot(x - last[0], y - last[1]))
             if length > LEAST_WAY:
@@ -91,104 +81,87 @@ class Way:
         )
 
 
-@dataclass(frozen=True)
-class Seen:
-    """A frame: device s, s of its middle since the onset, and its touches."""
-
-    time: float
-    middle: float
-    touches: tuple[Touch, ...]
+Seen = tuple[float, float, tuple[Touch, ...]]
+"""A frame: device s, s of its middle since the onset, and its touches."""
 
 
-def run(data: Path | None) -> tuple[Report, ...]:
-    """No recordings are needed: the twin is the truth."""
-    del data
+def run() -> Iterator[Report]:
     rows = []
-    for motion, preset in CASES:
-        for electrodes in ELECTRODES:
-            progress(f"{motion}, {preset}, {electrodes} electrodes")
-            runs = [
-                (way, tuple(_seen(electrodes, preset, motion[:-1], way, seed)))
-                for seed in SEEDS
-                for way in (Way.drawn(seed, number) for number in range(RUNS))
-            ]
-            rows += [(motion, preset, electrodes, *_row(runs, lag)) for lag in LAGS]
-    return (
-        Report(
-            "a finger that moves at 60 mm/s",
-            (
-                *("motion", "sheet", "electrodes", "slide_lag, mm", "frames", "found"),
-                *("with a second touch", "median mm", "p95 mm", "straight on: median mm"),
-                *("behind, mm", "lifted: frames with a touch"),
-            ),
-            tuple(rows),
-            (
-                f"textile discs, 2 to 6 N, 12 mm radius, within {1e3 * WITHIN:.0f} mm of the "
-                f"middle, from corner to corner; seeds {SEEDS}, {RUNS} runs each",
-                "errors against the middle of the scan; straight on: from "
-                f"{STRAIGHT:g} s after a corner on; behind: along the way, median, straight on",
-                "sheet: textile, or ideal without memory, drift and vices of the board; rolls: "
-                "friction of 0.02 in place of 0.3",
-            ),
-        ),
+    for (motion, preset), electrodes in ((c, n) for c in CASES for n in ELECTRODES):
+        progress(f"{motion}, {preset}, {electrodes} electrodes")
+        runs = [
+            (way, tuple(_seen(electrodes, preset, motion[:-1], way, seed)))
+            for seed in SEEDS
+            for way in (Way.drawn(seed, number) for number in range(RUNS))
+        ]
+        case = {"motion": motion, "sheet": preset, "electrodes": electrodes}
+        rows += [case | _row(runs, lag) for lag in LAGS]
+    yield table(
+        "a finger that moves at 60 mm/s",
+        rows,
+        f"textile discs, 2 to 6 N, 12 mm radius, within {1e3 * WITHIN:.0f} mm of the "
+        f"middle, from corner to corner; seeds {SEEDS}, {RUNS} runs each",
+        "errors against the middle of the scan; straight on: from "
+        f"{STRAIGHT:g} s after a corner on; behind: along the way, median, straight on",
+        "ideal: without memory, drift and vices; rolls: friction of 0.02 in place of 0.3",
     )
 
 
-def _row(runs: Sequence[tuple[Way, Sequence[Seen]]], lag: float) -> tuple[object, ...]:
+def _row(runs: Sequence[tuple[Way, Sequence[Seen]]], lag: float) -> dict[str, Any]:
     errors, straight, behind, second, frames, after = [], [], [], 0, 0, 0
     for way, seen in runs:
         slides = SlideCorrection(lag)
-        for frame in seen:
-            slides = slides.after(frame.touches, frame.time)
-            after += bool(frame.touches) and frame.middle > way.end + 2 * RAMP + STRAIGHT
-            if not 0.1 + RAMP < frame.middle < way.end:
+        for time, middle, touches in seen:
+            slides = slides.after(touches, time)
+            after += bool(touches) and middle > way.end + 2 * RAMP + STRAIGHT
+            if not 0.1 + RAMP < middle < way.end:
                 continue
             frames += 1
-            second += len(frame.touches) > 1
-            true = way.at(frame.middle)
-            places = [slides.of_finger(t).detection for t in frame.touches]
+            second += len(touches) > 1
+            true = way.at(middle)
+            places = [slides.of_finger(t).detection for t in touches]
             off = [np.array([d.x, d.y]) - true for d in places]
             if not off:
                 continue
             nearest = min(off, key=lambda error: float(np.hypot(*error)))
             errors.append(float(np.hypot(*nearest)))
-            if way.straight(frame.middle):
-                heading = true - way.at(frame.middle - 0.05)
+            if way.straight(middle):
+                heading = true - way.at(middle - 0.05)
                 straight.append(errors[-1])
                 behind.append(-float(nearest @ heading) / float(np.hypot(*heading)))
-    figures = (np.median(errors), np.percentile(errors, 95), np.median(straight), np.median(behind))
-    return (
-        f"{1e3 * lag:g}", frames, len(errors), second,
-        *(f"{1e3 * value:.1f}" for value in figures), after,
-    )  # fmt: skip
+    median, p95 = mm(*np.percentile(errors, (50, 95)), digits=1)
+    return {
+        "slide_lag, mm": f"{1e3 * lag:g}",
+        "frames": frames,
+        "found": len(errors),
+        "with a second touch": second,
+        "median mm": median,
+        "p95 mm": p95,
+        "straight on: median mm": mm(np.median(straight), digits=1)[0],
+        "behind, mm": mm(np.median(behind), digits=1)[0],
+        "lifted: frames with a touch": after,
+    }
+
+
+def recorded(
+    prepared: Prepared, way: Way, preset: str, motion: str, seed: int
+) -> tuple[list[Frame], float]:
+    """Frames of a session in which a finger goes a way, and ticks of a second."""
+    with tempfile.TemporaryDirectory() as folder:
+        path, script = Path(folder) / "run.mcap", Script.from_toml(way.script(preset, motion))
+        simulate(script, prepared.skin, path, seed=seed, advance=lambda _, __: None)
+        with SessionReader(path) as session:
+            return [item.frame for item in session.frames()], tick_rate(session)
 
 
 def _seen(electrodes: int, preset: str, motion: str, way: Way, seed: int) -> Iterator[Seen]:
     """What the live pipeline makes of it, by way of a session file."""
-    prepared, scan_time = stage(electrodes)
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "run.mcap"
-        script = Script.from_toml(way.script(preset, motion))
-        simulate(script, prepared.skin, path, seed=seed, advance=lambda _, __: None)
-        with SessionReader(path) as session:
-            pipeline, onset = Pipeline(prepared), None
-            pipeline.tick_rate = tick_rate(session)
-            for item in session.frames():
-                host = item.frame.host_time
-                if onset is None:  # a frame comes when its scan ends
-                    onset = host - scan_time + LEAD + START
-                if (result := pipeline.push(item.frame)) is not None:
-                    time = item.frame.ticks / pipeline.tick_rate
-                    yield Seen(time, host - scan_time / 2 - onset, result.touches)
-
-
-@cache
-def stage(electrodes: int) -> tuple[Prepared, float]:
-    """What frames are seen by, and s that a scan takes."""
-    prepared = prepare(Skin.load(f"textile-disc-{electrodes}"))
-    return prepared, Configuration.of(prepared.scan, ScanSettings.of(prepared.skin)).scan_time
-
-
-def _somewhere(random: np.random.Generator, within: float) -> tuple[float, float]:
-    away, turn = within * np.sqrt(random.uniform()), random.uniform(0, 2 * np.pi)
-    return float(away * np.cos(turn)), float(away * np.sin(turn))
+    prepared = stage(electrodes)
+    frames, rate = recorded(prepared, way, preset, motion, seed)
+    pipeline, scan = Pipeline(prepared), scan_time(prepared)
+    pipeline.tick_rate = rate
+    onset = frames[0].host_time - scan + LEAD + START  # a frame comes when its scan ends
+    for frame in frames:
+        if (result := pipeline.push(frame)) is not None:
+            middle = frame.host_time - scan / 2 - onset
+            yield frame.ticks / pipeline.tick_rate, middle, result.touches

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Mapping
+import time
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from report import Report, progress
-from tomoskin.core import FloatArray, Touch
+from bench_rig import evenly, gap, held
+from report import Floats, Report, mm, progress, table
+from tomoskin.board.source import Link, ScanSettings
+from tomoskin.core import FloatArray, Frame, Touch
 from tomoskin.model.skin import Skin
-from tomoskin.pipeline import Prepared, prepare
-from tomoskin.twin import Press, SteppedSkin, TwinSettings
+from tomoskin.pipeline import Pipeline, Prepared, prepare
+from tomoskin.twin import Press, SteppedSkin, TwinSettings, open_twin
 
 SEEDS = (41, 42)
 """Nothing was chosen on them; 31 to 33 are there to choose on."""
@@ -33,22 +34,28 @@ MARGIN, NEAR = 0.02, 0.025
 _DISC, _SQUARE = "textile-disc-16", "textile-square-16"
 _SLAB = {"shape": "rectangle", "width": "240 mm", "height": "80 mm"}
 _ANGLE = [[-80, -80], [80, -80], [80, 0], [0, 0], [0, 80], [-80, 80]]
-_CORNERS = {"shape": "polygon", "width": None, "height": None}
+_CORNERS = {
+    **{"shape": "polygon", "width": None, "height": None},
+    "vertices": [[f"{v} mm" for v in xy] for xy in _ANGLE],
+}
+
+RELEASED_SKINS, RELEASED_SEEDS = ("textile-disc-16", "textile-disc-8"), (21, 22, 23)
+"""Nothing here was chosen on these seeds."""
+
+RELEASED = ("first found", "reported in between", "light one found", "reported afterwards")
+HEAVY, LIGHT, TRIALS = (5.0, 20.0), (0.5, 1.0, 2.0), 4
+FIRST, BETWEEN, AGAIN, AFTER = 5.0, (0.4, 0.9), 0.6, 2.0
+QUIET = 0.35
+"""Seconds from the start of the release on, after which a reported touch counts as left behind."""
 
 Changes = Mapping[str, Mapping[str, Any]]
 
 SKINS: dict[str, tuple[str, Changes]] = {
-    "textile-disc-8": ("textile-disc-8", {}),
-    "textile-disc-16": (_DISC, {}),
-    "textile-disc-32": ("textile-disc-32", {}),
-    "textile-square-16": (_SQUARE, {}),
+    **{name: (name, {}) for name in ("textile-disc-8", _DISC, "textile-disc-32", _SQUARE)},
     "disc, 12": (_DISC, {"electrodes": {"count": 12}}),
     "disc, 24": (_DISC, {"electrodes": {"count": 24}}),
     "strip 3:1": (_SQUARE, {"outline": _SLAB, "electrodes": {"first": "150 deg"}}),
-    "L": (
-        _SQUARE,
-        {"outline": {**_CORNERS, "vertices": [[f"{v} mm" for v in xy] for xy in _ANGLE]}},
-    ),
+    "L": (_SQUARE, {"outline": _CORNERS}),
     "cap": (_DISC, {"surface": {"shape": "cap", "radius": "150 mm"}}),
 }
 """Of each name a built-in skin, and what of it is changed."""
@@ -71,10 +78,8 @@ class Counts:
             setattr(self, name, getattr(self, name) + value)
 
 
-def run(data: Path | None) -> tuple[Report, ...]:
-    """No recordings are needed: the twin is the truth."""
-    del data
-    return (report(tuple(SKINS), SEEDS, PRESSES),)
+def run() -> Iterator[Report]:
+    yield report(tuple(SKINS), SEEDS, PRESSES)
 
 
 def report(names: tuple[str, ...], seeds: tuple[int, ...], presses: int) -> Report:
@@ -86,29 +91,18 @@ def report(names: tuple[str, ...], seeds: tuple[int, ...], presses: int) -> Repo
         for seed in seeds:
             progress(f"{name}, seed {seed}")
             counts.add(standing(prepared, seed, presses))
-        median = 1e3 * float(np.median(counts.away)) if counts.away else None
-        rows.append(
-            (
-                name,
-                presses * len(seeds),
-                counts.missed,
-                counts.torn,
-                counts.doubled,
-                counts.late,
-                None if median is None else round(median, 1),
-            )
-        )
-    return Report(
+        row = {"skin, electrodes": name, "presses": presses * len(seeds)}
+        row |= {"not found": counts.missed, "torn or interrupted": counts.torn}
+        row |= {"doubled": counts.doubled, "still shown after": counts.late}
+        median = mm(np.median(counts.away), digits=1)[0] if counts.away else None
+        rows.append(row | {"median, mm": median})
+    return table(
         "standing presses, one after the other",
-        ("skin, electrodes", "presses", "not found", "torn or interrupted", "doubled",
-         "still shown after", "median, mm"),
-        tuple(rows),
-        (
-            f"textile preset, seeds {seeds}, {FORCES[0]:g} to {FORCES[1]:g} N, held for {HELD:g} s "
-            f"every {HELD + PAUSE:g} s without a new reference, as a live run shows them",
-            f"after: {GONE:g} s after the release",
-        ),
-    )  # fmt: skip
+        rows,
+        f"textile preset, seeds {seeds}, {FORCES[0]:g} to {FORCES[1]:g} N, held for {HELD:g} s "
+        f"every {HELD + PAUSE:g} s without a new reference, as a live run shows them",
+        f"after: {GONE:g} s after the release",
+    )
 
 
 def standing(prepared: Prepared, seed: int, presses: int) -> Counts:
@@ -124,24 +118,20 @@ def standing(prepared: Prepared, seed: int, presses: int) -> Counts:
 
 def _one(twin: SteppedSkin, press: Press) -> Counts:
     ramp = max(round(RAMP / twin.period), 1)
-    frames: list[tuple[Touch, ...]] = []
-    for step in range(ramp + round(HELD / twin.period)):
-        force = press.force * min(1.0, (step + 1) / ramp)
-        frames.append(twin.step((Press(press.x, press.y, force, press.radius),)).touches)
-    frames = frames[ramp + round(SETTLED / twin.period) :]
+    frames = list(held(twin, (press,), HELD, RAMP))[ramp + round(SETTLED / twin.period) :]
     after = [twin.step(()).touches for _ in range(round(PAUSE / twin.period))]
-    near = [[t for t in touches if _away(t, press) < NEAR] for touches in frames]
+    near = [[t for t in touches if gap(t, press) < NEAR] for touches in frames]
     ids = {touches[0].id if touches else None for touches in near}
     return Counts(
         missed=ids == {None},
         torn=len(ids) > 1,
         doubled=any(len(touches) > 1 for touches in frames),
         late=any(after[round(GONE / twin.period) :]),
-        away=tuple(_away(touches[0], press) for touches in near if touches),
+        away=tuple(gap(touches[0], press) for touches in near if touches),
     )
 
 
-def _places(skin: Skin, random: np.random.Generator, count: int) -> FloatArray:
+def _places(skin: Skin, random: np.random.Generator, count: int) -> Floats:
     """(count, 2) m, even over the sheet but for its margin."""
     mesh = skin.mesh()
     sides = np.sort(np.concatenate([mesh.cells[:, pair] for pair in ([0, 1], [1, 2], [0, 2])]))
@@ -151,11 +141,143 @@ def _places(skin: Skin, random: np.random.Generator, count: int) -> FloatArray:
     return np.asarray(mesh.centroids[random.choice(inside, count), :2])
 
 
-def _away(touch: Touch, press: Press) -> float:
-    return float(np.hypot(touch.detection.x - press.x, touch.detection.y - press.y))
+def run_released() -> Iterator[Report]:
+    """What is left after a press: nothing is reported, and a new light press is found."""
+    rows = []
+    for name in RELEASED_SKINS:
+        prepared = prepare(Skin.load(name))
+        for heavy, light in ((heavy, light) for heavy in HEAVY for light in LIGHT):
+            progress(f"{name}, {heavy:g} N, then {light:g} N")
+            trials = np.array(
+                [t for s in RELEASED_SEEDS for t in _trials(prepared, s, heavy, light)]
+            )
+            row = {"skin": name, "first N": heavy, "then N": light, "presses": len(trials)}
+            found = zip(RELEASED, trials.sum(axis=0).tolist(), strict=True)
+            rows.append(row | dict(found))
+    yield table(
+        "a light press on the spot of a heavy one, within a second of its release",
+        rows,
+        f"textile preset, seeds {RELEASED_SEEDS}; the first is held for {FIRST:g} s, the pause "
+        f"is {BETWEEN[0]:g} to {BETWEEN[1]:g} s, the light one is held for {AGAIN:g} s",
+        f"reported: any touch later than {QUIET:g} s after the start of a release, until "
+        f"the light press, or for {AFTER:g} s after it",
+    )
 
 
-if __name__ == "__main__":
-    # Some of it: python benchmarks/standing.py 31 200 textile-disc-8 "disc, 24"
-    made = report(tuple(sys.argv[3:]), (int(sys.argv[1]),), int(sys.argv[2]))
-    print(*(" | ".join(map(str, row)) for row in (made.columns, *made.rows)), sep="\n")
+def _trials(prepared: Prepared, seed: int, heavy: float, light: float) -> list[tuple[bool, ...]]:
+    """A press and a light one after it: what of RELEASED is true."""
+    twin, trials = SteppedSkin(prepared, TwinSettings.preset("textile", seed)), []
+    for number in range(TRIALS):
+        random = np.random.default_rng((seed, number))
+        reach, turn = 0.07 * np.sqrt(random.uniform()), random.uniform(0, 2 * np.pi)
+        x, y = float(reach * np.cos(turn)), float(reach * np.sin(turn))
+        twin.reset(seed)
+        first = _is_found(twin, Press(x, y, heavy, 10e-3), FIRST)
+        between = _is_shown(twin, random.uniform(*BETWEEN))
+        again = _is_found(twin, Press(x, y, light, 10e-3), AGAIN)
+        trials.append((first, between, again, _is_shown(twin, AFTER)))
+    return trials
+
+
+def _is_found(twin: SteppedSkin, press: Press, seconds: float) -> bool:
+    """Whether a touch is found at the press while it stands."""
+    frames = list(held(twin, (press,), seconds, RAMP))
+    return any(gap(touch, press) < 0.02 for touches in frames for touch in touches)
+
+
+def _is_shown(twin: SteppedSkin, seconds: float) -> bool:
+    """Whether anything is reported once a touch should be gone."""
+    shown = [bool(twin.step(()).touches) for _ in range(round(seconds / twin.period))]
+    return any(shown[round(QUIET / twin.period) :])
+
+
+COUNTED = ("textile-disc-8", "textile-disc-16", "textile-disc-32")
+COUNTED_SEEDS, COUNTED_PRESSES = (101, 102), 30
+COUNTED_FORCES, TIP, RIM = (1.0, 2.0, 5.0), 0.01, 0.012
+UNTOUCHED, PRESSED, FREE = 60, 6, 4
+REACHED = 0.0225
+
+
+def run_electrodes() -> Iterator[Report]:
+    """8, 16 and 32 electrodes at one read-out: where presses are found, and what a frame costs."""
+    yield table(
+        "presses found by the fit",
+        map(counted, COUNTED),
+        f"200 mm textile twin, {COUNTED_PRESSES} places a seed, seeds {COUNTED_SEEDS}, "
+        f"{COUNTED_FORCES} N in turn, 50 mA, four conversions of 12 bits, as the Pico's front end "
+        f"reads; found: in the {PRESSED}th frame within {1e3 * REACHED:g} mm; processor time",
+    )
+
+
+def counted(name: str) -> dict[str, Any]:
+    """Values of one skin."""
+    began = time.process_time()
+    pico = Skin.load("textile-disc-32").readout
+    skin = Skin.load(name).altered(
+        {
+            "drive": {"current": "50 mA"},
+            "readout": {
+                "adc_bits": pico.adc_bits,
+                "reference_voltage": f"{pico.reference_voltage} V",
+                "gain": pico.gain,
+                "oversampling": pico.oversampling,
+                "settling": f"{1e6 * pico.settling} us",
+            },
+        }
+    )
+    prepared = prepare(skin)
+    prepared.warm_up()
+    set_up = time.process_time() - began
+    parts = []
+    for seed in COUNTED_SEEDS:
+        progress(f"{name}, seed {seed}")
+        parts.append(measured(prepared, seed))
+    errors, forces = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
+    rest, pressed = (np.concatenate([part[k] for part in parts]) for k in (2, 3))
+    near, light = errors < REACHED, forces == COUNTED_FORCES[0]
+    found = 1e3 * errors[near]
+    return {
+        "electrodes": prepared.pattern.n_electrodes,
+        "measurements": prepared.pattern.n_meas,
+        "set-up, s": f"{set_up:.1f}",
+        "reference, s": f"{max(rest.max(), pressed.max()):.1f}",
+        "frame at rest, ms": f"{1e3 * np.median(rest):.1f}",
+        "pressed, ms": f"{1e3 * np.median(pressed):.1f}",
+        "found": f"{near.sum()} of {len(errors)}",
+        "median error, mm": f"{np.median(found):.1f}",
+        "p90, mm": f"{np.percentile(found, 90):.1f}",
+        "1 N: found": f"{(near & light).sum()} of {light.sum()}",
+        "1 N: median, mm": f"{1e3 * np.median(errors[near & light]):.1f}",
+    }
+
+
+def measured(prepared: Prepared, seed: int) -> tuple[FloatArray, ...]:
+    """Errors m (infinite: none), forces N, s a frame at rest and pressed."""
+    random, pipeline = np.random.default_rng(seed), Pipeline(prepared)
+    transport = open_twin(f"fast,seed={seed}", prepared.skin)
+    errors, rest, pressed = [], [], []
+    forces = np.resize(COUNTED_FORCES, COUNTED_PRESSES)
+    with Link(transport, prepared.scan, ScanSettings.of(prepared.skin)) as link:
+        _pushed(link, pipeline, UNTOUCHED, rest)
+        for force in forces:
+            ((x, y),) = evenly(random, 1, 0.1 - RIM).tolist()
+            transport.set_presses((Press(x, y, force, TIP),))
+            touches = _pushed(link, pipeline, PRESSED, pressed)
+            errors.append(min((gap(t, (x, y)) for t in touches), default=np.inf))
+            transport.set_presses(())
+            _pushed(link, pipeline, FREE, rest)
+    return np.array(errors), forces, np.array(rest), np.array(pressed)
+
+
+def _pushed(link: Link, pipeline: Pipeline, count: int, spent: list[float]) -> tuple[Touch, ...]:
+    """The touches of the last of the next ``count`` frames; s of each are added to ``spent``."""
+    touches: tuple[Touch, ...] = ()
+    while count:
+        for frame in link.poll(1.0):
+            if isinstance(frame, Frame) and count:
+                began = time.process_time()
+                result = pipeline.push(frame)
+                spent.append(time.process_time() - began)
+                touches = result.touches if result else ()
+                count -= 1
+    return touches

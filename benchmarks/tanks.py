@@ -3,21 +3,165 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.path import Path as Polygon
+from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation
 from scipy.stats import rankdata
 
-from from_examples import load_example
-from report import Report
-from simulated_tanks import simulated
-from tomoskin.core import DataError, FloatArray
+from bench_rig import load_example
+from report import Report, recordings, table
+from tomoskin.core import FloatArray
+from tomoskin.model.forward import ForwardModel
+from tomoskin.model.mesh import Disc, ElectrodeArc, triangulate
+from tomoskin.model.pattern import Pattern
 
-ROOT = Path(__file__).resolve().parents[1]
-SHARED = ROOT.parent / "shared" / "data"
+RADIUS, PIXELS, CELLS = 0.115, 256, 9000
+WIDTHS = (0.0115, 0.0125, 0.0135)
+"""Widths that the electrodes may have, m; the method takes the middle one."""
+
+GAP, RIM, SMALLEST = 6, 0.108, 400
+"""Pixels between targets, the circle that holds them, m, and the smallest, pixels."""
+
+Inside = Callable[[FloatArray], NDArray[np.bool_]]
+
+
+@dataclass(frozen=True, eq=False)
+class Tank:
+    """What was in it, (256, 256), and what was measured, (rows,) V."""
+
+    truth: NDArray[np.uint8]
+    u: FloatArray
+    u_ref: FloatArray
+
+
+def simulated(seed: int, inj: FloatArray, mpat: FloatArray) -> Tank:
+    """A tank with one to four targets, its own contacts, channels and change of the water."""
+    rng = np.random.default_rng(seed)
+    truth = targets(rng)
+    model = _model(float(rng.choice(WIDTHS)), inj, mpat)
+    model = ForwardModel(
+        model.mesh, model.pattern, np.exp(rng.normal(np.log(3e-4), 0.9, 32)), model.current
+    )
+    leak = np.asarray(rng.normal(0.0, 0.012, mpat.shape[1]))
+    water = 0.73
+    drifted, plastic = water * np.exp(rng.normal(0.0, 0.03)), 0.004
+    metal = np.exp(rng.uniform(np.log(8.0), np.log(300.0)))
+    sigma = _mixed(model, truth, np.array([drifted, plastic, metal]))
+    u_ref, change = _read(model, water, inj, mpat, leak), _read(model, sigma, inj, mpat, leak)
+    change -= u_ref
+    touched = ((inj != 0).T @ (mpat != 0)).ravel()
+    n = len(change)
+    u_ref += rng.normal(0.0, 0.004, n) + touched * rng.normal(0.0, 0.02, n)
+    change *= 1.0 + 0.025 * rng.standard_normal(n)
+    change += 3e-4 * rng.standard_normal(n) + touched * rng.normal(0.0, 0.01, n)
+    shape = (inj.shape[1], mpat.shape[1])
+    gain = (1 + 0.01 * rng.standard_normal((shape[0], 1))) * (
+        1 + 0.01 * rng.standard_normal(shape[1])
+    )
+    return Tank(truth, u_ref + change * gain.ravel(), u_ref)
+
+
+def targets(rng: np.random.Generator) -> NDArray[np.uint8]:
+    """Labels (256, 256) of one to four targets that do not touch; row 0 at the top."""
+    labels = np.zeros(PIXELS * PIXELS, np.uint8)
+    taken = np.zeros(PIXELS * PIXELS, bool)
+    wanted, one_kind = rng.choice([1, 2, 3, 4], p=[0.15, 0.35, 0.3, 0.2]), rng.random() < 0.15
+    kind, places = rng.integers(1, 3), _pixels()
+    for _ in range(60):
+        inside, turn, away = shape(rng), rng.uniform(0, 2 * np.pi), rng.uniform(0, 2 * np.pi)
+        centre = 0.1 * np.sqrt(rng.random()) * np.array([np.cos(away), np.sin(away)])
+        turned = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+        mine = inside((places - centre) @ turned)
+        outside = np.hypot(*places[mine].T) > RIM
+        if mine.sum() < SMALLEST or outside.any() or (mine & taken).any():
+            continue
+        labels[mine] = kind if one_kind else rng.integers(1, 3)
+        taken = binary_dilation((labels > 0).reshape(PIXELS, PIXELS), iterations=GAP).ravel()
+        wanted -= 1
+        if not wanted:
+            break
+    return labels.reshape(PIXELS, PIXELS)
+
+
+def shape(rng: np.random.Generator) -> Inside:
+    """A disc, ellipse, rectangle, triangle, polygon, cross, L or C, 28 to 100 mm across."""
+    r, kind = rng.uniform(0.014, 0.042), rng.integers(8)
+    ratio, thick, long = rng.uniform(0.4, 1.0), r * rng.uniform(0.3, 0.45), 1.25 * r
+    if kind <= 1:
+        return lambda q: np.hypot(q[:, 0], q[:, 1] / (1.0 if kind == 0 else ratio)) < r
+    if kind == 2:
+        return lambda q: np.asarray((np.abs(q) < 0.9 * r * np.array([1.0, ratio])).all(axis=1))
+    if kind <= 4:
+        n = 3 if kind == 3 else int(rng.integers(4, 7))
+        at = np.arange(n) * 2 * np.pi / n + rng.uniform(-0.3, 0.3, n)
+        reach = 1.1 * r * rng.uniform(0.75, 1.15, (n, 1))
+        return Polygon(reach * np.column_stack([np.cos(at), np.sin(at)])).contains_points
+    if kind == 5:
+        side = np.array([thick, long])
+        return lambda q: np.asarray((np.sort(np.abs(q), axis=1) < side).all(axis=1))
+    if kind == 6:
+        return lambda q: (np.abs(q) < long).all(axis=1) & (q.min(axis=1) < 2 * thick - long)
+    return lambda q: (
+        (np.abs(np.hypot(*q.T) - long + 0.8 * thick) < 0.8 * thick)
+        & ~((q[:, 0] > 0) & (np.abs(q[:, 1]) < 0.6 * r))
+    )
+
+
+@cache
+def _pixels() -> FloatArray:
+    step = RADIUS * ((np.arange(PIXELS) + 0.5) / PIXELS * 2 - 1)
+    x, y = np.meshgrid(step, -step)
+    return np.column_stack([x.ravel(), y.ravel()])
+
+
+_MODELS: dict[float, ForwardModel] = {}
+
+
+def _model(width: float, inj: FloatArray, mpat: FloatArray) -> ForwardModel:
+    if width not in _MODELS:
+        rim = Disc(RADIUS)
+        arcs = [ElectrodeArc.around((0.25 + k / 32) * rim.length, width) for k in range(32)]
+        drives = np.column_stack([inj.argmax(axis=0), inj.argmin(axis=0)])
+        pairs = np.column_stack([mpat.argmax(axis=0), mpat.argmin(axis=0)])
+        unique = np.unique(np.sort(drives, axis=1), axis=0)
+        pattern = Pattern.from_pairs(32, unique, pairs, include_driven=True)
+        mesh = triangulate(rim, arcs, CELLS, seed=5)
+        _MODELS[width] = ForwardModel(mesh, pattern, 1e-4)
+    return _MODELS[width]
+
+
+def _mixed(model: ForwardModel, truth: NDArray[np.uint8], values: FloatArray) -> FloatArray:
+    """Conductivity of each cell, by the mean reflection at four points in it."""
+    inner = np.array([[0.6, 0.2, 0.2], [0.2, 0.6, 0.2], [0.2, 0.2, 0.6], [1 / 3, 1 / 3, 1 / 3]])
+    points = np.einsum("wk,nkd->nwd", inner, model.mesh.points[model.mesh.cells]) / RADIUS
+    row = ((1 - points[..., 1]) * PIXELS / 2).astype(int)
+    column = ((1 + points[..., 0]) * PIXELS / 2).astype(int)
+    found = values[truth[row, column]]
+    water = values[0]
+    reflection = ((found - water) / (found + water)).mean(axis=1)
+    return np.asarray(water * (1 + reflection) / (1 - reflection))
+
+
+def _read(
+    model: ForwardModel,
+    sigma: float | FloatArray,
+    inj: FloatArray,
+    mpat: FloatArray,
+    leak: FloatArray,
+) -> FloatArray:
+    """(rows,) V: differences of potentials, and a part of the common voltage over the sink's."""
+    at = inj.T @ model.transfer_resistance(sigma)
+    sink = np.take_along_axis(at, inj.argmin(axis=0)[:, None], axis=1)
+    return np.asarray((at @ mpat + leak * (at @ (np.abs(mpat) / 2) - sink)).ravel())
+
+
 LEVELS = range(1, 8)
 METHODS = ("shapes", "linear and Otsu", "water only")
 TANKS = 8
@@ -54,56 +198,38 @@ class Judged:
     constant: float
 
 
-def run(data: Path | None) -> tuple[Report, ...]:
+def run(data: Path | None) -> Iterator[Report]:
     """Segment tanks at every level; ``data`` is the folder of public recordings."""
-    file = (data or SHARED) / "ktc2023_tank32" / "train.npz"
-    if not file.exists():
-        raise DataError("expected the challenge's training data", where=str(file), hint="--data")
+    file = Path("ktc2023_tank32") / "train.npz"
     example = load_example("ktc2023")
-    measured = list(example.samples(file))
+    measured = list(example.samples(recordings(data, str(file)) / file))
     inj, mpat = measured[0].inj, measured[0].mpat
-    groups: list[tuple[str, list[list[Judged]]]] = [
-        ("4 measured", [[judged(example, tank, level) for tank in measured] for level in LEVELS]),
-        (f"{TANKS} simulated", [_simulated(example, level, inj, mpat) for level in LEVELS]),
-    ]
-    columns = ("tanks", "method", *(f"level {n}" for n in LEVELS), "mean", "times 21")
-    scores = [row for name, group in groups for row in _scores(name, group)]
-    certain = [row for name, group in groups for row in _certainty(name, group)]
-    return (
-        Report(
-            "score, 1 is best",
-            columns,
-            tuple(scores),
-            (
-                "times 21: the challenge's sum over three samples at each of seven levels",
-                "±: standard error of the mean over tanks; simulated ones are others at each level",
-                "seconds: mean processor time of one segmentation",
-            ),
-        ),
-        Report(
-            "where it is sure",
-            columns[:-1],
-            tuple(certain),
-            (
-                "ranked: how often a wrong pixel is less sure than a right one; 0.5 is chance",
-                "loss: mean of −log₂ of the probability given to the true label",
-                "constant: the same if every label counted as wrong as often as labels are",
-            ),
-        ),
+    groups: dict[str, list[list[Judged]]] = {
+        "4 measured": [[judged(example, tank, level) for tank in measured] for level in LEVELS],
+        f"{TANKS} simulated": [_simulated(example, level, inj, mpat) for level in LEVELS],
+    }
+    yield table(
+        "score, 1 is best",
+        (row for name, group in groups.items() for row in _scores(name, group)),
+        "times 21: the challenge's sum over three samples at each of seven levels",
+        "±: standard error of the mean over tanks; simulated ones are others at each level",
+    )
+    yield table(
+        "where it is sure",
+        (row for name, group in groups.items() for row in _certainty(name, group)),
+        "ranked: how often a wrong pixel is less sure than a right one; 0.5 is chance",
+        "loss: mean of −log₂ of the probability given to the true label",
+        "constant: the same if every label counted as wrong as often as labels are",
     )
 
 
 def _simulated(example: Any, level: int, inj: FloatArray, mpat: FloatArray) -> list[Judged]:
-    tanks = ((seed, simulated(seed, inj, mpat)) for seed in seeds(level))
+    seeds = range(6000 + 100 * level, 6000 + 100 * level + TANKS)
+    tanks = ((seed, simulated(seed, inj, mpat)) for seed in seeds)
     return [
         judged(example, example.Sample(str(seed), t.u, t.u_ref, inj, mpat, t.truth), level)
         for seed, t in tanks
     ]
-
-
-def seeds(level: int) -> range:
-    """Seeds of a level's simulated tanks."""
-    return range(6000 + 100 * level, 6000 + 100 * level + TANKS)
 
 
 def judged(example: Any, tank: Any, level: int) -> Judged:
@@ -134,29 +260,25 @@ def certainty(found: Any, points: FloatArray, truth: Any) -> tuple[float, float,
     return float(wrong.mean()), float(ranked), float(-np.log2(given + 1e-3).mean()), float(constant)
 
 
-def _scores(name: str, group: Sequence[Sequence[Judged]]) -> list[tuple[Any, ...]]:
-    scores = np.array([[tank.scores for tank in tanks] for tanks in group])
-    rows = [
-        (name, method, *_spread(scores[..., k]), f"{21 * scores[..., k].mean():.2f}")
-        for k, method in enumerate(METHODS)
-    ]
-    taken = np.array([[tank.seconds for tank in tanks] for tanks in group]).mean(axis=1)
-    means = (*taken, taken.mean())
-    return [*rows, (name, "seconds", *(f"{second:.1f}" for second in means), "")]
+def _scores(name: str, group: Sequence[Sequence[Judged]]) -> Iterator[dict[str, Any]]:
+    """Mean and its standard error at each level, and over all."""
+    for k, method in enumerate(METHODS):
+        scores = np.array([[tank.scores[k] for tank in tanks] for tanks in group])
+        error = scores.std(axis=1, ddof=1) / np.sqrt(scores.shape[1])
+        means = [*scores.mean(axis=1), scores.mean()]
+        errors = [*error, np.sqrt((error**2).sum()) / len(error)]
+        values = [f"{m:.3f} ± {e:.3f}" for m, e in zip(means, errors, strict=True)]
+        yield _by_level(name, method, values) | {"times 21": f"{21 * scores.mean():.2f}"}
+    taken = np.array([np.mean([tank.seconds for tank in tanks]) for tanks in group])
+    yield _by_level(name, "seconds", [f"{s:.1f}" for s in (*taken, taken.mean())])
 
 
-def _certainty(name: str, group: Sequence[Sequence[Judged]]) -> list[tuple[Any, ...]]:
-    rows = []
+def _certainty(name: str, group: Sequence[Sequence[Judged]]) -> Iterator[dict[str, Any]]:
     for what in ("wrong", "ranked", "loss", "constant"):
-        values = np.array([[getattr(tank, what) for tank in tanks] for tanks in group])
-        means = values.mean(axis=1)
-        rows.append((name, what, *(f"{m:.3f}" for m in means), f"{means.mean():.3f}"))
-    return rows
+        means = np.array([np.mean([getattr(tank, what) for tank in tanks]) for tanks in group])
+        yield _by_level(name, what, [f"{m:.3f}" for m in (*means, means.mean())])
 
 
-def _spread(scores: FloatArray) -> list[str]:
-    """Mean and its standard error of (levels, tanks): each level, and all."""
-    error = scores.std(axis=1, ddof=1) / np.sqrt(scores.shape[1])
-    means = [*scores.mean(axis=1), scores.mean()]
-    errors = [*error, np.sqrt((error**2).sum()) / len(error)]
-    return [f"{m:.3f} ± {e:.3f}" for m, e in zip(means, errors, strict=True)]
+def _by_level(name: str, method: str, values: Sequence[str]) -> dict[str, Any]:
+    columns = (*(f"level {n}" for n in LEVELS), "mean")
+    return {"tanks": name, "method": method, **dict(zip(columns, values, strict=True))}

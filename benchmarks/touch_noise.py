@@ -2,15 +2,129 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from noisy_board import Floats, Noise, NoisyBoard
-from report import Report, progress
+from report import Floats, Report, progress, table
+from tomoskin.core import Frame
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Pipeline, Prepared, prepare, voltage_covariance
 from tomoskin.sensing.fit import Whitener
+
+PERIOD, BUSY = 0.05, 0.9
+"""Seconds between two frames, and the part of them in which samples are read."""
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Noise beside that of the read-out, of which one row has the deviation 1.
+
+    Attributes
+    ----------
+    samples, rows
+        Of each sample, in parts of the read-out's; of each row by itself, as a differential
+        board's.
+    hum, advance
+        Of the mains in a row, rms; turns by which it goes on between frames.
+    drift, walk
+        Part by which all voltages rise and fall in 300 s; of each electrode's random walk in 30 s.
+    loud, every
+        Times as loud as the others one electrode becomes, another one after so many frames.
+    """
+
+    samples: float = 1.0
+    rows: float = 0.0
+    hum: float = 0.0
+    advance: float = 0.13
+    drift: float = 0.0
+    walk: float = 0.0
+    loud: float = 1.0
+    every: int = 1000
+
+
+class NoisyBoard:
+    """A board on an untouched skin; ``volts`` (n_meas,) that a touch adds may be set."""
+
+    def __init__(self, prepared: Prepared, noise: Noise, seed: int) -> None:
+        self.prepared, self.noise = prepared, noise
+        self.random = np.random.default_rng(seed)
+        scan, readout = prepared.scan, prepared.readout
+        self.makes = np.zeros((len(scan.plus), scan.n_samples))
+        rows = np.arange(len(scan.plus))
+        self.makes[rows, scan.plus], self.makes[rows, scan.minus] = 1.0, -1.0
+        self.inverse = np.linalg.pinv(self.makes)
+        self.unit = readout.noise / readout.volts_per_count
+        self.rest = self._rest()
+        self.electrode = scan.sample_electrode
+        self.n = prepared.skin.n_electrodes
+        self.hum = (1 + 0.5 * self.random.standard_normal(self.n))[self.electrode]
+        self.mains = 2 * np.pi * (np.arange(scan.n_samples) / scan.n_samples * BUSY * PERIOD * 50.0)
+        size = self.makes @ (self.hum * np.exp(1j * self.mains))
+        self.hum *= noise.hum * self.unit / np.sqrt(np.mean(np.abs(size) ** 2) / 2)
+        self.phase = self.random.uniform(0, 2 * np.pi)
+        self.offset = np.zeros(scan.n_samples)
+        self.volts: Floats = np.zeros(len(scan.plus))
+
+    def _rest(self) -> Floats:
+        """(n_samples,) counts without noise."""
+        prepared = self.prepared
+        scan, settings = prepared.scan, prepared.skin.readout
+        potentials = prepared.model.solve(prepared.skin.conductivity).electrode_potentials
+        ground = potentials[scan.sample_drive, scan.drives[scan.sample_drive, 1]]
+        volts = settings.gain * (potentials[scan.sample_drive, scan.sample_electrode] - ground)
+        full = settings.oversampling * (2**settings.adc_bits - 1)
+        return np.asarray((volts + settings.offset) / settings.reference_voltage * full)
+
+    def loud(self, number: int) -> Floats:
+        """(n_samples,) times by which each sample wavers more."""
+        times, since = np.ones(len(self.rest)), number // self.noise.every
+        if self.noise.loud != 1.0 and since:
+            times[self.electrode == (3 * since) % self.n] = self.noise.loud
+        return times
+
+    def covariance(self, number: int) -> Floats:
+        """(n_meas, n_meas) V² of the noise of a frame, but for drift."""
+        noise, readout = self.noise, self.prepared.readout
+        sd = noise.samples * self.loud(number) / np.sqrt(2)
+        both = (self.makes * sd**2) @ self.makes.T + noise.rows**2 * np.eye(len(self.makes))
+        wave = self.makes @ (self.hum * np.exp(1j * self.mains)) / self.unit
+        both += (np.outer(wave.real, wave.real) + np.outer(wave.imag, wave.imag)) / 2
+        return np.asarray(both * readout.noise**2)
+
+    def counts(self, number: int) -> Floats:
+        """(n_samples,) of frame ``number``, before they are rounded."""
+        noise, random, time = self.noise, self.random, PERIOD * number
+        sd = noise.samples * self.loud(number) * self.unit / np.sqrt(2)
+        counts = self.rest * (1 + noise.drift * np.sin(2 * np.pi * time / 300.0))
+        counts = counts + sd * random.standard_normal(len(sd))
+        if noise.rows:
+            counts += self.inverse @ (noise.rows * self.unit * random.standard_normal(self.n_meas))
+        if noise.hum:
+            turn = self.phase + 2 * np.pi * noise.advance * number
+            counts += self.hum * np.sin(self.mains + turn)
+        if noise.walk:
+            step = noise.walk * self.unit / np.sqrt(2 * 30.0 / PERIOD)
+            self.offset += step * random.standard_normal(len(self.offset))
+            counts += self.offset
+        return counts + self.inverse @ (self.volts / self.prepared.readout.volts_per_count)
+
+    @property
+    def n_meas(self) -> int:
+        """Rows."""
+        return len(self.makes)
+
+    def frames(self, count: int, first: int = 0) -> Iterator[Frame]:
+        """Frames as the pipeline takes them."""
+        settings = self.prepared.skin.readout
+        most = settings.oversampling * (2**settings.adc_bits - 1)
+        for number in range(first, first + count):
+            samples = np.clip(np.round(self.counts(number)), 0, most).astype(np.uint16)
+            time = PERIOD * number
+            yield Frame(number, round(time * settings.tick_rate), time, 1, 0, 0, samples)
+
 
 SKINS = ("textile-disc-8", "textile-disc-16")
 SEED = 31
@@ -29,11 +143,21 @@ CASES = {
 }
 
 
-def run(data: Path | None) -> tuple[Report, ...]:
-    """No recordings are needed."""
-    del data
-    prepared = {name: fitted(name) for name in SKINS}
-    return _false(prepared), _missed(prepared)
+def run() -> Iterator[Report]:
+    prepared = [fitted(name) for name in SKINS]
+    yield table(
+        f"an untouched skin, {FRAMES} frames",
+        (row for skin in prepared for row in _false(skin)),
+        f"live pipeline, 20 frames/s, reference of {NEEDED} frames, seed {SEED}; noise in "
+        "parts of the read-out's; hum of 50 Hz beats with the scan; the loud electrode is so "
+        "in the second half",
+    )
+    yield table(
+        "content that a faint touch needs, in parts of what it needed if the noise were known",
+        (row for skin in prepared for row in _missed(skin)),
+        f"all candidates of the sheet, reference of {NEEDED} frames, seed {SEED}; the ideal: "
+        "the true covariance, and the noise of the reference",
+    )
 
 
 def fitted(name: str) -> Prepared:
@@ -55,22 +179,12 @@ def false_touches(prepared: Prepared, noise: Noise, seed: int, frames: int) -> t
     return len(numbers), touched, said
 
 
-def _false(prepared: dict[str, Prepared]) -> Report:
-    rows = []
-    for name, skin in prepared.items():
-        for case, noise in CASES.items():
-            progress(f"{name}, {case}")
-            rows.append((name, case, *false_touches(skin, noise, SEED, FRAMES)))
-    return Report(
-        f"an untouched skin, {FRAMES} frames",
-        ("skin", "noise", "false touches", "frames with one", "frames with a problem said"),
-        tuple(rows),
-        (
-            f"live pipeline, 20 frames/s, reference of {NEEDED} frames, seed {SEED}; noise in "
-            "parts of the read-out's; hum of 50 Hz beats with the scan; the loud electrode is so "
-            "in the second half",
-        ),
-    )
+def _false(prepared: Prepared) -> Iterator[dict[str, Any]]:
+    columns = ("false touches", "frames with one", "frames with a problem said")
+    for case, noise in CASES.items():
+        progress(f"{prepared.skin.name}, {case}")
+        counts = zip(columns, false_touches(prepared, noise, SEED, FRAMES), strict=True)
+        yield {"skin": prepared.skin.name, "noise": case, **dict(counts)}
 
 
 def least_found(prepared: Prepared, noise: Noise, seed: int, frames: int) -> Floats:
@@ -91,25 +205,14 @@ def least_found(prepared: Prepared, noise: Noise, seed: int, frames: int) -> Flo
     return np.asarray(ideal / real)
 
 
-def _missed(prepared: dict[str, Prepared]) -> Report:
-    rows = []
-    for name, skin in prepared.items():
-        for case, noise in CASES.items():
-            if noise.loud != 1.0 or noise.walk:
-                continue
-            progress(f"{name}, {case}, faint touches")
-            needed = [least_found(skin, noise, SEED, frames) for frames in (0, AFTER)]
-            figures = [round(float(f(n)), 3) for n in needed for f in (np.median, np.max)]
-            rows.append((name, case, *figures))
-    return Report(
-        "content that a faint touch needs, in parts of what it needed if the noise were known",
-        (
-            *("skin", "noise", "after the reference, median", "worst place"),
-            *(f"after {AFTER} frames more, median", "worst place "),
-        ),
-        tuple(rows),
-        (
-            f"all candidates of the sheet, reference of {NEEDED} frames, seed {SEED}; the ideal: "
-            "the true covariance, and the noise of the reference",
-        ),
-    )
+def _missed(prepared: Prepared) -> Iterator[dict[str, Any]]:
+    for case, noise in CASES.items():
+        if noise.loud != 1.0 or noise.walk:
+            continue
+        progress(f"{prepared.skin.name}, {case}, faint touches")
+        row = {"skin": prepared.skin.name, "noise": case}
+        for name, frames in (("after the reference", 0), (f"after {AFTER} frames more", AFTER)):
+            needed = least_found(prepared, noise, SEED, frames)
+            row |= {f"{name}, median": round(float(np.median(needed)), 3)}
+            row |= {f"{name}, worst place": round(float(np.max(needed)), 3)}
+        yield row

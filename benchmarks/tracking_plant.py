@@ -3,18 +3,174 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from pathlib import Path
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache
+from typing import Any
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from moving_plant import RAMP, Sheet, Shown, Slide
-from plant import Finger
-from report import Report, progress
-from tomoskin.core import Touch
-from tracking_scenes import moving, past, quick, together
+from bench_rig import gap, scan_time, stage
+from report import Report, percent, progress, table
+from tomoskin.model.mesh import Mesh
+from tomoskin.pipeline import FrameResult, Pipeline
+from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
+from touch_lab import Finger, Plant, plant_mesh
+
+UNEVEN = 0.1
+RAMP = 0.05
+"""Seconds in which a finger comes down, and in which it is lifted."""
+
+SETTLED = 260
+"""Idle frames before a scene: the reference, and those in which the sheet is learnt from it."""
+
+SPEED, APART, INSIDE = 0.06, 0.045, 0.075
+RADII, FALLS = (0.012, 0.020), (0.15, 0.35)
+STRAYS = 0.015
+"""Two that meet pass each other, or stop, at up to so many metres: closer than is told apart."""
+
+
+@dataclass(frozen=True)
+class Slide:
+    """A finger from ``start`` to ``end`` s along ``path``, rows of s, x and y m."""
+
+    finger: Finger
+    start: float
+    end: float
+    path: tuple[tuple[float, float, float], ...]
+
+    def at(self, time: float) -> Finger | None:
+        """It at a moment; None where it does not touch."""
+        depth = min((time - self.start) / RAMP, (self.end - time) / RAMP, 1.0)
+        if depth <= 0:
+            return None
+        times, x, y = np.array(self.path).T
+        here = {"x": float(np.interp(time, times, x)), "y": float(np.interp(time, times, y))}
+        return replace(self.finger, **here, fall=self.finger.fall * depth)
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What the pipeline makes of a frame, and its number, begin and end in s of the scene."""
+
+    result: FrameResult
+    number: int
+    begin: float
+    end: float
+
+
+@cache
+def _mesh(electrodes: int) -> Mesh:
+    return plant_mesh(stage(electrodes).skin)
+
+
+class Sheet:
+    """A plant with a pipeline that has its reference: one scene after the other."""
+
+    def __init__(self, electrodes: int, seed: int) -> None:
+        prepared = stage(electrodes)
+        self.plant = Plant(prepared.skin, _mesh(electrodes), UNEVEN, seed)
+        self.pipeline = Pipeline(prepared)
+        self._interval, self._number = scan_time(prepared), 0
+        for _ in range(REFERENCE_FRAMES + SETTLED):
+            self._push((), 0.0)
+
+    def scene(self, slides: Sequence[Slide], seconds: float) -> Iterator[Shown]:
+        """Frames of a scene, and of half a second without anything after it."""
+        for number in range(round((seconds + 0.5) / self._interval)):
+            begin = number * self._interval
+            result = self._push(slides, begin)
+            assert result is not None
+            yield Shown(result, number, begin, begin + self._interval)
+
+    def _push(self, slides: Sequence[Slide], begin: float) -> FrameResult | None:
+        moments = (begin, begin + self._interval / 2, begin + self._interval)
+        pressed = [[f for slide in slides if (f := slide.at(time))] for time in moments]
+        frame = self.plant.scan_of(*pressed)
+        now = self._number * self._interval
+        ticks = round(now * self.pipeline.tick_rate)
+        self._number += 1
+        return self.pipeline.push(replace(frame, sequence=self._number, ticks=ticks, host_time=now))
+
+
+def moving(random: np.random.Generator, count: int) -> tuple[list[Slide], float]:
+    """Fingers that come at different times, slide at 60 mm/s, never near each other, and go."""
+    while True:
+        slides = [_course(random) for _ in range(count)]
+        times = np.linspace(0, 3.4, 69)
+        ways = [
+            np.column_stack([np.interp(times, *np.array(s.path).T[[0, k]]) for k in (1, 2)])
+            for s in slides
+        ]
+        gaps = [
+            np.linalg.norm(ways[i] - ways[j], axis=1).min() for i in range(count) for j in range(i)
+        ]
+        if min(gaps, default=APART) >= APART:
+            return slides, 3.4
+
+
+def _course(random: np.random.Generator) -> Slide:
+    """From one place to another, over 0.5 to 1.5 s, then it stands."""
+    start, end = random.uniform(0.2, 1.0), random.uniform(2.4, 3.2)
+    while True:
+        ends = random.uniform(-INSIDE, INSIDE, (2, 2))
+        far = float(np.linalg.norm(ends[1] - ends[0]))
+        if (np.linalg.norm(ends, axis=1) < INSIDE).all() and 0.03 < far < 0.09:
+            break
+    go = start + 0.3
+    path = ((0.0, *ends[0]), (go, *ends[0]), (go + far / SPEED, *ends[1]))
+    return Slide(_finger(random), start, end, path)
+
+
+def quick(random: np.random.Generator) -> tuple[list[Slide], float]:
+    """Six taps of 0.2 s, 0.1 s after each other, each 60 mm from the last at least."""
+    slides: list[Slide] = []
+    place = np.array([np.inf, np.inf])
+    for number in range(6):
+        while True:
+            fresh = random.uniform(-INSIDE, INSIDE, 2)
+            if np.linalg.norm(fresh) < INSIDE and not np.linalg.norm(fresh - place) < 0.06:
+                break
+        place, start = fresh, 0.2 + 0.3 * number
+        slides.append(Slide(_finger(random), start, start + 0.2, ((0.0, *place),)))
+    return slides, 2.2
+
+
+def past(random: np.random.Generator) -> tuple[list[Slide], float]:
+    """Two fingers from 90 mm apart past each other, as far on; with one speed."""
+    middle, along, across = _line(random)
+    stray, speed = random.uniform(0, STRAYS), random.uniform(0.04, 0.10)
+    slides, going = [], 0.09 / speed
+    for side in (1, -1):
+        a, b = (middle + side * (s * 0.045 * along + stray / 2 * across) for s in (1, -1))
+        path = ((0.0, *a), (0.8, *a), (0.8 + going, *b))
+        slides.append(Slide(_finger(random), 0.2, 1.4 + going, path))
+    return slides, 1.4 + going
+
+
+def together(random: np.random.Generator) -> tuple[list[Slide], float]:
+    """Two fingers from 90 mm apart to each other, a rest of up to 0.6 s, and back."""
+    middle, along, _ = _line(random)
+    near, speed = random.uniform(0.004, STRAYS), random.uniform(0.04, 0.10)
+    rest, going = random.uniform(0.1, 0.6), (0.045 - 0.5 * near) / speed
+    slides, back = [], 0.8 + going + rest
+    for side in (1, -1):
+        a, b = middle + side * 0.045 * along, middle + side * near / 2 * along
+        path = ((0.0, *a), (0.8, *a), (0.8 + going, *b), (back, *b), (back + going, *a))
+        slides.append(Slide(_finger(random), 0.2, back + going + 0.6, path))
+    return slides, back + going + 0.6
+
+
+def _line(random: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    angle = random.uniform(0, 2 * np.pi)
+    along = np.array([np.cos(angle), np.sin(angle)])
+    return random.uniform(-0.02, 0.02, 2), along, np.array([-along[1], along[0]])
+
+
+def _finger(random: np.random.Generator) -> Finger:
+    return Finger(0.0, 0.0, random.uniform(*RADII), random.uniform(*FALLS))
+
 
 SEEDS = (11, 12, 13)
 """What was chosen was chosen on seeds 1 to 3."""
@@ -22,7 +178,7 @@ SEEDS = (11, 12, 13)
 SCENES = 5
 """Of each kind on each sheet."""
 
-OVERSAMPLING = {8: 16, 16: 8}
+ELECTRODES = (8, 16)
 """Of the built-in skins: 18 and 10 frames a second."""
 
 KINDS: dict[str, Callable[[np.random.Generator], tuple[list[Slide], float]]] = {
@@ -71,58 +227,43 @@ class Scores:
             self.who[kind][identity(slides, shown)] += 1
 
 
-def run(data: Path | None) -> tuple[Report, ...]:
-    """No recordings are needed: the plant is the truth."""
-    del data
-    return (table(SEEDS, SCENES),)
-
-
-def table(seeds: Sequence[int], scenes: int) -> Report:
-    """By electrodes."""
-    rows = []
-    for electrodes in OVERSAMPLING:
-        scores = Scores()
-        for seed in seeds:
-            _measure(scores, electrodes, seed, scenes)
-        onsets, releases = np.array(scores.onsets), np.array(scores.releases)
-        rows.append(
-            (
-                electrodes,
-                scores.frames,
-                *(round(1000 * n / scores.frames, 1) for n in (scores.ghosts, scores.surplus)),
-                *(_percent(v) for v in (onsets <= 1, onsets <= 2, onsets < LATE, releases <= 3)),
-                f"{scores.ids} for {scores.fingers}",
-                *(", ".join(f"{n} {w}" for w, n in scores.who[k].most_common()) for k in MEETINGS),
-            )
-        )
-    return Report(
+def run() -> Iterator[Report]:
+    yield table(
         "fingers that move, on uneven sheets",
-        (
-            *("electrodes", "frames", "with a ghost, of 1,000", "with one too many"),
-            *(
-                "reported in their first frame",
-                "in two",
-                "at all",
-                "gone in three",
-                "identities",
-                "past each other",
-            ),
-            "together and apart",
-        ),
-        tuple(rows),
-        (
-            f"seeds {tuple(seeds)}, {scenes} scenes of each kind; radii 12 to 20 mm, conductivity "
-            f"down by 15 to 35 %, up and down in {1e3 * RAMP:.0f} ms, sheet uneven by 10 %",
-            f"ghost: a touch farther than {1e3 * NEAR:.1f} mm from every finger of its own that "
-            "presses or has been lifted two frames ago, and not said to be several",
-            "first frame: from that in whose middle half of the finger is down; gone: from the "
-            "first frame without it; meetings: at the end, both ids as at first",
-        ),
+        (_row(electrodes, SEEDS, SCENES) for electrodes in ELECTRODES),
+        f"seeds {SEEDS}, {SCENES} scenes of each kind; radii 12 to 20 mm, conductivity "
+        f"down by 15 to 35 %, up and down in {1e3 * RAMP:.0f} ms, sheet uneven by 10 %",
+        f"ghost: a touch farther than {1e3 * NEAR:.1f} mm from every finger of its own that "
+        "presses or has been lifted two frames ago, and not said to be several",
+        "first frame: in whose middle half of the finger is down; meetings: ids at the end",
     )
 
 
+def _row(electrodes: int, seeds: Sequence[int], scenes: int) -> dict[str, Any]:
+    scores = Scores()
+    for seed in seeds:
+        _measure(scores, electrodes, seed, scenes)
+    onsets, releases = np.array(scores.onsets), np.array(scores.releases)
+    past, parted = (
+        ", ".join(f"{n} {w}" for w, n in scores.who[kind].most_common()) for kind in MEETINGS
+    )
+    return {
+        "electrodes": electrodes,
+        "frames": scores.frames,
+        "with a ghost, of 1,000": round(1000 * scores.ghosts / scores.frames, 1),
+        "with one too many": round(1000 * scores.surplus / scores.frames, 1),
+        "reported in their first frame": percent(onsets <= 1),
+        "in two": percent(onsets <= 2),
+        "at all": percent(onsets < LATE),
+        "gone in three": percent(releases <= 3),
+        "identities": f"{scores.ids} for {scores.fingers}",
+        "past each other": past,
+        "together and apart": parted,
+    }
+
+
 def _measure(scores: Scores, electrodes: int, seed: int, scenes: int) -> None:
-    sheet = Sheet(electrodes, seed, OVERSAMPLING[electrodes])
+    sheet = Sheet(electrodes, seed)
     for index, (kind, drawn) in enumerate(KINDS.items()):
         for number in range(scenes):
             progress(f"{electrodes} electrodes, seed {seed}, {kind} {number}")
@@ -136,7 +277,7 @@ def has_ghost(frame: Shown, slides: Sequence[Slide]) -> bool:
     alone = {k for k, t in enumerate(touches) if not t.merged and not t.detection.close}
     if not touches or not here:
         return bool(alone)
-    away = np.array([[_away(t, _held(s, frame)) for t in touches] for s in here])
+    away = np.array([[gap(t, _held(s, frame)) for t in touches] for s in here])
     pairs = zip(*linear_sum_assignment(away), strict=True)
     return bool(alone - {int(k) for finger, k in pairs if away[finger, k] < NEAR})
 
@@ -175,7 +316,7 @@ def identity(slides: Sequence[Slide], shown: Sequence[Shown]) -> str:
         if len(down) < 2 or len(touches) != 2 or any(t.merged for t in touches):
             continue
         fingers = [_held(s, frame) for s in down]
-        away = np.array([[_away(t, f) for f in fingers] for t in touches])
+        away = np.array([[gap(t, f) for f in fingers] for t in touches])
         swapped = int(away[0, 0] + away[1, 1] > away[0, 1] + away[1, 0])
         if max(away[0, swapped], away[1, 1 - swapped]) > ALMOST:
             continue
@@ -192,7 +333,7 @@ def identity(slides: Sequence[Slide], shown: Sequence[Shown]) -> str:
 
 def _is_seen(slide: Slide, frame: Shown) -> bool:
     finger = _held(slide, frame)
-    return any(_away(touch, finger) < ALMOST for touch in frame.result.touches)
+    return any(gap(touch, finger) < ALMOST for touch in frame.result.touches)
 
 
 def _held(slide: Slide, frame: Shown) -> Finger:
@@ -201,11 +342,3 @@ def _held(slide: Slide, frame: Shown) -> Finger:
     finger = slide.at(min(max(middle, slide.start + 1e-3), slide.end - 1e-3))
     assert finger is not None
     return finger
-
-
-def _away(touch: Touch, finger: Finger) -> float:
-    return float(np.hypot(touch.detection.x - finger.x, touch.detection.y - finger.y))
-
-
-def _percent(which: np.ndarray) -> str:
-    return f"{100 * which.mean():.0f} %"

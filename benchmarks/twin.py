@@ -3,31 +3,20 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 
-from report import Report
-from tomoskin.board.source import ScanSettings
-from tomoskin.board.wire import Drive
+from bench_rig import Rig
+from report import Report, progress, spent, table
 from tomoskin.model.forward import State
-from tomoskin.model.pattern import Scan
 from tomoskin.model.skin import Skin
+from tomoskin.pipeline import prepare
 from tomoskin.run import in_processes, in_this_process, make_set
-from tomoskin.twin import (
-    COMMON_PRESSES,
-    Press,
-    SampleTable,
-    ScanClock,
-    SetPlan,
-    TwinElectronics,
-    TwinSettings,
-    TwinSkin,
-    make_electronics,
-    sample_table,
-)
+from tomoskin.twin import COMMON_PRESSES, Press, SetPlan, SteppedSkin, TwinSettings, TwinSkin
 from tomoskin.twin.dent import solved_dent
 
 CASES = (
@@ -37,70 +26,53 @@ CASES = (
     ("textile-disc-8", "textile", 1056),
     ("tank-16", "tank", 3000),
 )
-COLUMNS = (
-    *("skin", "preset", "triangles", "dent ms", "material ms", "solve ms"),
-    *("whole frame ms", "frames /s", "best tenth", "× real time", "off, of noise"),
-)
-FRAMES, ROUND = 300, 100
-PROMISED = 5000
-CHECKED = 20
-SEED = 1
+FRAMES, ROUND, CHECKED, SEED = 300, 100, 20, 1
 SET, SET_SKIN, SET_ROUNDS, PROCESSES = 5000, "textile-disc-8", 2, (1, 2)
+STEPS, STEPPED_SEED, STEPS_PROMISED = 500, 11, 1000
 
 
-def run(data: Path | None) -> tuple[Report, ...]:
-    """Time every case; ``data`` is not needed."""
-    del data
-    rows = tuple(row(*case) for case in CASES)
-    report = Report(
+def run() -> Iterator[Report]:
+    yield table(
         "twin: presses → counts",
-        COLUMNS,
-        rows,
-        (
-            f"{FRAMES} frames, each with three flat round presses of 12 mm and 3 N that have moved "
-            f"on a circle since the frame before; seed {SEED}",
-            "median of the frames' processor time, from presses that are there; every frame is "
-            "solved again",
-            f"off: largest difference to a model's whole solve over {CHECKED} frames, at the "
-            "amplifiers, as a part of the read-out noise of a sample; promised: a tenth",
-            "best tenth: frames/s of the 10th percentile, what a quiet machine comes close to",
-            f"promised: {PROMISED} frames/s for 16 electrodes at 3k triangles",
-            "ideal: a sheet that conducts equally in all directions; textile: a tensor per cell, "
-            "creep, play, temperature, all vices of the board",
-        ),
+        (row(*case) for case in CASES),
+        f"{FRAMES} frames, each with three flat round presses of 12 mm and 3 N that have moved "
+        f"on a circle since the frame before; seed {SEED}",
+        f"off: largest difference to a model's whole solve over {CHECKED} frames, at the "
+        "amplifiers, as a part of the read-out noise of a sample; promised: a tenth",
     )
-    return report, _labelled()
+    yield _labelled()
+
+
+def run_steps() -> Iterator[Report]:
+    """Steps a second of a twin that is pressed step by step, with and without its touches."""
+    yield table("steps a second of processor time, one core", _stepped())
 
 
 def _labelled() -> Report:
     """Labelled frames by one process and by two, starts and writing included."""
     took: dict[int, list[float]] = {n: [] for n in PROCESSES}
-    for round_ in range(SET_ROUNDS):
+    for number in range(SET_ROUNDS):
         for n in PROCESSES:
-            plan = SetPlan(Skin.load(SET_SKIN).to_toml(), COMMON_PRESSES, "textile", round_, SET)
+            plan = SetPlan(Skin.load(SET_SKIN).to_toml(), COMMON_PRESSES, "textile", number, SET)
             with TemporaryDirectory() as folder:
                 took[n].append(_set_seconds(plan, Path(folder) / "set", n))
-    alone = min(took[1])
-    return Report(
+    rows = (
+        {
+            "skin": SET_SKIN,
+            "frames": SET,
+            "processes": n,
+            "s, least": round(min(times), 1),
+            "s, most": round(max(times), 1),
+            "frames /s": round(SET / min(times)),
+            "× one process": round(min(took[1]) / min(times), 2),
+        }
+        for n, times in took.items()
+    )
+    return table(
         "twin: labelled frames, over processes",
-        ("skin", "frames", "processes", "s, least", "s, most", "frames /s", "× one process"),
-        tuple(
-            (
-                SET_SKIN,
-                SET,
-                n,
-                round(min(times), 1),
-                round(max(times), 1),
-                round(SET / min(times)),
-                round(alone / min(times), 2),
-            )
-            for n, times in took.items()
-        ),
-        (
-            f"one round press each, preset textile; {SET_ROUNDS} rounds in turn, seeds from 0",
-            "from the plan to files; in two processes, with their start",
-            "each process first solves the dents of 25 faces, about 2.5 s of processor time",
-        ),
+        rows,
+        f"one round press each, preset textile; {SET_ROUNDS} rounds in turn, seeds from 0",
+        "each process first solves the dents of 25 faces, about 2.5 s of processor time",
     )
 
 
@@ -112,32 +84,41 @@ def _set_seconds(plan: SetPlan, out: Path, processes: int) -> float:
     return time.perf_counter() - start
 
 
-def row(name: str, preset: str, triangles: int) -> tuple[object, ...]:
-    """Values under ``COLUMNS``."""
+def row(name: str, preset: str, triangles: int) -> dict[str, Any]:
+    """One case."""
     settings = TwinSettings.preset(preset, SEED)
     cells = round(triangles / settings.mesh_ratio)
     skin = Skin.load(name).altered({"mesh": {"cells": cells}})
-    board, table = make_electronics(skin, settings), table_of(skin)
-    sheet = board.sheet
+    rig = Rig(skin, preset, SEED)
+    sheet = rig.board.sheet
+
+    def frame(number: int) -> Callable[[], object]:
+        presses, moment = _presses(number, skin), number * rig.interval
+
+        def sampled() -> object:
+            sheet.set_presses(presses)
+            return rig.board.sample(rig.table, moment)
+
+        return sampled
+
     for number in range(10):
-        _frame(board, table, number, skin)()
-    spent = [
-        (_spent(_frame(board, table, k, skin)), *_stages(sheet, _presses(k, skin)))
-        for k in range(10, FRAMES)
-    ]
-    whole, dent, sigma, solve = 1e3 * np.median(spent, axis=0)
-    quiet = 1e3 * float(np.percentile([times[0] for times in spent], 10))
-    rate = 1e3 / whole
-    return (
-        name,
-        preset,
-        len(sheet.model.mesh.cells),
-        *(round(float(part), 3) for part in (dent, sigma, solve, whole)),
-        round(float(rate)),
-        round(1e3 / quiet),
-        round(float(rate * table.seconds), 1),
-        float(f"{_off(sheet, skin, settings):.1g}"),
-    )
+        frame(number)()
+    taken = [(spent(frame(k)), *_stages(sheet, _presses(k, skin))) for k in range(10, FRAMES)]
+    whole, dent, sigma, solve = 1e3 * np.median(taken, axis=0)
+    quiet = 1e3 * float(np.percentile([times[0] for times in taken], 10))
+    return {
+        "skin": name,
+        "preset": preset,
+        "triangles": len(sheet.model.mesh.cells),
+        "dent ms": round(float(dent), 3),
+        "material ms": round(float(sigma), 3),
+        "solve ms": round(float(solve), 3),
+        "whole frame ms": round(float(whole), 3),
+        "frames /s": round(float(1e3 / whole)),
+        "best tenth": round(1e3 / quiet),
+        "× real time": round(float(1e3 / whole * rig.interval), 1),
+        "off, of noise": float(f"{_off(sheet, skin, settings):.1g}"),
+    }
 
 
 def _off(sheet: TwinSkin, skin: Skin, settings: TwinSettings) -> float:
@@ -145,38 +126,19 @@ def _off(sheet: TwinSkin, skin: Skin, settings: TwinSettings) -> float:
     readout, wrong = skin.readout, 0.0
     for number in range(CHECKED):
         sheet.set_presses(_presses(number, skin))
-        found, sigma = sheet.resistance(), sheet.conductivity()
+        ours, sigma = sheet.resistance(), sheet.conductivity()
         exact = State(sheet.model, sigma).transfer_resistance
-        wrong = max(wrong, float(np.abs(found - exact).max()))
+        wrong = max(wrong, float(np.abs(ours - exact).max()))
     code = readout.reference_voltage / readout.gain / (1 << readout.adc_bits)
     return skin.current * wrong / (settings.electronics.noise * code / readout.oversampling**0.5)
-
-
-def _frame(
-    board: TwinElectronics, table: SampleTable, number: int, skin: Skin
-) -> Callable[[], object]:
-    """What makes a frame, of presses that are there already."""
-    presses, time_ = _presses(number, skin), number * table.seconds
-
-    def frame() -> object:
-        board.sheet.set_presses(presses)
-        return board.sample(table, time_)
-
-    return frame
 
 
 def _stages(sheet: TwinSkin, presses: tuple[Press, ...]) -> tuple[float, float, float]:
     """s of dent, material and solve: each is asked for by itself and kept for the next."""
     sheet.set_presses(())
     sheet.resistance()
-    dent = _spent(lambda: sheet.set_presses(presses))
-    return dent, _spent(sheet.conductivity), _spent(sheet.resistance)
-
-
-def _spent(work: Callable[[], object]) -> float:
-    start = time.process_time()
-    work()
-    return time.process_time() - start
+    dent = spent(lambda: sheet.set_presses(presses))
+    return dent, spent(sheet.conductivity), spent(sheet.resistance)
 
 
 def _presses(number: int, skin: Skin) -> tuple[Press, ...]:
@@ -186,12 +148,33 @@ def _presses(number: int, skin: Skin) -> tuple[Press, ...]:
     return tuple(Press(x, y, 3.0, 0.012) for x, y in places.tolist())
 
 
-def table_of(skin: Skin) -> SampleTable:
-    """The samples of a skin's scan, and when they are taken."""
-    scan, asked = Scan.of(skin.pattern()), ScanSettings.of(skin)
-    drives = [
-        Drive(source, sink, mask)
-        for (source, sink), mask in zip(scan.drives.tolist(), scan.masks.tolist(), strict=True)
-    ]
-    clock = ScanClock(asked.dead_time, asked.settling, asked.conversion)
-    return sample_table(drives, asked.oversampling, clock)
+def _stepped() -> Iterator[dict[str, Any]]:
+    kinds: dict[str, Callable[[int], tuple[Press, ...]]] = {
+        "moving": lambda step: (Press(0.03 * float(np.cos(step / 50)), 0.01, 5.0, 0.012),),
+        "held": lambda _: (Press(0.03, 0.01, 5.0, 0.012),),
+        "none": lambda _: (),
+    }
+    for name in ("textile-disc-8", "textile-disc-16"):
+        prepared = prepare(Skin.load(name))
+        for preset in ("ideal", "textile"):
+            progress(f"{name}, {preset}")
+            settings = TwinSettings.preset(preset, STEPPED_SEED)
+            alone, both = (SteppedSkin(prepared, settings, with_touches=on) for on in (False, True))
+            for kind, press in kinds.items():
+                yield {
+                    "skin": name,
+                    "preset": preset,
+                    "press": kind,
+                    "voltages alone": round(_rate(alone, press)),
+                    "with touches": round(_rate(both, press)),
+                    "promised": STEPS_PROMISED,
+                }
+
+
+def _rate(skin: SteppedSkin, press: Callable[[int], tuple[Press, ...]]) -> float:
+    skin.reset()
+    skin.step(press(0))  # the dent of the face is solved once
+    begun = time.process_time()
+    for step in range(STEPS):
+        skin.step(press(step))
+    return STEPS / (time.process_time() - begun)

@@ -3,63 +3,90 @@
 from __future__ import annotations
 
 import os
+import resource
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
-import forward_peer
+import numpy as np
+import scipy.linalg
+from scipy.interpolate import RBFInterpolator
+
 import frame
+import page
 import session
 import twin
-import wire
-from forward_cases import clock
-from report import Report, cell, named, progress
-from tomoskin.model.skin import Skin
+from bench_rig import labelled_presses
+from forward_measure import ALPHA, PATTERN, disc, measure_touch, set_up
+from forward_others import INSTALLED, Peer, Script
+from report import Report, cell, clock, medians, progress
+from tomoskin import ForwardModel, Locator, Skin
+from tomoskin.core import FloatArray
 from tomoskin.pipeline import prepare
-from whole_forward import forward_lines
-from whole_line import Line
-from whole_page import page_lines
-from whole_start import start_lines
-from whole_touch import touch_lines
+from tomoskin.server import STATIC
 
-CELLS = 3000
+CELLS, SECONDS = 3000, 8.0
+REPEATS = 5
+"""Starts of each program."""
+
 RECORDED, SOUGHT = 10, 600
 """Seconds recorded at their own pace, and of the session that is sought in."""
 
+SKIN, LEARNT, TESTED = "textile-disc-16", 200, 200
+SMOOTHING = 1.0
+"""Of the radial basis functions, on rows of unit deviation; 0.1 and 10 are no better."""
 
-def run(data: Path | None) -> tuple[Report, ...]:
-    """Measure every part; ``data`` is not needed."""
-    del data
-    parts: tuple[tuple[str, Callable[[], Iterator[Line]]], ...] = (
-        ("start", start_lines),
-        ("forward", forward_lines),
-        ("frame", _frame_lines),
-        ("touch", touch_lines),
-        ("twin", _twin_lines),
-        ("wire", _wire_lines),
-        ("session", _session_lines),
-        ("page", _on_all_cores),
-    )
+MODEL = {
+    "forward": "voltages of a new conductivity",
+    "jacobian": "Jacobian with its solves",
+    "set-up": "mesh to one-step operator (NOSER)",
+    "picture": "picture of a frame's voltages",
+}
+
+
+@dataclass(frozen=True)
+class Line:
+    """What was measured here, what was promised of it, and what others take for the same."""
+
+    what: str
+    unit: str
+    value: float | str | None
+    promised: str = ""
+    scipy: float | None = None
+    peer: float | None = None
+
+
+def run() -> Iterator[Report]:
+    parts: dict[str, Callable[[], Iterator[Line]]] = {
+        "start": _start,
+        "forward": _forward,
+        "frame": _frame,
+        "touch": _touch,
+        "twin": _twin,
+        "wire": _wire,
+        "session": _session,
+        "page": _page,
+    }
     rows = []
-    for number, (part, lines) in enumerate(parts, start=1):
+    for number, (part, lines) in enumerate(parts.items(), start=1):
         progress(f"{part} ({number} of {len(parts)})")
         rows += [_row(part, line) for line in lines()]
-    return (
-        Report(
-            "all parts in one run",
-            ("part", "what", "measured", "promised", "plain scipy", "×", "pyEIT", "×"),
-            tuple(rows),
-            (
-                f"16 electrodes, adjacent, {CELLS:,} triangles unless said otherwise; medians of "
-                f"{clock()[1]}; the page on all cores, by the browser's clock",
-                "× is how many times longer, or further off, the other is, in this run",
-                "plain scipy: benchmarks/forward_script.py; a dense solve for the operator; "
-                "RBFInterpolator for places; its import alone at the start",
-                f"{forward_peer.name()}: point electrodes, its own interface",
-                "frame: two moving presses on the twin; touch: presses on the twin, preset textile",
-            ),
-        ),
+    columns = ("part", "what", "measured", "promised", "plain scipy", "×", "pyEIT", "×")
+    notes = (
+        f"16 electrodes, adjacent, {CELLS:,} triangles unless said otherwise; medians of "
+        f"{clock()[1]}; the page on all cores, by the browser's clock",
+        "× is how many times longer, or further off, the other is, in this run",
+        "plain scipy: benchmarks/forward_others.py; a dense solve for the operator; "
+        "RBFInterpolator for places; its import alone at the start",
     )
+    yield Report("all parts in one run", columns, tuple(rows), notes)
 
 
 def _row(part: str, line: Line) -> tuple[object, ...]:
@@ -72,48 +99,163 @@ def _row(part: str, line: Line) -> tuple[object, ...]:
     return part, f"{line.what}, {line.unit}", here, line.promised, *others
 
 
-def _frame_lines() -> Iterator[Line]:
+def _ms(seconds: float | None) -> float | None:
+    return None if seconds is None else 1e3 * seconds
+
+
+def _start() -> Iterator[Line]:
+    """Until something can be done at all: processor time of programs that only begin."""
+    yield Line("tomoskin --help", "ms", _begun("from tomoskin.cli import main; main(['--help'])"),
+               "< 150")  # fmt: skip
+    yield Line("import tomoskin", "ms", _begun("import tomoskin"), "< 300")
+    names = "from tomoskin import ForwardModel, Locator, OneStep, Skin"
+    plain = _begun("import numpy, scipy.linalg, scipy.sparse.linalg")
+    peer = _begun("import pyeit.eit.jac, pyeit.mesh") if INSTALLED else None
+    yield Line(names, "ms", _begun(names), scipy=plain, peer=peer)
+
+
+def _begun(code: str) -> float:
+    """Median processor time of a program, the interpreter's own included, ms."""
+    return 1e3 * statistics.median(_once(code) for _ in range(REPEATS))
+
+
+def _once(code: str) -> float:
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def _forward() -> Iterator[Line]:
+    """The model and its operator: one mesh, every call of the three by turns."""
+    case = disc("3k", CELLS)
+    model = ForwardModel(case.mesh, PATTERN, case.contact_impedance)
+    sigma = 1.0 + 0.1 * np.random.default_rng(1).random(len(case.mesh.cells))
+    script = Script(case.mesh, PATTERN, case.contact_impedance)
+    operator, plain = set_up(case), _plain_operator(script, sigma)
+    change = 1e-3 * model.solve(sigma).voltages
+    calls: dict[str, Callable[[], object]] = {
+        "forward": lambda: model.solve(sigma),
+        "scipy forward": lambda: script.voltages(sigma),
+        "jacobian": lambda: model.jacobian(sigma),
+        "scipy jacobian": lambda: script.jacobian(sigma),
+        "set-up": lambda: set_up(case),
+        "scipy set-up": lambda: _plain_operator(script, sigma),
+        "picture": lambda: operator(change),
+        "scipy picture": lambda: plain @ change,
+    }
+    if INSTALLED:
+        calls |= _peer_calls(Peer(case.mesh, PATTERN), sigma, change)
+    times = medians(calls, SECONDS)
+    for name, what in MODEL.items():
+        plain_ms, peer_ms = (_ms(times.get(f"{who} {name}")) for who in ("scipy", "peer"))
+        yield Line(what, "ms", _ms(times[name]), scipy=plain_ms, peer=peer_ms)
+    touch, what = measure_touch(case).times, "voltages of a touch of 150 cells (local update)"
+    plain_ms, peer_ms = _ms(touch["script forward"]), _ms(times.get("peer forward"))
+    yield Line(what, "ms", _ms(touch["update"]), "≤ 0.5", plain_ms, peer_ms)
+
+
+def _plain_operator(script: Script, sigma: FloatArray) -> FloatArray:
+    """(n_cells, n_meas), as it stands in textbooks: one unknown for each cell."""
+    jacobian = script.jacobian(sigma)
+    normal = jacobian.T @ jacobian
+    normal[np.diag_indices_from(normal)] += ALPHA**2 * np.sqrt(normal.diagonal())
+    solved: FloatArray = scipy.linalg.solve(normal, jacobian.T, assume_a="pos")
+    return solved
+
+
+def _peer_calls(
+    peer: Peer, sigma: FloatArray, change: FloatArray
+) -> dict[str, Callable[[], object]]:
+    peer.prepare()
+    operator = peer.set_up(ALPHA)
+    return {
+        "peer forward": lambda: peer.forward(sigma),
+        "peer jacobian": lambda: peer.jacobian(sigma),
+        "peer set-up": lambda: peer.set_up(ALPHA),
+        "peer picture": lambda: -np.dot(operator, change),
+    }
+
+
+def _frame() -> Iterator[Line]:
     for electrodes in (8, 16):
         skin = Skin.load(f"textile-disc-{electrodes}").altered({"mesh": {"cells": CELLS}})
-        found = named(frame.COLUMNS, frame.row(prepare(skin)))
+        row = frame.row(prepare(skin))
         what = f"bytes to touches, {electrodes} electrodes"
-        yield Line(f"{what}, p50", "ms", found["p50 ms"])
-        promised = "≤ 1" if electrodes == 16 else ""
-        yield Line(f"{what}, p99", "ms", found["p99 ms"], promised)
-    yield Line("allocated memory that stays", "B a frame", found["growth B/frame"])
+        yield Line(f"{what}, p50", "ms", row["p50 ms"])
+        yield Line(f"{what}, p99", "ms", row["p99 ms"], "≤ 1" if electrodes == 16 else "")
+    yield Line("allocated memory that stays", "B a frame", row["growth B/frame"])
 
 
-def _twin_lines() -> Iterator[Line]:
-    found = named(twin.COLUMNS, twin.row("textile-disc-16", "ideal", CELLS))
-    yield Line("exact frames, three moving presses", "1/s", found["frames /s"], "≥ 5,000")
+def _touch() -> Iterator[Line]:
+    """Places on the twin: fitted to the voltages, and learnt from labelled presses."""
+    skin = Skin.load(SKIN)
+    fitted = prepare(skin.altered({"touch": {"method": "fit"}}))
+    yield Line("two touches fitted to the voltages, p50", "ms a frame", frame.p50(fitted, 2))
+    dv, xy = labelled_presses(skin, 1, LEARNT + TESTED)
+    began = time.process_time()
+    locator = Locator.fit(dv[:LEARNT], xy[:LEARNT], skin=skin)
+    learning = time.process_time() - began
+    began = time.process_time()
+    places = np.concatenate([locator.predict(row[None])[0] for row in dv[LEARNT:]])
+    each = 1e3 * (time.process_time() - began) / TESTED
+    rows = (dv - dv[:LEARNT].mean(axis=0)) / dv[:LEARNT].std(axis=0)
+    began = time.process_time()
+    spline = RBFInterpolator(rows[:LEARNT], xy[:LEARNT], kernel="linear", smoothing=SMOOTHING)
+    plain_learning = time.process_time() - began
+    off, plain_off = (
+        1e3 * float(np.median(np.linalg.norm(p - xy[LEARNT:], axis=1)))
+        for p in (places, spline(rows[LEARNT:]))
+    )
+    yield Line(f"learning from {LEARNT} labelled presses", "s", learning, "< 2", plain_learning)
+    yield Line("place of a frame by it", "ms", each, "< 1")
+    yield Line(f"error of {TESTED} other places, median", "mm", off, scipy=plain_off)
 
 
-def _wire_lines() -> Iterator[Line]:
+def _twin() -> Iterator[Line]:
+    rate = twin.row("textile-disc-16", "ideal", CELLS)["frames /s"]
+    yield Line("exact frames, three moving presses", "1/s", rate, "≥ 5,000")
+
+
+def _wire() -> Iterator[Line]:
     for electrodes in (8, 16):
-        found = named(wire.COLUMNS, wire.row(electrodes, packed=False))
+        row = frame.wire_row(electrodes, packed=False)
         what = f"decoded, {electrodes} electrodes"
-        yield Line(what, "frames/s", found["decoded frames/s"])
-        yield Line(f"{what}, by what 1 Mbaud carries", "×", found["times"], "≥ 20")
+        yield Line(what, "frames/s", row["decoded frames/s"])
+        yield Line(f"{what}, by what 1 Mbaud carries", "×", row["times"], "≥ 20")
 
 
-def _session_lines() -> Iterator[Line]:
+def _session() -> Iterator[Line]:
     skin = Skin.load(session.SKIN)
     frames = session.frames_of(skin)
-    with TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder:
         paced, long = Path(folder) / "paced.mcap", Path(folder) / "long.mcap"
         row = session.recorded(paced, skin, frames, RECORDED, paced=True)
-        share = named(session.RECORDED, row)["% of a core"]
-        yield Line("recording 1,000 frames/s", "% of a core", share, "< 20")
+        yield Line("recording 1,000 frames/s", "% of a core", row["% of a core"], "< 20")
         row = session.opened(session.of_length(long, skin, frames, SOUGHT), SOUGHT)
-        seek = named(session.OPENED, row)["open and seek ms"]
+        seek = row["open and seek ms"]
         yield Line(f"open and seek in {SOUGHT // 60} minutes", "ms", seek, "< 200")
 
 
-def _on_all_cores() -> Iterator[Line]:
-    """A browser is several processes that run at once."""
+def _page() -> Iterator[Line]:
+    """Numbers of the page itself, on all cores: a browser is several processes at once."""
+    if missing := _missing():
+        yield Line(f"not measured: no {missing}", "–", None)
+        return
     before = os.sched_getaffinity(0)
     os.sched_setaffinity(0, range(os.cpu_count() or 1))
+    page.CELLS = {CELLS: page.CELLS[CELLS]}  # its finer sheets take minutes more
     try:
-        yield from page_lines()
+        for what, value, promised in next(page.run()).rows:
+            name, _, unit = what.partition(", ")
+            yield Line(name, unit or "–", value, promised)
     finally:
         os.sched_setaffinity(0, before)
+
+
+def _missing() -> str:
+    if not (STATIC / "index.html").is_file():
+        return "built page (make page)"
+    if find_spec("playwright") is None:
+        return "playwright (requirements/dev.txt)"
+    return "" if any(map(shutil.which, ("chromium", "google-chrome"))) else "Chromium"

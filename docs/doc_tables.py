@@ -1,8 +1,8 @@
 """Write the tables of the documentation that follow from declarations: `python docs/doc_tables.py`.
 
 Each page is written by hand down to its mark. Below stand the keys of the skin file
-(skin-file.md), of a script (simulate.md) and of a robot (robot-file.md), and the numbers of the
-twin (twin.md).
+(skin-file.md), of a script (simulate.md) and of a robot (robot-file.md), the numbers of the
+twin (twin.md), the messages between board and host (protocol.md), and the boards (firmware.md).
 """
 
 from __future__ import annotations
@@ -12,8 +12,12 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+from tomoskin.board.source import BOARDS
+from tomoskin.board.wire import SCHEMA
+from tomoskin.board.wire.schema import FieldSpec
 from tomoskin.model.robot import SECTIONS as ROBOT_SECTIONS
-from tomoskin.model.skin import SECTIONS, Key, Section, literal
+from tomoskin.model.section import Key, Section, literal
+from tomoskin.model.skin import SECTIONS
 from tomoskin.twin import (
     PRESETS,
     BendSettings,
@@ -51,11 +55,62 @@ def parameter_tables() -> str:
     return "\n".join([*(_stage(*named) for named in enumerate(_STAGES)), _line()])
 
 
+def schema_tables() -> str:
+    """The bytes of every message of the protocol, its groups, and its values."""
+    parts = []
+    for title, to_device in (("From the board", False), ("To the board", True)):
+        parts.append(f"## {title}\n")
+        for message in SCHEMA.messages:
+            if message.to_device == to_device:
+                parts.append(f"### {message.name} (0x{message.type:02X})\n\n{message.text}.\n")
+                head = [["0", "type", "u8", f"0x{message.type:02X}"]]
+                parts.append(_table(_BYTES, [*head, *_field_rows(message.fields, 1)]))
+    parts.append("## Groups and values\n")
+    for name, struct in SCHEMA.structs.items():
+        table = _table(_BYTES, _field_rows(struct.fields, 0))
+        parts.append(f"### {name}\n\n{struct.text}.\n\n{table}")
+    for name, enum in SCHEMA.enums.items():
+        rows = [[str(one.value), one.name, one.text] for one in enum.values]
+        table = _table(["value", "name", "meaning"], rows)
+        parts.append(f"### {name}\n\n{enum.text}.\n\n{table}")
+    return "\n".join(parts)
+
+
+def board_table() -> str:
+    """What the records of the boards say, a row a board."""
+    head = ["name", "board", "channels", "converter", "values in a frame", "alternating drive"]
+    rows = (
+        [
+            f"`{name}`",
+            board.text,
+            ", ".join(map(str, board.channels)),
+            f"{board.adc_bits} bits, {1e6 * board.converter.conversion(64):g} µs",
+            str(board.max_samples),
+            f"{board.chop.min_chop} to {board.chop.max_chop} Hz" if board.chop.max_chop else "none",
+        ]
+        for name, board in BOARDS.items()
+    )
+    return f"### The boards\n\n{_table(head, rows)}"
+
+
+_BYTES = ["byte", "field", "type", "meaning"]
+
+
+def _field_rows(fields: Iterable[FieldSpec], start: int) -> Iterator[list[str]]:
+    for field in fields:
+        unit = f", {field.unit}" if field.unit else ""
+        link = f" (see {field.enum})" if field.enum else ""
+        yield [str(start), field.name, field.type_name, field.text + unit + link]
+        start += field.size
+
+
 PAGES: dict[str, Callable[[], str]] = {
     "skin-file.md": lambda: tables(SECTIONS.values()),
     "simulate.md": lambda: tables(SCRIPT_SECTIONS.values()),
     "robot-file.md": lambda: tables(ROBOT_SECTIONS.values()),
     "twin.md": parameter_tables,
+    "protocol.md": schema_tables,
+    "firmware.md": board_table,
 }
 
 

@@ -23,6 +23,7 @@ import figures
 from bodies import options_of
 from lab import FRAMES as SOURCE_FRAMES
 from lab import Changes, report
+from layered import Inclusion, Layered, Plate
 from tomoskin.board.source import ScanSettings
 from tomoskin.core import Detection, FloatArray, Frame
 from tomoskin.imaging import Matern, OneStep
@@ -34,9 +35,6 @@ from tomoskin.sensing.fit import SpotFinder, SpotModel, measured_covariance
 from tomoskin.sensing.signal import NuisanceSubspace, Readout
 from tomoskin.twin import (
     ContactSettings,
-    Inclusion,
-    Layered,
-    Plate,
     Pose,
     TwinSettings,
     make_electronics,

@@ -35,12 +35,27 @@ _PAD = re.compile(
     r'.*?\(layers ([^)]*)\).*?(?:\(net (\d+) "[^"]*"\)|\n\t\t\))',
     re.DOTALL,
 )
+_EDGE = re.compile(
+    r'\(gr_line\s+\(start (\S+) (\S+)\)\s+\(end [^)]*\)(?:(?!\(gr_line).)*?"Edge\.Cuts"', re.DOTALL
+)
 _POUR = re.compile(
     r'\(zone\s+\(net \d+\)\s+\(net_name "([^"]+)"\)\s+\(layer "([^"]+)"\)'
     r".*?\(polygon\s+\(pts(.*?)\)\s+\)\s",
     re.DOTALL,
 )
 Point = tuple[float, float]
+
+
+def places(file: Path) -> dict[str, Point]:
+    """Where each part of a .kicad_pcb stands, mm from the upper left corner of the board."""
+    text = file.read_text(encoding="utf-8")
+    edges = [float(value) for line in _EDGE.findall(text) for value in line]
+    left, top = min(edges[::2]), min(edges[1::2])
+    found = {}
+    for part in _FOOTPRINT.findall(text):
+        (reference,), (x, y, _) = _REFERENCE.findall(part), _AT.findall(part)[0]
+        found[reference] = (float(x) - left, float(y) - top)
+    return found
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
-"""What the decks say of the thesis's circuit and of ours, and the file that the twin reads it from.
+"""What the decks say of the thesis's circuit and of ours, in the record of the board.
 
-``python hardware/results.py`` writes the file, ``… --check`` fails when it says something else.
+``python hardware/results.py`` writes them, ``… --check`` fails when the file says something else.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ from pathlib import Path
 from spice import run
 
 ROOT = Path(__file__).resolve().parent.parent
-FILE = ROOT / "src" / "tomoskin" / "sensing" / "signal" / "board.toml"
+FILE = ROOT / "src" / "tomoskin" / "board" / "source" / "boards.toml"
+SECTION = "[mega.electronics]\n"
 Figures = dict[str, float]
 
 LSB = 5 / 1024
@@ -94,13 +95,13 @@ def shared(step: float = 1 / GAIN) -> Figures:
     return {"settling": said["settled"][0] - 20e-6, "last": said["last"][0]}
 
 
-def measured() -> dict[str, Figures]:
+def measured() -> Figures:
     """The figures of the file, rounded to what means something."""
     rest, step = compliance("mended"), switching("mended")
     pin = noise(1 / GAIN)["pin"]
     total = math.hypot(CONVERTER_NOISE, pin / LSB)
     high = clipping("source", 20, AMPERES)["pin"]
-    board = {
+    return {
         "noise": float(f"{total:.3g}"),
         "input_noise": float(f"{total * LSB / GAIN:.3g}"),
         "amplifier_noise": float(f"{pin / GAIN:.2g}"),
@@ -114,32 +115,26 @@ def measured() -> dict[str, Figures]:
         "current_error": float(f"{rest['current_error']:.1g}"),
         "peak": float(f"{step['peak']:.3g}"),
     }
-    return {"board": board}
 
 
-def written(figures: dict[str, Figures]) -> str:
-    """The file."""
-    lines = [
-        "# What ngspice says of the board, for the twin's read-out and the noise of designs: by",
-        "# hardware/results.py from hardware/decks. SI units; noise in LSB of one conversion, and",
-        "# the same at the amplifier's input, V; amplifier_noise without the converter's; settling",
-        "# to half an LSB; peak into the skin over the nominal current.",
-    ]
-    for name, values in figures.items():
-        lines += ["", f"[{name}]", *(f"{key} = {value!r}" for key, value in values.items())]
-    return "\n".join(lines) + "\n"
+def written(figures: Figures, text: str) -> str:
+    """The file, now ``text``, with these figures in their section."""
+    above, below = text.split(SECTION)
+    rest = below[below.index("\n\n") :]
+    return (
+        above + SECTION + "\n".join(f"{key} = {value!r}" for key, value in figures.items()) + rest
+    )
 
 
 def main() -> int:
-    """Write the file, or say whether the one that is there is right."""
-    made = written(measured())
-    if sys.argv[1:] == ["--check"]:
-        old = tomllib.loads(FILE.read_text(encoding="utf-8"))
-        if old == tomllib.loads(made):
-            return 0
+    """Write the figures, or say whether those that are there are right."""
+    old = FILE.read_text(encoding="utf-8")
+    made = written(measured(), old)
+    if sys.argv[1:] != ["--check"]:
+        FILE.write_text(made, encoding="utf-8")
+    elif tomllib.loads(old) != tomllib.loads(made):
         print(f"{FILE.name} is stale: run python hardware/{Path(__file__).name}", file=sys.stderr)
         return 1
-    FILE.write_text(made, encoding="utf-8")
     return 0
 
 

@@ -6,10 +6,9 @@ import math
 from dataclasses import dataclass
 
 _EPSILON = 8.854e-12
-_PREPREG, _CORE, _MASK = 0.2104, 1.065, 0.01
-"""mm; the prepreg is one sheet of 7628."""
+_PREPREG, _PREPREG_ER = 0.2104, 4.4
+"""mm of one sheet of 7628, and its permittivity."""
 
-_PREPREG_ER, _CORE_ER = 4.4, 4.6
 VIA_OHMS = 1.72e-8 * 1.6e-3 / (math.pi * 0.3e-3 * 20e-6)
 """Through the board: a hole of 0.3 mm, plated with 20 µm."""
 
@@ -49,36 +48,3 @@ LAYERS = {
     "B.Cu": Layer(0.035, _PREPREG, _PREPREG_ER, False),
 }
 """Front, ground, rails, back; below the rails is the back's pour of ground."""
-
-
-def kicad() -> str:
-    """The same, as a .kicad_pcb has it."""
-
-    def copper(name: str) -> str:
-        return f'\t\t\t(layer "{name}" (type "copper") (thickness {LAYERS[name].thickness}))'
-
-    def insulator(number: int, kind: str, thickness: float, er: float) -> str:
-        return (
-            f'\t\t\t(layer "dielectric {number}" (type "{kind}") (thickness {thickness}) '
-            f'(material "FR4") (epsilon_r {er}) (loss_tangent 0.02))'
-        )
-
-    def mask(side: str, name: str) -> str:
-        return (
-            f'\t\t\t(layer "{side}.Mask" (type "{name} Solder Mask") (color "Green") '
-            f"(thickness {_MASK}))"
-        )
-
-    lines = [
-        mask("F", "Top"),
-        copper("F.Cu"),
-        insulator(1, "prepreg", _PREPREG, _PREPREG_ER),
-        copper("In1.Cu"),
-        insulator(2, "core", _CORE, _CORE_ER),
-        copper("In2.Cu"),
-        insulator(3, "prepreg", _PREPREG, _PREPREG_ER),
-        copper("B.Cu"),
-        mask("B", "Bottom"),
-    ]
-    tail = ['\t\t\t(copper_finish "HAL lead-free")', "\t\t\t(dielectric_constraints no)"]
-    return "\n".join(["\t\t(stackup", *lines, *tail, "\t\t)"]) + "\n"

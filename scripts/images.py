@@ -8,15 +8,10 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
+import tomllib
 from pathlib import Path
 
 from page import digest_of
-
-BOARDS = (
-    ("avr-gcc", "image", "tomoskin-{}.hex", (8, 16)),
-    ("arm-none-eabi-gcc", "pico", "tomoskin-pico-{}.bin", (8, 16, 32)),
-)
-"""Compiler, target of firmware/Makefile, what it makes by channels, and the channels."""
 
 
 class ImageError(Exception):
@@ -33,22 +28,24 @@ def build(root: Path) -> None:
         ones are removed.
     """
     folder, firmware = root / "src" / "tomoskin" / "twin" / "emulator" / "images", root / "firmware"
-    sources = [
-        firmware / "Makefile",
-        *sorted(firmware.glob("src/*")),
-        *sorted(firmware.glob("avr/*")),
-        *sorted(firmware.glob("pico/*.*")),
+    table = root / "src" / "tomoskin" / "board" / "source" / "boards.toml"
+    boards = [
+        board for board in tomllib.loads(table.read_text("utf-8")).values() if "firmware" in board
     ]
+    names = ["src/*", *(f"{board['firmware']['folder']}/*.*" for board in boards)]
+    sources = [table, firmware / "Makefile", *(f for n in names for f in sorted(firmware.glob(n)))]
     stamp, digest = folder / "sources.sha256", digest_of(root, sources)
     if stamp.is_file() and stamp.read_text(encoding="utf-8") == digest:
         return
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
-    absent = [compiler for compiler, *_ in BOARDS if shutil.which(compiler) is None]
-    for compiler, target, name, sizes in BOARDS:
-        for channels in sizes if compiler not in absent else ():
-            _make(firmware, target, channels)
-            shutil.copy(root / "build" / "firmware" / name.format(channels), folder)
+    compilers = {board["text"]: board["firmware"]["needs"][0] for board in boards}
+    absent = [compiler for compiler in compilers.values() if shutil.which(compiler) is None]
+    for board in boards:
+        files = board["firmware"]
+        for channels in board["channels"] if compilers[board["text"]] not in absent else ():
+            _make(firmware, files["make_image"], channels)
+            shutil.copy(root / "build" / "firmware" / files["image"].format(channels), folder)
     if absent:
         raise ImageError(f"its boards' images are not in it: {' and '.join(absent)} missing")
     stamp.write_text(digest, encoding="utf-8")

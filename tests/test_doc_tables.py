@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from doc_tables import FOLDER, PAGES, written
-from tomoskin.model.skin import SECTIONS, Section
+from tomoskin.model.section import Section
+from tomoskin.model.skin import SECTIONS
 from tomoskin.twin.script_schema import SECTIONS as SCRIPT_SECTIONS
 
 

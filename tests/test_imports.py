@@ -15,14 +15,14 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 UNITS = {
     "core": (),
-    "model": ("mesh", "pattern", "skin", "robot", "forward"),
+    "model": ("section", "mesh", "pattern", "prior", "skin", "robot", "forward"),
     "imaging": (),
     "board": ("wire", "source"),
     "sensing": ("signal", "track", "segment", "fit"),
     "learning": (),
     "pipeline": (),
     "twin": (".", "emulator"),
-    "files": ("session", "imports", "exports"),
+    "files": ("messages", "session", "imports", "exports"),
     "run": ("sinks", "."),
     "server": (),
     "cli": (),

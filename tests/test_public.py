@@ -76,7 +76,7 @@ PACKAGES = (
     *("core", "model.mesh", "model.pattern", "model.skin", "model.robot", "model.forward"),
     *("imaging", "board.wire", "board.source", "sensing.signal", "sensing.track"),
     *("sensing.segment", "sensing.fit", "learning", "pipeline", "twin", "twin.emulator"),
-    *("files.session", "files.imports", "files.exports", "run.sinks", "run"),
+    *("files.messages", "files.session", "files.imports", "files.exports", "run.sinks", "run"),
 )
 
 

@@ -5,8 +5,10 @@
 
 from __future__ import annotations
 
+import statistics
 import sys
 import time
+import timeit
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -63,12 +65,7 @@ def _cell_array(arrays: list[NDArray[Any]]) -> NDArray[Any]:
 def timed(work: Callable[[], object]) -> float:
     """Median seconds of processor time."""
     work()
-    times = []
-    for _ in range(REPEATS):
-        began = time.process_time()
-        work()
-        times.append(time.process_time() - began)
-    return float(np.median(times))
+    return statistics.median(timeit.repeat(work, timer=time.process_time, repeat=REPEATS, number=1))
 
 
 def main(folder: Path, sizes: tuple[int, ...] = SIZES) -> list[Path]:

@@ -9,7 +9,9 @@
 #define CHANNELS 16u /* a board with 8 or 32: make CHANNELS=8 */
 #endif
 
+#ifndef MOST_DRIVES
 #define MOST_DRIVES 128u
+#endif
 #ifndef MOST_SAMPLES
 #define MOST_SAMPLES 448u /* values in a frame: a chopped one has two a sample */
 #endif

@@ -14,7 +14,7 @@ from tomoskin.cli.output import Bar
 from tomoskin.files.imports import read_recording
 from tomoskin.files.session import SessionReader
 from tomoskin.model.skin import Skin
-from tomoskin.twin.shards import SHARD_FRAMES
+from tomoskin.twin.labelled import SHARD_FRAMES
 
 EXAMPLE, PRESSES_EXAMPLE = examples("simulate.md")
 

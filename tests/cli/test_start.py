@@ -89,7 +89,7 @@ def test_a_command_that_is_nearly_one_is_named(tomoskin) -> None:
     ("board", "channels", "said"),
     [
         ("mega", 7, "expected 8 or 16 channels (Arduino Mega 2560), got 7"),
-        ("mega", 32, "got 32; a Pico has up to 32: --board pico"),
+        ("mega", 32, "got 32; a Raspberry Pi Pico has them: --board pico"),
         ("pico", 64, "expected 8, 16 or 32 channels (Raspberry Pi Pico), got 64"),
     ],
 )

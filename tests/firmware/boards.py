@@ -18,6 +18,7 @@ from tomoskin.twin.emulator.program import build_alone
 
 ROOT = Path(__file__).parents[2]
 FIRMWARE = ROOT / "firmware"
+TABLE = ROOT / "src" / "tomoskin" / "board" / "source" / "boards.toml"
 SCAN = Scan.of(Pattern.adjacent(8))
 SETTINGS = ScanSettings(oversampling=4, settling=200e-6, current_limit=0.1, adc_bits=10)
 PATIENCE = 300.0
@@ -36,7 +37,7 @@ def make(*arguments: str, folder: Path = FIRMWARE) -> subprocess.CompletedProces
     """Run make there, as if nobody had run make around it."""
     with build_alone():
         return subprocess.run(
-            ["make", "--silent", "-C", str(folder), *arguments],
+            ["make", "--silent", "-C", str(folder), f"BOARDS={TABLE}", *arguments],
             capture_output=True,
             text=True,
             check=False,

@@ -6,7 +6,7 @@ import re
 import pytest
 
 from firmware.boards import FIRMWARE, ROOT
-from tomoskin.board.wire import SCHEMA, SCHEMA_HASH
+from tomoskin.board.wire import SCHEMA
 
 
 @pytest.fixture(scope="module")
@@ -21,9 +21,13 @@ def test_the_header_is_not_stale(script):
     assert (FIRMWARE / "src" / "protocol.h").read_text(encoding="utf-8") == script.header(SCHEMA)
 
 
+def test_the_types_of_the_records_are_not_stale(script):
+    assert script.STUB.read_text(encoding="utf-8") == script.stub(SCHEMA)
+
+
 def test_it_holds_the_hash_and_every_message(script):
     made = script.header(SCHEMA)
-    assert f"PROTOCOL_HASH UINT32_C(0x{SCHEMA_HASH:08X})" in made
+    assert f"PROTOCOL_HASH UINT32_C(0x{SCHEMA.hash:08X})" in made
     for message in SCHEMA.messages:
         assert re.search(rf"#define MSG_{message.name} 0x{message.type:02X}u\n", made)
     assert "#define AT_SET_SCAN_PRESCALER 13u\n" in made
@@ -34,7 +38,9 @@ def test_it_holds_the_hash_and_every_message(script):
 
 def test_check_says_stale(script, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(script, "HEADER", tmp_path / "protocol.h")
-    script.HEADER.write_text("old", encoding="utf-8")
+    monkeypatch.setattr(script, "STUB", tmp_path / "messages.pyi")
+    for file in (script.HEADER, script.STUB):
+        file.write_text("old", encoding="utf-8")
     monkeypatch.setattr("sys.argv", ["firmware_header.py", "--check"])
     assert script.main() == 1
     assert "stale" in capsys.readouterr().err

@@ -2,12 +2,13 @@
 
 import json
 import math
+import re
 
 import pytest
 
 import parasitics
 from copper import ROOT, Copper, Pad, Track, heating
-from stackup import LAYERS, kicad
+from stackup import LAYERS
 
 WIDE = LAYERS["F.Cu"]
 KICAD = ROOT / "kicad"
@@ -81,4 +82,12 @@ def test_conductors_are_further_apart_than_their_voltage_asks():
 def test_the_stack_up_is_in_the_boards():
     for channels in parasitics.BOARDS:
         text = (KICAD / f"board-{channels}.kicad_pcb").read_text(encoding="utf-8")
-        assert kicad() in text
+        of_copper = dict(
+            re.findall(r'\(layer "(\S+)" \(type "copper"\) \(thickness ([^)]+)\)', text)
+        )
+        assert of_copper == {name: str(layer.thickness) for name, layer in LAYERS.items()}
+        prepreg = (
+            r'\(type "prepreg"\) \(thickness ([^)]+)\) \(material "FR4"\) \(epsilon_r ([^)]+)\)'
+        )
+        found = {(float(a), float(b)) for a, b in re.findall(prepreg, text)}
+        assert found == {(layer.height, layer.permittivity) for layer in LAYERS.values()}

@@ -123,7 +123,8 @@ def test_one_amplifier_for_all_would_settle_anew_for_each_electrode():
 
 
 def test_the_twins_figures_are_those_of_the_decks():
-    assert results.FILE.read_text(encoding="utf-8") == results.written(results.measured())
+    text = results.FILE.read_text(encoding="utf-8")
+    assert text == results.written(results.measured(), text)
 
 
 def test_a_deck_without_its_values_is_refused():

@@ -19,13 +19,12 @@ from tomoskin.imaging import (
     TotalVariation,
     homogeneous,
 )
-from tomoskin.imaging.iterative.absolute import Quadratic
 from tomoskin.imaging.iterative.newton import Descent, Goal, descend, minimiser
 from tomoskin.imaging.iterative.unknowns import Cells, Joint, Unknowns, others
-from tomoskin.imaging.priors.penalty import Diagonal
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.pattern import Pattern
+from tomoskin.model.prior import Diagonal
 
 LESS, MORE = np.array([-0.04, -0.02]), np.array([0.04, 0.03])
 NOISE = 1e-3
@@ -259,7 +258,7 @@ class Bowl:
 
 
 def bowl(target: float, start: float, **settings: Any) -> Descent:
-    goal = Goal(Bowl(), Quadratic(Diagonal(np.array([1e-12]))), np.array([target]))
+    goal = Goal(Bowl().at, np.array([target]), lambda _: Diagonal(np.array([1e-12])))
     begin = Descent(np.array([start]), np.array([1e-12 * start]), (), "not begun", False)
     return descend(goal, begin, **{"most": 50, "tolerance": 1e-12, **settings})
 

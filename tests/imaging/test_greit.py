@@ -12,8 +12,9 @@ from scipy.optimize import brentq
 from golden import mismatch
 from shapes import box, disc, patched
 from tomoskin.core import DataError, FloatArray, ModelError
-from tomoskin.imaging import Desired, Greit, Merit, OneStep, Targets, along, figures
+from tomoskin.imaging import Greit, Merit, OneStep, Targets, along, figures
 from tomoskin.imaging.trained.targets import Balls
+from tomoskin.imaging.trained.trainer import DESIRED_RADIUS
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import ElectrodeArc, Mesh, Rectangle, triangulate
 from tomoskin.model.pattern import Pattern
@@ -45,27 +46,18 @@ def noser(figure: float) -> Merit:
     return figures(OneStep(model(), alpha=10.0 ** brentq(excess, -2.5, 2.0, xtol=1e-3)), targets())
 
 
-@pytest.mark.parametrize(
-    "desired", [Desired(), Desired(0.12, 0.06), Desired(0.15, 0.05, 4.0, 0.5)], ids=str
-)
-def test_each_row_is_the_weighted_least_squares_solution(desired: Desired) -> None:
+def test_each_row_is_the_least_squares_solution() -> None:
     """Against the normal equations of single cells, set up from the desired images alone."""
-    operator = greit(desired=desired, noise_figure=1.1)
+    operator = greit(noise_figure=1.1)
     mesh, training = model().mesh, operator.training
     y = (training.dv / training.amount[:, None]).T
     noise = np.full(len(y), np.sqrt((y**2).mean() * y.shape[1]))
     extent = np.ptp(mesh.points, axis=0).max()
-    balls = Balls(mesh)
-    spot, ring = (
-        np.array([balls.share(p, r * extent) for p in training.places])
-        for r in (desired.radius, desired.radius + desired.edge)
-    )
+    spot = np.array([Balls(mesh).share(p, DESIRED_RADIUS * extent) for p in training.places])
     wanted = spot / (spot @ mesh.volumes)[:, None]
+    system = y @ y.T + operator.noise_weight * np.diag(noise**2)
     for cell in (0, 77, len(mesh.cells) - 1):
-        inside, outside = spot[:, cell], 1.0 - ring[:, cell]
-        weight = desired.inside * inside + desired.outside * outside
-        system = (y * weight) @ y.T + operator.noise_weight * np.diag(noise**2)
-        goal = y @ (desired.inside * (inside > 0) * wanted[:, cell])
+        goal = y @ wanted[:, cell]
         assert mismatch(operator.matrix[cell], np.linalg.solve(system, goal)) < 1e-6
 
 
@@ -157,19 +149,6 @@ def test_training_targets_of_another_pattern() -> None:
     other = ForwardModel(model().mesh, Pattern.opposite(8), 0.01)
     with pytest.raises(ModelError, match="same pattern"):
         Greit(model(), simulated_on=other)
-
-
-@pytest.mark.parametrize(
-    "settings", [{"radius": 0.0}, {"edge": -0.1}, {"inside": 0.0}, {"outside": np.nan}]
-)
-def test_an_impossible_desired_response(settings: dict[str, float]) -> None:
-    with pytest.raises(ModelError, match="desired response: expected"):
-        Desired(**settings)
-
-
-def test_a_desired_disc_below_the_mesh() -> None:
-    with pytest.raises(ModelError, match="smaller than the mesh can show"):
-        Greit(model(), simulated_on=model(1500), count=50, desired=Desired(radius=1e-4))
 
 
 def test_data_of_another_length() -> None:

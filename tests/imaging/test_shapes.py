@@ -14,10 +14,10 @@ from tomoskin.core import DataError, FloatArray, ModelError
 from tomoskin.imaging import Observation, RandomField, Segmented, ShapeImaging
 from tomoskin.imaging.iterative import shapes as shapes_module
 from tomoskin.imaging.iterative.shapes import BACKGROUND, LESS, MORE, Phases
-from tomoskin.imaging.priors.smooth import CORRELATIONS
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.pattern import Pattern
+from tomoskin.model.prior.smooth import CORRELATIONS
 
 LENGTH = 0.025
 
@@ -64,14 +64,14 @@ def test_regions_are_found_with_their_kind() -> None:
     labels = found().at(points)
     assert overlap(labels, truth(points), LESS) > 0.8
     assert overlap(labels, truth(points), MORE) > 0.75
-    assert found().found.background == pytest.approx(2.0, rel=0.05)
-    assert found().found.misfit < found().found.n_values
+    assert found().absolute.background == pytest.approx(2.0, rel=0.05)
+    assert found().absolute.misfit < found().absolute.n_values
 
 
 def test_cells_are_labelled_as_the_points_in_them() -> None:
     assert np.array_equal(found().cells, found().at(mesh().centroids))
-    sigma = found().found.conductivity.values
-    medium = found().found.background
+    sigma = found().absolute.conductivity.values
+    medium = found().absolute.background
     assert (sigma[found().cells == MORE] > 2 * medium).all()
     assert (sigma[found().cells == LESS] < medium / 2).all()
 
@@ -84,12 +84,12 @@ def test_an_empty_medium_has_no_regions() -> None:
         Observation.of(v + noise * np.random.default_rng(4).standard_normal(len(v)), noise)
     )
     assert not empty.cells.any()
-    assert empty.found.background == pytest.approx(1.3, rel=0.01)
+    assert empty.absolute.background == pytest.approx(1.3, rel=0.01)
 
 
 def test_the_medium_may_be_known() -> None:
     model = ForwardModel(mesh(), Pattern.adjacent(16), 0.01)
-    near = ShapeImaging(model, LENGTH, drift=1e-6)(seen(), 1.9).found
+    near = ShapeImaging(model, LENGTH, drift=1e-6)(seen(), 1.9).absolute
     assert near.background == pytest.approx(1.9, rel=1e-4)
 
 
@@ -99,7 +99,7 @@ def test_contact_impedances_may_be_looked_for() -> None:
     true = ForwardModel(mesh(), model.pattern, 0.01).solve(sigma).voltages
     imaging = ShapeImaging(model, LENGTH, contacts="one")
     segmented = imaging(Observation.of(true, 0.005 * np.abs(true).max()))
-    assert segmented.found.contact_impedance == pytest.approx(np.full(16, 0.01), rel=0.1)
+    assert segmented.absolute.contact_impedance == pytest.approx(np.full(16, 0.01), rel=0.1)
     assert overlap(segmented.cells, truth(mesh().centroids), LESS) > 0.6
 
 
@@ -110,9 +110,9 @@ def test_a_region_in_a_volume() -> None:
     segmented = ShapeImaging(
         ForwardModel(bar, Pattern.from_tables([[0, 1]], [[0, 1]]), 1e-4), 0.05
     )(Observation.of([rng.uniform(1.0, 2.0)], 1e-3))
-    assert segmented.found.conductivity.unit == "S/m"
+    assert segmented.absolute.conductivity.unit == "S/m"
     assert segmented.cells.shape == (len(bar.cells),)
-    assert segmented.found.misfit < 10.0
+    assert segmented.absolute.misfit < 10.0
 
 
 def test_a_large_region_does_not_lift_the_background(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,4 +1,4 @@
-"""Kalman filter and smoother, against the textbook's filter of all cells and against theory."""
+"""The Kalman filter over frames, against the textbook's filter of all cells and against theory."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from golden import mismatch
 from shapes import disc
 from tomoskin.core import DataError, FloatArray, ModelError
-from tomoskin.imaging import Modes, OneStep, Operator, Smoother, Spectrum, Temporal, prior_matrix
+from tomoskin.imaging import Modes, OneStep, Spectrum, Temporal, prior_matrix
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.pattern import Pattern
 
@@ -32,6 +32,10 @@ def operator(**settings: Any) -> OneStep:
     return OneStep(model(), **{"alpha": ALPHA, **settings})
 
 
+def filtered(op: OneStep, tau: float) -> Temporal:
+    return Temporal(Modes.of(Spectrum.of(op.problem), ALPHA), tau)
+
+
 def frames(n: int = len(TIMES), seed: int = 0) -> FloatArray:
     """Noise and a spot that moves: data with every mode in them."""
     rng = np.random.default_rng(seed)
@@ -41,54 +45,40 @@ def frames(n: int = len(TIMES), seed: int = 0) -> FloatArray:
 
 
 class Textbook:
-    """The same process with the covariance of all cells, and the backward pass over all frames."""
+    """The same process with the covariance of all cells."""
 
     def __init__(self, op: OneStep, tau: float) -> None:
         q = prior_matrix("noser", op.model.mesh, op.problem.jacobian)
         self.prior, self.tau = np.diag(1.0 / q), tau
         self.j, self.r = op.problem.jacobian, np.diag(ALPHA**2 / op.problem.weights)
 
-    def run(self, data: FloatArray, times: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Filtered and smoothed images, (n, n_cells)."""
+    def run(self, data: FloatArray, times: FloatArray) -> FloatArray:
+        """Filtered images, (n, n_cells)."""
         x, p = np.zeros(len(self.prior)), self.prior
-        means, covs, ahead = [], [], []
+        means = []
         for k, dv in enumerate(data):
             phi = 0.0 if k == 0 else np.exp(-(times[k] - times[k - 1]) / self.tau)
             x, p = phi * x, phi**2 * p + (1 - phi**2) * self.prior
-            ahead.append((phi, x, p))
             gain = np.linalg.solve(self.j @ p @ self.j.T + self.r, self.j @ p).T
             x, p = x + gain @ (dv - self.j @ x), p - gain @ self.j @ p
             means.append(x)
-            covs.append(p)
-        smooth = [means[-1]]
-        for k in range(len(data) - 2, -1, -1):
-            phi, x_next, p_next = ahead[k + 1]
-            back = phi * np.linalg.solve(p_next, covs[k]).T
-            smooth.append(means[k] + back @ (smooth[-1] - x_next))
-        return np.array(means), np.array(smooth[::-1])
+        return np.array(means)
 
 
 @pytest.mark.parametrize("difference", ["plain", "normalised"])
 @pytest.mark.parametrize("tau", [0.05, 0.7])
-def test_filter_and_smoother_are_the_textbooks(tau: float, difference: str) -> None:
+def test_the_filter_is_the_textbooks(tau: float, difference: str) -> None:
     op = operator(difference=difference)
-    filtered, smoothed = Textbook(op, tau).run(frames(), TIMES)
-    temporal, smoother = Temporal(op, tau), Smoother(op, tau, lag=len(TIMES) - 1)
-    pairs = list(zip(frames(), TIMES, strict=True))
-    got = np.array([temporal.push(dv, t).values for dv, t in pairs])
-    assert mismatch(got, filtered) < 1e-5  # single precision
-    waiting = [smoother.push(dv, t) for dv, t in pairs]
-    assert waiting[:-1] == [None] * (len(TIMES) - 1)
-    late = [waiting[-1], *smoother.finish()]
-    assert [s.time for s in late if s] == TIMES.tolist()
-    assert mismatch(np.array([s.image.values for s in late if s]), smoothed) < 1e-5
+    temporal = filtered(op, tau)
+    got = np.array([temporal.push(dv, t).values for dv, t in zip(frames(), TIMES, strict=True)])
+    assert mismatch(got, Textbook(op, tau).run(frames(), TIMES)) < 1e-5  # single precision
 
 
 @pytest.mark.parametrize("prior", ["noser", "laplace", "gaussian", "identity"])
 @pytest.mark.parametrize("tau", [0.0, 1e-4])
 def test_without_memory_it_is_the_operator(prior: str, tau: float) -> None:
     op = operator(prior=prior)
-    temporal = Temporal(op, tau)
+    temporal = filtered(op, tau)
     for dv, t in zip(frames(), TIMES, strict=True):
         assert mismatch(temporal.push(dv, t).values, op(dv).values) < 1e-5
 
@@ -96,11 +86,11 @@ def test_without_memory_it_is_the_operator(prior: str, tau: float) -> None:
 def test_a_complex_operator_is_filtered_too() -> None:
     op = OneStep(model(), alpha=ALPHA, conductivity=1.0 + 0.5j)
     data = frames() * (1 - 0.3j)
-    assert mismatch(Temporal(op, 0.0).push(data[0], 0.0).values, op(data[0]).values) < 1e-5
+    assert mismatch(filtered(op, 0.0).push(data[0], 0.0).values, op(data[0]).values) < 1e-5
 
 
 def test_a_constant_input_converges() -> None:
-    temporal, dv = Temporal(operator(), 0.5), frames(1)[0]
+    temporal, dv = filtered(operator(), 0.5), frames(1)[0]
     images = [temporal.push(dv, 0.1 * k).values for k in range(120)]
     steps = [np.linalg.norm(b - a) for a, b in pairwise(images)]
     assert steps[-1] < 1e-5 * np.linalg.norm(images[-1])
@@ -113,7 +103,7 @@ def test_a_constant_input_converges() -> None:
 
 @given(interval=st.floats(1e-3, 3.0), tau=st.floats(1e-3, 30.0))
 def test_the_filter_settles_where_the_steady_one_stands(interval: float, tau: float) -> None:
-    temporal, dv = Temporal(operator(), tau), np.zeros(40)
+    temporal, dv = filtered(operator(), tau), np.zeros(40)
     for k in range(600):
         temporal.push(dv, k * interval)
     before = temporal.belief
@@ -125,32 +115,30 @@ def test_the_filter_settles_where_the_steady_one_stands(interval: float, tau: fl
     assert (np.abs(steady.pole) < 1).all()
 
 
+def noise_left(temporal: Temporal) -> FloatArray:
+    """(n_cells,) deviation of each cell under white noise, as a part of the operator's."""
+    noise = 1.0 / np.sqrt(operator().problem.weights)
+    plain = np.linalg.norm(operator().matrix * noise, axis=1)
+    return np.asarray(np.linalg.norm(temporal.spread(noise, 0.1), axis=1) / plain)
+
+
 @pytest.mark.parametrize("tau", [0.05, 0.3, 2.0])
 def test_noise_is_reduced_as_theory_says(tau: float) -> None:
     """4000 frames of white noise; frames within τ are not independent, hence 10 %."""
-    temporal, rng = Temporal(operator(), tau), np.random.default_rng(3)
+    temporal, rng = filtered(operator(), tau), np.random.default_rng(3)
     noise = rng.standard_normal((4000, 40)) / np.sqrt(operator().problem.weights)
     images = np.array([temporal.push(dv, 0.1 * k).values for k, dv in enumerate(noise)])[200:]
     plain = np.array([operator()(dv).values for dv in noise])[200:]
     measured = np.sqrt(images.var(axis=0).mean() / plain.var(axis=0).mean())
     power = plain.var(axis=0)
-    theory = np.sqrt((temporal.noise_left(0.1) ** 2 @ power) / power.sum())
+    theory = np.sqrt((noise_left(temporal) ** 2 @ power) / power.sum())
     assert measured == pytest.approx(theory, rel=0.1)
     assert theory < 1.0
 
 
-def test_spread_of_white_noise_is_the_noise_that_is_left() -> None:
-    temporal = Temporal(operator(), 0.3)
-    noise = 1.0 / np.sqrt(operator().problem.weights)
-    spread = temporal.spread(noise, 0.1)
-    plain = np.linalg.norm(operator().matrix * noise, axis=1)
-    left = np.linalg.norm(spread, axis=1) / plain
-    assert left == pytest.approx(temporal.noise_left(0.1), rel=1e-9)
-
-
 def test_spread_of_uneven_noise_is_what_a_simulation_finds() -> None:
     """Noise that differs from row to row couples modes; with one mode alone it would not."""
-    temporal, rng = Temporal(operator(), 0.2), np.random.default_rng(5)
+    temporal, rng = filtered(operator(), 0.2), np.random.default_rng(5)
     noise = rng.uniform(0.2, 3.0, 40)
     data = noise * rng.standard_normal((6000, 40))
     images = np.array([temporal.push(dv, 0.1 * k).values for k, dv in enumerate(data)])[100:]
@@ -160,46 +148,10 @@ def test_spread_of_uneven_noise_is_what_a_simulation_finds() -> None:
     assert images.std(axis=0) == pytest.approx(sd, rel=0.08)
 
 
-@pytest.mark.parametrize("prior", ["noser", "laplace"])
-def test_modes_of_a_spectrum_are_those_of_its_operator(prior: str) -> None:
-    problem = operator(prior=prior).problem
-    spectrum = Spectrum.of(problem)
-    made = spectrum.operator(ALPHA)
-    known, found = Modes.of_spectrum(spectrum, ALPHA, made), Modes.of(problem, made)
-    a, b = Temporal(known, 0.3), Temporal(found, 0.3)
-    for dv, t in zip(frames(), TIMES, strict=True):
-        assert mismatch(a.push(dv, t).values, b.push(dv, t).values) < 1e-5  # single precision
-    assert known.trust.sum() == pytest.approx(found.trust.sum())
-
-
 def test_the_longer_it_remembers_the_quieter_it_is() -> None:
-    left = [Temporal(operator(), tau).noise_left(0.1).mean() for tau in (0.0, 0.05, 0.5, 5.0)]
+    left = [noise_left(filtered(operator(), tau)).mean() for tau in (0.0, 0.05, 0.5, 5.0)]
     assert left[0] == pytest.approx(1.0)
     assert left[0] > left[1] > left[2] > left[3]
-
-
-def test_a_smoothed_image_is_never_less_certain_than_the_filtered_one() -> None:
-    temporal, smoother = Temporal(operator(), 0.4), Smoother(operator(), 0.4, lag=3)
-    filtered = {}
-    for dv, t in zip(frames(), TIMES, strict=True):
-        temporal.push(dv, t)
-        assert temporal.belief is not None
-        filtered[t] = temporal.belief.variance
-        late = smoother.push(dv, t)
-        if late:
-            assert (late.variance <= filtered[late.time] + 1e-15).all()
-            assert late.variance.sum() < filtered[late.time].sum()
-    assert [s.time for s in smoother.finish()] == TIMES[-3:].tolist()
-    assert smoother.finish() == ()
-
-
-def test_a_lag_of_nothing_is_the_filter() -> None:
-    temporal, smoother = Temporal(operator(), 0.4), Smoother(operator(), 0.4, lag=0)
-    for dv, t in zip(frames(), TIMES, strict=True):
-        late = smoother.push(dv, t)
-        assert late is not None
-        assert np.array_equal(late.image.values, temporal.push(dv, t).values)
-    assert smoother.finish() == ()
 
 
 def test_a_touch_shows_at_once_and_noise_does_not() -> None:
@@ -207,39 +159,15 @@ def test_a_touch_shows_at_once_and_noise_does_not() -> None:
     mesh, op = model().mesh, OneStep(model(), alpha=0.05)
     spot = (np.linalg.norm(mesh.centroids - (0.03, 0.0), axis=1) < 0.03).astype(float)
     touch = -0.3 * op.problem.jacobian @ spot
-    temporal = Temporal(op, 0.3)
+    temporal = Temporal(Modes.of(Spectrum.of(op.problem), op.alpha), 0.3)
     for k in range(30):
         temporal.push(np.zeros(40), 0.05 * k)
     first = temporal.push(touch, 1.5).values
     assert first.min() / op(touch).values.min() > 0.5
 
 
-def test_modes_may_be_shared() -> None:
-    modes = Modes.of(operator().problem, operator().problem.operator(ALPHA))
-    filters = Temporal(modes, 0.3), Smoother(modes, 0.3, 0), Temporal(operator(), 0.3)
-    late = filters[1].push(frames()[0], 0.0)
-    assert late is not None
-    images = [filters[0].push(frames()[0], 0.0), late.image, filters[2].push(frames()[0], 0.0)]
-    assert all(mismatch(image.values, images[0].values) < 1e-5 for image in images)
-
-
-@pytest.mark.parametrize("kind", ["rows", "trained", "mesh"])
-def test_an_operator_of_something_else_has_no_modes(kind: str) -> None:
-    problem, other = operator().problem, operator()
-    matrix = {"rows": other.without([3, 17]).matrix, "trained": np.roll(other.matrix, 1, axis=1)}
-    foreign = Operator(
-        model(),
-        matrix.get(kind, other.matrix[:-1]),
-        precision=other.precision,
-        reference=other.reference,
-        difference="plain",
-    )
-    with pytest.raises(ModelError, match="solves the linear problem with all of its rows"):
-        Modes.of(problem, foreign)
-
-
 def test_reset_forgets() -> None:
-    temporal = Temporal(operator(), 10.0)
+    temporal = filtered(operator(), 10.0)
     first = temporal.push(frames()[0], 0.0).values
     temporal.push(frames()[1], 1.0)
     temporal.reset()
@@ -248,7 +176,7 @@ def test_reset_forgets() -> None:
 
 @pytest.mark.parametrize("time", [0.0, -1.0, np.nan, np.inf])
 def test_time_must_go_on(time: float) -> None:
-    temporal = Temporal(operator(), 1.0)
+    temporal = filtered(operator(), 1.0)
     temporal.push(frames()[0], 0.0)
     before = temporal.belief
     with pytest.raises(DataError, match=r"expected (frames in order of time|a finite time), got"):
@@ -257,7 +185,7 @@ def test_time_must_go_on(time: float) -> None:
 
 
 def test_data_that_do_not_fit_leave_the_filter_alone() -> None:
-    temporal = Temporal(operator(), 1.0)
+    temporal = filtered(operator(), 1.0)
     temporal.push(frames()[0], 0.0)
     before = temporal.belief
     with pytest.raises(DataError, match=r"rows \[3\] are not"):
@@ -269,18 +197,11 @@ def test_data_that_do_not_fit_leave_the_filter_alone() -> None:
 
 @pytest.mark.parametrize("tau", [-1.0, np.nan, np.inf])
 def test_an_impossible_time_constant(tau: float) -> None:
-    for make in (lambda: Temporal(operator(), tau), lambda: Smoother(operator(), tau, 1)):
-        with pytest.raises(ModelError, match="time constant of 0 s or more"):
-            make()
-
-
-@pytest.mark.parametrize("lag", [-1, 1.5])
-def test_an_impossible_lag(lag: Any) -> None:
-    with pytest.raises(ModelError, match="lag of 0 frames or more"):
-        Smoother(operator(), 1.0, lag)
+    with pytest.raises(ModelError, match="time constant of 0 s or more"):
+        filtered(operator(), tau)
 
 
 @pytest.mark.parametrize("interval", [0.0, -1.0, np.nan, np.inf])
 def test_an_impossible_interval(interval: float) -> None:
     with pytest.raises(DataError, match="interval above 0 s"):
-        Temporal(operator(), 1.0).steady(interval)
+        filtered(operator(), 1.0).steady(interval)

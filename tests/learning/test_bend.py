@@ -32,7 +32,7 @@ def learnt(axes=(np.pi / 2,), seed=0):
     angle = np.tile(ANGLES, len(axes))
     axis = np.repeat(axes, len(ANGLES))
     time = np.arange(len(angle)) * 0.1
-    examples = BendExamples.of(frames(angle, axis, random), angle, axis, time)
+    examples = BendExamples.checked(frames(angle, axis, random), angle, axis, time)
     return BendModel.learn(examples, COVARIANCE)
 
 
@@ -92,7 +92,9 @@ def test_what_lags_behind_by_a_play_is_undone():
         lagging.append(0.7 * value + 0.3 * play)
     dv = frames(np.array(lagging), np.full(400, np.pi / 2), random)
     time = np.arange(400) * 0.1
-    model = BendModel.learn(BendExamples.of(dv, course, np.full(400, np.pi / 2), time), COVARIANCE)
+    model = BendModel.learn(
+        BendExamples.checked(dv, course, np.full(400, np.pi / 2), time), COVARIANCE
+    )
     assert model.remembers
     assert np.degrees(model.error) < 0.5
 
@@ -102,7 +104,7 @@ def test_noise_is_no_bend():
     dv = NOISE * random.standard_normal((len(ANGLES), ROWS))
     time = np.arange(len(ANGLES))
     with pytest.raises(DataError, match="larger than the noise"):
-        BendModel.learn(BendExamples.of(dv, ANGLES, np.zeros(len(ANGLES)), time), COVARIANCE)
+        BendModel.learn(BendExamples.checked(dv, ANGLES, np.zeros(len(ANGLES)), time), COVARIANCE)
 
 
 @pytest.mark.parametrize(
@@ -122,7 +124,7 @@ def test_examples_that_teach_nothing_are_refused(change, message):
         "time": np.arange(9.0),
     }
     with pytest.raises(DataError, match=message):
-        BendExamples.of(**(given | change))
+        BendExamples.checked(**(given | change))
 
 
 @pytest.fixture(scope="module")
@@ -138,7 +140,7 @@ def reader(skin, seed=0):
     random = np.random.default_rng(seed)
     dv = ANGLES[:, None] * shape + NOISE * random.standard_normal((len(ANGLES), rows))
     time = np.arange(len(ANGLES)) * 0.1
-    examples = BendExamples.of(dv, ANGLES, np.full(len(ANGLES), 0.5), time)
+    examples = BendExamples.checked(dv, ANGLES, np.full(len(ANGLES), 0.5), time)
     model = BendModel.learn(examples, np.eye(rows) * NOISE**2)
     return BendReader(model, skin.response), shape, NOISE * random.standard_normal(rows)
 

@@ -184,14 +184,10 @@ def test_what_does_not_belong_together_is_refused() -> None:
     with pytest.raises(DataError, match="expected the classes"):
         examples.and_then(replace(examples, codes=Codes(("x", "y"), exclusive=False)))
     with pytest.raises(DataError, match="rows"):
-        examples.and_then(Examples.of(examples.codes, dv[:, :5], flags))
+        examples.and_then(Examples.checked(examples.codes, dv[:, :5], flags))
     pattern = Pattern.adjacent(8)
     with pytest.raises(DataError, match="dv of shape"):
         Classifier.fit(dv[:, :39], flags, pattern=pattern)
-    fitted = Classifier.fit(dv, flags, pattern=pattern, skin_id="mine")
-    fitted.check(pattern.identity, "mine")
-    with pytest.raises(DataError, match="for skin mine"):
-        fitted.check(skin_id="another")
 
 
 @pytest.mark.data

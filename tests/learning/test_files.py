@@ -1,17 +1,21 @@
-"""The calibration of touch as a file."""
+"""Calibrations as files."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from tomoskin.core import DataError
-from tomoskin.learning import TOUCH, Calibration, Locator
+from tomoskin.learning import KINDS, TOUCH, Calibration, Kind, Locator, load_calibration
 from tomoskin.model.pattern import Pattern
 
 PATTERN = Pattern.adjacent(8)
+ABOUT = ("kind", "version", "drive", "measure", "n_electrodes", "skin_name", "pattern")
+OPTIONAL = ("skin", "strength", "spread_m2", "method", "session")
+"""Keys of what a file is of, and of what a calibration can do without."""
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +38,7 @@ def test_what_is_read_answers_as_what_was_written(calibration: Calibration, tmp_
     ):
         np.testing.assert_array_equal(ours, theirs)
     np.testing.assert_array_equal(calibration.model.strength(frames), again.model.strength(frames))
-    assert again.pattern.identity == PATTERN.identity == again.model.pattern_id
+    assert again.pattern.identity == PATTERN.identity
     assert again.skin_name == "a skin"
     assert [p.name for p in tmp_path.iterdir()] == ["c.npz"]
 
@@ -80,3 +84,30 @@ def test_damaged_files_are_refused(
     with pytest.raises(DataError, match=words) as caught:
         TOUCH.read(path)
     assert "c.npz" in str(caught.value)
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
+def test_files_of_earlier_versions_are_read(kind: Kind[Any]) -> None:
+    """Each was written before files were packed by the annotations of what they hold."""
+    path = Path(__file__).parent / "files" / f"{kind.name}.npz"
+    known = kind.read(path)
+    assert load_calibration(path).kind is kind
+    assert (known.skin_name, known.pattern.identity) == ("a skin", PATTERN.identity)
+    assert getattr(known.model, "skin_id", "a skin's identity") == "a skin's identity"
+    with np.load(path) as kept:
+        own = kind.pack(known.model)
+        assert {*own} == {*kept} - {*ABOUT}
+        for key, array in own.items():
+            np.testing.assert_array_equal(array, kept[key])
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
+def test_files_that_lack_something_are_refused(kind: Kind[Any], tmp_path: Path) -> None:
+    path = Path(__file__).parent / "files" / f"{kind.name}.npz"
+    with np.load(path) as kept:
+        arrays = dict(kept)
+    for key in {*arrays} - {*ABOUT, *OPTIONAL}:
+        np.savez(tmp_path / "c.npz", **{k: v for k, v in arrays.items() if k != key})
+        with pytest.raises(DataError, match=f"expected {key} in the file") as caught:
+            kind.read(tmp_path / "c.npz")
+        assert "c.npz" in str(caught.value)

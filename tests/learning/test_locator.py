@@ -12,8 +12,8 @@ from tomoskin import Locator, Pattern, Skin
 from tomoskin.core import DataError
 from tomoskin.learning import LeftOut, Presses
 from tomoskin.learning.touch.maps import ResponseMaps
-from tomoskin.learning.touch.posterior import GridLikelihood, moments, pooled
-from tomoskin.learning.touch.process import Basis, Likeness
+from tomoskin.learning.touch.posterior import GridLikelihood, pooled
+from tomoskin.learning.touch.process import Basis, Likeness, moments
 from tomoskin.sensing.segment import Region
 
 
@@ -66,7 +66,8 @@ def test_the_posterior_of_maps_of_known_noise_holds_what_it_says() -> None:
     side = np.linspace(-1.1, 1.1, 45)
     grid = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
     grid = grid[np.linalg.norm(grid, axis=1) < 1.0]
-    log_likelihood = GridLikelihood.of(maps, grid)(features[300:])
+    likelihood = GridLikelihood.of(maps, grid)
+    log_likelihood = likelihood.of_misfit(likelihood.misfit(features[300:]))
     mean, covariance = moments(pooled([log_likelihood], np.ones(1)), grid)
     assert held(mean - xy[300:], covariance) > 0.8
 
@@ -188,7 +189,6 @@ def test_labels_outside_the_skin_are_refused() -> None:
     n_meas = skin.pattern().n_meas
     dv = np.random.default_rng(0).normal(size=(20, n_meas))
     xy = 0.5 * places(20, 0)
-    Locator.fit(dv, xy, skin=skin).check(skin=skin)
     with pytest.raises(DataError, match="outside the skin") as caught:
         Locator.fit(dv, 1e3 * xy, skin=skin)
     assert "metres" in str(caught.value)
@@ -205,20 +205,17 @@ def test_how_far_outside_is_measured_from_the_outline() -> None:
         region.beyond(np.array([*rims, [0.1, 0.01]])), [0.003, 0.003, 0.002 * np.sqrt(2), 0]
     )
     for place in rims:
-        Presses.of(np.ones((7, 2)), [*inside, place]).within(region)
+        Presses.checked(np.ones((7, 2)), [*inside, place]).within(region)
     for place in ([0.208, 0.0], [0.0, 0.028]):
         with pytest.raises(DataError, match="press 6"):
-            Presses.of(np.ones((7, 2)), [*inside, place]).within(region)
+            Presses.checked(np.ones((7, 2)), [*inside, place]).within(region)
 
 
-def test_a_calibration_of_another_pattern_or_skin_is_refused() -> None:
+def test_frames_of_another_pattern_are_refused() -> None:
     pattern = Pattern.adjacent(8)
     xy = places(20, 0)
     dv = np.random.default_rng(0).normal(size=(20, pattern.n_meas))
     locator = Locator.fit(dv, xy, pattern=pattern)
-    locator.check(pattern, Skin.load("textile-disc-8"))
-    with pytest.raises(DataError, match="of pattern"):
-        locator.check(Pattern.adjacent(9))
     with pytest.raises(DataError, match="shape"):
         locator.predict(dv[:, 1:])
     with pytest.raises(DataError, match="frame 1"):

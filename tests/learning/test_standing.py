@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from learning.labelled import Floats
-from tomoskin.learning.touch.standing import Standing
+from tomoskin.learning.touch.kind import Standing
 
 NOISE, ROWS = 0.1, 40
 

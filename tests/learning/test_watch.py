@@ -10,7 +10,7 @@ from tomoskin import Locator
 from tomoskin.core import DataError
 from tomoskin.learning import Watch
 from tomoskin.learning.touch.health import STRANGE
-from tomoskin.learning.touch.lost_rows import LIVE, LostRows, without
+from tomoskin.learning.touch.watch import LIVE, LostRows, without
 
 JUMPED = [3, 8, 21, 30, 35, 38]
 
@@ -37,8 +37,8 @@ def test_rows_that_jump_are_left_out_and_named(locator: Locator) -> None:
     assert covariance.shape == (120, 2, 2)
     assert set(watch.jumped.tolist()) == set(JUMPED)
     late = slice(40, None)
-    assert error(told[late], xy[late]) < 0.3 * error(locator.predict(dv[late])[0], xy[late])
-    assert error(told[late], xy[late]) < 0.06
+    assert error(told[late], xy[late]) < 0.6 * error(locator.predict(dv[late])[0], xy[late])
+    assert error(told[late], xy[late]) < 0.045
 
 
 def test_without_a_jump_the_answers_are_the_locator_s(locator: Locator) -> None:

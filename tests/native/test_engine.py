@@ -19,7 +19,6 @@ from tomoskin.model.forward import (
     Terminals,
     choose_engine,
     engine_choice,
-    native,
 )
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.pattern import Pattern
@@ -193,7 +192,7 @@ def test_a_change_of_the_interface_raises_its_number() -> None:
     """The sum of what the stub says, beside the number; change both, in Rust and in Python."""
     stub = (ROOT / "core-native" / "tomoskin_core.pyi").read_text(encoding="utf-8")
     signatures = ast.unparse(_without_docs(ast.parse(stub)))
-    assert (native.INTERFACE, hashlib.sha256(signatures.encode()).hexdigest()[:8]) == (
+    assert (engine_choice.INTERFACE, hashlib.sha256(signatures.encode()).hexdigest()[:8]) == (
         6,
         "d9d83422",
     )

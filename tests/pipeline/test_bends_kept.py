@@ -30,7 +30,7 @@ def bending(prepared):
     angle = np.radians([0, 10, 20, 30, 20, 10, 0] * 3)
     shape = 1e-2 * random.standard_normal(rows)
     dv = angle[:, None] * shape + 1e-4 * random.standard_normal((len(angle), rows))
-    examples = BendExamples.of(dv, angle, np.full(len(angle), 0.5), np.arange(len(angle)) / 10)
+    examples = BendExamples.checked(dv, angle, np.full(len(angle), 0.5), np.arange(len(angle)) / 10)
     bends = BendModel.learn(examples, 1e-8 * np.eye(rows))
     return prepared.calibrated(BENDS.of(bends, prepared.pattern))
 

@@ -14,7 +14,7 @@ from tomoskin.cli import main
 from tomoskin.core import DataError, Frame
 from tomoskin.files.imports import read_recording
 from tomoskin.files.session import SessionReader, as_recorded, replayed, tick_rate
-from tomoskin.learning import CLASSES, Classifier, ClassReading, FrameClassifier
+from tomoskin.learning import CLASSES, Classifier, ClassReading
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Pipeline, prepare, reconstruct
 from tomoskin.server.views import state as message
@@ -42,7 +42,7 @@ def classes(prepared):
     known = Classifier.fit(
         np.concatenate(dv), labels, pattern=prepared.pattern, skin_id=prepared.skin.identity
     )
-    return CLASSES.of(FrameClassifier.of(known), prepared.pattern, prepared.skin)
+    return CLASSES.of(known, prepared.pattern, prepared.skin)
 
 
 @pytest.fixture(scope="module")
@@ -100,20 +100,20 @@ def test_a_recording_says_the_same_off_line(run):
 def test_what_was_not_learnt_is_unknown(prepared, classes):
     classifier = classes.model
     rng = np.random.default_rng(1)
-    strange = classifier(rng.normal(size=prepared.pattern.n_meas))
+    strange = classifier.read(rng.normal(size=prepared.pattern.n_meas))
     assert strange.unknown
     assert strange.text == f"unknown class (nearest: {strange.name})"
-    assert classifier(np.full(prepared.pattern.n_meas, np.nan)).unknown, "nothing was read"
+    assert classifier.read(np.full(prepared.pattern.n_meas, np.nan)).unknown, "nothing was read"
 
 
 def test_rows_that_are_lost_or_left_out_do_not_count(prepared, classes):
     classifier, n = classes.model, prepared.pattern.n_meas
-    sample = classes.model.classifier.examples.dv[EACH + 1]
-    assert classifier(sample).name == "left"
+    sample = classes.model.examples.dv[EACH + 1]
+    assert classifier.read(sample).name == "left"
     lost = np.where(np.arange(n) % 5 == 0, np.nan, sample)
     out = np.arange(0, n, 5)
-    assert classifier(lost) == classifier.without(out)(np.delete(sample, out))
-    assert classifier(lost).name == "left"
+    assert classifier.read(lost) == classifier.without(out).read(np.delete(sample, out))
+    assert classifier.read(lost).name == "left"
     assert (
         prepared.calibrated(classes).without(out).calibrations[CLASSES.name].model.rows.tolist()
         == np.delete(np.arange(n), out).tolist()
@@ -126,8 +126,8 @@ def test_states_of_another_skin_are_refused(classes):
 
 
 def test_on_the_command_line_states_of_another_skin_are_refused(run, classes, tmp_path, capfd):
-    other = replace(classes.model.classifier, skin_id="another")
-    classes.with_model(FrameClassifier.of(other)).write(tmp_path / "c.npz")
+    other = replace(classes.model, skin_id="another")
+    classes.with_model(other).write(tmp_path / "c.npz")
     with pytest.raises(SystemExit) as end:
         main(["image", str(run[0]), "--calibration", str(tmp_path / "c.npz")])
     assert end.value.code == 1
@@ -138,7 +138,7 @@ def test_on_the_command_line_states_of_another_skin_are_refused(run, classes, tm
 def test_the_command_line_tells_them(run, classes, tmp_path, capfd):
     path, c = run[0], tmp_path / "c.npz"
     classes.write(c)
-    assert CLASSES.read(c).model.classifier.right == classes.model.classifier.right
+    assert CLASSES.read(c).model.right == classes.model.right
     said = []
     for more in ([], ["--json", "--alpha", "0.1"]):
         with pytest.raises(SystemExit) as end:

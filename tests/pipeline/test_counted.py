@@ -14,7 +14,7 @@ from run.board import pressed, samples_of
 from tomoskin.board.wire import Decoder, encode
 from tomoskin.core import Frame
 from tomoskin.model.forward import choose_engine
-from tomoskin.model.forward.native import Native
+from tomoskin.model.forward.engine_choice import Native
 from tomoskin.pipeline import Pipeline, prepare
 
 REFERENCE, WARM, COUNTED = 20, 360, 60

@@ -11,18 +11,19 @@ import pytest
 from run.test_runner import PATIENCE, Watch
 from server.serving import Site
 from tomoskin.core import Event, SinkError
+from tomoskin.files.messages import event_content
 from tomoskin.files.session.replay import open_replay
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import prepare
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
 from tomoskin.run import Runner
-from tomoskin.run.sinks import Moment, Naming
-from tomoskin.run.sinks.contact import event_content
+from tomoskin.run.sinks import Contacts
+from tomoskin.run.sinks import Sink as Base
 
 FRAMES = 3 * REFERENCE_FRAMES
 
 
-class Sink:
+class Sink(Base):
     """Keeps what it is given, and does to each what the test wants."""
 
     def __init__(self, name, does=lambda: None):
@@ -76,13 +77,12 @@ def test_bad_sinks_delay_nothing(runner, sinks):
     assert runner.status().dropped == 0
     assert len(sinks["hung"].items) == 1
     runner.stop()
-    good = [item for item in sinks["good"].items if isinstance(item, Moment)]
+    good = [item for item in sinks["good"].items if isinstance(item, Contacts)]
     assert [item.sequence for item in good] == list(range(runner.status().frames))
-    assert good[-1].image is None or good[-1].ready
-    assert [item.ready for item in good] == [
+    assert good[-1].image is None or good[-1].valid
+    assert [item.valid for item in good] == [
         number >= REFERENCE_FRAMES - 1 for number in range(len(good))
     ]
-    assert all(len(item.messages) == len(item.happened) for item in good)
     kinds = [item.kind for item in sinks["good"].items if isinstance(item, Event)]
     assert {"connected", "sink-away"} <= set(kinds)
     (stream,) = sinks["good"].streams
@@ -122,5 +122,20 @@ def test_a_replay_is_published_with_the_times_of_its_day():
     (stream,) = sink.streams
     assert (stream.epoch, stream.replayed) == (1e9, True)
     event = Event(0.5, "connected", "board 01")
-    assert event_content(stream, Naming(), event, of_frame=True)["utc_s"] == 1e9 + 0.5
-    assert event_content(stream, Naming(), event)["utc_s"] is None  # it is of today
+    assert event_content(stream, event, of_frame=True)["utc_s"] == 1e9 + 0.5
+    assert event_content(stream, event)["utc_s"] is None  # it is of today
+
+
+def test_a_board_that_is_lost_is_said_on_every_sink(prepared, board):
+    sink = Sink("good")
+    runner = Runner(prepared, board.open, sinks=(sink,))
+    runner.start()
+    until = Watch(runner).until
+    until(lambda: runner.status().reference.ready)
+    board.lose()
+    assert board.sought.acquire(timeout=PATIENCE)
+    runner.stop()
+    *_, before, event, last = sink.items
+    assert (before.valid, event.kind) == (True, "source-lost")
+    assert (last.valid, last.problem, last.touches) == (False, event.text, ())
+    assert last.host_time >= before.host_time

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tomoskin.core import ModelError
-from tomoskin.twin import ElectronicsSettings, FaultEvent, Faults, faults_at, line_potentials
+from tomoskin.twin import ElectronicsSettings, Faults, line_potentials
 from tomoskin.twin.circuit import driven, settling, shorted
 from tomoskin.twin.faults import check_electrodes
 
@@ -90,36 +90,6 @@ def test_settling_starts_where_the_drive_before_was_left():
     assert start[:, 0] == pytest.approx([0.0, first, second, third])
     later = matrix @ np.concatenate([np.full((1, 1), 0.5), potentials])
     assert (later - start)[:, 0] == pytest.approx(0.5 * np.exp([0.0, -1.0, -3.0, -4.0]))
-
-
-def test_faults_come_and_go_in_their_order():
-    events = (
-        FaultEvent(2.0, "restore", 3),
-        FaultEvent(1.0, "cut", 3),
-        FaultEvent(1.5, "short", 5, 4),
-        FaultEvent(1.5, "rail", 0),
-        FaultEvent(3.0, "unshort", 4, 5),
-        FaultEvent(3.0, "unrail", 0),
-    )
-    assert faults_at(events, 0.5) == Faults()
-    assert faults_at(events, 1.0) == Faults(cut=frozenset({3}))
-    assert faults_at(events, 2.5) == Faults(shorts=frozenset({(4, 5)}), railed=frozenset({0}))
-    assert faults_at(events, 9.0) == Faults()
-
-
-@pytest.mark.parametrize(
-    ("values", "said"),
-    [
-        ((1.0, "melt", 0), r"fault at 1.0 s: expected a kind among cut, .* got \"melt\""),
-        ((math.nan, "cut", 0), "finite time"),
-        ((1.0, "cut", -1), r"an electrode from 0 \(E1\), got -1"),
-        ((1.0, "short", 2, 2), r"two different electrodes from 0 \(E1\), got \(2, 2\)"),
-        ((1.0, "short", 2), "two different electrodes"),
-    ],
-)
-def test_impossible_faults(values, said):
-    with pytest.raises(ModelError, match=said):
-        FaultEvent(*values)
 
 
 def test_a_fault_of_an_electrode_that_is_not_there():

@@ -5,26 +5,9 @@ import pytest
 
 from tomoskin.board.wire import Decoder, encode
 from tomoskin.core import Frame, ModelError
-from tomoskin.twin import FaultyLine, Line, LineSettings
+from tomoskin.twin import Line, LineSettings
 
 SENT = np.random.default_rng(0).integers(0, 256, 20_000).astype(np.uint8).tobytes()
-
-
-class Wire:
-    name = "wire"
-
-    def __init__(self, chunks):
-        self.chunks = list(chunks)
-        self.written, self.closed = b"", False
-
-    def read(self, _timeout):
-        return self.chunks.pop(0) if self.chunks else b""
-
-    def write(self, data):
-        self.written += data
-
-    def close(self):
-        self.closed = True
 
 
 def test_a_perfect_line_changes_nothing():
@@ -72,26 +55,15 @@ def test_a_frame_that_suffered_is_counted_and_the_others_are_whole():
     frames = [
         Frame(k, 1000 * k, 0.0, 7, 0, 0, np.arange(48, dtype=np.uint16) + k) for k in range(400)
     ]
-    wire = Wire(encode(frame) for frame in frames)
-    line = FaultyLine(wire, LineSettings(loss=5e-4, corruption=5e-4), 2)
+    line = Line(LineSettings(loss=5e-4, corruption=5e-4), 2)
     decoder, heard = Decoder(), []
-    while wire.chunks:
-        heard += decoder.feed(line.read(0.0), 0.0)
+    for frame in frames:
+        heard += decoder.feed(line.carry(encode(frame)), 0.0)
     whole = [m for m in heard if isinstance(m, Frame)]
     assert 300 < len(whole) < 400
     for frame in whole:
         assert frame.samples.tolist() == frames[frame.sequence].samples.tolist()
     assert decoder.counters.corrupt >= 1
-
-
-def test_the_way_to_the_board_is_good():
-    wire = Wire([])
-    line = FaultyLine(wire, LineSettings(loss=0.9), 1)
-    line.write(SENT)
-    line.close()
-    assert wire.written == SENT
-    assert wire.closed
-    assert line.name == "wire"
 
 
 @pytest.mark.parametrize("name", ["loss", "corruption", "hold"])

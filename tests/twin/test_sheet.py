@@ -138,7 +138,7 @@ def test_few_changed_cells_are_solved_by_the_local_update(skin, monkeypatch):
     assert 0 < len(changed) < 0.04 * len(rest)
     asked = []
     monkeypatch.setattr(
-        type(sheet._base.local),
+        type(sheet._network.base.local),
         "transfer_resistance",
         lambda _, cells, sigma: asked.append((cells, sigma)) or exact,
     )

@@ -5,9 +5,11 @@ from __future__ import annotations
 import ast
 import importlib
 import os
+import re
 import sys
+from inspect import signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
@@ -61,43 +63,56 @@ def bench(
     """
     from threadpoolctl import threadpool_limits
 
-    benchmarks = _benchmarks()
+    benchmarks = known_benchmarks()
     if list_:
-        for key, summary in benchmarks.items():
-            typer.echo(f"{key:<14} {summary}")
+        for key, benchmark in benchmarks.items():
+            typer.echo(f"{key:<18} {benchmark.summary}")
         return
     if name not in benchmarks:
         raise typer.BadParameter(
             f'expected {", ".join(benchmarks)}; got "{name}"{meant(name, benchmarks)}',
             param_hint="NAME",
         )
-    benchmark = _load(name)
-    usual: int = getattr(benchmark, "CORES", 1)
+    module = _load(benchmarks[name].module)
+    usual: int = getattr(module, "CORES", 1)
     cores = cores or usual
     os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[-cores:])
     os.environ["RAYON_NUM_THREADS"] = str(cores)  # the native engine reads it at each call
     with threadpool_limits(cores):
-        part = into and _load("markdown_part").Part.of(into, name)
-        reports = benchmark.run(data)
+        part = into and _load("report").Part.of(into, name)
+        run = getattr(module, benchmarks[name].function)
+        reports = tuple(run(data) if "data" in signature(run).parameters else run())
     if part:
         part.write(reports)
     tell(reports, _lines(reports), json=json)
 
 
-def _benchmarks() -> dict[str, str]:
-    """Name → first line of the docstring of every module with a ``run`` function."""
+class Benchmark(NamedTuple):
+    """A module of the folder, one of its functions, and what that measures."""
+
+    module: str
+    function: str
+    summary: str
+
+
+def known_benchmarks() -> dict[str, Benchmark]:
+    """Benchmarks of the source tree by name: ``run_x`` has that of its module and ``_x``."""
     if not _FOLDER.is_dir():
         raise DataError(
             "the benchmarks are not part of the installed package",
             where="tomoskin bench",
             hint="run it from a checkout of the source code",
         )
-    summaries = {}
+    found = {}
     for path in sorted(_FOLDER.glob("*.py")):
         tree = ast.parse(path.read_text(encoding="utf-8"))
-        if any(isinstance(node, ast.FunctionDef) and node.name == "run" for node in tree.body):
-            summaries[path.stem] = (ast.get_docstring(tree) or "").partition("\n")[0]
-    return summaries
+        for node in tree.body:
+            if isinstance(node, ast.FunctionDef) and re.fullmatch(r"run(_\w+)?", node.name):
+                about = tree if node.name == "run" else node
+                summary = (ast.get_docstring(about) or "").partition("\n")[0]
+                name = path.stem + node.name.removeprefix("run")
+                found[name] = Benchmark(path.stem, node.name, summary)
+    return found
 
 
 def _load(name: str) -> ModuleType:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from tomoskin.board.source import BOARDS, DEFAULT_BOARD
 from tomoskin.cli.app import group
 from tomoskin.cli.choices import quantity
 from tomoskin.cli.output import JsonFlag, emit
@@ -18,7 +19,9 @@ if TYPE_CHECKING:
     from tomoskin.run import CheckFinding
 
 app = group("board")
-_EMULATORS = {"emulator": "mega", "emulator:pico": "pico"}
+
+
+MOST = BOARDS[DEFAULT_BOARD].channels[-1]
 
 
 @app.callback()
@@ -32,7 +35,7 @@ def check(
         str, typer.Option(help="serial:PORT, serial:auto, or emulator to try the procedure.")
     ] = "serial:auto",
     channels: Annotated[
-        int, typer.Option(min=4, max=16, help="Number of the board's channels: 8 or 16.")
+        int, typer.Option(min=4, max=MOST, help="Number of the board's channels.")
     ] = 8,
     current: Annotated[
         str, typer.Option(metavar="CURRENT", help="Current that the sense resistor is made for.")
@@ -115,8 +118,9 @@ def _opened(source: str, ring: object, current: float) -> Iterator[Transport]:
     from tomoskin.twin.emulator import emulate_load
 
     assert isinstance(ring, LoadRing)
-    if source in _EMULATORS:
-        with emulate_load(ring.resistance, current, _EMULATORS[source]) as transport:
+    name, _, board = source.partition(":")
+    if name == "emulator" and (board or DEFAULT_BOARD) in BOARDS:
+        with emulate_load(ring.resistance, current, board or DEFAULT_BOARD) as transport:
             yield transport
         return
     transport = open_source(source, Skin.load("textile-disc-8"))

@@ -1,51 +1,207 @@
-"""``tomoskin calibrate``: learn from labelled presses."""
+"""``tomoskin calibrate KIND``: learn from labelled examples, one command for every kind.
+
+A kind is a function of what was recorded and of the options that it alone has; :func:`_kind` makes
+its command, with the options that all kinds share.
+"""
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
+from dataclasses import asdict, dataclass, field, replace
+from enum import StrEnum
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Self, get_type_hints
 
+import numpy as np
 import typer
 
 from tomoskin.cli.app import group
-from tomoskin.cli.calibrate_bend import calibrate_bend
-from tomoskin.cli.calibrate_class import calibrate_class
-from tomoskin.cli.calibrate_force import calibrate_force
-from tomoskin.cli.calibrate_mapping import calibrate_mapping
-from tomoskin.cli.calibrate_rub import calibrate_rub
-from tomoskin.cli.named_files import ForceFlag, Reads
-from tomoskin.cli.options import CalibrationOut, KnownSkinOption, LabelledArgument, ReferenceOption
-from tomoskin.cli.output import Bar, JsonFlag, emit, remark
-from tomoskin.cli.recording import changes, labelled_frames, labels, say_notes
+from tomoskin.cli.calibrate_labels import ALONG_Y, bends, class_examples, forces, weighed
+from tomoskin.cli.calibrate_reports import (
+    class_facts,
+    class_lines,
+    mapping_facts,
+    mapping_lines,
+    touch_facts,
+    touch_lines,
+)
+from tomoskin.cli.choices import skin_for_file, skin_if_any
+from tomoskin.cli.named_files import SKIN, ForceFlag, Reads, Writes
+from tomoskin.cli.options import CalibrationOut, KnownSkinOption, ReferenceOption, SkinOption
+from tomoskin.cli.output import Bar, JsonFlag, remark, tell
+from tomoskin.cli.recording import (
+    changes,
+    idle_frames,
+    labelled_frames,
+    labels,
+    reconstructed,
+    say_notes,
+)
+from tomoskin.core import DataError, FloatArray, write_text
 
 if TYPE_CHECKING:
-    from tomoskin.core import FloatArray
+    from tomoskin.core import IntArray
     from tomoskin.learning import Calibration, Locator
     from tomoskin.model.pattern import Pattern
     from tomoskin.model.skin import Skin
-    from tomoskin.sensing.signal import Recording
-
-    Learn = Callable[[FloatArray, FloatArray], Calibration[Locator]]
+    from tomoskin.sensing.signal import Recording, Reference
 
 app = group("calibrate")
 
-_SHOWN = 10
-_DRIFTED = 2.0
+_STANDS_OUT = 4.0
+"""Root mean square of a frame's changes, in noise deviations, from which it shows a touch."""
 
 
-app.command("bend")(calibrate_bend)
-app.command("force")(calibrate_force)
-app.command("rub")(calibrate_rub)
-app.command("class")(calibrate_class)
-app.command("mapping")(calibrate_mapping)
+@dataclass(frozen=True, eq=False)
+class Labelled:
+    """A file that is learnt from: the ``skin`` that it is of, where that is known, the ``pattern``
+    of its rows, and which frames are untouched (``reference``)."""
+
+    path: Path
+    recording: Recording
+    skin: Skin | None
+    pattern: Pattern
+    reference: str | None
+
+    @classmethod
+    def of(cls, path: Path, skin: str | None, reference: str | None, *, needs_skin: bool) -> Self:
+        """Read the file; without a skin its rows are as they stand there."""
+        from tomoskin.files.imports import read_recording
+        from tomoskin.model.pattern import Pattern
+
+        recording = read_recording(path)
+        say_notes(recording)
+        chosen = skin_for_file(skin, path) if needs_skin else skin_if_any(skin, path)
+        if chosen is None:
+            pattern = Pattern.from_tables(recording.drive, recording.measure)
+        else:
+            pattern = chosen.pattern()
+        return cls(path, recording, chosen, pattern, reference)
+
+    def onto(self, old: Calibration[Any] | None) -> Self:
+        """The same with the rows of an older calibration, where there is one, of the same skin."""
+        if old is None:
+            return self
+        if self.skin is not None:
+            old.check_skin(self.skin)
+        return replace(self, pattern=old.pattern)
+
+    @property
+    def drawn(self) -> Skin:
+        """The skin, of a kind that needs one."""
+        assert self.skin is not None
+        return self.skin
+
+    @cached_property
+    def data(self) -> Recording:
+        """The recording in the order of the pattern."""
+        return self.recording.in_order_of(self.pattern)
+
+    @cached_property
+    def dv(self) -> FloatArray:
+        """(n, n_meas) frames minus the untouched skin."""
+        return changes(self.data, self.reference, self.pattern)
+
+    @cached_property
+    def rest(self) -> Reference | None:
+        """The untouched skin, where the file, or the reference, holds it."""
+        from tomoskin.sensing.signal import Reference
+
+        idle = idle_frames(self.data, self.reference, self.pattern)
+        if idle is None or isinstance(idle, str):
+            return None
+        return Reference.of(idle.real.astype(float))
+
+    @property
+    def noise(self) -> FloatArray | None:
+        """(n_meas,) V of the untouched skin; None where that is not known of every row."""
+        rest = self.rest
+        usable = rest is not None and rest.noise_is_known and (rest.noise > 0).all()
+        return rest.noise if rest is not None and usable else None
 
 
-@app.command("touch")
+@dataclass(frozen=True)
+class LearningOutcome:
+    """What came of it: ``write`` makes the file, ``facts`` and ``lines`` say it to programs and to
+    people; a ``problem`` is raised at the end."""
+
+    write: Callable[..., None] | None
+    facts: dict[str, Any]
+    lines: list[str] = field(default_factory=list)
+    problem: DataError | None = None
+
+
+Learn = Callable[..., LearningOutcome]
+
+
+def _kind(
+    name: str, about: str, skin: Any = SkinOption, out: Any = CalibrationOut
+) -> Callable[[Learn], Learn]:
+    """Make a function the command ``name``, whose input is ``about`` something; a decorator.
+
+    Its first parameter is what was recorded, the others are its own options.
+    """
+
+    def register(learn: Learn) -> Learn:
+        def command(
+            recording: Path,
+            out: Path,
+            skin: str | None,
+            reference: str | None,
+            force: bool,
+            json: bool,
+            **own: Any,
+        ) -> None:
+            found = learn(Labelled.of(recording, skin, reference, needs_skin=needs_skin), **own)
+            if found.write is not None:
+                found.write(out, overwrite=force)
+            tell(found.facts, found.lines, json=json)
+            if found.problem is not None:
+                raise found.problem
+
+        needs_skin = skin is SkinOption
+        _describe(command, learn, {"recording": _input(about), "out": out, "skin": skin})
+        app.command(name)(command)
+        return learn
+
+    return register
+
+
+def _input(about: str) -> Any:
+    return Annotated[Path, typer.Argument(metavar="INPUT", help=about), Reads()]
+
+
+def _describe(command: Callable[..., None], learn: Learn, first: dict[str, Any]) -> None:
+    """Give ``command`` the sentence and the own options of ``learn``, for the command line."""
+    hints = get_type_hints(learn, include_extras=True)
+    options = {"reference": ReferenceOption, "force": ForceFlag, "json": JsonFlag}
+    defaults = {"skin": None, "reference": None, "force": False, "json": False}
+    own = list(inspect.signature(learn).parameters.values())[1:]
+    defaults |= {parameter.name: parameter.default for parameter in own}
+    kinds = {**first, **{p.name: hints[p.name] for p in own}, **options}
+    command.__doc__ = learn.__doc__
+    command.__annotations__ = kinds
+    command.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
+        [
+            inspect.Parameter(
+                name,
+                inspect.Parameter.KEYWORD_ONLY,
+                default=defaults.get(name, inspect.Parameter.empty),
+                annotation=kind,
+            )
+            for name, kind in kinds.items()
+        ]
+    )
+
+
+_TOUCHED = "Frames with labels, one touch in each."
+
+
+@_kind("touch", _TOUCHED, KnownSkinOption)
 def touch(
-    recording: LabelledArgument,
-    out: CalibrationOut,
-    skin: KnownSkinOption = None,
+    labelled: Labelled,
     onto: Annotated[
         Path | None,
         typer.Option(
@@ -63,97 +219,49 @@ def touch(
             "align the old calibration to today, and labels are optional.",
         ),
     ] = False,
-    reference: ReferenceOption = None,
-    force: ForceFlag = False,
-    json: JsonFlag = False,
-) -> None:
+) -> LearningOutcome:
     """Learn where a touch is from presses at known positions."""
-    import numpy as np
+    from tomoskin.learning import TOUCH, Locator
 
-    from tomoskin.core import DataError
-    from tomoskin.files.imports import read_recording
-
-    data = read_recording(recording)
-    say_notes(data)
     if unlabelled and not onto:
         raise DataError(
             "--unlabelled aligns an older calibration, but none is given",
             hint="add --onto OLD.npz",
         )
-    learn, pattern = (
-        _onto(onto, skin, recording, aligns=unlabelled)
-        if onto
-        else _from_skin(*_what_of(skin, recording, data))
-    )
-    data = data.in_order_of(pattern)
-    dv = changes(data, reference, pattern)
-    xy = _labels_if_any(data) if unlabelled else labels(data)
+    old = TOUCH.read(onto) if onto else None
+    given = labelled.onto(old)
+    dv, xy = given.dv, _positions(given.data, optional=unlabelled)
     frames = np.arange(len(dv)) if unlabelled else labelled_frames(xy)
-    calibration = learn(dv[frames], xy[frames])
-    calibration.write(out, overwrite=force)
-    known = calibration.model.presses.dv  # of an alignment, all frames, labelled ones or none
-    added = (
-        some.tolist()
-        for some in (frames, labelled_frames(xy))
-        if len(some) and np.array_equal(known[-len(some) :], dv[some], equal_nan=True)
-    )
-    facts = _findings(calibration, next(added, []))
+    dv, xy = dv[frames], xy[frames]
+    if old is None:
+        with Bar("learning") as bar:
+            locator = Locator.fit(dv, xy, pattern=given.pattern, skin=given.skin, progress=bar)
+        calibration = TOUCH.of(locator, given.pattern, given.skin)
+    elif unlabelled:
+        calibration = old.with_model(_aligned(old.model, dv, xy))
+    else:
+        with Bar("learning") as bar:
+            calibration = old.with_model(old.model.updated(dv, xy, progress=bar))
+    added = _added(calibration.model, frames, dv, xy)
+    facts = touch_facts(calibration.model, added)
     if facts["is_guess"]:
         remark(
-            f"{recording}: the data hardly depend on the position. Presses left out have a mean "
+            f"{given.path}: the data hardly depend on the position. Presses left out have a mean "
             f"error of {facts['mean_mm']:.0f} mm, and of {facts['guessed_mm']:.0f} mm if the "
             "answer is always their middle. Check --reference and the labels, or press harder"
         )
-    if json:
-        emit(facts)
-    else:
-        _say(facts)
+    return LearningOutcome(calibration.write, facts, touch_lines(facts))
 
 
-def _from_skin(skin: Skin | None, pattern: Pattern) -> tuple[Learn, Pattern]:
-    """What learns from these presses alone."""
-    from tomoskin.learning import TOUCH, Locator
-
-    def learn(dv: FloatArray, xy: FloatArray) -> Calibration[Locator]:
-        with Bar("learning") as bar:
-            locator = Locator.fit(dv, xy, pattern=pattern, skin=skin, progress=bar)
-        return TOUCH.of(locator, pattern, skin)
-
-    return learn, pattern
-
-
-def _labels_if_any(data: Recording) -> FloatArray:
+def _positions(data: Recording, *, optional: bool) -> FloatArray:
     """(n_frames, 2) m, rows of NaN where there is no label."""
-    import numpy as np
-
-    return np.full((len(data.time), 2), np.nan) if data.labels is None else data.labels
-
-
-def _onto(path: Path, name: str | None, recording: Path, *, aligns: bool) -> tuple[Learn, Pattern]:
-    """What learns from these presses and an older calibration of the same skin.
-
-    It ``aligns`` that one to frames of which few have a label, or adds labelled presses to its own.
-    """
-    from tomoskin.cli.choices import skin_if_any
-    from tomoskin.learning import TOUCH
-
-    old = TOUCH.read(path)
-    if (skin := skin_if_any(name, recording)) is not None:
-        old.check_skin(skin)
-
-    def learn(dv: FloatArray, xy: FloatArray) -> Calibration[Locator]:
-        with Bar("learning") as bar:
-            return old.with_model(old.model.updated(dv, xy, progress=bar))
-
-    def align(dv: FloatArray, xy: FloatArray) -> Calibration[Locator]:
-        return old.with_model(_aligned(old.model, dv, xy))
-
-    return (align if aligns else learn), old.pattern
+    if optional and data.labels is None:
+        return np.full((len(data.time), 2), np.nan)
+    return data.labels if optional and data.labels is not None else labels(data)
 
 
 def _aligned(locator: Locator, dv: FloatArray, xy: FloatArray) -> Locator:
     """The locator for the session of these frames; what has changed is said."""
-    from tomoskin.core import DataError
     from tomoskin.learning import SessionAlignment
 
     alignment = SessionAlignment.of(locator, dv, xy)
@@ -165,64 +273,223 @@ def _aligned(locator: Locator, dv: FloatArray, xy: FloatArray) -> Locator:
         return locator.aligned(alignment, bar)
 
 
-def _what_of(name: str | None, path: Path, data: Recording) -> tuple[Skin | None, Pattern]:
-    """The skin, where there is one, and the table of rows."""
-    from tomoskin.cli.choices import skin_if_any
-    from tomoskin.model.pattern import Pattern
+def _added(locator: Locator, frames: IntArray, dv: FloatArray, xy: FloatArray) -> list[int]:
+    """Frames that are the locator's last presses: all, or after an alignment the labelled ones."""
+    presses = locator.presses.dv
+    for some in (np.arange(len(dv)), labelled_frames(xy)):
+        if len(some) and np.array_equal(presses[-len(some) :], dv[some], equal_nan=True):
+            return list(frames[some].tolist())
+    return []
 
-    skin = skin_if_any(name, path)
-    return skin, skin.pattern() if skin else Pattern.from_tables(data.drive, data.measure)
 
+@_kind("rub", _TOUCHED)
+def rub(labelled: Labelled) -> LearningOutcome:
+    """Learn where a touch is from one finger that rubs the whole skin, without labels.
 
-def _findings(calibration: Calibration[Locator], frames: list[int]) -> dict[str, Any]:
-    import numpy as np
+    The skin file says where the electrodes are. Five frames with a label improve the result.
+    """
+    from tomoskin.learning import TOUCH, Rubbing
 
-    from tomoskin.learning import LeftOut
-
-    locator, left_out = calibration.model, LeftOut.of(calibration.model)
-    older = len(locator.presses) - len(frames)
-    errors = 1e3 * locator.errors
-    x, y = (1e3 * locator.next_place()).tolist()
-    return {
-        "presses": len(locator.presses),
-        "mean_mm": float(errors.mean()),
-        "median_mm": float(np.median(errors)),
-        "p95_mm": float(np.percentile(errors, 95)),
-        "guessed_mm": 1e3 * left_out.guessed,
-        "is_guess": left_out.is_guess,
-        "held_by_90_percent_ellipses": locator.held,
-        "one_force": left_out.one_force,
-        "drift": left_out.drift,
-        "next_press_mm": [x, y],
-        "remarks": [
-            {"frame": frames[r.row - older] if r.row >= older else None, "reason": r.reason}
-            for r in locator.remarks
-        ],
+    dv, noise, skin = labelled.dv, labelled.noise, labelled.drawn
+    frames = np.arange(len(dv))
+    if noise is not None:
+        frames = np.flatnonzero(np.sqrt(np.nanmean((dv / noise) ** 2, axis=1)) > _STANDS_OUT)
+    xy = None if labelled.data.labels is None else labelled.data.labels[frames]
+    with Bar("learning") as bar:
+        rubbing = Rubbing.of(dv[frames], skin, xy)
+        if not rubbing.holds:
+            raise DataError("; ".join(rubbing.findings), where=str(labelled.path))
+        locator = rubbing.locator(bar)
+    for finding in rubbing.findings:
+        remark(finding)
+    facts = {
+        "touched_frames": len(frames),
+        "used": len(rubbing.presses),
+        "labelled": rubbing.labelled,
+        "deviation_mm": 1e3 * rubbing.deviation,
+        "alike": rubbing.alike,
     }
-
-
-def _say(facts: dict[str, Any]) -> None:
-    typer.echo(
-        f"{facts['presses']} presses; each press left out in turn, the mean error is "
-        f"{facts['mean_mm']:.1f} mm (median {facts['median_mm']:.1f}, 95 % "
-        f"{facts['p95_mm']:.1f}), and {100 * facts['held_by_90_percent_ellipses']:.0f} % lie "
-        "within their 90 % ellipses"
+    made = TOUCH.of(locator, labelled.pattern, skin)
+    return LearningOutcome(
+        made.write, facts, [f"{len(frames)} frames with a touch, {rubbing.text}"]
     )
-    if facts["one_force"]:
-        typer.echo(
-            "all presses were about equally hard: softer and harder ones have larger errors; add "
-            "some of both with --onto"
+
+
+class Unit(StrEnum):
+    """The unit of the labels."""
+
+    N = "N"
+    G = "g"
+    KG = "kg"
+
+
+@_kind("force", "Frames; some have a label with their force.")
+def force(
+    labelled: Labelled,
+    weight: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="FORCE=A:B",
+            help="Label: this weight pressed in frames A to B-1. Can be repeated. Default: "
+            "force_n of the file.",
+        ),
+    ] = None,
+    unit: Annotated[Unit, typer.Option(help="Unit of the forces.")] = Unit.N,
+) -> LearningOutcome:
+    """Learn the force of touches from presses with known weights, all by the same tip."""
+    from tomoskin.learning import FORCE, NEWTONS, ForceModel, ForceReport
+    from tomoskin.pipeline import prepare
+
+    skin, path = labelled.drawn, labelled.path
+    newtons = NEWTONS[unit.value] * forces(path, len(labelled.recording), weight)
+    with Bar("preparing"):
+        prepared = prepare(skin)
+    with Bar("finding touches") as bar:
+        result = reconstructed(labelled.data, prepared, labelled.reference, None, bar)
+    presses = weighed(path, result, newtons, labelled.data.time)
+    with Bar("learning"):
+        model = ForceModel.fit(presses, skin)
+    report = ForceReport.of(model)
+    facts = asdict(report)
+    facts["held_by_90_percent_intervals"] = facts.pop("held")
+    lines = [
+        report.text,
+        "forces are valid for the tip that pressed: a tip of another size changes the sheet "
+        "differently",
+    ]
+    for doubtful in report.remarks:
+        who = "" if doubtful.press is None else f"press {doubtful.press:>4}  uncertain: "
+        lines.append(f"{who}{doubtful.reason}")
+    return LearningOutcome(FORCE.of(model, labelled.pattern, skin).write, facts, lines)
+
+
+@_kind("class", "Frames; some have a label with their class.", KnownSkinOption)
+def classes(
+    labelled: Labelled,
+    label: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--class",
+            metavar="NAME=A:B",
+            help="Label: frames A to B-1 show this class. Can be repeated. Default: class or "
+            "flags of the file.",
+        ),
+    ] = None,
+    onto: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="OLD.npz",
+            help="Calibration of another session. These frames, labelled or not, align it to "
+            "this one.",
+        ),
+        Reads(),
+    ] = None,
+) -> LearningOutcome:
+    """Learn the class of a frame, or flags, from a few examples of each."""
+    from tomoskin.learning import CLASSES, Classifier
+
+    with Bar("learning from the older calibration"):
+        old = CLASSES.read(onto) if onto else None
+    given = labelled.onto(old)
+    codes = old.model.examples.codes if old else None
+    examples = class_examples(given.path, given.dv, label, codes)
+    with Bar("learning"):
+        if old is None:
+            skin_id = given.skin.identity if given.skin else ""
+            made = CLASSES.of(Classifier.learn(examples, skin_id), given.pattern, given.skin)
+        else:
+            made = old.with_model(old.model.in_session(examples.dv, examples.flags))
+    facts = class_facts(made.model, len(given.dv))
+    return LearningOutcome(
+        made.write, facts, class_lines(made.model, facts, is_aligned=old is not None)
+    )
+
+
+@_kind("bend", "Frames of known bends, without touches.")
+def bend(
+    labelled: Labelled,
+    bend: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="DEG[@AXIS]=A:B",
+            help="Label: frames A to B-1 are bent by this angle about an axis in this direction "
+            f"from x (default {ALONG_Y:.0f}). Can be repeated. Default: the session's own "
+            "truth.",
+        ),
+    ] = None,
+) -> LearningOutcome:
+    """Learn the bends of a skin: touches are then separated from them, and angles estimated."""
+    from tomoskin.learning import BENDS, BendExamples, BendModel
+    from tomoskin.pipeline import prepare, voltage_covariance
+
+    skin, data, straight = labelled.drawn, labelled.data, labelled.rest
+    if straight is None:
+        raise DataError(
+            "expected voltages with untouched frames, got none", where=str(labelled.path)
         )
-    for doubtful in facts["remarks"][:_SHOWN]:
-        frame = doubtful["frame"]
-        who = "an older press" if frame is None else f"frame {frame:>4}"
-        typer.echo(f"{who}  uncertain: {doubtful['reason']}")
-    if len(facts["remarks"]) > _SHOWN:
-        typer.echo(f"… and {len(facts['remarks']) - _SHOWN} more: --json lists all")
-    if facts["drift"] > _DRIFTED:
-        typer.echo(
-            f"the errors of the last presses are {facts['drift']:.1f} times as large as usual: "
-            "the skin has changed; press it again"
+    with Bar("preparing"):
+        prepared = prepare(skin)
+    frames, angle, axis = bends(labelled.path, data, bend)
+    dv = data.voltages[frames] - straight.mean
+    examples = BendExamples.checked(dv, angle, axis, data.time[frames])
+    with Bar("learning"):
+        model = BendModel.learn(examples, voltage_covariance(prepared, straight))
+    error = float(np.degrees(model.error))
+    facts = {
+        "frames": len(examples.angle),
+        "directions": model.n_modes,
+        "axes_deg": np.degrees(examples.axes).round(1).tolist(),
+        "error_deg": error,
+        "remembers": model.remembers,
+    }
+    lines = [
+        f"{facts['frames']} frames, {facts['directions']} directions; in cross-validation "
+        f"the RMS error of an angle is {error:.2f}°"
+    ]
+    if model.remembers:
+        lines.append("the sheet's memory is part of the calibration: process frames in their order")
+    if not examples.turns:
+        lines.append(
+            "the axis of a bend is estimated from three directions on; here the given axis is used"
         )
+    return LearningOutcome(BENDS.of(model, labelled.pattern, skin).write, facts, lines)
+
+
+_MappedOut = Annotated[
+    Path,
+    typer.Option(
+        metavar="MAPPED.toml", help="New skin file with the channel mapping that was found."
+    ),
+    Writes(SKIN),
+]
+
+
+@_kind("mapping", _TOUCHED, out=_MappedOut)
+def mapping(labelled: Labelled) -> LearningOutcome:
+    """Find rotation, mirroring, swapped wires and polarity from some presses.
+
+    The result is a skin file whose electrodes are where the wires end. Give it as --skin to any
+    other command.
+    """
+    from tomoskin.learning import solve_channel_mapping
+
+    xy, dv, rest = labels(labelled.data), labelled.dv, labelled.rest
+    frames, skin = labelled_frames(xy), labelled.drawn
+    with Bar("comparing channel mappings") as bar:
+        answer = solve_channel_mapping(
+            dv[frames], xy[frames], skin, reference=None if rest is None else rest.mean,
+            noise=labelled.noise, progress=bar,
+        )  # fmt: skip
+    facts = mapping_facts(answer, skin, frames.tolist())
+    lines = mapping_lines(facts)
+    if answer.sure:
+        document = answer.mapping.applied(skin).to_toml()
+
+        def write(out: Path, *, overwrite: bool) -> None:
+            write_text(out, document, overwrite=overwrite)
+
+        return LearningOutcome(write, facts, lines)
     x, y = facts["next_press_mm"]
-    typer.echo(f"the next press is most useful at x {x:+.0f} mm, y {y:+.0f} mm")
+    hint = f"a further press is most useful at x {x:+.0f} mm, y {y:+.0f} mm"
+    problem = DataError(answer.reason, where=str(labelled.path), hint=hint)
+    return LearningOutcome(None, facts, lines, problem)

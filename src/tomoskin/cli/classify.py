@@ -48,7 +48,7 @@ def classify(
 
     with Bar("learning"):
         loaded = CLASSES.read(calibration)
-    classifier = loaded.model.classifier
+    classifier = loaded.model
     data = read_recording(recording)
     say_notes(data)
     if (chosen := skin_if_any(skin, recording)) is not None:

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from tomoskin.board.source import BOARDS, DEFAULT_BOARD, BoardRecord
 from tomoskin.cli.app import group
 from tomoskin.cli.choices import quantity
 from tomoskin.cli.options import DEFAULT_SKIN, NamedSkinOption
@@ -22,43 +23,52 @@ def _eight_bytes(name: str | None) -> str | None:
     return name
 
 
-Channels = Annotated[
-    int, typer.Option(help="Number of the board's channels: 8 or 16, on a Pico also 32.")
-]
+def _numbers(channels: tuple[int, ...]) -> str:
+    """``8, 16 or 32``."""
+    *others, most = map(str, channels)
+    return f"{', '.join(others)} or {most}" if others else most
+
+
+_SIZES = "; ".join(f"{_numbers(board.channels)} ({name})" for name, board in BOARDS.items())
+Channels = Annotated[int, typer.Option(help=f"Number of the board's channels: {_SIZES}.")]
 
 
 def _checked_board(board: str) -> str:
-    if board not in ("mega", "pico"):
-        raise typer.BadParameter(f'expected mega or pico, got "{board}"')
+    if board not in BOARDS:
+        raise typer.BadParameter(f'expected {" or ".join(BOARDS)}, got "{board}"')
     return board
 
 
 Board = Annotated[
     str,
     typer.Option(
-        help="mega (Arduino Mega 2560) or pico (Raspberry Pi Pico).", callback=_checked_board
+        help=f"{' or '.join(f'{name} ({board.text})' for name, board in BOARDS.items())}.",
+        callback=_checked_board,
     ),
 ]
 
 
-def _check_channels(channels: int, board: str) -> None:
-    from tomoskin.twin.emulator import BOARDS
-
-    kind = BOARDS[board]
-    if channels not in kind.channels:
-        wanted = ", ".join(map(str, kind.channels[:-1])) + f" or {kind.channels[-1]}"
-        other = "; a Pico has up to 32: --board pico" if channels == 32 else ""
-        raise typer.BadParameter(f"expected {wanted} channels ({kind.text}), got {channels}{other}")
+def _record(board: str, channels: int) -> BoardRecord:
+    """The record of a board whose firmware is built for so many channels."""
+    record = BOARDS[board]
+    if channels not in record.channels:
+        wanted = _numbers(record.channels)
+        more = [name for name, other in BOARDS.items() if channels in other.channels]
+        other = f"; a {BOARDS[more[0]].text} has them: --board {more[0]}" if more else ""
+        raise typer.BadParameter(
+            f"expected {wanted} channels ({record.text}), got {channels}{other}"
+        )
+    return record
 
 
 @app.command()
-def build(channels: Channels = 8, board: Board = "mega") -> None:
+def build(channels: Channels = 8, board: Board = DEFAULT_BOARD) -> None:
     """Build the firmware of a board: the ELF of an ATmega2560, the UF2 of a Pico."""
-    from tomoskin.twin.emulator import build_elf, build_uf2
+    from tomoskin.twin.emulator import build_firmware
 
-    _check_channels(channels, board)
+    record = _record(board, channels)
     with Bar("building"):
-        made = build_uf2(channels) if board == "pico" else build_elf(channels)
+        made = build_firmware(record, channels)
     typer.echo(str(made))
 
 
@@ -72,24 +82,20 @@ def flash(
         ),
     ] = None,
     channels: Channels = 8,
-    board: Board = "mega",
+    board: Board = DEFAULT_BOARD,
 ) -> None:
     """Write the firmware to a board: to a Mega with avrdude, to a Pico's boot drive as UF2."""
-    from tomoskin.twin.emulator import find_boot_drive, pico_image, write_firmware, write_uf2
+    from tomoskin.twin.emulator import write_firmware
 
-    _check_channels(channels, board)
-    if board == "mega" and port is None:
+    record = _record(board, channels)
+    if record.flash == "avrdude" and port is None:
         raise typer.BadParameter("expected the port of the board, such as /dev/ttyACM0, got none")
     with Bar("writing"):
-        if board == "mega":
-            assert port is not None
-            write_firmware(port, channels)
-        else:
-            drive = find_boot_drive() if port is None else Path(port)
-            write_uf2(pico_image(channels), drive)
-            port = str(drive)
+        port = write_firmware(record, channels, port)
     after = (
-        "next: tomoskin firmware configure" if board == "mega" else ("the Pico starts it by itself")
+        "the Pico starts it by itself"
+        if record.flash == "uf2"
+        else "next: tomoskin firmware configure"
     )
     typer.echo(f"{port}: firmware for {channels} channels; {after}")
 
@@ -119,7 +125,7 @@ def configure(
         str | None,
         typer.Option(help="Built-in name or path. A current above that of this skin is refused."),
     ] = None,
-    board: Board = "mega",
+    board: Board = DEFAULT_BOARD,
 ) -> None:
     """Write a board's current and id into its EEPROM and read them back; without either, show
     them and the board's name. Of a Pico the current alone is written, to its flash."""
@@ -135,8 +141,8 @@ def configure(
     asked = None if current is None else quantity(current, "current", "--current")
     of_skin = Skin.load(skin).current if skin else None
     if asked is not None:
-        check_current(asked, of_skin)
-    if board == "pico":
+        check_current(asked, BOARDS[board], of_skin)
+    if BOARDS[board].flash == "uf2":
         _configure_pico(Path(port), asked, name)
         return
     held = read_identity(port)
@@ -144,7 +150,7 @@ def configure(
         typer.echo(f"{port}: {say_board(held)}")
         return
     identity = held.change(asked, name)
-    check_current(identity.current, of_skin)
+    check_current(identity.current, BOARDS[board], of_skin)
     with Bar("writing"):
         write_identity(port, identity)
     typer.echo(f"{port}: {say_identity(identity)}, read back from the firmware")
@@ -175,7 +181,7 @@ def _say_resistor(current: float) -> None:
 
 
 @app.command()
-def emulate(skin: NamedSkinOption = DEFAULT_SKIN, board: Board = "mega") -> None:
+def emulate(skin: NamedSkinOption = DEFAULT_SKIN, board: Board = DEFAULT_BOARD) -> None:
     """Run the firmware on a simulated board until Ctrl-C; its serial port is printed."""
     from tomoskin.model.skin import Skin
     from tomoskin.twin.emulator import emulate_board

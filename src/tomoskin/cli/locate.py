@@ -133,22 +133,16 @@ def _several(loaded: Calibration[Locator], dv: FloatArray) -> Iterator[tuple[Tou
 
 
 def _single(loaded: Calibration[Locator], dv: FloatArray) -> Iterator[tuple[Touch, ...]]:
-    import numpy as np
-
-    from tomoskin.core import Detection, Touch
-    from tomoskin.learning import Watch
+    from tomoskin.core import Touch
+    from tomoskin.learning import Watch, detection_at
 
     locator = loaded.model
     watch = Watch(locator)
     for start in range(0, len(dv), _BLOCK):
         part = dv[start : start + _BLOCK]
-        positions, covariance = watch(part)
-        deviation = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
-        strength = locator.strength(part)
-        for place, sd, peak in zip(positions, deviation, strength, strict=True):
-            (x, y), (sd_x, sd_y) = place.tolist(), sd.tolist()
-            nothing = np.empty(0, dtype=np.int64)
-            detection = Detection(x, y, sd_x, sd_y, area=np.nan, peak=float(peak), cells=nothing)
+        answers = zip(*watch(part), locator.strength(part).tolist(), strict=True)
+        for position, covariance, peak in answers:
+            detection = detection_at(position, covariance, peak)
             yield (Touch(id=1, kind="touch", since=0.0, detection=detection),)
     _say_health(replace(watch.health, presses=0))  # strangeness has been said of all frames
 

@@ -66,7 +66,7 @@ class Bar:
                 self._running = True
 
     def __enter__(self) -> Self:
-        """Show the bar."""
+        """Show the bar when the job takes long."""
         if self._shown:
             self._timer.start()
         return self
@@ -77,7 +77,7 @@ class Bar:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Remove the bar."""
+        """Remove the bar, however the job ended."""
         self._timer.cancel()
         with self._lock:
             self._over = True

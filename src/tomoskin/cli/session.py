@@ -148,9 +148,8 @@ def export(
     """Convert a session to tables, images or the format of another program."""
     from tomoskin.files.exports import WRITERS, Export, omitted
     from tomoskin.files.session import SessionReader
-    from tomoskin.run.sinks import write_bag, write_rerun
 
-    write = (WRITERS | {".mcap": write_bag, ".rrd": write_rerun})[out.suffix.lower()]
+    write = WRITERS[out.suffix.lower()]
     with SessionReader(file) as session, Bar(f"writing {out}") as bar:
         job = Export(session, every, bar, overwrite=force)
         write(job, out)

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from tomoskin.core.cache import cache_folder, kept
     from tomoskin.core.clocks import Clock, VirtualClock, WallClock, clock_ahead
     from tomoskin.core.colours import AMOUNT, CHANGE, CHANGE_ON_DARK, ColourScale
-    from tomoskin.core.extras import install_hint
+    from tomoskin.core.extras import install_hint, needed
     from tomoskin.core.json_bytes import encode_json, plain_values
     from tomoskin.core.memory import check_fits, machine_memory, most_bytes
     from tomoskin.core.records import (
@@ -51,6 +51,7 @@ if TYPE_CHECKING:
         real_numbers,
         whole_number,
     )
+    from tomoskin.core.worker import Capacity, Consumer, Say, Worker, stop_workers
 
 _HOME = {
     "AMOUNT": "colours",
@@ -63,11 +64,16 @@ _HOME = {
     "electrode_table": "typed_arrays",
     "encode_json": "json_bytes",
     "cache_folder": "cache",
+    "Capacity": "worker",
     "Clock": "clocks",
+    "Consumer": "worker",
+    "Say": "worker",
     "VirtualClock": "clocks",
     "WallClock": "clocks",
+    "Worker": "worker",
     "clock_ahead": "clocks",
     "install_hint": "extras",
+    "needed": "extras",
     "kept": "cache",
     "load_arrays": "archive",
     "machine_memory": "memory",
@@ -77,6 +83,7 @@ _HOME = {
     "plain_values": "json_bytes",
     "real_numbers": "typed_arrays",
     "save_arrays": "archive",
+    "stop_workers": "worker",
     "unpack_arrays": "archive",
     "whole_number": "typed_arrays",
 }
@@ -92,9 +99,11 @@ __all__ = [
     "MOST_ELECTRODES",
     "RECORDING",
     "Arrays",
+    "Capacity",
     "Clock",
     "ColourScale",
     "ComplexArray",
+    "Consumer",
     "DataError",
     "DeferredImage",
     "Detection",
@@ -110,6 +119,7 @@ __all__ = [
     "OutputError",
     "PatternError",
     "PixelMap",
+    "Say",
     "ScriptError",
     "SinkError",
     "SkinError",
@@ -121,6 +131,7 @@ __all__ = [
     "Voltages",
     "WallClock",
     "WireError",
+    "Worker",
     "cache_folder",
     "check_fits",
     "check_outputs",
@@ -133,6 +144,7 @@ __all__ = [
     "load_arrays",
     "machine_memory",
     "most_bytes",
+    "needed",
     "numbers",
     "pack_arrays",
     "parse_quantity",
@@ -140,6 +152,7 @@ __all__ = [
     "reach",
     "real_numbers",
     "save_arrays",
+    "stop_workers",
     "unpack_arrays",
     "watch_stages",
     "whole_number",

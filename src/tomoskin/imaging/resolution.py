@@ -1,4 +1,4 @@
-"""What an operator can tell and what not: resolution, point spread, sensitivity, Picard plot."""
+"""What data can tell and what not: the map of what they leave open, and the Picard plot."""
 
 from __future__ import annotations
 
@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import eigvalsh
+from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
@@ -15,35 +14,11 @@ from tomoskin.core import FloatArray, ModelError
 from tomoskin.imaging.linear.operator import Operator
 from tomoskin.imaging.linear.problem import LinearProblem
 from tomoskin.imaging.linear.spectrum import Spectrum
-from tomoskin.imaging.priors.penalty import Diagonal
 from tomoskin.model.mesh import Mesh
-
-_ROUNDING = 1e-14
-"""An eigenvalue of RᴴR below this part of the largest is rounding."""
+from tomoskin.model.prior import Diagonal
 
 _BLOCK = 256
 """Discs that the prior is asked of at a time."""
-
-
-def resolution_matrix(operator: Operator, problem: LinearProblem) -> NDArray[Any]:
-    """RJ, (n_cells, n_cells): as many numbers as that; ask for what you need of it below.
-
-    Raises
-    ------
-    ModelError
-        When operator and problem are not of one mesh, pattern and difference; so below.
-    """
-    _check_pair(operator, problem)
-    return np.asarray(operator.matrix @ problem.jacobian)
-
-
-def resolved(operator: Operator, problem: LinearProblem) -> NDArray[Any]:
-    """(n_cells,) diagonal of RJ: the part of a change in a cell that its own position shows.
-
-    Of a one-step operator the sum is the number of degrees of freedom that the data decide.
-    """
-    _check_pair(operator, problem)
-    return np.asarray(np.einsum("cm,mc->c", operator.matrix, problem.jacobian))
 
 
 def unresolved(
@@ -71,8 +46,8 @@ def unresolved(
     spread, gram = problem.carried
     data = gram + np.diag(alpha**2 / problem.weights)  # covariance of the data
     prior = _prior_variance(problem, discs)
-    seen, shared = discs @ operator.matrix, discs @ spread
-    explained = 2 * _products(seen, shared) - _products(seen @ data, seen)
+    image, shared = discs @ operator.matrix, discs @ spread
+    explained = 2 * _products(image, shared) - _products(image @ data, image)
     return np.asarray(np.clip(1.0 - explained / prior, 0.0, 1.0))
 
 
@@ -98,38 +73,6 @@ def _prior_variance(problem: LinearProblem, discs: csr_array) -> FloatArray:
 def _products(one: NDArray[Any], other: NDArray[Any]) -> FloatArray:
     """(n,) real part of the product of each row with the other's."""
     return np.asarray(np.einsum("nm,nm->n", one, other.conj()).real)
-
-
-def point_spread(operator: Operator, problem: LinearProblem, cells: ArrayLike) -> NDArray[Any]:
-    """(n_cells, k) images of a change of 1 in each of ``cells``: columns of RJ."""
-    _check_pair(operator, problem)
-    return np.asarray(operator.matrix @ problem.jacobian[:, np.asarray(cells)])
-
-
-def averaging(operator: Operator, problem: LinearProblem, cells: ArrayLike) -> NDArray[Any]:
-    """(k, n_cells) weights with which changes enter the image of each of ``cells``."""
-    _check_pair(operator, problem)
-    return np.asarray(operator.matrix[np.asarray(cells)] @ problem.jacobian)
-
-
-def sensitivity(problem: LinearProblem) -> FloatArray:
-    """(n_cells,) root of Σ_rows W|J|², per area of the cell, so that meshes can be compared.
-
-    V/S/m² with unit weights on a sheet; what a change of given size and area does to the data.
-    """
-    power = np.einsum("mc,m,mc->c", problem.jacobian, problem.weights, problem.jacobian.conj())
-    return np.asarray(np.sqrt(power.real) / problem.model.mesh.volumes)
-
-
-def condition_number(operator: Operator) -> float:
-    """Largest over least singular value of R: the most that noise can outgrow a change in it.
-
-    From the eigenvalues of RᴴR, so up to 1e7 of what R holds; rows that say the same twice, as
-    reciprocal ones do, are counted once. See :attr:`Spectrum.condition` for that of J.
-    """
-    values = eigvalsh(operator.matrix.conj().T @ operator.matrix)
-    kept = values[values > _ROUNDING * values[-1]]
-    return float(np.sqrt(kept[-1] / kept[0]))
 
 
 def _check_pair(operator: Operator, problem: LinearProblem) -> None:
@@ -167,11 +110,6 @@ class Picard:
     coefficients: FloatArray
     solution: FloatArray
     noise: FloatArray
-
-    @property
-    def above_noise(self) -> int:
-        """Number of coefficients that are more than noise: above three deviations."""
-        return int(np.count_nonzero(self.coefficients > 3.0 * self.noise))
 
 
 def picard(spectrum: Spectrum, dv: NDArray[Any], noise: FloatArray | None = None) -> Picard:

@@ -4,22 +4,16 @@ from pathlib import Path
 from typing import Any
 
 from tomoskin.core import DataError, StrPath, load_arrays
-from tomoskin.learning.bend.examples import BendExamples
-from tomoskin.learning.bend.joint import JointReference
-from tomoskin.learning.bend.kind import BENDS
+from tomoskin.learning.bend.examples import BendExamples, JointReference
+from tomoskin.learning.bend.kind import BENDS, BendReader, BendReading
 from tomoskin.learning.bend.model import BendModel
-from tomoskin.learning.bend.reader import BendReader, BendReading
-from tomoskin.learning.classes.alignment import Alignment
-from tomoskin.learning.classes.classifier import Answers, Classifier
 from tomoskin.learning.classes.examples import Codes, Examples, against_rest
-from tomoskin.learning.classes.kind import CLASSES, ClassReading, FrameClassifier
-from tomoskin.learning.force.identify import MaterialFit, identify
-from tomoskin.learning.force.kind import FORCE
+from tomoskin.learning.classes.kind import CLASSES, Answers, Classifier, ClassReading
+from tomoskin.learning.force.identify import identify
+from tomoskin.learning.force.kind import FORCE, ForceReport, least_known
 from tomoskin.learning.force.measured import ForceProcess
-from tomoskin.learning.force.model import ForceModel, LabelRemark, PressedSpots
-from tomoskin.learning.force.presses import WeighedPresses
-from tomoskin.learning.force.report import ForceReport, least_known
-from tomoskin.learning.force.weights import NEWTONS, Weight
+from tomoskin.learning.force.model import ForceModel
+from tomoskin.learning.force.presses import NEWTONS, WeighedPresses, Weight
 from tomoskin.learning.kind import (
     Applied,
     Calibration,
@@ -33,10 +27,9 @@ from tomoskin.learning.kind import (
 )
 from tomoskin.learning.mapping.mapping import ChannelMapping, ring_of
 from tomoskin.learning.mapping.solve import MappingAnswer, solve_channel_mapping
-from tomoskin.learning.touch.health import CalibrationHealth
+from tomoskin.learning.touch.health import CalibrationHealth, LeftOut
 from tomoskin.learning.touch.kind import TOUCH
-from tomoskin.learning.touch.left_out import LeftOut
-from tomoskin.learning.touch.locator import Locator
+from tomoskin.learning.touch.locator import Locator, detection_at
 from tomoskin.learning.touch.presses import Presses
 from tomoskin.learning.touch.rubbing import Rubbing, quiet_electrodes
 from tomoskin.learning.touch.session_alignment import SessionAlignment
@@ -56,7 +49,7 @@ def load_calibration(path: StrPath, progress: Progress = silent) -> Calibration[
         raise DataError(
             "is not a calibration", where=str(path), hint="make one: tomoskin calibrate --help"
         )
-    return kind.learn(arrays, str(path), progress)
+    return kind.unpack(arrays, str(path), progress)
 
 
 __all__ = [
@@ -66,7 +59,6 @@ __all__ = [
     "KINDS",
     "NEWTONS",
     "TOUCH",
-    "Alignment",
     "Answers",
     "Applied",
     "BendExamples",
@@ -85,16 +77,12 @@ __all__ = [
     "ForceModel",
     "ForceProcess",
     "ForceReport",
-    "FrameClassifier",
     "FrameView",
     "JointReference",
     "Kind",
-    "LabelRemark",
     "LeftOut",
     "Locator",
     "MappingAnswer",
-    "MaterialFit",
-    "PressedSpots",
     "Presses",
     "Rubbing",
     "SessionAlignment",
@@ -104,6 +92,7 @@ __all__ = [
     "WeighedPresses",
     "Weight",
     "against_rest",
+    "detection_at",
     "identify",
     "least_known",
     "load_calibration",

@@ -1,8 +1,12 @@
 """One concept of calibration: what is learnt from examples, kept in a file, and applied to frames.
 
-A kind says how its model is packed, unpacked, checked and applied; files, sessions, the pipeline
-and the command line go through the kinds and know none of them by name. A further kind is one
-module that makes a :class:`Kind` and stands in :data:`tomoskin.learning.KINDS`.
+A kind says what its model is learnt from, how it is checked and how it is applied; files, sessions,
+the pipeline and the command line go through the kinds and know none of them by name. A further kind
+is one folder that makes a :class:`Kind`, which stands in :data:`tomoskin.learning.KINDS`.
+
+Keys of a file, an .npz: ``kind``, ``version``; ``drive``, ``measure`` (n_meas, 2),
+``n_electrodes``; ``skin_name``; and what the kind's model is learnt from. It is learnt again when
+the file is read, which gives the same model: a file outlives the method.
 """
 
 from __future__ import annotations
@@ -33,6 +37,7 @@ from tomoskin.core import (
     unpack_arrays,
     whole_number,
 )
+from tomoskin.learning.record_arrays import kept_names, pack, unpack
 from tomoskin.model.pattern import Pattern
 from tomoskin.model.skin import Skin
 from tomoskin.sensing.fit import Response
@@ -186,6 +191,9 @@ Progress = Callable[[float, float], None]
 M = TypeVar("M")
 
 _PATTERN_KEYS = frozenset({"version", "drive", "measure", "n_electrodes"})
+_VERSION = 1
+_GIVEN = {"pattern", "progress"}
+"""Parameters of a kind's ``learn`` that no file holds under their names."""
 
 
 def silent(_done: float, _total: float) -> None:
@@ -199,28 +207,22 @@ class Kind(Generic[M]):
     Attributes
     ----------
     name
-        Its key in :data:`tomoskin.learning.KINDS`.
-    title, version
+        Its key in :data:`tomoskin.learning.KINDS`, and the sub-command of ``tomoskin calibrate``
+        that makes one.
+    title
         What its file says that it is.
     subject
         What it calibrates, for messages.
-    command
-        The sub-command of ``tomoskin calibrate`` that makes one.
     attachment
         Name of its file inside a session.
-    keys
-        Arrays that its file must have beside those of the pattern.
-    pack
-        Model → arrays of its file.
-    unpack
-        Arrays of a file, the pattern, the file's name and a progress → model, learnt again.
-        Raises DataError.
+    learn
+        What its file holds → model, learnt again; raises DataError. Its parameters name the
+        attributes of the model that the file holds, beside a ``pattern`` and a ``progress`` where
+        it asks for them; their annotations say how they are read (:mod:`.record_arrays`).
     exclude
         Model without some measurements; None where it cannot do without.
     apply
         Model and conditions → what it does with each frame.
-    skin_id
-        Model → identity of the skin that it was learnt on; "" where none is known.
     check
         Raises DataError where a calibration cannot serve a skin of its own scan; None where it
         always can.
@@ -237,16 +239,11 @@ class Kind(Generic[M]):
 
     name: str
     title: str
-    version: int
     subject: str
-    command: str
     attachment: str
-    keys: frozenset[str]
-    pack: Callable[[M], Arrays]
-    unpack: Callable[[Arrays, Pattern, str, Progress], M]
+    learn: Callable[..., M]
     exclude: Callable[[M, IntArray], M | None]
     apply: Callable[[M, Conditions], Applied]
-    skin_id: Callable[[M], str]
     check: Callable[[Calibration[M], Skin], None] | None = None
     directions: Callable[[M], FloatArray] | None = None
     locates: bool = False
@@ -265,30 +262,36 @@ class Kind(Generic[M]):
         DataError
             When it is missing, damaged, or of another kind.
         """
-        return self.learn(load_arrays(path), str(path), progress)
+        return self.unpack(load_arrays(path), str(path), progress)
 
     def decode(self, data: bytes, where: str) -> Calibration[M]:
         """:meth:`read` from the file's bytes."""
-        return self.learn(unpack_arrays(data, where), where, silent)
+        return self.unpack(unpack_arrays(data, where), where)
 
-    def learn(self, arrays: Arrays, where: str, progress: Progress) -> Calibration[M]:
+    def unpack(self, arrays: Arrays, where: str, progress: Progress = silent) -> Calibration[M]:
         """:meth:`read` from the arrays of the file."""
         pattern = self._pattern(arrays, where)
-        model = self.unpack(arrays, pattern, where, progress)
+        with located(where):
+            rows = arrays["dv"].shape[1:] if "dv" in arrays else (pattern.n_meas,)
+            if rows != (pattern.n_meas,):
+                raise DataError(f"expected {pattern.n_meas} rows of dv, got {rows}")
+            model = unpack(self.learn, arrays, pattern=pattern, progress=progress)
         return Calibration(self, model, pattern, str(arrays.get("skin_name", "")))
+
+    def pack(self, model: M) -> dict[str, NDArray[Any]]:
+        """What its file holds of a ``model``."""
+        return pack({name: getattr(model, name) for name in kept_names(self.learn, _GIVEN)})
 
     def _pattern(self, arrays: Arrays, where: str) -> Pattern:
         title = str(arrays.get("kind", ""))
-        if title != self.title or not set(arrays) >= self.keys | _PATTERN_KEYS:
+        if title != self.title or not set(arrays) >= _PATTERN_KEYS:
             raise DataError(
                 f"is not a calibration of {self.subject}",
                 where=where,
-                hint=f"make one: tomoskin calibrate {self.command}",
+                hint=f"make one: tomoskin calibrate {self.name}",
             )
-        if whole_number(arrays, "version", where) != self.version:
-            raise DataError(
-                f"expected version {self.version}, got {arrays['version']}", where=where
-            )
+        if whole_number(arrays, "version", where) != _VERSION:
+            raise DataError(f"expected version {_VERSION}, got {arrays['version']}", where=where)
         drive, measure = (electrode_table(arrays, key, where) for key in ("drive", "measure"))
         with located(where):
             n_electrodes = whole_number(arrays, "n_electrodes", where, MOST_ELECTRODES)
@@ -324,7 +327,7 @@ class Calibration(Generic[M]):
 
     def check_skin(self, skin: Skin) -> None:
         """Raise DataError where it was learnt on another skin, or on other settings of it."""
-        learnt_on = self.kind.skin_id(self.model)
+        learnt_on = getattr(self.model, "skin_id", "")
         if learnt_on and learnt_on != skin.identity:
             raise self.mismatch("skin", skin)
 
@@ -335,7 +338,7 @@ class Calibration(Generic[M]):
         return DataError(
             f"the calibration of {self.kind.subject} belongs to another {what}: it was learnt on "
             f"{mine} and is used on {other}",
-            hint=f"calibrate this skin: tomoskin calibrate {self.kind.command}",
+            hint=f"calibrate this skin: tomoskin calibrate {self.kind.name}",
         )
 
     def with_model(self, model: M) -> Self:
@@ -354,7 +357,7 @@ class Calibration(Generic[M]):
     def _arrays(self) -> Arrays:
         return {
             "kind": np.array(self.kind.title),
-            "version": np.array(self.kind.version),
+            "version": np.array(_VERSION),
             "drive": self.pattern.drive,
             "measure": self.pattern.measure,
             "n_electrodes": np.array(self.pattern.n_electrodes),

@@ -18,9 +18,7 @@ from tomoskin.imaging import (
     LinearProblem,
     Modes,
     Operator,
-    Prior,
     Spectrum,
-    named_prior,
 )
 from tomoskin.learning import Calibration, Kind
 from tomoskin.model.forward import ForwardModel
@@ -84,7 +82,7 @@ class Prepared:
         """The skin with the ``operator`` of ``choice``, made from the ``spectrum``."""
         modes = None
         if self.skin.inverse.time_constant:
-            modes = Modes.of_spectrum(spectrum, choice.alpha, operator)
+            modes = Modes.of(spectrum, choice.alpha, operator)
         return replace(self, operator=operator, modes=modes, choice=choice)
 
     def calibrated(self, calibration: Calibration[Any]) -> Prepared:
@@ -152,7 +150,7 @@ class Prepared:
         left = jacobian - basis @ (basis.T @ jacobian)
         if not left.any(axis=0).all():  # nothing is left to weigh by
             return self
-        prior = _prior(self.skin).penalty(self.mesh, left)
+        prior = self.skin.inverse.record("prior").penalty(self.mesh, left)
         operator = replace(self.problem, prior=prior).operator(self.choice.alpha)
         return replace(self, operator=operator)
 
@@ -207,7 +205,7 @@ def prepare(skin: Skin, previous: Prepared | None = None) -> Prepared:
 def _problem(model: ForwardModel, skin: Skin) -> LinearProblem:
     return LinearProblem.of(
         model,
-        _prior(skin),
+        skin.inverse.record("prior"),
         conductivity=skin.conductivity,
         difference=skin.inverse.difference,
     )
@@ -218,9 +216,9 @@ def _problem_after(previous: Prepared, skin: Skin) -> LinearProblem:
     problem = previous.problem
     if not _same_difference(skin, previous.skin):
         return _problem(previous.model, skin)
-    if _prior(skin) == _prior(previous.skin):
+    if skin.inverse.record("prior") == previous.skin.inverse.record("prior"):
         return problem
-    penalty = _prior(skin).penalty(previous.mesh, problem.jacobian)
+    penalty = skin.inverse.record("prior").penalty(previous.mesh, problem.jacobian)
     return replace(problem, prior=penalty)
 
 
@@ -237,15 +235,6 @@ def colour_limit(prepared: Prepared) -> float:
     change = np.where(touched, -skin.conductivity, 0.0)
     dv = (prepared.problem.jacobian @ change).real
     return _rounded(float(np.abs(prepared.operator(dv).values).max()))
-
-
-def _prior(skin: Skin) -> Prior:
-    settings = skin.inverse
-    return named_prior(
-        settings.prior,
-        exponent=settings.exponent,
-        correlation_length=settings.correlation_length,
-    )
 
 
 def _prepared(skin: Skin, problem: LinearProblem, previous: Prepared | None = None) -> Prepared:
@@ -273,7 +262,7 @@ def _prepared(skin: Skin, problem: LinearProblem, previous: Prepared | None = No
         model=model,
         problem=problem,
         operator=operator,
-        modes=Modes.of(problem, operator) if skin.inverse.time_constant else None,
+        modes=_modes(skin, problem, light_touch, choice, operator),
         segmenter=segmenter or Segmenter(model.mesh, skin.touch),
         readout=readout,
         choice=choice,
@@ -281,6 +270,20 @@ def _prepared(skin: Skin, problem: LinearProblem, previous: Prepared | None = No
         spots=spots,
         calibrations=calibrations,
     )
+
+
+def _modes(
+    skin: Skin,
+    problem: LinearProblem,
+    light_touch: LightTouch | None,
+    choice: AlphaChoice,
+    operator: Operator,
+) -> Modes | None:
+    """Those of a filter over frames, where the skin has one."""
+    if not skin.inverse.time_constant:
+        return None
+    spectrum = light_touch.spectrum if light_touch else Spectrum.of(problem)
+    return Modes.of(spectrum, choice.alpha, operator)
 
 
 def _fits(skin: Skin, calibrations: Mapping[str, Calibration[Any]]) -> bool:

@@ -8,16 +8,24 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tomoskin.board.source import Link, ScanSettings, Timing, Transport
-from tomoskin.board.wire import Info
+from tomoskin.board.source import (
+    BOARDS,
+    DEFAULT_BOARD,
+    BoardRecord,
+    Link,
+    ScanSettings,
+    Timing,
+    Transport,
+    board_named,
+)
+from tomoskin.board.wire import BoardLimits, Info
 from tomoskin.core import FloatArray, Frame, SourceError
 from tomoskin.model.pattern import Scan
 from tomoskin.run.safe_off import check_safe_off
 from tomoskin.sensing.signal import CountScale, LoadRing, diagnose
 
-GAIN, REFERENCE, BITS = 35.0, 5.0, 10
-"""Of the board's amplifiers, and of the Mega's converter, V and bits; a Pico's samples are scaled
-to it."""
+BITS = BOARDS[DEFAULT_BOARD].adc_bits
+"""Of a count here: the samples of a finer converter are scaled to it."""
 
 _NOISE = 2.0
 """Counts a conversion; the decks give 0.7, and rounding adds 0.3."""
@@ -51,7 +59,13 @@ class _Readings:
     mean: FloatArray
     sd: FloatArray
     info: Info
-    name: str
+    board: BoardLimits | None
+
+    @property
+    def record(self) -> BoardRecord:
+        """What is known of such a board; of an unknown one, what is known of the first."""
+        known = board_named(self.board.text) if self.board else None
+        return known or BOARDS[DEFAULT_BOARD]
 
 
 def check_board(
@@ -71,8 +85,9 @@ def check_board(
     settings = ScanSettings(4, _LATE, current, BITS)
     first = _measure(transport, onward, settings, frames, Timing())
     yield _identity(first, n, current)
+    yield from _differences(first)
     second = _measure(transport, back, settings, frames, _AT_ONCE)
-    scale = CountScale.of(GAIN, REFERENCE, BITS)
+    scale = CountScale.of(first.record.gain, first.record.reference, BITS)
     found = diagnose(
         np.vstack([first.mean, second.mean]),
         ring,
@@ -124,7 +139,7 @@ def _measure(
     shape = scan.drives.shape[0], -1
     mean = samples.mean(axis=0).reshape(shape) / settings.oversampling
     sd = samples.std(axis=0, ddof=1).reshape(shape) / np.sqrt(settings.oversampling)
-    return _Readings(mean, sd, info, link.board_name)
+    return _Readings(mean, sd, info, link.board)
 
 
 _PATIENCE = 60.0
@@ -135,7 +150,7 @@ def _identity(readings: _Readings, n: int, current: float) -> CheckFinding:
     info = readings.info
     firmware = ".".join(map(str, info.firmware))
     said = f"firmware {firmware}, {info.channels} channels, {info.current / 1e3:g} mA"
-    said = f"{readings.name}, {said}" if readings.name else said
+    said = f"{readings.board.text}, {said}" if readings.board else said
     if info.channels < n:
         return CheckFinding(
             "handshake",
@@ -146,6 +161,24 @@ def _identity(readings: _Readings, n: int, current: float) -> CheckFinding:
         hint = f'but expected {current * 1e3:g} mA: tomoskin firmware configure PORT --current "…"'
         return CheckFinding("handshake", False, f"{said}, {hint}")
     return CheckFinding("handshake", True, said)
+
+
+def _differences(readings: _Readings) -> Iterator[CheckFinding]:
+    """What a known board says of itself against its record; what it says counts."""
+    info, board, record = readings.info, readings.board, readings.record
+    if board is None or board.text != record.text:
+        return
+    said = {name: getattr(info, name) for name in ("adc_bits", "max_samples", "tick_rate")}
+    said |= {name: getattr(board, name) for name in ("min_chop", "max_chop", "clock")}
+    known = {name: getattr(record, name, getattr(record.chop, name, None)) for name in said}
+    different = [name for name in said if said[name] != known[name]]
+    if different:
+        text = ", ".join(f"{name} {said[name]} instead of {known[name]:g}" for name in different)
+        yield CheckFinding(
+            "record",
+            False,
+            f"the firmware is another than the one known here of the {record.text}: {text}",
+        )
 
 
 def _noise(sd: FloatArray) -> CheckFinding:

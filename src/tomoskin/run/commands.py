@@ -14,7 +14,7 @@ from typing import Annotated
 from msgspec import Meta
 
 from tomoskin.board.source import Transport
-from tomoskin.files.session import Log
+from tomoskin.files.session import MessageLog
 from tomoskin.pipeline import Prepared
 from tomoskin.run.twin_requests import SetPose, SetTwin, StrictRequest
 from tomoskin.twin import Contact
@@ -82,7 +82,7 @@ class Record:
     """
 
     path: Path
-    log: Log | None = None
+    log: MessageLog | None = None
     """Where the session goes, instead of a file of its own."""
 
 

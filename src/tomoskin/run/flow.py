@@ -134,7 +134,7 @@ class Flow:
     def take(self, link: Link, items: Sequence[Frame | Event]) -> None:
         """What one read of the link brought: frames and events."""
         self._polled, self._waited = self._clock(), link.waited
-        self._note_board(link.info, link.board_name)
+        self._note_board(link.info, link.board.text if link.board else "")
         frames = [item for item in items if isinstance(item, Frame)]
         self._drops = frames[-1].drops if frames else self._drops
         self._losses = Losses.of(link, self._drops)

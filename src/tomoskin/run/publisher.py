@@ -9,24 +9,14 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
-from tomoskin.core import Event
+from tomoskin.core import Capacity, Consumer, Event, Worker, stop_workers
+from tomoskin.files.messages import Stream
 from tomoskin.files.session import RunMessage
 from tomoskin.model.robot import Place
 from tomoskin.pipeline import FrameResult, Prepared
 from tomoskin.run.board_memory import BoardMemory
 from tomoskin.run.recordings import Recordings
-from tomoskin.run.sinks import (
-    Capacity,
-    Consumer,
-    Sink,
-    SinkConsumer,
-    SinkReport,
-    Stream,
-    Worker,
-    sink_report,
-    sink_worker,
-    stop_workers,
-)
+from tomoskin.run.sinks import Sink, SinkConsumer, SinkReport, sink_report, sink_worker
 from tomoskin.run.turns import Turns
 
 MOST_WAITING = 256

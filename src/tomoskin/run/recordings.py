@@ -8,12 +8,13 @@ from concurrent.futures import Future
 from dataclasses import replace
 from pathlib import Path
 
-from tomoskin.core import Frame
+from tomoskin.core import Capacity, Frame, Worker
+from tomoskin.files.messages import epoch, raster
 from tomoskin.files.session import (
     BoardInfo,
-    Log,
     Mark,
     MarkedFrame,
+    MessageLog,
     RawRead,
     Recorder,
     RunMessage,
@@ -22,7 +23,6 @@ from tomoskin.files.session import (
     Truth,
 )
 from tomoskin.pipeline import REFERENCE_FRAMES, FrameResult, Prepared
-from tomoskin.run.sinks import Capacity, Worker, epoch, raster
 
 _KEPT = 3 * REFERENCE_FRAMES
 """Frames that make a reference, and during which the operator follows its noise."""
@@ -153,7 +153,7 @@ class Recordings:
         """The newest frames in which nothing touched."""
         return self._pre_roll.untouched
 
-    def begin(self, path: Path, log: Log | None = None) -> Future[None]:
+    def begin(self, path: Path, log: MessageLog | None = None) -> Future[None]:
         """Record from the next bytes on, and end what was being recorded.
 
         ``log``: where it goes, instead of a file of its own. Done when the file has been made;
@@ -240,7 +240,7 @@ class Recordings:
 
 
 def _worker(
-    path: Path, prepared: Prepared, start: float, say: Say, log: Log | None
+    path: Path, prepared: Prepared, start: float, say: Say, log: MessageLog | None
 ) -> Worker[Recorder]:
     def make() -> SessionWriter:
         session = SessionWriter(path, prepared.skin, epoch=epoch(), start=start, log=log)

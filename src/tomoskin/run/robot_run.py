@@ -11,14 +11,15 @@ from pathlib import Path
 from time import monotonic
 
 from tomoskin.core import SourceError, StrPath, TomoskinError
-from tomoskin.files.session import RobotLog
+from tomoskin.files.messages import epoch
+from tomoskin.files.session import MessageLog, robot_logs
 from tomoskin.model.robot import Place
 from tomoskin.pipeline import Prepared
 from tomoskin.run import commands
 from tomoskin.run.board_memory import BoardMemory
 from tomoskin.run.commands import Opener
 from tomoskin.run.runner import Runner
-from tomoskin.run.sinks import Sink, epoch
+from tomoskin.run.sinks import Sink
 from tomoskin.run.status import Status
 from tomoskin.run.turns import Turns
 
@@ -63,7 +64,7 @@ class RobotRun:
         }
         self._boards = {m.place.name: m.board for m in members}
         self._problems: Mapping[str, str] = {}
-        self._log: RobotLog | None = None
+        self._logs: Mapping[str, MessageLog] = {}
         self._ended = threading.Event()
         self._watch = threading.Thread(target=self._look_on, name="tomoskin-robot", daemon=True)
 
@@ -109,9 +110,8 @@ class RobotRun:
         """
         path = Path(path)
         self.stop_recording()
-        self._log = RobotLog(path, tuple(self.runners), epoch=epoch(), start=monotonic())
-        parts = self._log.parts
-        asked = [r.submit(commands.Record(path, parts[n])) for n, r in self.runners.items()]
+        logs = self._logs = robot_logs(path, tuple(self.runners), epoch=epoch(), start=monotonic())
+        asked = [r.submit(commands.Record(path, logs[n])) for n, r in self.runners.items()]
         try:
             for future in asked:
                 future.result()
@@ -121,14 +121,14 @@ class RobotRun:
 
     def stop_recording(self) -> None:
         """End the recording, if there is one; returns when the file is complete."""
-        if self._log is not None:
+        if self._logs:
             wait([r.submit(commands.StopRecording()) for r in self.runners.values()])
         self._close_log()
 
     @property
     def recording(self) -> Path | None:
         """The file that is being recorded to, or None."""
-        return None if self._log is None else self._log.path
+        return next((log.path for log in self._logs.values()), None)
 
     def statuses(self) -> dict[str, Status]:
         """How each skin is doing now, by its name."""
@@ -148,11 +148,10 @@ class RobotRun:
         return stack
 
     def _close_log(self) -> None:
-        log, self._log = self._log, None
-        if log is not None:
-            for part in log.parts.values():
-                with suppress(TomoskinError):  # whoever wrote last has said so
-                    part.close()
+        logs, self._logs = self._logs, {}
+        for log in logs.values():
+            with suppress(TomoskinError):  # whoever wrote last has said so
+                log.close()
 
     def _look_on(self) -> None:
         """What no run can see by itself."""

@@ -13,9 +13,9 @@ import numpy as np
 
 from tomoskin import __version__
 from tomoskin.core import FloatArray, WireError, encode_json
+from tomoskin.files.messages import Contacts, Stream
 from tomoskin.model.robot import PlacedSkin, Pose, Robot
 from tomoskin.run import RobotRun, Runner, StrictRequest, commands
-from tomoskin.run.sinks import Moment, Naming, Stream, contacts_of
 from tomoskin.server.page_connection import Host
 from tomoskin.server.page_messages import (
     PlacedShape,
@@ -61,7 +61,7 @@ class NewestTouches:
 
     def _touches(self, name: str, runner: Runner) -> TouchesOfSkin:
         assert runner.newest is not None
-        moment = Moment.of(runner.newest.result, with_image=False)
+        contacts = Contacts.of(self._streams[name], runner.newest.result)
         pose = self._poses[name]
         touches = [
             SpaceTouch(
@@ -71,9 +71,9 @@ class NewestTouches:
                 peak=contact.touch.detection.peak,
                 force=contact.force,
             )
-            for contact in contacts_of(self._streams[name], moment)
+            for contact in contacts.touches
         ]
-        return TouchesOfSkin(valid=moment.valid, touches=touches)
+        return TouchesOfSkin(valid=contacts.valid, touches=touches)
 
 
 class Overview(Host):
@@ -175,7 +175,7 @@ def scene(robot: Robot, streams: Mapping[str, Stream], poses: Mapping[str, Pose]
 
 def _skin(skin: PlacedSkin, stream: Stream, pose: Pose) -> PlacedShape:
     corners = np.zeros((0, 3)) if stream.corners is None else stream.corners.reshape(-1, 3)
-    frame = Naming().of_skin(stream).frame_id
+    frame = stream.naming.frame_id
     return PlacedShape.of(skin, frame=frame, corners=_rounded(pose(corners).ravel()))
 
 

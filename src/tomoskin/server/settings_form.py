@@ -11,18 +11,17 @@ from msgspec.structs import replace
 
 from tomoskin.core import PatternError, SkinError, TomoskinError
 from tomoskin.model.pattern import named
-from tomoskin.model.skin import (
-    SECTIONS,
+from tomoskin.model.section import (
     Choice,
     Number,
     NumberOrWord,
     OneOrEach,
     Quantity,
-    Skin,
     Table,
     ValueKind,
     Whole,
 )
+from tomoskin.model.skin import SECTIONS, Skin
 from tomoskin.server.settings_messages import (
     Condition,
     KeyForm,

@@ -6,7 +6,13 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from tomoskin.board.source import Transport, list_ports, open_source
+from tomoskin.board.source import (
+    BOARDS,
+    DEFAULT_BOARD,
+    Transport,
+    list_ports,
+    open_source,
+)
 from tomoskin.board.wire import SCHEMA, Info
 from tomoskin.core import SourceError
 from tomoskin.files.session import ReplayTransport, SessionReader, as_recorded, parse_replay
@@ -17,13 +23,13 @@ from tomoskin.server.hub import Hub
 from tomoskin.server.page_messages import BoardNow, Offer, Sources
 from tomoskin.server.requests import Connect, ListSources
 from tomoskin.server.task import Listener
-from tomoskin.twin.emulator import BOARDS, DEFAULT
 
 EMULATED = {
     "emulator"
-    if name == DEFAULT
+    if name == DEFAULT_BOARD
     else f"emulator:{name}": f"Real firmware on a simulated {board.text}"
     for name, board in BOARDS.items()
+    if board.emulator
 }
 
 

@@ -3,21 +3,25 @@
 from tomoskin.twin.bend import BendSettings, Bent, Deformation, Pose, Stretched, strain_of
 from tomoskin.twin.board import Board, HeldScanning
 from tomoskin.twin.circuit import ElectronicsSettings, Lines, line_potentials
-from tomoskin.twin.contact import ContactSettings, Dented, Grid, solve_contact
-from tomoskin.twin.course import ScriptedBend, bent, bent_truth, pressed
+from tomoskin.twin.contact import ContactSettings, Grid, solve_contact
+from tomoskin.twin.course import bent, bent_truth, pressed
 from tomoskin.twin.dent import Load, indent
 from tomoskin.twin.device import TwinDevice
 from tomoskin.twin.electrodes import ThermalVoltages
 from tomoskin.twin.electronics import TwinElectronics, convert
-from tomoskin.twin.faults import Disturbance, FaultEvent, Faults, disturbed, faults_at, reboots
-from tomoskin.twin.layered import Inclusion, Layered, Plate
-from tomoskin.twin.line import FaultyLine, Line, LineSettings
+from tomoskin.twin.faults import (
+    Disturbance,
+    Faults,
+    Line,
+    LineSettings,
+    disturbed,
+    reboots,
+)
+from tomoskin.twin.labelled import COMMON_PRESSES, Population, SetPlan, make_shard
 from tomoskin.twin.material import MaterialSettings, MaterialState, advance, conductivity
-from tomoskin.twin.population import COMMON_PRESSES, Population
 from tomoskin.twin.presets import PRESETS, TwinSettings
 from tomoskin.twin.probe import Contact, Press, Probe
 from tomoskin.twin.scanning import (
-    Analogue,
     SampleTable,
     ScanClock,
     chopped_table,
@@ -27,17 +31,21 @@ from tomoskin.twin.scanning import (
 from tomoskin.twin.script import Script
 from tomoskin.twin.script_check import check_script, check_settling
 from tomoskin.twin.shape import FACES, Circle, Face, Finger, Shape, Square
-from tomoskin.twin.shards import SetPlan, make_shard
 from tomoskin.twin.sheet import TwinSkin
-from tomoskin.twin.source import make_electronics, make_twin, open_twin, read_settings
+from tomoskin.twin.source import (
+    TwinTransport,
+    make_electronics,
+    make_twin,
+    on_converter,
+    open_twin,
+    read_settings,
+)
 from tomoskin.twin.stepped import Step, SteppedSkin
-from tomoskin.twin.transport import TwinTransport
 
 __all__ = [
     "COMMON_PRESSES",
     "FACES",
     "PRESETS",
-    "Analogue",
     "BendSettings",
     "Bent",
     "Board",
@@ -45,25 +53,19 @@ __all__ = [
     "Contact",
     "ContactSettings",
     "Deformation",
-    "Dented",
     "Disturbance",
     "ElectronicsSettings",
     "Face",
-    "FaultEvent",
     "Faults",
-    "FaultyLine",
     "Finger",
     "Grid",
     "HeldScanning",
-    "Inclusion",
-    "Layered",
     "Line",
     "LineSettings",
     "Lines",
     "Load",
     "MaterialSettings",
     "MaterialState",
-    "Plate",
     "Population",
     "Pose",
     "Press",
@@ -71,7 +73,6 @@ __all__ = [
     "SampleTable",
     "ScanClock",
     "Script",
-    "ScriptedBend",
     "SetPlan",
     "Shape",
     "Square",
@@ -93,12 +94,12 @@ __all__ = [
     "conductivity",
     "convert",
     "disturbed",
-    "faults_at",
     "indent",
     "line_potentials",
     "make_electronics",
     "make_shard",
     "make_twin",
+    "on_converter",
     "open_twin",
     "pressed",
     "read_settings",

@@ -3,9 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
+from typing import Self
 
-from tomoskin.board.source import PRESCALERS, ScanSettings, chop_limit
+from tomoskin.board.source import (
+    BOARDS,
+    DEFAULT_BOARD,
+    PRESCALERS,
+    BoardRecord,
+    Converter,
+    ScanSettings,
+    chop_limit,
+)
 from tomoskin.board.wire import (
     SCHEMA,
     Ack,
@@ -36,7 +45,7 @@ Verdict = tuple[Result, int]
 
 OK: Verdict = (Result.OK, 0)
 _MAX_SETTLING = 100_000
-_CONVERSIONS = (1, 64)
+_MOST_CONVERSIONS, _MOST_SAMPLE = 64, 0xFFFF
 _DRIVES_OF_PATTERN = 9
 """Drives that a PATTERN holds at most."""
 
@@ -54,6 +63,27 @@ class Board:
     firmware: tuple[int, int, int] = (1, 2, 0)
     unique_id: bytes = b"twin\0\0\0\0"
     limits: BoardLimits = LIMITS
+    converter: Converter = BOARDS[DEFAULT_BOARD].converter
+
+    @classmethod
+    def of(cls, record: BoardRecord, needed: int, current: float, unique_id: bytes) -> Self:
+        """A board of the table, of the smallest size that has the channels ``needed``."""
+        return cls(
+            channels=next((n for n in record.channels if n >= needed), record.channels[-1]),
+            adc_bits=record.adc_bits,
+            current=current,
+            tick_rate=record.tick_rate,
+            max_drives=record.max_drives,
+            max_samples=record.max_samples,
+            unique_id=unique_id,
+            limits=record.limits,
+            converter=record.converter,
+        )
+
+    @property
+    def max_oversampling(self) -> int:
+        """Conversions whose sum fits a sample."""
+        return min(_MOST_CONVERSIONS, _MOST_SAMPLE // ((1 << self.adc_bits) - 1))
 
     def info(self, request: int) -> Info:
         """The answer to GET_INFO."""
@@ -66,7 +96,7 @@ class Board:
             reset=Reset.POWER,
             channels=self.channels,
             adc_bits=self.adc_bits,
-            max_oversampling=_CONVERSIONS[1],
+            max_oversampling=self.max_oversampling,
             max_drives=self.max_drives,
             max_samples=self.max_samples,
             tick_rate=round(self.tick_rate),
@@ -81,22 +111,19 @@ class Board:
             return Result.TOO_MANY_DRIVES, self.max_drives
         if round(self.current * 1e6) > command.current_limit:
             return Result.CURRENT_TOO_HIGH, 0
-        low, high = _CONVERSIONS
         good = {
             "configuration": command.configuration > 0,
             "n_drives": command.n_drives > 0,
             "settling": command.settling <= _MAX_SETTLING,
-            "oversampling": low <= command.oversampling <= high,
+            "oversampling": 1 <= command.oversampling <= self.max_oversampling,
             "prescaler": command.prescaler in PRESCALERS,
         }
         names = [field.name for field in SCHEMA.by_name["SET_SCAN"].fields]
         wrong = next((name for name, fine in good.items() if not fine), None)
         return OK if wrong is None else (Result.BAD_VALUE, names.index(wrong))
 
-    def check_drives(self, command: SetPattern, scan: SetScan | None) -> Verdict:
+    def check_drives(self, command: SetPattern, scan: SetScan) -> Verdict:
         """Whether a SET_PATTERN fits the announced scan and this board."""
-        if scan is None or command.configuration != scan.configuration:
-            return Result.WRONG_CONFIGURATION, 0
         if not command.drives or command.first + len(command.drives) > scan.n_drives:
             return Result.BAD_VALUE, 2
         for number, drive in enumerate(command.drives, start=command.first):
@@ -106,17 +133,13 @@ class Board:
                 return Result.NO_SUCH_CHANNEL, number
         return OK
 
-    def check_format(self, command: SetFormat, scan: SetScan | None) -> Verdict:
+    def check_format(self, command: SetFormat, scan: SetScan) -> Verdict:
         """Whether a SET_FORMAT fits the announced scan and this converter."""
-        if scan is None or command.configuration != scan.configuration:
-            return Result.WRONG_CONFIGURATION, 0
         fits = scan.oversampling == 1 and self.adc_bits == 10
         return OK if command.format is Format.SIXTEEN or fits else (Result.BAD_VALUE, 2)
 
-    def check_mode(self, command: SetMode, scan: SetScan | None) -> Verdict:
+    def check_mode(self, command: SetMode, scan: SetScan) -> Verdict:
         """Whether a SET_MODE fits the announced scan and this board."""
-        if scan is None or command.configuration != scan.configuration:
-            return Result.WRONG_CONFIGURATION, 0
         periods, frequency = command.periods, command.frequency
         if command.mode is DriveMode.DIRECT:
             wrong = 3 if frequency else 4 if periods else None
@@ -167,24 +190,23 @@ class HeldScanning:
 
     def set(self, command: SetScan | SetPattern | SetFormat | SetMode) -> Verdict:
         """Take over what the board accepts."""
+        if isinstance(command, SetScan):
+            if (verdict := self._board.check_scan(command)) == OK:
+                self.scan, self.format, self.mode = command, Format.SIXTEEN, None
+                self.drives = [None] * command.n_drives
+            return verdict
+        if self.scan is None or command.configuration != self.scan.configuration:
+            return Result.WRONG_CONFIGURATION, 0
         match command:
-            case SetScan():
-                verdict = self._board.check_scan(command)
-                if verdict == OK:
-                    self.scan, self.format, self.mode = command, Format.SIXTEEN, None
-                    self.drives = [None] * command.n_drives
             case SetPattern():
-                verdict = self._board.check_drives(command, self.scan)
-                if verdict == OK:
+                if (verdict := self._board.check_drives(command, self.scan)) == OK:
                     end = command.first + len(command.drives)
                     self.drives[command.first : end] = command.drives
             case SetFormat():
-                verdict = self._board.check_format(command, self.scan)
-                if verdict == OK:
+                if (verdict := self._board.check_format(command, self.scan)) == OK:
                     self.format = command.format
             case SetMode():
-                verdict = self._board.check_mode(command, self.scan)
-                if verdict == OK:
+                if (verdict := self._board.check_mode(command, self.scan)) == OK:
                     self.mode = command if command.mode is DriveMode.CHOPPED else None
         return verdict
 
@@ -194,10 +216,7 @@ class HeldScanning:
         if scan is None:
             return Ack(request, type_byte(type(command)), Result.WRONG_CONFIGURATION, 0)
         if isinstance(command, GetScan):
-            return HeldScan(
-                request, scan.configuration, scan.n_drives, scan.settling, scan.dead_time,
-                scan.oversampling, scan.prescaler, scan.current_limit, self.format,
-            )  # fmt: skip
+            return HeldScan(*(request, *astuple(scan)[1:], self.format))
         if isinstance(command, GetMode):
             mode = self.mode or SetMode(0, 0, DriveMode.DIRECT, 0, 0)
             return HeldMode(request, scan.configuration, mode.mode, mode.frequency, mode.periods)

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from tomoskin.board.source import conversion_time
 from tomoskin.board.wire import (
     SCHEMA,
     Ack,
-    ChoppedFrame,
     Command,
     Deframer,
     Fault,
@@ -21,8 +19,6 @@ from tomoskin.board.wire import (
     GetPattern,
     GetScan,
     Hello,
-    Message,
-    PackedFrame,
     Result,
     SafeOff,
     SetBaud,
@@ -116,16 +112,11 @@ class TwinDevice:
             self._say(Hello(SCHEMA.major, SCHEMA.minor, SCHEMA.hash))
             self._next_hello = max(self._next_hello + _HELLO_INTERVAL, now)
         if self._scanning and now >= self._scanning.due:
-            self._say(self._sent(self._frame(self._scanning, now)))
+            frame = self._frame(self._scanning, now)
+            self._out += encode(frame, packed=self._held.format is Format.PACKED)
         data = bytes(self._out)
         self._out.clear()
         return data
-
-    def _sent(self, frame: Frame) -> Message:
-        """The message that a frame goes in."""
-        if frame.sums is not None:
-            return ChoppedFrame.of(frame)
-        return PackedFrame.of(frame) if self._held.format is Format.PACKED else frame
 
     def _frame(self, scanning: _Scanning, now: float) -> Frame:
         counts = self._analogue.sample(scanning.table, scanning.device_time)
@@ -206,21 +197,22 @@ class TwinDevice:
         if verdict != OK or held.scan is None:
             return verdict
         scan, drives = held.scan, [drive for drive in held.drives if drive]
+        converter, mode = self._board.converter, held.mode
         times = ScanClock(
-            scan.dead_time * 1e-6, scan.settling * 1e-6, conversion_time(scan.prescaler)
+            scan.dead_time * 1e-6,
+            scan.settling * 1e-6,
+            converter.conversion(scan.prescaler),
+            dropped=converter.dropped,
         )
-        table = (
-            sample_table(drives, scan.oversampling, times)
-            if held.mode is None
-            else chopped_table(
-                drives, scan.oversampling, times, held.mode.frequency, held.mode.periods
-            )
-        )
+        if mode is None:
+            table = sample_table(drives, scan.oversampling, times)
+        else:
+            table = chopped_table(drives, scan.oversampling, times, mode.frequency, mode.periods)
         period = table.seconds
         self._scanning = _Scanning(
             table, scan.configuration, period, now + period * self._pace, now - self._power_on
         )
         return OK
 
-    def _say(self, message: Message) -> None:
+    def _say(self, message: Hello | Fault | Ack) -> None:
         self._out += encode(message)

@@ -14,6 +14,7 @@ import numpy as np
 
 from tomoskin.core import FloatArray
 from tomoskin.twin.circuit import ElectronicsSettings
+from tomoskin.twin.parameters import wandered
 from tomoskin.twin.scanning import SampleTable
 
 
@@ -29,12 +30,10 @@ class ThermalVoltages:
         self.volts: FloatArray = self._sd * self._random.standard_normal(n)
 
     def wander(self, dt: float) -> None:
-        """Ornstein–Uhlenbeck, exact for any step (Gillespie 1996, eq. 2.47)."""
-        if self._sd == 0:
-            return
-        kept = math.exp(-dt / self._time)
-        fresh = self._random.standard_normal(len(self.volts))
-        self.volts = kept * self.volts + self._sd * math.sqrt(1 - kept**2) * fresh
+        """Let the contacts get warmer or colder for ``dt`` s."""
+        if self._sd > 0:
+            chance = self._random.standard_normal(len(self.volts))
+            self.volts = wandered(self.volts, self._sd, self._time, dt, chance)
 
 
 class Electrodes:

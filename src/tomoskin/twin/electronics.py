@@ -17,6 +17,7 @@ from tomoskin.twin.bend import Pose
 from tomoskin.twin.circuit import ElectronicsSettings, Lines, line_potentials, settling
 from tomoskin.twin.electrodes import Electrodes
 from tomoskin.twin.faults import Faults, check_electrodes
+from tomoskin.twin.parameters import wandered
 from tomoskin.twin.probe import Contact
 from tomoskin.twin.scanning import SampleTable
 from tomoskin.twin.sheet import TwinSkin
@@ -275,13 +276,11 @@ class TwinElectronics:
         )
 
     def _age_contacts(self, dt: float) -> None:
-        """Ornstein–Uhlenbeck, exact for any step (Gillespie 1996, eq. 2.47)."""
-        sd = self.settings.contact_sd
-        if sd == 0 or dt == 0:
-            return
-        kept = math.exp(-dt / self.settings.contact_time)
-        fresh = self._contacts.standard_normal(len(self._contact))
-        self._contact = kept * self._contact + sd * math.sqrt(1 - kept**2) * fresh
+        """Let the contacts' resistance wander for ``dt`` s."""
+        sd, time = self.settings.contact_sd, self.settings.contact_time
+        if sd > 0 and dt > 0:
+            chance = self._contacts.standard_normal(len(self._contact))
+            self._contact = wandered(self._contact, sd, time, dt, chance)
 
 
 @lru_cache(maxsize=16)

@@ -1,21 +1,14 @@
-"""What breaks on a skin, its board and its line, and when: by events, or by a script."""
+"""What breaks on a skin, its board and its line, and when."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from tomoskin.core import ModelError
-from tomoskin.twin.line import LineSettings
-
-KINDS = ("cut", "restore", "short", "unshort", "rail", "unrail")
-"""Events: an electrode's wire breaks or is mended, two electrodes touch or part, a channel
-stands at its rail or works again."""
-
-
-_OF_WIRES = ("cut", "short", "rail")
-"""Kinds of a script's faults that are events too."""
+from tomoskin.twin.parameters import parameter
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,67 +31,58 @@ class Faults:
 
 
 @dataclass(frozen=True, slots=True)
-class FaultEvent:
-    """One of :data:`KINDS` at ``time`` s, of ``electrode`` (with ``other``, for a short).
+class LineSettings:
+    """What the line does to the bytes of the board; nothing by default."""
 
-    Raises
-    ------
-    ModelError
-        For an unknown kind, a time that is not finite, electrodes below 0, or a short of an
-        electrode with itself.
-    """
-
-    time: float
-    kind: str
-    electrode: int
-    other: int = -1
+    loss: float = parameter(0.0, "", "Probability that a byte is lost.", "ideal")
+    corruption: float = parameter(
+        0.0, "", "Probability that a byte arrives with one bit flipped.", "ideal"
+    )
+    hold: float = parameter(
+        0.0,
+        "",
+        "Probability that bytes that have arrived are delayed until the next read.",
+        "ideal",
+    )
 
     def __post_init__(self) -> None:
-        """Check the values."""
-        where = f"fault at {self.time} s"
-        if self.kind not in KINDS:
-            raise ModelError(
-                f'expected a kind among {", ".join(KINDS)}, got "{self.kind}"', where=where
-            )
-        if not math.isfinite(self.time):
-            raise ModelError(f"expected a finite time, got {self.time}", where=where)
-        pair = self.kind in ("short", "unshort")
-        if self.electrode < 0 or (pair and (self.other < 0 or self.other == self.electrode)):
-            raise ModelError(
-                "expected "
-                f"{'two different electrodes' if pair else 'an electrode'} from 0 (E1), got "
-                f"{(self.electrode, self.other) if pair else self.electrode}",
-                where=where,
-            )
+        """Check the numbers."""
+        for name in ("loss", "corruption", "hold"):
+            value = getattr(self, name)
+            if not 0 <= value < 1:
+                raise ModelError(
+                    f"expected {name} from 0 to below 1, got {value}", where="LineSettings"
+                )
+
+    @property
+    def perfect(self) -> bool:
+        """Whether every byte arrives, as it was sent and in time."""
+        return self.loss == self.corruption == self.hold == 0
 
 
-def happen(faults: Faults, event: FaultEvent) -> Faults:
-    """What is broken after ``event``."""
-    one = frozenset({event.electrode})
-    low, high = sorted((event.electrode, event.other))
-    pair = frozenset({(low, high)})
-    match event.kind:
-        case "cut":
-            return replace(faults, cut=faults.cut | one)
-        case "restore":
-            return replace(faults, cut=faults.cut - one)
-        case "short":
-            return replace(faults, shorts=faults.shorts | pair)
-        case "unshort":
-            return replace(faults, shorts=faults.shorts - pair)
-        case "rail":
-            return replace(faults, railed=faults.railed | one)
-        case _:
-            return replace(faults, railed=faults.railed - one)
+class Line:
+    """The line, read by read; the same seed does the same to the same bytes."""
 
+    def __init__(self, settings: LineSettings, seed: int) -> None:
+        self.settings = settings
+        self._random = np.random.default_rng(seed)
+        self._held = b""
 
-def faults_at(events: Sequence[FaultEvent], time: float) -> Faults:
-    """What is broken at ``time`` s: everything up to and at that time has happened, in order."""
-    faults = Faults()
-    for event in sorted(events, key=lambda event: event.time):
-        if event.time <= time:
-            faults = happen(faults, event)
-    return faults
+    def carry(self, data: bytes) -> bytes:
+        """What arrives when the board sends ``data``."""
+        arrived = self._held + (data if self.settings.perfect else self._spoiled(data))
+        self._held = b""
+        if arrived and self.settings.hold and self._random.random() < self.settings.hold:
+            self._held, arrived = arrived, b""
+        return arrived
+
+    def _spoiled(self, data: bytes) -> bytes:
+        sent = np.frombuffer(data, dtype=np.uint8)
+        chance = self._random.random((2, len(sent)))
+        bit = self._random.integers(0, 8, len(sent))
+        flipped = np.where(chance[0] < self.settings.corruption, sent ^ (1 << bit), sent)
+        arrived = flipped[chance[1] >= self.settings.loss].astype(np.uint8)
+        return bytes(arrived)
 
 
 def check_electrodes(faults: Faults, n: int) -> None:
@@ -168,15 +152,17 @@ def reboots(faults: Iterable[ScriptedFault], since: float, time: float) -> bool:
 
 
 def _with(now: Disturbance, fault: ScriptedFault) -> Disturbance:
-    if fault.kind in _OF_WIRES:
-        event = FaultEvent(fault.start, fault.kind, fault.electrode, fault.other)
-        return replace(now, faults=happen(now.faults, event))
-    match fault.kind:
-        case "noise":
-            return replace(now, noise=fault.amount)
-        case "loss":
-            return replace(now, line=replace(now.line, loss=fault.amount))
-        case "corruption":
-            return replace(now, line=replace(now.line, corruption=fault.amount))
-        case _:
-            return replace(now, line=replace(now.line, hold=fault.amount))
+    low, high = sorted((fault.electrode, fault.other))
+    wires = {
+        "cut": ("cut", fault.electrode),
+        "short": ("shorts", (low, high)),
+        "rail": ("railed", fault.electrode),
+    }
+    if fault.kind in wires:
+        name, broken = wires[fault.kind]
+        faults = replace(now.faults, **{name: getattr(now.faults, name) | {broken}})
+        return replace(now, faults=faults)
+    if fault.kind == "noise":
+        return replace(now, noise=fault.amount)
+    name = {"loss": "loss", "corruption": "corruption", "delay": "hold"}[fault.kind]
+    return replace(now, line=replace(now.line, **{name: fault.amount}))

@@ -20,7 +20,7 @@ from tomoskin.model.skin import (
     followed,
 )
 from tomoskin.twin.dent import Load
-from tomoskin.twin.parameters import check_numbers, parameter
+from tomoskin.twin.parameters import check_numbers, parameter, wandered
 
 _MOST_COMPRESSION = 0.99
 _MOST_LOG = 12.0
@@ -208,7 +208,7 @@ def advance(
     """The state after the load has stood for ``dt`` s; exact for any length of the step.
 
     The load is taken to jump at the start of the step. ``chance`` is a standard normal number
-    for the temperature (Ornstein & Uhlenbeck; Gillespie 1996, Phys. Rev. E 54, 2084, eq. 2.47).
+    for the temperature.
 
     Raises
     ------
@@ -278,8 +278,8 @@ def _worn(state: MaterialState, felt: FloatArray, settings: MaterialSettings) ->
 def _warmed(warmer: float, settings: MaterialSettings, dt: float, chance: float) -> float:
     if settings.temperature_sd == 0:
         return warmer
-    kept = math.exp(-dt / settings.temperature_time)
-    return warmer * kept + settings.temperature_sd * math.sqrt(1 - kept**2) * chance
+    sd, time = settings.temperature_sd, settings.temperature_time
+    return float(wandered(warmer, sd, time, dt, chance))
 
 
 def _directed(
@@ -288,21 +288,13 @@ def _directed(
     """(n, 2, 2) level · exp(rise − M) for M = [[half, cross], [cross, −half]].
 
     M² = d², so that exp(rise − M) = eʳ (cosh d − sinh(d)/d · M). The components lie in rows, as
-    they are computed and as the forward model reads them.
+    the forward model reads them.
     """
-    size = np.sqrt(half * half + cross * cross)
-    np.maximum(size, 1e-12, out=size)  # sinh(d)/d is 1 there
+    size = np.maximum(np.hypot(half, cross), 1e-12)  # sinh(d)/d is 1 there
     bounded = np.minimum(size, _MOST_LOG)
-    level = level / 2
-    most, least = level * np.exp(rise + bounded), level * np.exp(rise - bounded)
-    mean = most + least
-    slope = (most - least) / size
-    apart = slope * half
-    rows = np.empty((2, 2, len(size)))
-    np.subtract(mean, apart, out=rows[0, 0])
-    np.add(mean, apart, out=rows[1, 1])
-    rows[0, 1] = rows[1, 0] = -slope * cross
-    return rows.transpose(2, 0, 1)
+    even, odd = np.cosh(bounded), np.sinh(bounded) / size
+    parts = np.array([[even - odd * half, -odd * cross], [-odd * cross, even + odd * half]])
+    return np.asarray((level * np.exp(rise) * parts).transpose(2, 0, 1))
 
 
 def spread_over(

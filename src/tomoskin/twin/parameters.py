@@ -1,15 +1,18 @@
-"""Numbers of the twin with their unit, meaning and source: docs/twin.md is made from them."""
+"""Numbers of the twin with unit, meaning and source, as docs/twin.md has them; how they wander."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from tomoskin.core import ModelError
+from tomoskin.core import FloatArray, ModelError
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
+
+
+N = TypeVar("N", float, FloatArray)
 
 
 def parameter(default: Any, unit: str, meaning: str, source: str) -> Any:
@@ -32,3 +35,13 @@ def check_numbers(record: DataclassInstance, above: str = "", least: str = "") -
         value = getattr(record, name)
         if not 0 <= value < math.inf:
             raise ModelError(f"expected {name} of 0 or more, got {value}", where=where)
+
+
+def wandered(value: N, sd: float, correlation_time: float, dt: float, chance: N) -> N:
+    """Where a ``value`` with a standard deviation of ``sd`` has gone after ``dt`` s.
+
+    Ornstein and Uhlenbeck's process, exact for any step (Gillespie 1996, Phys. Rev. E 54, 2084,
+    eq. 2.47); ``chance`` is standard normal.
+    """
+    kept = math.exp(-dt / correlation_time)
+    return kept * value + sd * math.sqrt(1 - kept**2) * chance

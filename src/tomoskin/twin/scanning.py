@@ -39,12 +39,14 @@ class ScanClock:
     """Times of a scan, s: all off between two drives, wait after each switch, one conversion.
 
     ``on``: of each direction of an alternating drive; 0: until everything has been read.
+    ``dropped``: conversions before the first one of each sample.
     """
 
     dead_time: float = 0.0
     settling: float = 0.0
     conversion: float = 0.0
     on: float = 0.0
+    dropped: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,11 +155,11 @@ def sample_table(
         )
     ]
     drive, channel, place = np.array(rows, dtype=np.int64).reshape(-1, 3).T
-    each = oversampling * clock.conversion
+    each = (oversampling + clock.dropped) * clock.conversion
     length = clock.settling + np.bincount(drive, minlength=len(drives)) * each
     length = np.maximum(length, clock.on)
     switched = np.cumsum(clock.dead_time + length) - length
-    since = clock.settling + place * each
+    since = clock.settling + place * each + clock.dropped * clock.conversion
     return SampleTable(
         drives=np.array([(d.source, d.sink) for d in drives], dtype=np.int64).reshape(-1, 2),
         drive=drive,

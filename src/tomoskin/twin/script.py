@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any, Self, TypeVar
 
 from tomoskin.core import GeometryError, ScriptError, SkinError
-from tomoskin.model.skin import Section, check_names, show, toml_tables
+from tomoskin.model.section import Section, check_names, show, toml_tables
 from tomoskin.twin.course import Rows, ScriptedBend, ScriptedMark, ScriptedPress, ramp
 from tomoskin.twin.faults import ScriptedFault
 from tomoskin.twin.script_schema import (

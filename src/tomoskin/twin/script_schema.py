@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from tomoskin.model.skin import (
+from tomoskin.model.section import (
     Choice,
     Number,
     OneOrSpan,

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,12 +18,8 @@ LEAST_SIZE = 1e-6
 """Of a face and of its curvature, m: far below any mesh, and its square is a number still."""
 
 
-class Shape(Protocol):
+class Shape(ABC):
     """The face of a rigid probe in coordinates of its own, m; equal faces are solved once."""
-
-    def __hash__(self) -> int:
-        """Every kind of face has its own."""
-        return hash(type(self))
 
     @property
     @abstractmethod
@@ -37,17 +32,42 @@ class Shape(Protocol):
         """Area of the face seen from above, m²."""
 
     @property
-    @abstractmethod
     def flat(self) -> bool:
         """Whether the whole face touches at once: then everything is linear in the force."""
+        return False
 
     @abstractmethod
+    def inside(self, points: FloatArray) -> NDArray[np.bool_]:
+        """(n,) whether the ``points`` (n, 2) m are on the face."""
+
+    @abstractmethod
+    def height(self, points: FloatArray) -> FloatArray:
+        """(n,) m of the face above its own at the origin."""
+
     def gap(self, points: FloatArray) -> FloatArray:
         """(n,) m between a flat sheet and the face that just touches it; inf off the face."""
+        inside, height = self.inside(points), self.height(points)
+        lowest = height[inside].min(initial=np.inf) if inside.any() else 0.0
+        return np.asarray(np.where(inside, height - lowest, np.inf))
+
+
+class _Crowned(Shape):
+    """A face that is flat, or a paraboloid with ``crown`` m as its radius of curvature."""
+
+    crown: float
+
+    @property
+    def flat(self) -> bool:
+        """Whether the face has no crown."""
+        return math.isinf(self.crown)
+
+    def height(self, points: FloatArray) -> FloatArray:
+        """(n,) m of the paraboloid above its lowest point."""
+        return np.asarray((points**2).sum(axis=1) / (2 * self.crown))
 
 
 @dataclass(frozen=True, slots=True)
-class Circle(Shape):
+class Circle(_Crowned):
     """Round face of ``radius`` m; ``crown`` is its radius of curvature, m (inf: flat).
 
     A ball is a circle with its crown: a paraboloid near the point of contact.
@@ -71,19 +91,13 @@ class Circle(Shape):
         """Area of the face, m²."""
         return math.pi * self.radius**2
 
-    @property
-    def flat(self) -> bool:
-        """Whether the face has no crown."""
-        return math.isinf(self.crown)
-
-    def gap(self, points: FloatArray) -> FloatArray:
-        """Gaps (n,) m; infinite off the face."""
-        squared = (points**2).sum(axis=1)
-        return _within(squared < self.radius**2, squared / (2 * self.crown))
+    def inside(self, points: FloatArray) -> NDArray[np.bool_]:
+        """(n,) whether points are within the radius."""
+        return np.asarray((points**2).sum(axis=1) < self.radius**2)
 
 
 @dataclass(frozen=True, slots=True)
-class Square(Shape):
+class Square(_Crowned):
     """Square face with ``side`` m, along the probe's axes, and a ``crown`` as :class:`Circle`."""
 
     side: float
@@ -104,20 +118,14 @@ class Square(Shape):
         """Area of the face, m²."""
         return self.side**2
 
-    @property
-    def flat(self) -> bool:
-        """Whether the face has no crown."""
-        return math.isinf(self.crown)
-
-    def gap(self, points: FloatArray) -> FloatArray:
-        """Gaps (n,) m; infinite off the face."""
-        inside = np.abs(points).max(axis=1) < self.side / 2
-        return _within(inside, (points**2).sum(axis=1) / (2 * self.crown))
+    def inside(self, points: FloatArray) -> NDArray[np.bool_]:
+        """(n,) whether points are within the square."""
+        return np.asarray(np.abs(points).max(axis=1) < self.side / 2)
 
 
 @dataclass(frozen=True, slots=True)
 class Finger(Shape):
-    """Fingertip: an elliptic paraboloid.
+    """Fingertip: an elliptic paraboloid, which is never flat.
 
     Attributes
     ----------
@@ -148,20 +156,17 @@ class Finger(Shape):
         """Area of the pad, m²."""
         return math.pi * self.length * self.width / 4
 
-    @property
-    def flat(self) -> bool:
-        """A fingertip is never flat."""
-        return False
+    def inside(self, points: FloatArray) -> NDArray[np.bool_]:
+        """(n,) whether points are on the pad."""
+        return np.asarray(points**2 @ np.array([4 / self.length**2, 4 / self.width**2]) < 1)
 
-    def gap(self, points: FloatArray) -> FloatArray:
-        """Gaps (n,) m; infinite off the pad."""
-        squared = points**2
-        inside = squared @ np.array([4 / self.length**2, 4 / self.width**2]) < 1
-        return _within(inside, squared @ np.array([0.5 / self.along, 0.5 / self.across]))
+    def height(self, points: FloatArray) -> FloatArray:
+        """(n,) m of the pad above its lowest point."""
+        return np.asarray(points**2 @ np.array([0.5 / self.along, 0.5 / self.across]))
 
 
 @dataclass(frozen=True)
-class Face(Shape):
+class Face(_Crowned):
     """Free polygon with ``vertices`` ((x, y), …) m around the probe's origin, and a ``crown``.
 
     Raises
@@ -192,14 +197,9 @@ class Face(Shape):
         """Area of the face, m²."""
         return self._polygon.area
 
-    @property
-    def flat(self) -> bool:
-        """Whether the face has no crown."""
-        return math.isinf(self.crown)
-
-    def gap(self, points: FloatArray) -> FloatArray:
-        """Gaps (n,) m; infinite off the face."""
-        return _within(self._polygon.contains(points), (points**2).sum(axis=1) / (2 * self.crown))
+    def inside(self, points: FloatArray) -> NDArray[np.bool_]:
+        """(n,) whether points are within the polygon."""
+        return self._polygon.contains(points)
 
 
 def _finger(half_length: float) -> Finger:
@@ -215,12 +215,6 @@ FACES: dict[str, Callable[[float], Shape]] = {
     "finger": _finger,
 }
 """Faces by their name and half of their extent along x, m."""
-
-
-def _within(inside: NDArray[np.bool_], height: FloatArray) -> FloatArray:
-    """Heights above the lowest point of the face, inf where there is none."""
-    lowest = height[inside].min(initial=np.inf) if inside.any() else 0.0
-    return np.asarray(np.where(inside, height - lowest, np.inf))
 
 
 def _check(name: str, value: float, *, curved: bool = False) -> None:

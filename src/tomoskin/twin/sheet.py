@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 
 from tomoskin.core import FloatArray
-from tomoskin.model.forward import ForwardModel, State, Terminals
+from tomoskin.model.forward import ForwardModel, Terminals
 from tomoskin.model.mesh import Outline, Plane, Surface, laid_on, triangulate
 from tomoskin.model.skin import Skin
 from tomoskin.twin import material
@@ -33,6 +33,92 @@ _FIRST = 64
 """One cell of so many is compared first."""
 
 
+_Under = tuple[tuple[Contact, ...], Pose]
+"""What presses on the sheet, and how it is bent."""
+
+
+class _Loading:
+    """What presses on a sheet, how it is bent, and what its cells feel; each is solved once."""
+
+    def __init__(
+        self, points: FloatArray, blur: float, outline: Outline, rest: Surface, given: TwinSettings
+    ) -> None:
+        self._points, self._outline = points, outline
+        self._ground = given.contact, points, blur
+        self._rest, self._height = rest, given.bend.height
+        nothing = Load.none(len(points))
+        self.now: _Under = ((), ())
+        self._dented: tuple[tuple[Contact, ...], Load] = ((), nothing)
+        self._posed: tuple[Pose, FloatArray] = ((), nothing.strain)
+        self._felt: tuple[_Under, Load] = (self.now, nothing)
+
+    def press(self, presses: tuple[Contact, ...]) -> None:
+        """Replace all presses; GeometryError when one is off the skin or its face cannot press."""
+        check_on_skin(presses, self._outline)
+        if presses != self.now[0]:
+            taken = tuple(presses)
+            self._dented = taken, indent(taken, *self._ground)
+            self.now = taken, self.now[1]
+
+    def bend(self, pose: Pose) -> None:
+        """Bend and stretch; GeometryError when the sheet cannot take that shape."""
+        if pose != self.now[1]:
+            taken = tuple(pose)
+            self._posed = taken, self._strain(taken)
+            self.now = self.now[0], taken
+
+    @property
+    def load(self) -> Load:
+        """What the cells feel now."""
+        under = presses, pose = self.now
+        if not _same(under, self._felt[0]):
+            if presses is not self._dented[0]:
+                self._dented = presses, indent(presses, *self._ground)
+            load = self._dented[1]
+            if pose:
+                if pose is not self._posed[0]:
+                    self._posed = pose, self._strain(pose)
+                felt = load.felt.copy()
+                felt[:3] += self._posed[1].T
+                felt[3] += depth_of(pose, self._points)
+                load = Load(felt)
+            self._felt = under, load
+        return self._felt[1]
+
+    def _strain(self, pose: Pose) -> FloatArray:
+        """(n_cells, 3) of the pose alone."""
+        return strain_of(pose, self._points, self._rest, self._height)
+
+
+class _Network:
+    """The resistance between electrodes, solved again only when the conductivity has changed."""
+
+    def __init__(self, model: ForwardModel, unloaded: FloatArray) -> None:
+        self.base, self._terminals = model.at(unloaded), Terminals(model)
+        self._sigma: FloatArray = np.empty(0)
+        self._under: tuple[object, object] = (None, None)
+        self._resistance: FloatArray = np.empty((0, 0))
+        self.solves = 0
+
+    def resistance(self, sigma: FloatArray, under: _Under) -> FloatArray:
+        """(n_electrodes, n_electrodes) Ω at ``sigma``, which what presses has made."""
+        if sigma is self._sigma:
+            return self._resistance
+        if not _same(under, self._under) or _changed(self._sigma, sigma):
+            self._resistance = self._solved(sigma)
+            self.solves += 1
+            self._sigma, self._under = sigma, under
+        return self._resistance
+
+    def _solved(self, sigma: FloatArray) -> FloatArray:
+        """Exact either way: by the local update where few cells differ from the sheet at rest."""
+        if sigma.ndim == 1:
+            cells = np.flatnonzero(sigma != self.base.conductivity)
+            if 0 < len(cells) <= _FEW * len(sigma):
+                return self.base.local.transfer_resistance(cells, sigma[cells])
+        return np.asarray(self._terminals.transfer_resistance(sigma))
+
+
 class TwinSkin:
     """A sheet with electrodes on a mesh of its own.
 
@@ -51,33 +137,18 @@ class TwinSkin:
 
         ``rest`` is what the sheet lies on at rest, and the mesh too.
         """
-        self.model = model
-        self.material, self.bend = settings.material, settings.bend
-        self.rest = rest or Plane()
-        self._outline = outline
-        self._points = np.asfortranarray(model.mesh.centroids)  # columns are read, not rows
-        self._blur = math.sqrt(float(model.mesh.volumes.mean())) / math.sqrt(12)
-        self._ground = settings.contact, self._points, self._blur
+        self.model, self.material = model, settings.material
+        points = np.asfortranarray(model.mesh.centroids)  # columns are read, not rows
+        blur = math.sqrt(float(model.mesh.volumes.mean())) / math.sqrt(12)
+        self._loading = _Loading(points, blur, outline, rest or Plane(), settings)
         spread, self._random = (
             np.random.default_rng(part) for part in np.random.SeedSequence(settings.seed).spawn(2)
         )
-        factors = material.spread_over(self.material, self._points, spread)
-        self._unloaded = conductivity * factors
-        self._base, self._terminals = model.at(self._unloaded), Terminals(model)
-        n = len(self._unloaded)
-        self._nothing = self._load = Load.none(n)
-        self._presses: tuple[Contact, ...] = ()
-        self._pose: Pose = ()
-        self._loaded: tuple[object, ...] = (self._presses, self._pose)
-        self._stood: tuple[object, ...] = self._loaded
-        self._dented: tuple[tuple[Contact, ...], Load] = (self._presses, self._nothing)
-        self._posed: tuple[Pose, FloatArray] = (self._pose, self._nothing.strain)
-        self._state = MaterialState.fresh(self.material, n)
+        self._unloaded = conductivity * material.spread_over(self.material, points, spread)
+        self._network = _Network(model, self._unloaded)
+        self._stood = self._loading.now
+        self._state = MaterialState.fresh(self.material, len(points))
         self._conductivity: FloatArray | None = None
-        self._solved_for: FloatArray = np.empty(0)
-        self._solved_under: tuple[object, ...] = (None, None)
-        self._resistance: FloatArray = np.empty((0, 0))
-        self.solves = 0
 
     @classmethod
     def of(cls, skin: Skin, settings: TwinSettings) -> Self:
@@ -96,36 +167,24 @@ class TwinSkin:
         return self.model.pattern.n_electrodes
 
     @property
+    def solves(self) -> int:
+        """How often the resistance has been solved."""
+        return self._network.solves
+
+    @property
     def presses(self) -> tuple[Contact, ...]:
         """What presses on the sheet now."""
-        return self._presses
+        return self._loading.now[0]
 
     @property
     def pose(self) -> Pose:
         """How the sheet is bent and stretched now."""
-        return self._pose
+        return self._loading.now[1]
 
     @property
     def load(self) -> Load:
         """What the cells feel under the present presses, in the present pose."""
-        presses, pose = self._presses, self._pose
-        if not _same((presses, pose), self._loaded):
-            if presses is not self._dented[0]:
-                self._dented = presses, indent(presses, *self._ground)
-            self._load = dented = self._dented[1]
-            if pose:
-                felt = dented.felt.copy()
-                felt[:3] += self._strain(pose).T
-                felt[3] += depth_of(pose, self._points)
-                self._load = Load(felt)
-            self._loaded = (presses, pose)
-        return self._load
-
-    def _strain(self, pose: Pose) -> FloatArray:
-        """(n_cells, 3) of the pose alone."""
-        if pose is not self._posed[0]:
-            self._posed = pose, strain_of(pose, self._points, self.rest, self.bend.height)
-        return self._posed[1]
+        return self._loading.load
 
     def set_presses(self, presses: tuple[Contact, ...]) -> None:
         """Replace all presses at once, from any thread; they are solved here.
@@ -136,11 +195,7 @@ class TwinSkin:
             When the centre of one is off the skin, or its face cannot press; then nothing is
             changed.
         """
-        check_on_skin(presses, self._outline)
-        if presses != self._presses:
-            taken = tuple(presses)
-            self._dented = taken, indent(taken, *self._ground)
-            self._presses = taken
+        self._loading.press(presses)
 
     def set_pose(self, pose: Pose) -> None:
         """Bend and stretch the sheet, from any thread; ``()`` lets it lie as at rest.
@@ -150,10 +205,7 @@ class TwinSkin:
         GeometryError
             When it cannot take that shape; then nothing is changed.
         """
-        if pose != self._pose:
-            taken = tuple(pose)
-            self._posed = taken, strain_of(taken, self._points, self.rest, self.bend.height)
-            self._pose = taken
+        self._loading.bend(pose)
 
     def advance(self, dt: float) -> None:
         """Let ``dt`` s go by under the present presses; any step is exact.
@@ -163,7 +215,7 @@ class TwinSkin:
         ModelError
             When dt is negative or not finite.
         """
-        now = (self._presses, self._pose)
+        now = self._loading.now
         settled = _same(now, self._stood) and (self.material.still or dt == 0)
         if settled and self._conductivity is not None and dt >= 0:
             return
@@ -179,10 +231,7 @@ class TwinSkin:
         """
         if chance is not None:
             self._random = np.random.default_rng(chance)
-        self._presses, self._pose = (), ()
-        nothing = (self._presses, self._pose)
-        self._loaded = self._stood = nothing
-        self._load = self._nothing
+        self._loading.now = self._stood = ((), ())
         self._state = MaterialState.fresh(self.material, len(self._unloaded))
         self._conductivity = None
 
@@ -204,24 +253,7 @@ class TwinSkin:
         The same array as before unless the conductivity has changed.
         """
         sigma = self.conductivity()
-        if sigma is self._solved_for:
-            return self._resistance
-        under = (self._presses, self._pose)
-        if not _same(under, self._solved_under) or _changed(self._solved_for, sigma):
-            self._resistance = _resistance_of(self._base, self._terminals, sigma)
-            self.solves += 1
-            self._solved_for, self._solved_under = sigma, under
-        return self._resistance
-
-
-def _resistance_of(rest: State, terminals: Terminals, sigma: FloatArray) -> FloatArray:
-    """Exact either way: by the local update where few cells have changed since ``rest``."""
-    if sigma.ndim == 1:
-        changed = sigma != rest.conductivity
-        if 0 < np.count_nonzero(changed) <= _FEW * len(sigma):
-            cells = np.flatnonzero(changed)
-            return rest.local.transfer_resistance(cells, sigma[cells])
-    return np.asarray(terminals.transfer_resistance(sigma))
+        return self._network.resistance(sigma, self._loading.now)
 
 
 def _changed(old: FloatArray, new: FloatArray) -> bool:
@@ -234,5 +266,5 @@ def _changed(old: FloatArray, new: FloatArray) -> bool:
     return False
 
 
-def _same(some: tuple[object, ...], others: tuple[object, ...]) -> bool:
-    return all(a is b for a, b in zip(some, others, strict=True))
+def _same(some: tuple[object, object], others: tuple[object, object]) -> bool:
+    return some[0] is others[0] and some[1] is others[1]

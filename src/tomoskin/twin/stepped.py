@@ -7,13 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tomoskin.board.source import ScanSettings
-from tomoskin.core import FloatArray, Frame, Touch
+from tomoskin.core import FloatArray, Touch
 from tomoskin.pipeline import REFERENCE_FRAMES, Pipeline, Prepared
 from tomoskin.twin.presets import TwinSettings
 from tomoskin.twin.probe import Contact
-from tomoskin.twin.scanning import table_of
-from tomoskin.twin.source import make_electronics
+from tomoskin.twin.source import Scans
 
 
 class Step(NamedTuple):
@@ -65,9 +63,8 @@ class SteppedSkin:
         if with_touches:
             prepared.warm_up()
         self._seed = (settings or TwinSettings()).seed
-        self._board = make_electronics(skin, settings or TwinSettings.preset(skin.twin.preset))
-        self._table = table_of(prepared.scan, ScanSettings.of(skin))
-        self.period = self._table.seconds
+        self._scans = Scans(skin, settings or TwinSettings.preset(skin.twin.preset))
+        self.period = self._scans.table.seconds
         self.reset()
 
     def reset(self, seed: int | None = None) -> Step:
@@ -76,9 +73,7 @@ class SteppedSkin:
         ``seed``: of the episode's noise and temperature; without it that of the episode before.
         """
         self._seed = self._seed if seed is None else seed
-        of_sheet, of_board = np.random.SeedSequence(self._seed).spawn(2)
-        self._board.sheet.renew(of_sheet)
-        self._board.renew(of_board)
+        self._scans.renew(np.random.SeedSequence(self._seed))
         self._pipeline = Pipeline(self._prepared)
         self._steps = 0
         return [self.step(()) for _ in range(REFERENCE_FRAMES if self._with_touches else 1)][-1]
@@ -91,26 +86,13 @@ class SteppedSkin:
         GeometryError
             When the centre of one is off the skin; then nothing is changed.
         """
-        self._board.sheet.set_presses(tuple(presses))
-        frame = self._frame()
+        self._scans.electronics.sheet.set_presses(tuple(presses))
+        time = self._steps * self.period
+        self._steps += 1
+        frame = self._scans.frame(self._steps, time)
         if not self._with_touches:
             return Step(self._prepared.readout(frame).values, ())
         result = self._pipeline.push(frame)
         if result is None:
             raise AssertionError("a frame of the skin's own scan is never left out")
         return Step(result.voltages, result.touches)
-
-    def _frame(self) -> Frame:
-        time = self._steps * self.period
-        samples, sums = self._table.readings(self._board.sample(self._table, time))
-        self._steps += 1
-        return Frame(
-            sequence=self._steps % 2**32,
-            ticks=round(time * self._prepared.skin.readout.tick_rate),
-            host_time=time,
-            configuration=0,
-            flags=0,
-            drops=0,
-            samples=samples,
-            sums=sums,
-        )

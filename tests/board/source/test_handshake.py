@@ -290,7 +290,7 @@ def test_a_mega_refuses_32_electrodes_before_anything_is_set(clock):
     board = ScriptedBoard(clock)
     board.answer = lambda command: [replace(BOARD.info(command.request), channels=16)]
     link = Link(board, Scan.of(Pattern.adjacent(32)), SETTINGS, clock=clock.now)
-    said = r"needs 32 electrodes, but the board has at most 16 .*or a Pico, which has up to 32"
+    said = r"needs 32 .* at most 16 .*or a Raspberry Pi Pico, which has up to 32"
     with pytest.raises(SourceError, match=said):
         link.connect()
     assert board.names == ["GetInfo"]

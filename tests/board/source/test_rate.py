@@ -6,7 +6,7 @@ import pytest
 
 from board.source.boards import HELLO, ManualClock, ScriptedBoard, events, frame_of, frames, linked
 from tomoskin.board.source import Link
-from tomoskin.board.source.agreement import RATES, LineQuality
+from tomoskin.board.source.agreement import RATES, RateFollower
 from tomoskin.board.wire import Counters, SetBaud, encode
 
 
@@ -116,11 +116,13 @@ def test_a_lost_answer_to_the_change_is_asked_for_anew(clock: ManualClock) -> No
 
 
 def test_a_few_damaged_messages_are_no_reason() -> None:
-    quality = LineQuality()
+    follower = RateFollower(Cable(ManualClock(), RATES[0]))
     for k in range(1, 20):
-        assert quality.slower(Counters(messages=50 * k, checksum=2 * k), RATES[0]) is None
-    assert quality.slower(Counters(messages=960, checksum=60), RATES[0]) == RATES[1]
+        assert follower.slower(Counters(messages=50 * k, checksum=2 * k), running=True) is None
+    assert follower.slower(Counters(messages=960, checksum=60), running=True) == RATES[1]
 
 
 def test_below_the_slowest_rate_there_is_none() -> None:
-    assert LineQuality().slower(Counters(messages=10, torn=40), RATES[-1]) is None
+    cable = Cable(ManualClock(), RATES[0])
+    cable.rate = RATES[-1]
+    assert RateFollower(cable).slower(Counters(messages=10, torn=40), running=True) is None

@@ -4,7 +4,7 @@ from importlib.metadata import EntryPoint, EntryPoints
 
 import pytest
 
-from tomoskin.board.source import open_source, read_options, registry, source_names
+from tomoskin.board.source import open_source, read_options, source_names, transport
 from tomoskin.core import SourceError
 
 
@@ -15,9 +15,9 @@ def echo(argument, skin):
 @pytest.fixture(autouse=True)
 def installed(monkeypatch):
     known = EntryPoints(
-        EntryPoint(name, f"{__name__}:echo", registry.GROUP) for name in ("twin", "serial")
+        EntryPoint(name, f"{__name__}:echo", transport.GROUP) for name in ("twin", "serial")
     )
-    monkeypatch.setattr(registry, "entry_points", known.select)
+    monkeypatch.setattr(transport, "entry_points", known.select)
     monkeypatch.setattr(EntryPoint, "load", lambda _: echo)
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tomoskin.board.source.silence import BAUD, Silence, is_bootloader
+from tomoskin.board.source.silence import BAUD, is_bootloader, likely_cause
 
 BOOTLOADER = bytes.fromhex("1b01000b0e010008") + b"AVRISP_2\x40"
 NOISE = bytes(range(128, 200))
@@ -33,7 +33,14 @@ MEGA = "Arduino Mega 2560"
     ],
 )
 def test_the_likeliest_cause_and_what_to_do(heard, bootloader, board, rate, says):
-    cause = Silence("/dev/ttyACM0", board, rate, heard, bootloader, "ports here: …").cause
+    cause = likely_cause(
+        "/dev/ttyACM0",
+        board,
+        rate=rate,
+        heard=heard,
+        bootloader=bootloader,
+        ports="ports here: …",
+    )
     assert cause.where == "serial:/dev/ttyACM0"
     with pytest.raises(type(cause), match=says):
         raise cause

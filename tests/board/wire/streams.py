@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tomoskin.board.wire import Decoder, PackedFrame, encode
+from tomoskin.board.wire import Decoder, encode
 from tomoskin.core import Frame
 
 BATCH = 10_000
@@ -83,7 +83,7 @@ def _mutated(random: np.random.Generator, count: int) -> Iterator[tuple[Frame, b
     for number, (kind, (at, to, much)) in enumerate(zip(kinds, places, strict=True)):
         if number % 100 == 0:
             frame = _frame(random, 0)
-            block = encode(PackedFrame.of(frame) if number % 200 else frame)
+            block = encode(frame, packed=bool(number % 200))
         dirt = noise[64 * number : 64 * number + 1 + int(much * 63)]
         yield frame, _mutate(block, kind, int(at * len(block)), int(to * len(block)), dirt)
 

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hypothesis import given
+from hypothesis import strategies as st
 
 from board.wire.messages_strategy import messages, same
 from tomoskin.board.wire import (
@@ -12,7 +13,6 @@ from tomoskin.board.wire import (
     Drive,
     GetInfo,
     Hello,
-    PackedFrame,
     Ping,
     Result,
     SetPattern,
@@ -57,6 +57,14 @@ def test_frame_takes_the_hosts_time_and_the_samples_are_not_copied():
     assert not frame.samples.flags.writeable
 
 
+@given(st.lists(st.integers(0, 1023), max_size=300))
+def test_packed_samples_come_back(counts):
+    frame = Frame(1, 2, 0.0, 3, 1, 4, np.array(counts, dtype=np.uint16))
+    payload = encode_payload(frame, packed=True)
+    assert len(payload) == 18 + len(counts) + -(-len(counts) // 4)
+    assert same(decode_payload(payload, 0.0), frame)
+
+
 def test_values_that_do_not_fit_are_refused():
     with pytest.raises(WireError, match="PING"):
         encode(Ping(256))
@@ -77,7 +85,8 @@ def test_values_that_do_not_fit_are_refused():
         b"\x82\x01\x02",  # too long
         b"\x03\x01\x82\x63\x00\x00",  # no such result
         encode_payload(Frame(0, 0, 0.0, 0, 0, 0, np.zeros(1, dtype=np.uint16))) + b"\x01",
-        encode_payload(PackedFrame(0, 0, 0.0, 0, 0, 0, np.zeros(6, dtype=np.uint8))),
+        encode_payload(Frame(0, 0, 0.0, 0, 0, 0, np.zeros(4, dtype=np.uint16)), packed=True)
+        + b"\0",
         b"\x86\x01\x00\x00\x00\x00\x01\x02\x03",  # half a drive
     ],
 )
@@ -94,18 +103,19 @@ def test_directions():
 def test_examples_in_the_document():
     document = (Path(__file__).parents[3] / "docs" / "protocol.md").read_text(encoding="utf-8")
     counts = np.array([512, 1023, 0, 300], dtype=np.uint16)
-    for message in (
-        GetInfo(1),
-        Ack(1, 0x87, Result.OK, 0),
-        SetPattern(4, 0x1A2B, 0, (Drive(1, 0, 0xFC),)),
-        Frame(7, 250_000, 0.0, 0x1A2B, 0, 0, counts),
-        PackedFrame.of(Frame(7, 250_000, 0.0, 0x1A2B, 0, 0, counts)),
+    frame = Frame(7, 250_000, 0.0, 0x1A2B, 0, 0, counts)
+    for message, packed in (
+        (GetInfo(1), False),
+        (Ack(1, 0x87, Result.OK, 0), False),
+        (SetPattern(4, 0x1A2B, 0, (Drive(1, 0, 0xFC),)), False),
+        (frame, False),
+        (frame, True),
     ):
-        payload = encode_payload(message)
+        payload = encode_payload(message, packed=packed)
         parts = {
             "payload": payload,
             "CRC": crc16(payload).to_bytes(2, "big"),
-            "line": encode(message),
+            "line": encode(message, packed=packed),
         }
         lines = "".join(f"  {name:<8} {part.hex(' ')}\n" for name, part in parts.items())
         assert lines in document

@@ -126,7 +126,7 @@ def test_an_image_of_another_mesh_is_refused() -> None:
 def test_without_matplotlib(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     panel = Panel("", np.zeros(len(mesh().cells)), ())
-    with pytest.raises(DataError, match="need matplotlib"):
+    with pytest.raises(DataError, match="needs the package matplotlib"):
         write_picture(tmp_path / "x.png", mesh(), [panel], "S")
 
 

@@ -10,7 +10,15 @@ import pytest
 
 from cli.conftest import tomoskin
 from run.sinks.test_bag import SCRIPT
-from tomoskin.files.exports.lerobot import FIELDS, MOST_TOUCHES, TOUCHES, VOLTAGES, write_lerobot
+from tomoskin.files.exports import Export
+from tomoskin.files.exports.lerobot import (
+    FIELDS,
+    MOST_TOUCHES,
+    TOUCHES,
+    VALID,
+    VOLTAGES,
+    write_lerobot,
+)
 from tomoskin.files.session import SessionReader, as_recorded, replayed
 from tomoskin.model.skin import Skin
 from tomoskin.run import simulate
@@ -34,7 +42,7 @@ def dataset(session):
     """Its folder, and the results that it was made from."""
     folder = session.with_name("press.lerobot")
     with SessionReader(session) as reader:
-        write_lerobot(folder, reader, 1 / RATE, nothing)
+        write_lerobot(Export(reader, 1 / RATE, nothing), folder)
         return folder, [r for r in replayed(as_recorded(reader), reader) if r.ready]
 
 
@@ -57,6 +65,7 @@ def test_a_row_holds_the_newest_frame(dataset):
             seen = touch.detection
             assert row == pytest.approx([1, seen.x, seen.y, 0, seen.peak], rel=1e-6)
     assert max(row[0] for row in table[TOUCHES]) == 1
+    assert table[VALID] == [[1.0]] * len(table["index"])
 
 
 def test_it_says_what_it_holds(dataset):

@@ -18,9 +18,16 @@ from mcap.opcode import Opcode
 from mcap.writer import CompressionType, Writer
 
 from files.session.runs import SKIN, frame_of, same_frame, write_all, write_frames
-from tomoskin.core import MAGIC, DataError
+from tomoskin.core import MAGIC, DataError, encode_json
 from tomoskin.files.imports import read_recording
-from tomoskin.files.session import SessionReader, message_counts, repair, session_info
+from tomoskin.files.session import (
+    SessionReader,
+    SessionWriter,
+    message_counts,
+    repair,
+    session_info,
+)
+from tomoskin.files.session.channels import TOUCHES
 from tomoskin.files.session.mcap_records import PREFIX
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -455,8 +462,8 @@ _RECORD = """
 import sys, threading
 from pathlib import Path
 from files.session.runs import frame_of, SKIN
+from tomoskin.core import Capacity, Worker
 from tomoskin.files.session import Mark, MarkedFrame, Recorder, SessionWriter
-from tomoskin.run.sinks import Capacity, Worker
 path = Path(sys.argv[1])
 recorder = Recorder(path, lambda: SessionWriter(path, SKIN), None, print)
 worker = Worker(recorder, Capacity(1 << 20, "oldest"), print)
@@ -477,3 +484,15 @@ def test_killed_while_nothing_comes_all_older_than_a_second_is_there(tmp_path):
         assert process.stdout.readline() == "a second later\n"
         process.send_signal(signal.SIGKILL)
     assert [frame.sequence for frame in frames_in(path)[0]] == list(range(20))
+
+
+@pytest.mark.parametrize("name", ["sequence", "touches", "host_time"])
+def test_a_message_of_another_program_is_an_error_that_says_where(tmp_path, name):
+    """Its chunk is whole and its JSON too, but it is no message of ours."""
+    path = tmp_path / "all.mcap"
+    message = {"host_time": 0.2, "sequence": 20, "touches": []}
+    del message[name]
+    with SessionWriter(path, SKIN) as session:
+        session._log.put(TOUCHES, 0.2, encode_json(message))
+    with SessionReader(path) as session, pytest.raises(DataError, match="/touches cannot be"):
+        list(session.touches())

@@ -15,7 +15,7 @@ import pytest
 
 from files.session.runs import INFO, SKIN, TOUCH, frame_of, same_frame
 from tomoskin.board.wire import encode
-from tomoskin.core import DataError, Event, Image
+from tomoskin.core import Capacity, DataError, Event, Image, Worker
 from tomoskin.files.session import (
     BoardInfo,
     Mark,
@@ -30,7 +30,6 @@ from tomoskin.files.session import (
 )
 from tomoskin.files.session.recorder import IMAGE_PERIOD
 from tomoskin.pipeline import FrameResult
-from tomoskin.run.sinks import Capacity, Worker
 
 PATIENCE = 300
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from files.session.runs import INFO, SCAN, SKIN, TOUCH, frame_of, put
-from tomoskin.files.exports import Export, write_touches
+from tomoskin.files.exports import WRITERS, Export, write_touches
 from tomoskin.files.imports import read_recording
 from tomoskin.files.session import Mark, SessionReader, SessionWriter
 from tomoskin.files.session.blocks import no_report
@@ -40,7 +40,7 @@ def exported(session: Path, name: str) -> list[dict[str, str]]:
     path = session.with_name(f"{name}.csv")
     with SessionReader(session) as reader:
         export = Export(reader, 0.1, no_report)
-        (export.touches if name == "touches" else export.csv)(path)
+        (Export.touches if name == "touches" else WRITERS[".csv"])(export, path)
     with path.open(encoding="utf-8") as file:
         return list(csv.DictReader(file))
 

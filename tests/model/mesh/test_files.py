@@ -13,7 +13,7 @@ import pytest
 
 from shapes import disc
 from tomoskin.core import FloatArray, GeometryError, IntArray
-from tomoskin.model.mesh import BoxPatch, Mesh, MeshFile, Places, box, cylinder, read_mesh
+from tomoskin.model.mesh import BoxPatch, Mesh, MeshFile, Places, box, cylinder
 from tomoskin.model.mesh import simplex_measure as measure
 
 SIZE = (0.3, 0.04, 0.03)
@@ -65,21 +65,21 @@ def test_msh_22_with_named_groups(tmp_path: Path, make: Callable[[], Mesh], bina
     names = [f"E{i + 1}" for i in range(len(mesh.electrodes))]
     meshio.gmsh.write(file, physical(mesh, names), "2.2", binary=binary)
     same(Mesh.read(file), mesh)
-    same(read_mesh(file, names[::-1]), Mesh(mesh.points, mesh.cells, mesh.electrodes[::-1]))
+    same(Mesh.read(file, names[::-1]), Mesh(mesh.points, mesh.cells, mesh.electrodes[::-1]))
 
 
 def test_groups_are_ordered_by_number_not_by_text(tmp_path: Path) -> None:
     mesh = cylinder(0.1, 0.04, count=11, width=0.02, bottom=0, top=0.04, cells=500, layers=2)
     names = [f"electrode_{i + 1}" for i in range(11)]
     meshio.gmsh.write(tmp_path / "a.msh", physical(mesh, names), "2.2", binary=False)
-    same(read_mesh(tmp_path / "a.msh"), mesh)
+    same(Mesh.read(tmp_path / "a.msh"), mesh)
 
 
 def test_msh_22_with_groups_that_have_numbers_only(tmp_path: Path) -> None:
     raw = physical(bar(), ["E1", "E2"])
     raw.field_data = {}
     meshio.gmsh.write(tmp_path / "a.msh", raw, "2.2", binary=False)
-    same(read_mesh(tmp_path / "a.msh", ["1", "2"]), bar())
+    same(Mesh.read(tmp_path / "a.msh", ["1", "2"]), bar())
 
 
 MSH_41 = """$MeshFormat
@@ -146,7 +146,7 @@ def test_vtu_with_numbered_facets(tmp_path: Path, make: Callable[[], Mesh]) -> N
             cell_data={"electrode": [numbers, np.zeros(len(mesh.cells), dtype=int)]},
         ),
     )
-    same(read_mesh(file), mesh)
+    same(Mesh.read(file), mesh)
 
 
 def test_facets_in_the_files_own_numbers(save: Save) -> None:
@@ -154,19 +154,19 @@ def test_facets_in_the_files_own_numbers(save: Save) -> None:
     stray = np.vstack([np.full((3, 3), 0.5), mesh.points])  # three points of no cell come first
     file = save(Mesh(mesh.points, mesh.cells, mesh.electrodes), "a.vtu")
     meshio.vtu.write(file, meshio.Mesh(stray, [("tetra", mesh.cells + 3)]))
-    same(read_mesh(file, [e + 3 for e in mesh.electrodes]), mesh)
+    same(Mesh.read(file, [e + 3 for e in mesh.electrodes]), mesh)
 
 
 def test_electrodes_by_a_function_of_centroids(save: Save) -> None:
     def ends(x: FloatArray) -> IntArray:
         return np.where(x[:, 0] < -0.149, 0, np.where(x[:, 0] > 0.149, 1, -1))
 
-    same(read_mesh(save(bar(), "a.vtu"), ends), bar())
+    same(Mesh.read(save(bar(), "a.vtu"), ends), bar())
 
 
 def test_electrodes_by_places(save: Save) -> None:
     spots = np.array([[-0.15, 0.01, 0.01], [-0.15, -0.01, 0.01], [0.1, 0.02, 0.02]])
-    mesh = read_mesh(save(bar(), "a.vtu"), Places(spots, 0.05))
+    mesh = Mesh.read(save(bar(), "a.vtu"), Places(spots, 0.05))
     for spot, facets in zip(spots, mesh.electrodes, strict=True):
         centroid = mesh.points[facets].mean(axis=1)
         gaps = np.linalg.norm(centroid[:, None] - spots, axis=2)
@@ -180,7 +180,7 @@ def test_scale(save: Save) -> None:
     file = save(large, "mm.vtu")
     with pytest.raises(GeometryError, match=r"extends over 300 m.*scale=1e-3"):
         MeshFile.read(file)
-    got = read_mesh(file, mesh.electrodes, scale=1e-3)
+    got = Mesh.read(file, mesh.electrodes, scale=1e-3)
     assert got.points == pytest.approx(mesh.points, abs=1e-15)
 
 
@@ -191,7 +191,7 @@ def test_stl_joins_the_corners_of_its_triangles(tmp_path: Path, binary: bool) ->
         file, meshio.Mesh(in_space(mesh.points), [("triangle", mesh.cells)]), binary=binary
     )
     middles = np.array([mesh.points[e].mean(axis=(0, 1)) for e in mesh.electrodes])
-    got = read_mesh(file, Places(middles, 0.011))
+    got = Mesh.read(file, Places(middles, 0.011))
     assert len(got.points) == len(mesh.points)
     assert got.volumes == pytest.approx(mesh.volumes, rel=1e-4)
     for a, b in zip(got.electrodes, mesh.electrodes, strict=True):
@@ -205,7 +205,7 @@ def test_obj_of_a_curved_sheet_keeps_three_coordinates(tmp_path: Path) -> None:
     dome = np.column_stack([mesh.points, 0.01 - (mesh.points**2).sum(axis=1)])
     file = tmp_path / "dome.obj"
     meshio.obj.write(file, meshio.Mesh(dome, [("triangle", mesh.cells)]))
-    same(read_mesh(file, mesh.electrodes), Mesh(dome, mesh.cells, mesh.electrodes))
+    same(Mesh.read(file, mesh.electrodes), Mesh(dome, mesh.cells, mesh.electrodes))
 
 
 # What is refused.
@@ -291,7 +291,7 @@ def test_a_cell_that_stands_twice_is_named(tmp_path: Path) -> None:
     cells = np.array([[0, 1, 2], [0, 2, 3], [2, 1, 0]])
     file = write_cells(tmp_path / "a.vtu", POINTS[:4], [("triangle", cells)])
     with pytest.raises(GeometryError, match="repeats cell 0") as caught:
-        read_mesh(file, [[[0, 1]]])
+        Mesh.read(file, [[[0, 1]]])
     assert caught.value.where.endswith("a.vtu, cell 2")
 
 
@@ -299,7 +299,7 @@ def test_a_degenerate_cell_is_named(tmp_path: Path) -> None:
     cells = np.array([[0, 1, 2], [0, 2, 2]])
     file = write_cells(tmp_path / "a.vtu", POINTS[:4], [("triangle", cells)])
     with pytest.raises(GeometryError, match="degenerate") as caught:
-        read_mesh(file, [[[0, 1]]])
+        Mesh.read(file, [[[0, 1]]])
     assert caught.value.where.endswith("a.vtu, cell 1")
 
 
@@ -324,7 +324,7 @@ def test_a_degenerate_cell_is_named(tmp_path: Path) -> None:
 )
 def test_electrodes_that_cannot_be(save: Save, electrodes: Any, message: str) -> None:
     with pytest.raises(GeometryError, match=message) as caught:
-        read_mesh(save(bar(), "a.vtu"), electrodes)
+        Mesh.read(save(bar(), "a.vtu"), electrodes)
     assert "a.vtu" in caught.value.where
 
 
@@ -332,7 +332,7 @@ def test_a_closed_surface_has_no_rim(tmp_path: Path) -> None:
     shell = bar().boundary
     file = write_cells(tmp_path / "a.vtu", bar().points, [("triangle", shell)])
     with pytest.raises(GeometryError, match="closed"):
-        read_mesh(file, Places([[0.15, 0, 0]], 0.1))
+        Mesh.read(file, Places([[0.15, 0, 0]], 0.1))
     assert len(MeshFile.read(file).cells) == len(shell)  # what it holds can be had
 
 
@@ -345,4 +345,4 @@ def test_impossible_scale(save: Save, scale: float) -> None:
 def test_known_groups_are_listed(tmp_path: Path) -> None:
     meshio.gmsh.write(tmp_path / "a.msh", physical(bar(), ["left", "right"]), "2.2", binary=False)
     with pytest.raises(GeometryError, match="groups: left, right"):
-        read_mesh(tmp_path / "a.msh")
+        Mesh.read(tmp_path / "a.msh")

@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ import pytest
 from files.session.runs import SKIN, TOUCH
 from tomoskin.core import Event, Image
 from tomoskin.pipeline import FrameResult
-from tomoskin.run.sinks import Moment, Stream
+from tomoskin.run.sinks import Contacts, Stream
 
 ROBOT = Path(__file__).resolve().parents[3] / "docs" / "robot.md"
 PATIENCE = 300
@@ -30,27 +31,33 @@ EVENT = Event(0.5, "connected", "board 01")
 STREAM = Stream(SKIN.name, "twin of textile-disc-8", PATTERN, MESH.pixels(48), EPOCH)
 
 
-def moment_at(host_time, *touches, sequence=0):
-    """Results of one frame, with an image."""
+def result_at(host_time, *touches, sequence=0, **changes):
+    """What a pipeline makes of one frame, with an image."""
     rows = np.arange(PATTERN.n_meas, dtype=float)
-    image = Image(VALUES, "S", MESH.identity)
-    return Moment(sequence, host_time, True, rows + 0.25, rows, touches, image)
-
-
-def result_at(host_time, *touches, sequence=0):
-    """What a pipeline makes of one frame."""
-    moment = moment_at(host_time, *touches, sequence=sequence)
-    return FrameResult(
+    result = FrameResult(
         sequence=sequence,
         host_time=host_time,
         ready=True,
         has_image=True,
-        image=moment.image,
-        voltages=moment.voltages,
-        reference=moment.reference,
+        image=Image(VALUES, "S", MESH.identity),
+        voltages=rows + 0.25,
+        reference=rows,
         touches=touches,
         left_out=0,
     )
+    return replace(result, **changes)
+
+
+def contacts_at(host_time, *touches, sequence=0, stream=STREAM):
+    """One frame as sinks get it, all of it worth a message."""
+    return Contacts.of(stream, result_at(host_time, *touches, sequence=sequence))
+
+
+def begin(sink, stream=STREAM):
+    """Open a sink as its worker does; what makes the contacts of its stream."""
+    named = stream.named(sink.naming)
+    sink.open(named)
+    return partial(contacts_at, stream=named)
 
 
 def free_port():

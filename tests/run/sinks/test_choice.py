@@ -11,7 +11,7 @@ from tomoskin.run.sinks import make_sink, sink_names
 
 
 def test_the_installed_sinks():
-    assert sink_names() == ("foxglove", "lsl", "mqtt", "rerun", "ros2", "zenoh")
+    assert sink_names() == ("foxglove", "lsl", "mqtt", "rerun", "ros2")
 
 
 @pytest.mark.parametrize(
@@ -25,10 +25,8 @@ def test_the_installed_sinks():
         ("mqtt://broker/robot/skin?frame=left_forearm", "mqtt://broker:1883/robot/skin"),
         ("lsl", "lsl tomoskin"),
         ("lsl:left-hand", "lsl left-hand"),
-        ("zenoh", "zenoh peers"),
-        ("zenoh:tcp/10.0.0.1:7447,domain=3", "zenoh tcp/10.0.0.1:7447"),
-        ("zenoh:namespace=left_arm", "zenoh peers"),
         ("ros2:domain=4", "ros2 /tomoskin, domain 4"),
+        ("ros2:namespace=left_arm,domain=3", "ros2 /left_arm, domain 3"),
     ],
 )
 def test_names_say_where_results_go_but_no_password(spec, name):
@@ -39,7 +37,7 @@ def test_names_say_where_results_go_but_no_password(spec, name):
     ("spec", "said"),
     [
         ("", "there is no sink"),
-        ("kafka", "sinks: foxglove, lsl, mqtt, rerun, ros2, zenoh"),
+        ("kafka", "sinks: foxglove, lsl, mqtt, rerun, ros2"),
         ("foxglove:port", "expected a port"),
         ("foxglove:70000", "expected a port"),
         ("foxglove:0", "expected a port"),
@@ -49,12 +47,6 @@ def test_names_say_where_results_go_but_no_password(spec, name):
         ("mqtt://host:port/x", "Port could not"),
         ("mqtt://host:99999", "Port out of range"),
         ("lsl:left hand", "letters and digits"),
-        ("zenoh:10.0.0.1", "expected an endpoint"),
-        ("zenoh:domain=x", "expected an endpoint"),
-        ("zenoh:tcp/a:1,tcp/b:2", "expected an endpoint"),
-        ('zenoh:tcp/"', "expected an endpoint"),
-        ("zenoh:namespace=left arm", "expected a namespace"),
-        ("zenoh:space=x", "expected domain=…, namespace=…, frame=…, parent=…, at=…"),
         ("mqtt://host/a?qos=1", "expected frame=…"),
         ("mqtt://host/a?frame=left arm", "expected a frame"),
     ],
@@ -77,7 +69,6 @@ def test_a_password_is_never_said():
         ("foxglove", "foxglove", "foxglove"),
         ("mqtt://host", "paho.mqtt.client", "mqtt"),
         ("lsl", "pylsl", "lsl"),
-        ("zenoh", "zenoh", "zenoh"),
         ("ros2", "cyclonedds.core", "ros2"),
     ],
 )

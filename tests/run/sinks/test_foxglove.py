@@ -15,7 +15,7 @@ import pytest
 from websockets.sync.client import connect
 
 from files.session.runs import TOUCH
-from run.sinks.conftest import EPOCH, EVENT, PATIENCE, free_port, moment_at
+from run.sinks.conftest import EPOCH, EVENT, PATIENCE, begin, contacts_at, free_port
 from tomoskin.core import SinkError
 from tomoskin.files.session import schema_of
 from tomoskin.run.sinks import make_sink
@@ -27,7 +27,7 @@ _MESSAGE = struct.Struct("<BIQ")
 def served(stream):
     port = free_port()
     sink = make_sink(f"foxglove:{port}")
-    sink.open(stream)
+    begin(sink, stream)
     yield sink, port
     sink.close()
 
@@ -83,10 +83,12 @@ def test_what_a_client_sees(served):
         topic, time, content = subscribed(sink, client)
         assert (topic, time) == ("/events", round((EPOCH + 0.5) * 1e9))
         assert content["message"] == EVENT.text
-        sink.publish(moment_at(1.0, TOUCH, sequence=3))
+        sink.publish(contacts_at(1.0, TOUCH, sequence=3))
         found = {topic: content for topic, _, content in (client.message() for _ in "abc")}
     assert found["/touches"]["sequence"] == 3
     assert found["/touches"]["touches"][0]["x"] == TOUCH.detection.x
+    assert found["/touches"]["touches"][0]["position"] == [TOUCH.detection.x, TOUCH.detection.y, 0]
+    assert found["/touches"]["valid"]
     assert found["/scene"]["entities"][0]["id"] == "touch-4"
     assert found["/image"]["column_count"] == 48
 
@@ -95,7 +97,7 @@ def test_a_port_in_use_is_said_and_a_closed_server_leaves_it(served, stream):
     sink, port = served
     second = make_sink(f"foxglove:{port}")
     with pytest.raises(SinkError, match=r"in use.*choose another port"):
-        second.open(stream)
+        begin(second, stream)
     second.close()
     sink.close()
     deadline = time.monotonic() + PATIENCE
@@ -106,7 +108,7 @@ def test_a_port_in_use_is_said_and_a_closed_server_leaves_it(served, stream):
 
 def served_by(sink, stream):
     try:
-        sink.open(stream)
+        begin(sink, stream)
     except SinkError:
         sink.close()
         return False

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from files.session.runs import TOUCH
-from run.sinks.conftest import EVENT, PATIENCE, moment_at, robot_program
+from run.sinks.conftest import EVENT, PATIENCE, begin, robot_program
 from tomoskin.board import source
 from tomoskin.run import sinks as sink
 from tomoskin.run.sinks import ContactListener, Naming
@@ -20,12 +20,11 @@ MOST_LINES = 15
 def test_a_function_gets_the_contacts_of_each_frame(stream):
     heard = []
     sink = ContactListener(heard.append, Naming("left_arm"))
-    sink.publish(moment_at(0.0))  # it is not open yet
-    sink.open(replace(stream, clock=lambda: 0.5))
+    contacts_at = begin(sink, replace(stream, clock=lambda: 0.5))
     sink.publish(EVENT)
-    sink.publish(moment_at(0.1))
-    sink.publish(moment_at(0.2, TOUCH, sequence=9))
-    sink.publish(replace(moment_at(0.3), valid=False, problem="E4 is dead"))
+    sink.publish(contacts_at(0.1))
+    sink.publish(contacts_at(0.2, TOUCH, sequence=9))
+    sink.publish(replace(contacts_at(0.3), valid=False, problem="E4 is dead"))
     sink.close()
     assert [len(contacts.touches) for contacts in heard] == [0, 1, 0]
     assert [contacts.valid for contacts in heard] == [True, True, False]

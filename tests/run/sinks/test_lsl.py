@@ -22,24 +22,24 @@ RUN = """
 import json, math, time
 import pylsl
 from files.session.runs import TOUCH
-from run.sinks.conftest import EVENT, STREAM, moment_at
+from run.sinks.conftest import EVENT, begin
 from tomoskin.run.sinks import make_sink
 
 sink = make_sink("lsl:try")
-sink.open(STREAM)
+contacts_at = begin(sink)
 found = {}
 for name in ("voltages", "dv", "touches", "events"):
     (info,) = pylsl.resolve_byprop("name", f"try-{name}", timeout=20)
     found[name] = pylsl.StreamInlet(info)
     found[name].open_stream(20)
 before = time.monotonic()
-sink.publish(moment_at(before, TOUCH))
+sink.publish(contacts_at(before, TOUCH))
 sink.publish(EVENT)
 rows = {name: inlet.pull_sample(20)[0] for name, inlet in found.items()}
 stamp = found["voltages"]
 info = stamp.info()
 channel = info.desc().child("channels").child("channel")
-sink.publish(moment_at(before + 1.0))
+sink.publish(contacts_at(before + 1.0))
 _, time_ = stamp.pull_sample(20)
 earliest = pylsl.local_clock() - time.monotonic()
 now = time.monotonic()
@@ -61,7 +61,8 @@ def told(tmp_path_factory):
     configuration = folder / "lsl.cfg"
     configuration.write_text(CONFIGURATION)
     tests = Path(__file__).resolve().parents[2]
-    environment = os.environ | {"LSLAPICFG": str(configuration), "PYTHONPATH": str(tests)}
+    paths = os.pathsep.join(filter(None, (str(tests), os.environ.get("PYTHONPATH"))))
+    environment = os.environ | {"LSLAPICFG": str(configuration), "PYTHONPATH": paths}
     command = [sys.executable, "-c", RUN]
     done = subprocess.run(
         command, env=environment, capture_output=True, text=True, timeout=100, check=False
@@ -78,7 +79,7 @@ def test_voltages_and_their_change(told):
 
 def test_touches_and_events(told):
     assert told["touches"][:4] == [4, 0.1, -0.2, -0.5]
-    assert told["touches"][4:] == [None] * 21
+    assert told["touches"][4:] == [None] * 21 + [1]  # the last says that they are valid
     assert told["event"] == ['{"kind":"connected","text":"board 01"}']
 
 

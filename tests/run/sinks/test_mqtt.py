@@ -15,8 +15,9 @@ from paho.mqtt import client as paho
 
 from conftest import missing
 from files.session.runs import TOUCH
-from run.sinks.conftest import EPOCH, EVENT, PATIENCE, free_port, moment_at, touch_of
-from tomoskin.core import SinkError
+from run.sinks.conftest import EPOCH, EVENT, PATIENCE, begin, free_port, result_at, touch_of
+from tomoskin.core import Event, SinkError
+from tomoskin.files.messages import Reporter
 from tomoskin.run.sinks import make_sink
 from tomoskin.run.sinks.mqtt import PERIOD
 from tomoskin.sensing.track import TouchEvent
@@ -88,9 +89,9 @@ def heard(broker):
 
 def test_touches_events_and_status(broker, heard, stream):
     sink = make_sink(broker.url)
-    sink.open(stream)
+    contacts_at = begin(sink, stream)
     assert heard() == ("robot/skin/status", "online")
-    sink.publish(moment_at(1.0, TOUCH, sequence=3))
+    sink.publish(contacts_at(1.0, TOUCH, sequence=3))
     topic, text = heard()
     assert topic == "robot/skin/touches"
     told = json.loads(text)
@@ -100,7 +101,7 @@ def test_touches_events_and_status(broker, heard, stream):
     assert (told["skin"], told["frame_id"]) == (stream.skin, "robot/skin/skin")
     assert told["utc_s"] == EPOCH + told["host_time"]
     begun = TouchEvent("onset", TOUCH, 1.1)
-    sink.publish(replace(moment_at(1.1, TOUCH, sequence=4), happened=(begun,)))
+    sink.publish(replace(contacts_at(1.1, TOUCH, sequence=4), happened=(begun,)))
     topic, text = heard()
     assert topic == "robot/skin/touch"
     told = json.loads(text)
@@ -117,27 +118,46 @@ def test_touches_events_and_status(broker, heard, stream):
 
 def test_beginnings_and_ends_are_sent_at_once_the_rest_now_and_then(broker, heard, stream):
     sink = make_sink(broker.url)
-    sink.open(stream)
+    begin(sink, stream)
     heard()
     one, two = touch_of(1), touch_of(2)
+    reporter = Reporter(stream.named(sink.naming), period=sink.period)
     for number, touches in enumerate(((), (one,), (one,), (one, two), (one, two), (), ())):
-        sink.publish(moment_at(0.01 * number, *touches, sequence=number))
-    sink.publish(moment_at(1.0, one, sequence=7))
-    sink.publish(moment_at(1.0 + 1.01 * PERIOD, one, sequence=8))
+        sink.publish(reporter.of(result_at(0.01 * number, *touches, sequence=number)))
+    sink.publish(reporter.of(result_at(1.0, one, sequence=7)))
+    sink.publish(reporter.of(result_at(1.0 + 1.01 * PERIOD, one, sequence=8)))
     assert [json.loads(heard()[1])["sequence"] for _ in range(6)] == [0, 1, 3, 5, 7, 8]
+    sink.close()
+
+
+def test_a_lost_board_is_told_and_kept_until_frames_come_again(broker, heard, stream):
+    sink = make_sink(broker.url)
+    begin(sink, stream)
+    reporter = Reporter(stream.named(sink.naming), period=sink.period)
+    sink.publish(reporter.of(result_at(1.0, TOUCH)))
+    assert [heard()[0] for _ in range(2)] == ["robot/skin/status", "robot/skin/touches"]
+    sink.publish(reporter.lost(Event(1.2, "source-lost", "the cable is out")))
+    sink.publish(reporter.still_lost())
+    assert heard() == ("robot/skin/status", "offline")
+    topic, text = heard()
+    told = json.loads(text)
+    assert topic == "robot/skin/touches"
+    assert (told["valid"], told["problem"], told["touches"]) == (False, "the cable is out", [])
+    sink.publish(reporter.of(result_at(2.0)))
+    assert heard() == ("robot/skin/status", "online")
     sink.close()
 
 
 def test_a_wrong_password_is_said(broker, stream):
     sink = make_sink(broker.url.replace("secret", "guess"))
     with pytest.raises(SinkError, match="refused"):
-        sink.open(stream)
+        begin(sink, stream)
     sink.close()
 
 
 def test_a_broker_that_goes_is_noticed(broker, heard, stream):
     sink = make_sink(broker.url)
-    sink.open(stream)
+    begin(sink, stream)
     heard()
     broker.stop()
     deadline = time.monotonic() + PATIENCE
@@ -150,7 +170,7 @@ def test_a_broker_that_goes_is_noticed(broker, heard, stream):
         go_on()
     sink.close()
     with pytest.raises(OSError, match="refused"):
-        sink.open(stream)
+        begin(sink, stream)
     sink.close()
 
 
@@ -158,7 +178,7 @@ def test_the_listener_of_the_documentation_hears_touches(broker, listener, strea
     place = f'client.username_pw_set("me", "secret")\nclient.connect("127.0.0.1", {broker.port})'
     heard = listener("paho", place=('client.connect("127.0.0.1", 1883)', place))
     sink = make_sink(broker.url)
-    sink.open(stream)
-    line = heard.hears(lambda number: sink.publish(moment_at(float(number), TOUCH)))
+    contacts_at = begin(sink, stream)
+    line = heard.hears(lambda number: sink.publish(contacts_at(float(number), TOUCH)))
     sink.close()
     assert line.split() == ["4", "0.1", "-0.2"]

@@ -20,7 +20,7 @@ import pytest
 
 from cli.conftest import tomoskin
 from files.session.runs import TOUCH
-from run.sinks.conftest import EPOCH, EVENT, MESH, PATIENCE, VALUES, free_port, moment_at, touch_of
+from run.sinks.conftest import EPOCH, EVENT, MESH, PATIENCE, VALUES, begin, free_port, touch_of
 from run.sinks.test_bag import SCRIPT
 from tomoskin.core import CHANGE, OutputError, SinkError
 from tomoskin.files.session import SessionReader, as_recorded, replayed
@@ -57,10 +57,10 @@ def entities(path):
 def test_a_file_holds_sheet_touches_and_series(tmp_path, whole):
     path = tmp_path / "run.rrd"
     sink = open_rerun(f"{path},namespace=left_arm")
-    sink.open(whole)
-    sink.publish(moment_at(0.25, TOUCH, touch_of(5)))
+    contacts_at = begin(sink, whole)
+    sink.publish(contacts_at(0.25, TOUCH, touch_of(5)))
     sink.publish(EVENT)
-    sink.publish(moment_at(0.5))
+    sink.publish(contacts_at(0.5))
     sink.close()
     sink.close()
     found = entities(path)
@@ -106,8 +106,8 @@ def test_a_viewer_gets_the_same(tmp_path, whole):
     try:
         wait_for(viewer, port)
         sink = open_rerun(f"127.0.0.1:{port}")
-        sink.open(whole)
-        sink.publish(moment_at(0.25, TOUCH))
+        contacts_at = begin(sink, whole)
+        sink.publish(contacts_at(0.25, TOUCH))
         sink.close()
         assert labels_of(viewer, path) == ["4"]
     finally:
@@ -129,8 +129,8 @@ def wait_for(viewer, port):
 def test_a_viewer_that_is_not_there_is_said(whole, monkeypatch):
     monkeypatch.setattr("tomoskin.run.sinks.rerun._PATIENCE", 0.2)
     sink = open_rerun(f"127.0.0.1:{free_port()}")
-    sink.open(whole)
-    sink.publish(moment_at(0.25, TOUCH))
+    contacts_at = begin(sink, whole)
+    sink.publish(contacts_at(0.25, TOUCH))
     with pytest.raises(SinkError, match="no viewer accepted the connection"):
         sink.close()
     sink.close()

@@ -16,16 +16,22 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from scipy.spatial.transform import Rotation
 
 from files.session.runs import TOUCH
-from run.sinks.conftest import EPOCH, EVENT, MESH, VALUES, moment_at, touch_of
+from run.sinks.conftest import EPOCH, EVENT, MESH, VALUES, contacts_at, result_at, touch_of
 from tomoskin.core import Event, Force
+from tomoskin.files.messages import (
+    TOPICS,
+    TYPES,
+    Contact,
+    Naming,
+    Reporter,
+    encode_cdr,
+    ros_messages,
+    type_hash,
+)
+from tomoskin.files.messages.ros_view import IMAGE, ODOMETRY, POSE, TEXT
 from tomoskin.model.mesh import Cylinder
 from tomoskin.model.robot import Place, Pose
-from tomoskin.run.sinks import Contacts, Naming, ros_messages
-from tomoskin.run.sinks.cdr import encode_cdr
-from tomoskin.run.sinks.contact import contact_of
-from tomoskin.run.sinks.ros import IMAGE, ODOMETRY, POSE, TEXT, TOPICS, RosView
-from tomoskin.run.sinks.ros_types import TYPES, type_hash
-from tomoskin.run.sinks.space import SpacePose
+from tomoskin.sensing.track import TouchEvent
 
 
 @pytest.fixture(scope="module", params=[Stores.ROS2_HUMBLE, Stores.ROS2_JAZZY])
@@ -61,10 +67,11 @@ def plain(value):
 
 
 def same(read, written):
-    """Whether what was read has the fields that were written."""
+    """Whether what was read has the fields that were written, and nothing in the others."""
     if isinstance(read, dict):
         named = {key: item for key, item in read.items() if key.islower() and key[0] != "_"}
-        return named.keys() == written.keys() and all(same(named[k], written[k]) for k in named)
+        assert written.keys() <= named.keys()
+        return all(same(v, written[k]) if k in written else empty(v) for k, v in named.items())
     if isinstance(read, list):
         return len(read) == len(written) and all(map(same, read, written))
     if isinstance(read, np.ndarray) and isinstance(written, bytes):
@@ -74,13 +81,21 @@ def same(read, written):
     )
 
 
+def empty(read):
+    """Whether there is nothing in it: zeros, no text, no items."""
+    if isinstance(read, dict):
+        named = {key: item for key, item in read.items() if key.islower() and key[0] != "_"}
+        return all(map(empty, named.values()))
+    return not np.any(read) if isinstance(read, np.ndarray) else not read
+
+
 def test_every_message_is_read_by_a_library_of_others(store, stream):
-    whole = replace(stream, points=np.column_stack([MESH.centroids, np.zeros(len(MESH.cells))]))
-    view = RosView(
-        whole, Naming(mount=Place("", "tool0", Pose.of((0.1, 0.2, 0.3), (0.1, 0.2, 0.3))))
-    )
+    mount = Place("", "tool0", Pose.of((0.1, 0.2, 0.3), (0.1, 0.2, 0.3)))
+    points = np.column_stack([MESH.centroids, np.zeros(len(MESH.cells))])
+    whole = replace(stream, points=points).named(Naming(mount=mount))
     read = []
-    for message in [*view.of(moment_at(0.25, TOUCH, touch_of(5))), *view.of(EVENT)]:
+    items = contacts_at(0.25, TOUCH, touch_of(5), stream=whole), EVENT
+    for message in (message for item in items for message in ros_messages(whole, item)):
         kind = TOPICS[message.topic]
         found = store.deserialize_cdr(encode_cdr(kind, message.value), kind)
         assert same(plain(found), message.value), message.topic
@@ -116,12 +131,14 @@ class Cdr:
         return self.place == len(self.data)
 
 
-def messages_of(stream, item):
-    return {message.topic: message.value for message in RosView(stream, Naming()).of(item)}
+def messages_of(stream, *at):
+    """Values by topic: of a time and its touches, or of what is given."""
+    item = contacts_at(*at, stream=stream) if isinstance(at[0], float) else at[0]
+    return {message.topic: message.value for message in ros_messages(stream, item)}
 
 
 def test_a_touch_is_a_pose_with_covariance(stream):
-    value = messages_of(stream, moment_at(0.25, TOUCH))["touch"]
+    value = messages_of(stream, 0.25, TOUCH)["touch"]
     cdr = Cdr(encode_cdr(POSE, value))
     assert cdr.header() == (pytest.approx(EPOCH + 0.25), "skin")
     pose = [cdr.take("d") for _ in range(7)]
@@ -132,14 +149,14 @@ def test_a_touch_is_a_pose_with_covariance(stream):
     assert (np.diag(covariance)[1:] == 1e6).all()  # its sd_y is not known
     assert (covariance == np.diag(np.diag(covariance))).all()
     reading = replace(TOUCH.detection, sd_y=2e-3, cov_xy=5e-7)
-    moment = moment_at(0.25, replace(TOUCH, detection=reading))
-    value = messages_of(stream, moment)["touch"]
+    value = messages_of(stream, 0.25, replace(TOUCH, detection=reading))["touch"]
     assert value["pose"]["covariance"][[1, 6]].tolist() == [5e-7, 5e-7]
 
 
 def test_a_track_says_whose_pose_it_is(stream):
-    view = RosView(stream, Naming("left_arm"))
-    tracks = [m for m in view.of(moment_at(0.25, TOUCH, touch_of(5))) if m.topic == "track"]
+    named = stream.named(Naming("left_arm"))
+    contacts = contacts_at(0.25, TOUCH, touch_of(5), stream=named)
+    tracks = [m for m in ros_messages(named, contacts) if m.topic == "track"]
     for message, number in zip(tracks, (4, 5), strict=True):
         cdr = Cdr(encode_cdr(ODOMETRY, message.value))
         assert cdr.header() == (pytest.approx(EPOCH + 0.25), "left_arm/skin")
@@ -155,7 +172,7 @@ def test_on_a_curved_skin_a_touch_is_where_it_is_in_space(stream):
     detection = replace(TOUCH.detection, x=radius * angle, y=0.02, sd_x=1e-3, sd_y=2e-3)
     touch = replace(TOUCH, detection=detection)
     curved = replace(stream, surface=Cylinder(radius), pixels=None)
-    value = messages_of(curved, moment_at(0.25, touch))
+    value = messages_of(curved, 0.25, touch)
     pose = value["touch"]["pose"]
     place = np.array([*pose["pose"]["position"].values()])
     x, height = radius * np.sin(angle), radius * (np.cos(angle) - 1)
@@ -172,8 +189,9 @@ def test_on_a_curved_skin_a_touch_is_where_it_is_in_space(stream):
 @pytest.mark.parametrize("turn", [(0, 0, 3.1), (0, 3.1, 0), (-3, 0.1, 0), (1, 2, -1)])
 def test_an_orientation_is_that_of_its_axes(turn):
     wanted = Rotation.from_rotvec(turn)
-    pose = SpacePose((0.0, 0.0, 0.0), tuple(wanted.as_matrix().T.tolist()), np.empty((3, 2)))
-    found = Rotation.from_quat(pose.quaternion())
+    axes = tuple(wanted.as_matrix().T.tolist())
+    contact = Contact(TOUCH, (0.0, 0.0, 0.0), axes, np.empty((3, 2)))
+    found = Rotation.from_quat(contact.orientation)
     assert (found.inv() * wanted).magnitude() == pytest.approx(0, abs=1e-12)
 
 
@@ -181,7 +199,7 @@ def test_contacts_say_where_and_which_way(stream):
     radius, angle = 0.05, 0.6
     touch = replace(TOUCH, detection=replace(TOUCH.detection, x=radius * angle, y=0.02))
     curved = replace(stream, surface=Cylinder(radius), pixels=None)
-    values = messages_of(curved, moment_at(0.25, touch))
+    values = messages_of(curved, 0.25, touch)
     (contact,) = values["contacts"]["contacts"]
     assert contact["name"] == "skin/touch_4"
     assert [*contact["normal"].values()] == pytest.approx([np.sin(angle), 0, np.cos(angle)])
@@ -196,20 +214,55 @@ def pushing(touch, newtons):
 
 
 def test_a_wrench_is_that_of_all_touches_about_the_origin(stream):
-    touches = [contact_of(stream, pushing(touch, 2.0)) for touch in (TOUCH, touch_of(5))]
-    found = replace(Contacts.of(stream, Naming(), moment_at(0.0)), touches=tuple(touches))
-    value = ros_messages.wrench(ros_messages.header(0, "skin"), found)["wrench"]
+    values = messages_of(stream, 0.0, pushing(TOUCH, 2.0), pushing(touch_of(5), 2.0))
+    value = values["wrench"]["wrench"]
     assert [*value["force"].values()] == [0, 0, -4]
     x, y = TOUCH.detection.x, TOUCH.detection.y
     assert [*value["torque"].values()] == pytest.approx([-4 * y, 4 * x, 0])
-    none = ros_messages.wrench({}, Contacts.of(stream, Naming(), moment_at(0.0)))
-    assert [*none["wrench"]["force"].values()] == [0, 0, 0]
+    for contact in values["contacts"]["contacts"]:
+        assert [*contact["wrench"]["torque"].values()] == pytest.approx([-2 * y, 2 * x, 0])
+    none = messages_of(stream, 0.0)["wrench"]["wrench"]
+    assert [*none["force"].values()] == [0, 0, 0]
+
+
+@pytest.mark.parametrize("blind", [{"ready": False}, {"has_image": False, "left_out": 40}])
+def test_what_a_blind_skin_says_is_not_that_nothing_touches(stream, blind):
+    values = messages_of(stream, Reporter(stream).of(result_at(0.0, **blind)))
+    assert values["valid"] == {"data": False}
+    assert not msgspec.json.decode(values["touches"]["data"])["valid"]
+    assert "contacts" not in values
+    for part in ("force", "torque"):
+        assert np.isnan([*values["wrench"]["wrench"][part].values()]).all()
+    assert values["/diagnostics"]["status"][0]["level"] == 2
+
+
+def test_a_lost_source_says_so_once_and_reports_on(stream):
+    now = [1.0]
+    live = replace(stream, clock=lambda: now[0])
+    reporter = Reporter(live)
+    reporter.of(result_at(0.9, TOUCH))
+    assert reporter.still_lost() is None
+    assert reporter.lost(EVENT) is None
+    sent = [messages_of(live, reporter.lost(Event(0.95, "source-lost", "the cable is out")))]
+    for now[0] in (1.9, 2.8):
+        sent.append(messages_of(live, reporter.still_lost()))
+    assert sent[0]["valid"] == {"data": False}
+    assert msgspec.json.decode(sent[0]["touches"]["data"])["touches"] == []
+    assert [set(values) for values in sent[1:]] == [{"/diagnostics"}] * 2
+    status = [values["/diagnostics"]["status"][0] for values in sent]
+    assert {(s["level"], s["message"]) for s in status} == {(2, "the cable is out")}
+    stamps = [values["/diagnostics"]["header"]["stamp"] for values in sent]
+    assert [stamp["sec"] + 1e-9 * stamp["nanosec"] - EPOCH for stamp in stamps] == pytest.approx(
+        [1.0, 1.9, 2.8], abs=1e-6
+    )
+    back = messages_of(live, reporter.of(result_at(3.0)))
+    assert (back["valid"]["data"], reporter.still_lost()) == (True, None)
 
 
 def test_markers_replace_those_before(stream):
-    shown = messages_of(stream, moment_at(0.25, TOUCH))["markers"]["markers"]
-    assert [(m["ns"], m["action"], m["type"]) for m in shown] == [
-        ("", 3, 0), ("touch", 0, 2), ("label", 0, 9),
+    shown = messages_of(stream, 0.25, TOUCH)["markers"]["markers"]
+    assert [(m.get("ns"), m.get("action"), m.get("type")) for m in shown] == [
+        (None, 3, None), ("touch", None, 2), ("label", None, 9),
     ]  # fmt: skip
     width = 2 * np.sqrt(TOUCH.detection.area / np.pi)
     assert [*shown[1]["scale"].values()] == pytest.approx([width, width, 0.2 * width])
@@ -218,41 +271,36 @@ def test_markers_replace_those_before(stream):
 
 def test_points_lie_on_the_surface(stream):
     places = np.random.default_rng(3).normal(size=(len(VALUES), 3))
-    value = messages_of(replace(stream, points=places), moment_at(0.0))["points"]
+    value = messages_of(replace(stream, points=places), 0.0)["points"]
     cloud = np.frombuffer(value["data"], "<f4").reshape(value["width"], 4)
     assert np.allclose(cloud, np.column_stack([places, VALUES]), atol=1e-6)
     assert value["row_step"] == len(value["data"]) == value["width"] * value["point_step"]
 
 
 def test_a_report_says_whether_touches_are_valid(stream):
-    view = RosView(stream, Naming())
-    lost = replace(moment_at(0.1), valid=False, problem="E4 is dead")
-    reports = {
-        moment.host_time: [m.value for m in view.of(moment) if m.topic == "/diagnostics"]
-        for moment in (moment_at(0.0), lost, replace(lost, host_time=0.9), moment_at(1.0))
-    }
-    assert [len(report) for report in reports.values()] == [1, 1, 0, 1]
-    levels = [
-        (r[0]["status"][0]["level"], r[0]["status"][0]["message"]) for r in reports.values() if r
-    ]
+    reporter = Reporter(stream)
+    lost = {"has_image": False, "unexplained": "E4 is dead"}
+    results = result_at(0.0), result_at(0.1, **lost), result_at(0.9, **lost), result_at(1.0)
+    reports = [messages_of(stream, reporter.of(r)).get("/diagnostics") for r in results]
+    levels = [(r["status"][0]["level"], r["status"][0]["message"]) for r in reports if r]
+    assert [report is not None for report in reports] == [True, True, False, True]
     assert levels == [(0, "OK"), (2, "E4 is dead"), (0, "OK")]
 
 
 def test_a_frame_on_a_robot_is_a_transform(stream):
     turn = (0.3, -0.4, 1.2)
     mount = Place("", "tool0", Pose.of((0.1, 0.2, 0.3), turn))
-    view = RosView(stream, Naming("left_arm", mount=mount))
-    (value,) = (m.value for m in view.of(moment_at(0.0)) if m.topic == "/tf_static")
+    value = messages_of(stream.named(Naming("left_arm", mount=mount)), 0.0)["/tf_static"]
     (found,) = value["transforms"]
     assert (found["header"]["frame_id"], found["child_frame_id"]) == ("tool0", "left_arm/skin")
     wanted = Rotation.from_euler("xyz", turn)
     rotation = Rotation.from_quat([*found["transform"]["rotation"].values()])
     assert (rotation.inv() * wanted).magnitude() == pytest.approx(0, abs=1e-12)
-    assert not [m for m in RosView(stream, Naming()).of(moment_at(0.0)) if m.topic == "/tf_static"]
+    assert "/tf_static" not in messages_of(stream, 0.0)
 
 
 def test_an_image_is_of_floats_with_the_top_row_first(stream):
-    cdr = Cdr(encode_cdr(IMAGE, messages_of(stream, moment_at(0.0))["image"]))
+    cdr = Cdr(encode_cdr(IMAGE, messages_of(stream, 0.0)["image"]))
     cdr.header()
     height, width = cdr.take("I"), cdr.take("I")
     assert (cdr.text(), cdr.take("B"), cdr.take("I")) == ("32FC1", 0, 4 * width)
@@ -263,28 +311,28 @@ def test_an_image_is_of_floats_with_the_top_row_first(stream):
 
 
 def test_what_is_sent_when(stream):
-    view = RosView(stream, Naming())
+    reporter = Reporter(stream, image_period=0.0)
+    release = TouchEvent("release", TOUCH, 0.3)
     sent = [
-        [m.topic for m in view.of(moment)]
-        for moment in (
-            moment_at(0.0, TOUCH), moment_at(0.1), moment_at(0.2),
-            replace(moment_at(0.3), messages=(Event(0.3, "touch-release", "touch 4 ends"),)),
-            replace(moment_at(0.4), valid=False), moment_at(1.5),
+        [m.topic for m in ros_messages(stream, reporter.of(result))]
+        for result in (
+            result_at(0.0, TOUCH), result_at(0.1), result_at(0.2),
+            result_at(0.3, events=(release,)), result_at(0.4, has_image=False), result_at(1.5),
         )
     ]  # fmt: skip
-    always = ["touches", "contacts", "wrench", "markers"]
+    always = ["touches", "valid", "contacts", "wrench", "markers"]
     assert sent[0] == ["touch", "track", *always, "image", "/diagnostics"]
     assert sent[1] == [*always, "image"]  # the last touch has ended
     assert sent[2] == ["image"]
     assert sent[3] == ["events", "image"]
-    assert sent[4] == [*always, "image", "/diagnostics"]  # it cannot be said any more
+    assert sent[4] == ["touches", "valid", "wrench", "markers", "/diagnostics"]  # it is blind
     assert sent[5] == [*always, "image", "/diagnostics"]  # once a second in any case
 
 
 def test_texts_are_json(stream):
-    view = RosView(replace(stream, clock=lambda: 0.262), Naming())
-    first = moment_at(0.25, TOUCH, touch_of(5), sequence=7)
-    touched = {m.topic: m.value for m in view.of(first)}
+    live = replace(stream, clock=lambda: 0.262)
+    first = contacts_at(0.25, TOUCH, touch_of(5), sequence=7, stream=live)
+    touched = messages_of(live, first)
     told = msgspec.json.decode(touched["touches"]["data"])
     assert [t.pop("id") for t in told["touches"]] == [4, 5]
     (found, _) = told.pop("touches")
@@ -295,11 +343,11 @@ def test_texts_are_json(stream):
     assert found["position"] == [TOUCH.detection.x, TOUCH.detection.y, 0]
     assert (found["normal"], found["covariance"], found["force"]) == ([0, 0, 1], None, None)
     reading = replace(TOUCH.detection, sd_x=1e-3, sd_y=2e-3, cov_xy=5e-7)
-    sure = Contacts.of(stream, Naming(), moment_at(0.3, replace(TOUCH, detection=reading)))
+    sure = contacts_at(0.3, replace(TOUCH, detection=reading))
     expected = [[1e-6, 5e-7, 0], [5e-7, 4e-6, 0], [0, 0, 0]]
     assert sure.touches[0].content()["covariance"] == pytest.approx(np.array(expected))
     assert sure.latency is None  # the stream has no clock
-    (event,) = view.of(EVENT)
+    (event,) = ros_messages(live, EVENT)
     cdr = Cdr(encode_cdr(TEXT, event.value))
     assert msgspec.json.decode(cdr.text()) == {
         "time_s": 0.5, "kind": "connected", "text": "board 01",

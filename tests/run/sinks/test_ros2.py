@@ -13,11 +13,10 @@ import numpy as np
 import pytest
 
 from files.session.runs import TOUCH
-from run.sinks.conftest import EPOCH, EVENT, MESH, PATIENCE, moment_at
+from run.sinks.conftest import EPOCH, EVENT, MESH, PATIENCE, begin
 from tomoskin.core import SinkError
+from tomoskin.files.messages import TOPICS, dds_name, type_hash
 from tomoskin.run.sinks import make_sink
-from tomoskin.run.sinks.ros import TOPICS
-from tomoskin.run.sinks.ros_types import dds_name, type_hash
 
 PEER = Path(__file__).with_name("ros_peer.py")
 LOOPBACK = (
@@ -42,7 +41,7 @@ def sink(domain, stream):
     assert domain
     points = np.column_stack([MESH.centroids, np.zeros(len(MESH.cells))])
     opened = make_sink("ros2:namespace=left_arm,parent=tool0,at=0/0/0.05")
-    opened.open(replace(stream, points=points))
+    opened.contacts_at = begin(opened, replace(stream, points=points))
     yield opened
     opened.close()
 
@@ -63,7 +62,7 @@ def heard_by(peer, sink, enough):
 
 def publish(sink, number):
     """Everything, so late by the clock that each frame is worth a report."""
-    sink.publish(moment_at(10.0 * number + 0.25, TOUCH, sequence=number))
+    sink.publish(sink.contacts_at(10.0 * number + 0.25, TOUCH, sequence=number))
     sink.publish(EVENT)
 
 
@@ -112,16 +111,16 @@ def test_a_subscriber_that_reads_no_more_delays_nobody(program, domain, sink):
 def test_a_sink_may_be_opened_again(sink, stream):
     sink.close()
     sink.close()
-    sink.open(stream)
-    sink.publish(moment_at(0.25, TOUCH))
+    contacts_at = begin(sink, stream)
+    sink.publish(contacts_at(0.25, TOUCH))
 
 
 def test_the_listener_of_the_documentation_hears_touches(listener, domain, stream):
     own = ("DomainParticipant(0)", f"DomainParticipant({domain})")
     heard = listener("cyclonedds", domain=own)
     sink = make_sink("ros2")
-    sink.open(stream)
-    line = heard.hears(lambda number: sink.publish(moment_at(float(number), TOUCH)))
+    contacts_at = begin(sink, stream)
+    line = heard.hears(lambda number: sink.publish(contacts_at(float(number), TOUCH)))
     sink.close()
     assert line.strip() == "4 [0.1, -0.2, 0.0]"
 
@@ -156,5 +155,5 @@ def test_without_a_network_it_is_said(monkeypatch, stream):
     monkeypatch.setenv("CYCLONEDDS_URI", LOOPBACK.replace("'lo'", "'no-such-interface'"))
     sink = make_sink("ros2:domain=99")
     with pytest.raises(SinkError, match=r"cannot join domain 99.*CYCLONEDDS_URI"):
-        sink.open(stream)
+        begin(sink, stream)
     sink.close()

@@ -8,12 +8,13 @@ from collections import deque
 import pytest
 
 from run.sinks.conftest import EVENT, PATIENCE, result_at
-from tomoskin.core import Event, SinkError
-from tomoskin.run.sinks import Capacity, Consumer, Worker, sink_report, sink_worker, stop_workers
-from tomoskin.run.sinks.consumer import IMAGE_PERIOD, MOST_WAITING
+from tomoskin.core import Capacity, Consumer, Event, SinkError, Worker, stop_workers
+from tomoskin.files.messages.reporter import IMAGE_PERIOD
+from tomoskin.run.sinks import Sink, sink_report, sink_worker
+from tomoskin.run.sinks.consumer import MOST_WAITING
 
 
-class Shelf:
+class Shelf(Sink):
     """A sink that keeps what it is given; ``behave`` runs before each call to ``publish``."""
 
     name = "shelf"

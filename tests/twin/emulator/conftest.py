@@ -8,7 +8,7 @@ from conftest import missing
 from firmware.boards import built
 from firmware.conftest import need
 from tomoskin.core import SourceError
-from tomoskin.twin.emulator import PicoPrograms, Programs, build_pico_programs
+from tomoskin.twin.emulator import PicoPrograms, Programs, programs_of
 
 
 @pytest.fixture(scope="session")
@@ -21,9 +21,11 @@ def programs() -> Programs:
 def pico() -> PicoPrograms:
     need(["make", "arm-none-eabi-gcc"], "gcc-arm-none-eabi libnewlib-arm-none-eabi")
     try:
-        return build_pico_programs()
+        made = programs_of("pico")
     except SourceError as error:
         if "build failed" in str(error):
             raise
         missing(f"the Pico's emulator: {error}")
         raise
+    assert isinstance(made, PicoPrograms)
+    return made

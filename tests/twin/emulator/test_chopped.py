@@ -171,7 +171,8 @@ def examine(board: Powered) -> None:
             frames += [item for item in link.poll(0.05) if isinstance(item, Frame)]
         info = link.info
         assert info is not None
-        assert link.board_name == kind.text
+        assert link.board is not None
+        assert link.board.text == kind.text
     ahead, back = analytic(kind, kind.settings.oversampling // 2)
     for number, frame in enumerate(frames[:12]):
         assert frame.sequence == number

@@ -104,10 +104,10 @@ def test_bad_options_are_said(skin: Skin, argument: str) -> None:
 def test_what_cannot_be_built_is_said(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr("shutil.which", lambda _: None)
     with pytest.raises(SourceError, match="avr-gcc"):
-        building.build_programs()
+        building.programs_of("mega")
     monkeypatch.setattr(building, "FOLDER", tmp_path / "none")
     with pytest.raises(SourceError, match="sources are not here"):
-        building.build_programs()
+        building.programs_of("mega")
 
 
 def test_a_skin_with_too_many_electrodes(tmp_path: Path) -> None:

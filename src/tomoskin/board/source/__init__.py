@@ -1,50 +1,65 @@
 """Where bytes come from, and the protocol session with the board behind them."""
 
 from tomoskin.board.source.agreement import BOARDS_SINCE
-from tomoskin.board.source.chopping import choose_periods, chop_limit
+from tomoskin.board.source.boards import (
+    BOARDS,
+    DEFAULT_BOARD,
+    BoardFigures,
+    BoardRecord,
+    Converter,
+    FirmwareFiles,
+    board_named,
+    read_boards,
+)
 from tomoskin.board.source.clock import TICK_RATES, ClockFit, ClockFitter
-from tomoskin.board.source.command_queue import FrameCounters, SequenceFilter
+from tomoskin.board.source.command_queue import FrameCounters
 from tomoskin.board.source.configuration import Configuration
-from tomoskin.board.source.exchange import Exchange
 from tomoskin.board.source.link import Link
-from tomoskin.board.source.protocol_session import ProtocolSession, Stage
-from tomoskin.board.source.registry import GROUP, open_source, read_options, source_names
 from tomoskin.board.source.serial import Port, SerialTransport, list_ports
 from tomoskin.board.source.settings import (
     PRESCALERS,
     ScanSettings,
     Timing,
-    conversion_time,
-    scan_time,
+    choose_periods,
+    chop_limit,
 )
-from tomoskin.board.source.transport import Played, Transport
+from tomoskin.board.source.transport import (
+    GROUP,
+    Exchange,
+    Transport,
+    open_source,
+    read_options,
+    source_names,
+)
 
 __all__ = [
+    "BOARDS",
     "BOARDS_SINCE",
+    "DEFAULT_BOARD",
     "GROUP",
     "PRESCALERS",
     "TICK_RATES",
+    "BoardFigures",
+    "BoardRecord",
     "ClockFit",
     "ClockFitter",
     "Configuration",
+    "Converter",
     "Exchange",
+    "FirmwareFiles",
     "FrameCounters",
     "Link",
-    "Played",
     "Port",
-    "ProtocolSession",
     "ScanSettings",
-    "SequenceFilter",
     "SerialTransport",
-    "Stage",
     "Timing",
     "Transport",
+    "board_named",
     "choose_periods",
     "chop_limit",
-    "conversion_time",
     "list_ports",
     "open_source",
+    "read_boards",
     "read_options",
-    "scan_time",
     "source_names",
 ]

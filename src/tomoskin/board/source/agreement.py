@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import fields
 from typing import Protocol, runtime_checkable
 
+from tomoskin.board.source.boards import BOARDS, DEFAULT_BOARD
 from tomoskin.board.source.clock import TICK_RATES
 from tomoskin.board.source.settings import ScanSettings
 from tomoskin.board.wire import (
@@ -24,8 +25,6 @@ from tomoskin.model.pattern import Scan
 
 BOARDS_SINCE = 2
 """The minor version in which boards say their name, and drive alternately."""
-
-_MEGA_CHANNELS, _PICO_CHANNELS = 16, 32
 
 RATES = (1_000_000, 500_000, 250_000)
 """Rates that the ATmega's clock divides into exactly, fastest first, Bd."""
@@ -49,35 +48,12 @@ class Rated(Protocol):
         """Send and read at ``rate`` Bd from now on; SourceError when the device has gone away."""
 
 
-class LineQuality:
-    """Watches what share of the messages arrives damaged."""
-
-    def __init__(self) -> None:
-        """A line that has carried nothing yet."""
-        self._messages = self._corrupt = 0
-
-    def slower(self, counters: Counters, rate: int) -> int | None:
-        """The rate to fall back to from ``rate``, where this one damages too much; else None."""
-        corrupt = counters.corrupt - self._corrupt
-        came = counters.messages - self._messages + corrupt
-        if came < _WINDOW and corrupt < _DAMAGED:
-            return None
-        self.forget(counters)
-        if corrupt < _DAMAGED:
-            return None
-        return next((slower for slower in RATES if slower < rate), None)
-
-    def forget(self, counters: Counters) -> None:
-        """Count from zero again."""
-        self._messages, self._corrupt = counters.messages, counters.corrupt
-
-
 class RateFollower:
-    """Follows the board to another rate; asks for a slower one on a bad line."""
+    """Follows the board to another rate; asks for a slower one where too much arrives damaged."""
 
     def __init__(self, transport: Rated) -> None:
         self._transport, self._first = transport, transport.rate
-        self._quality = LineQuality()
+        self._messages = self._corrupt = 0
 
     def follow(self, rate: int | None, *, silent: bool) -> None:
         """Use the ``rate`` that the board has changed to, or its first when it is ``silent``."""
@@ -88,10 +64,14 @@ class RateFollower:
 
     def slower(self, counters: Counters, *, running: bool) -> int | None:
         """The rate to set the board up at, where this one damages too much; else None."""
-        if not running:
-            self._quality.forget(counters)
+        corrupt = counters.corrupt - self._corrupt
+        damaged = corrupt >= _DAMAGED
+        if running and not damaged and counters.messages - self._messages + corrupt < _WINDOW:
             return None
-        return self._quality.slower(counters, self._transport.rate)
+        self._messages, self._corrupt = counters.messages, counters.corrupt
+        if not (running and damaged):
+            return None
+        return next((slower for slower in RATES if slower < self._transport.rate), None)
 
 
 _UPDATE_BOARD = "flash the firmware of this tomoskin: tomoskin firmware flash"
@@ -167,8 +147,9 @@ def fit_board(info: Info, scan: Scan, asked: ScanSettings, where: str) -> ScanSe
 def _check_size(info: Info, scan: Scan, asked: ScanSettings, where: str) -> None:
     channels = 1 + int(max(scan.drives.max(), scan.sample_electrode.max()))
     fewer = "use a skin with fewer electrodes"
-    if channels > _MEGA_CHANNELS:
-        fewer += f", or a Pico, which has up to {_PICO_CHANNELS}"
+    largest = max(BOARDS.values(), key=lambda board: board.channels[-1])
+    if BOARDS[DEFAULT_BOARD].channels[-1] < channels <= largest.channels[-1]:
+        fewer += f", or a {largest.text}, which has up to {largest.channels[-1]}"
     values, of_frame = scan.n_samples, "samples in a frame"
     if asked.chop_frequency:
         values, of_frame = 2 * scan.n_samples, "values, two for each sample, in a frame"

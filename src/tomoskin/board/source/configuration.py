@@ -8,6 +8,7 @@ from typing import Self
 from tomoskin.board.source.settings import ScanSettings, scan_time
 from tomoskin.board.wire import (
     SCHEMA,
+    BoardLimits,
     Command,
     Drive,
     DriveMode,
@@ -34,7 +35,8 @@ class Configuration:
     """Identity and commands; request ids are filled in when a command is sent.
 
     The identity is a checksum of ``scan`` and ``patterns``, never 0: the same scan has the same
-    identity on every host, and frames of another scan are recognised.
+    identity on every host, and frames of another scan are recognised. ``scan_time`` is that of the
+    board, s, or before one is known that of the slowest.
     """
 
     identity: int
@@ -64,18 +66,20 @@ class Configuration:
             return tuple(pattern for pattern in self.patterns if pattern.first == question.first)
         return (self.scan, self.format)
 
-    def on_board(self, fitted: ScanSettings) -> Self:
-        """The same scan as a board with another converter does it: under the same identity."""
-        packing = Format.PACKED if fitted.packs else Format.SIXTEEN
+    def on_board(
+        self, fitted: ScanSettings, board: BoardLimits | None = None, periods: int = 0
+    ) -> Self:
+        """The same scan as a ``board`` with another converter does it: under the same identity.
+
+        ``periods`` of each alternating drive.
+        """
         return replace(
             self,
             scan=replace(self.scan, oversampling=fitted.oversampling),
-            format=replace(self.format, format=packing),
+            format=replace(self.format, format=_format(fitted)),
+            mode=self.mode and replace(self.mode, periods=periods),
+            scan_time=scan_time(self.scan.n_drives, self.n_samples, fitted, board, periods),
         )
-
-    def with_periods(self, periods: int) -> Self:
-        """The same alternating drive, with so many periods a drive; the identity stays."""
-        return replace(self, mode=self.mode and replace(self.mode, periods=periods))
 
     @classmethod
     def of(cls, scan: Scan, settings: ScanSettings) -> Self:
@@ -99,10 +103,9 @@ class Configuration:
             identity,
             replace(announce, configuration=identity),
             tuple(replace(chunk, configuration=identity) for chunk in chunks),
-            # a sample of one conversion is shorter on the line when it is packed
-            SetFormat(0, identity, Format.PACKED if settings.packs else Format.SIXTEEN),
+            SetFormat(0, identity, _format(settings)),
             scan.n_samples,
-            _longest(scan, settings),
+            scan_time(len(scan.drives), scan.n_samples, settings),
             mode and replace(mode, configuration=identity),
         )
 
@@ -113,16 +116,9 @@ def _mode(settings: ScanSettings) -> SetMode | None:
     return SetMode(0, 0, DriveMode.CHOPPED, settings.chop_frequency, 0)
 
 
-def _longest(scan: Scan, settings: ScanSettings) -> float:
-    """s that a scan takes; alternately driven, with as many periods as a board may choose."""
-    if settings.chop_frequency:
-        return len(scan.drives) * (settings.oversampling // 2) / settings.chop_frequency
-    return scan_time(
-        len(scan.drives),
-        scan.n_samples * settings.oversampling,
-        settings.settling + settings.dead_time,
-        settings.prescaler,
-    )
+def _format(settings: ScanSettings) -> Format:
+    """A sample of one conversion is shorter on the line when it is packed."""
+    return Format.PACKED if settings.packs else Format.SIXTEEN
 
 
 def _chunks(scan: Scan) -> list[SetPattern]:

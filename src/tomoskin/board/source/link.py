@@ -14,7 +14,7 @@ from tomoskin.board.source.configuration import Configuration
 from tomoskin.board.source.protocol_session import ProtocolSession, Stage
 from tomoskin.board.source.settings import ScanSettings, Timing
 from tomoskin.board.source.transport import Diagnosable, Fetched, Played, Transport
-from tomoskin.board.wire import Ack, Counters, Decoder, Info
+from tomoskin.board.wire import Ack, BoardLimits, Counters, Decoder, Info
 from tomoskin.core import Event, Frame, SourceError
 from tomoskin.model.pattern import Scan
 
@@ -74,9 +74,9 @@ class Link(AbstractContextManager["Link"]):
         return self._session.info
 
     @property
-    def board_name(self) -> str:
-        """What the board calls itself; empty before protocol 1.2."""
-        return self._session.board.text if self._session.board else ""
+    def board(self) -> BoardLimits | None:
+        """The board's name and bounds, once it has said them; None before protocol 1.2."""
+        return self._session.board
 
     @property
     def configuration(self) -> Configuration:
@@ -167,20 +167,13 @@ class Link(AbstractContextManager["Link"]):
         items = []
         for message in self._decoder.feed(data, now):
             items += self._session.receive(message, now)
-        items += self._doubts(items)
+        items += _doubts(self._watch, self.info, items)
         if self._rate:
             self._rate.follow(self._session.take_rate(), silent=self._session.is_silent)
             slower = self._rate.slower(self.counters, running=self.running)
             items += [] if slower is None else [self._session.fall_back(slower, now)]
         self._flush()
         return items
-
-    def _doubts(self, items: list[Frame | Event]) -> list[Event]:
-        """What the times of frames say against the clock that the board states."""
-        if self.info is None:
-            return []
-        pushed = (self._watch.push(i, self.info.tick_rate) for i in items if isinstance(i, Frame))
-        return [event for event in pushed if event is not None]
 
     def _flush(self) -> None:
         data = self._session.commands.take()
@@ -191,3 +184,11 @@ class Link(AbstractContextManager["Link"]):
 def _diagnosis(transport: Transport, heard: bytes) -> SourceError | None:
     """The likeliest cause of nobody's having spoken, where the transport can tell."""
     return transport.diagnose(heard) if isinstance(transport, Diagnosable) else None
+
+
+def _doubts(watch: ClockWatch, info: Info | None, items: list[Frame | Event]) -> list[Event]:
+    """What the times of frames say against the clock that the board states."""
+    if info is None:
+        return []
+    pushed = (watch.push(item, info.tick_rate) for item in items if isinstance(item, Frame))
+    return [event for event in pushed if event is not None]

@@ -7,10 +7,9 @@ from enum import Enum, auto
 import numpy as np
 
 from tomoskin.board.source.agreement import BOARDS_SINCE, check_held, check_version, fit_board
-from tomoskin.board.source.chopping import choose_periods
 from tomoskin.board.source.command_queue import CommandQueue, SequenceFilter
 from tomoskin.board.source.configuration import Configuration
-from tomoskin.board.source.settings import ScanSettings, Timing
+from tomoskin.board.source.settings import ScanSettings, Timing, choose_periods
 from tomoskin.board.wire import (
     SCHEMA,
     Ack,
@@ -221,9 +220,8 @@ class ProtocolSession:
         if isinstance(pending, GetInfo) and info.request == pending.request:
             check_version(info, self._where)
             fitted = fit_board(info, self._scan, self._settings, self._where)
-            self.configuration = self.configuration.on_board(fitted)
             if info.minor < BOARDS_SINCE:  # that is all that it says of itself
-                self.info = info
+                self.info, self.configuration = info, self.configuration.on_board(fitted)
                 self.commands.add(self.configuration.commands(info.minor))
             else:
                 self._met = info, fitted
@@ -238,8 +236,8 @@ class ProtocolSession:
         info, fitted = self._met
         channels = int(np.bincount(self._scan.sample_drive).max())
         periods = choose_periods(board, fitted, channels, info.tick_rate, self._where)
-        self.configuration = self.configuration.with_periods(periods)
         self.info, self.board = info, board
+        self.configuration = self.configuration.on_board(fitted, board, periods)
         self.commands.add(self.configuration.commands(info.minor))
         self._answered(now)
 

@@ -7,9 +7,16 @@ import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from tomoskin.board.source.boards import BOARDS
 from tomoskin.board.source.read_ahead import ReadAhead
-from tomoskin.board.source.registry import read_options
-from tomoskin.board.source.silence import BAUD, PICO, SIGN_ON, SIGN_ON_RATE, Silence, is_bootloader
+from tomoskin.board.source.silence import (
+    BAUD,
+    SIGN_ON,
+    SIGN_ON_RATE,
+    is_bootloader,
+    likely_cause,
+)
+from tomoskin.board.source.transport import read_options
 from tomoskin.core import SourceError
 
 if TYPE_CHECKING:
@@ -18,15 +25,7 @@ if TYPE_CHECKING:
     from tomoskin.model.skin import Skin
 
 
-_MEGA = "Arduino Mega 2560"
-_BOARDS = (_MEGA, PICO)
-_KNOWN = {
-    (0x2341, 0x0010): _MEGA,
-    (0x2341, 0x0042): _MEGA,
-    (0x2341, 0x0242): _MEGA,
-    (0x2A03, 0x0010): _MEGA,
-    (0x2A03, 0x0042): _MEGA,
-    (0x2E8A, 0x000A): PICO,
+_BRIDGES = {
     (0x1A86, 0x7523): "CH340, as on many boards",
     (0x1A86, 0x5523): "CH341, as on many boards",
     (0x1A86, 0x55D4): "CH9102, as on many boards",
@@ -37,7 +36,7 @@ _KNOWN = {
     (0x10C4, 0xEA60): "CP210x, as on some boards",
     (0x067B, 0x2303): "PL2303, as on some boards",
 }
-"""What is behind a USB serial port, by vendor and product (the USB ID repository)."""
+"""What may be a board's bridge from USB, by vendor and product (the USB ID repository)."""
 
 AUTO = "auto"
 """Instead of a port: the one that a board could be behind."""
@@ -50,6 +49,11 @@ class Port:
     device: str
     board: str
 
+    @property
+    def is_board(self) -> bool:
+        """Whether it is a board that tomoskin knows, not just some bridge."""
+        return any(self.board == board.text for board in BOARDS.values())
+
     def __str__(self) -> str:
         """``/dev/ttyACM0 (Arduino Mega 2560)``."""
         return f"{self.device} ({self.board})" if self.board else self.device
@@ -59,10 +63,10 @@ def list_ports() -> tuple[Port, ...]:
     """The ports that are connected, those of known boards first."""
     from serial.tools.list_ports import comports  # noqa: PLC0415 - only who has a board needs it
 
-    ports = (Port(port.device, _KNOWN.get((port.vid, port.pid), "")) for port in comports())
-    return tuple(
-        sorted(ports, key=lambda port: (port.board not in _BOARDS, not port.board, port.device))
-    )
+    boards = {usb: board.text for board in BOARDS.values() for usb in board.usb}
+    known = _BRIDGES | boards
+    ports = (Port(port.device, known.get((port.vid, port.pid), "")) for port in comports())
+    return tuple(sorted(ports, key=lambda port: (not port.is_board, not port.board, port.device)))
 
 
 def say_ports() -> str:
@@ -72,7 +76,7 @@ def say_ports() -> str:
 
 
 def only_board() -> str:
-    """The one port with a Mega 2560 or a Pico, or else the one with a known bridge.
+    """The one port with a known board, or else the one with a known bridge.
 
     Raises
     ------
@@ -80,7 +84,7 @@ def only_board() -> str:
         When there is none, or more than one: opening a port resets what is behind it.
     """
     ports = list_ports()
-    candidates = [port for port in ports if port.board in _BOARDS] or [p for p in ports if p.board]
+    candidates = [port for port in ports if port.is_board] or [p for p in ports if p.board]
     if len(candidates) == 1:
         return candidates[0].device
     raise SourceError(
@@ -162,15 +166,22 @@ class SerialTransport:
         """Why no board answers: where nothing was ``heard``, a bootloader is asked too."""
         board = next((port.board for port in list_ports() if port.device == self._port), "")
         answer = b"" if heard else self._ask_bootloader()
-        return Silence(self._port, board, self.rate, heard, answer, say_ports()).cause
+        return likely_cause(
+            self._port,
+            board,
+            rate=self.rate,
+            heard=heard,
+            bootloader=answer,
+            ports=say_ports(),
+        )
 
     def _ask_bootloader(self) -> bytes:
         """What comes when a bootloader is asked who it is."""
         rate, answer, end = self.rate, b"", time.monotonic() + _ASKED
         self.use_rate(SIGN_ON_RATE)
         self.write(SIGN_ON)
-        while (left := end - time.monotonic()) > 0 and not is_bootloader(answer):
-            answer += self.read(left)
+        while (rest := end - time.monotonic()) > 0 and not is_bootloader(answer):
+            answer += self.read(rest)
         self.use_rate(rate)
         return answer
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Self
 
+from tomoskin.board.source.boards import BOARDS, DEFAULT_BOARD, board_named
+from tomoskin.board.wire import BoardLimits
 from tomoskin.core import SourceError
 
 if TYPE_CHECKING:
@@ -13,24 +15,7 @@ if TYPE_CHECKING:
 PRESCALERS = (16, 32, 64, 128)
 """Clock dividers of the ATmega2560's converter that leave it accurate enough."""
 
-_CYCLES = 13
-"""Converter clocks for one conversion (ATmega2560 datasheet, table 26-1)."""
-
-
 _PACKED_BITS = 10
-
-_CLOCK = 16e6
-"""Clock of the board, Hz."""
-
-
-def conversion_time(prescaler: int) -> float:
-    """Seconds for one conversion."""
-    return _CYCLES * prescaler / _CLOCK
-
-
-def scan_time(n_drives: int, n_conversions: int, per_drive: float, prescaler: int) -> float:
-    """Seconds for one scan: settling and dead time ``per_drive`` s, then the conversions."""
-    return n_drives * per_drive + n_conversions * conversion_time(prescaler)
 
 
 @dataclass(frozen=True)
@@ -97,8 +82,8 @@ class ScanSettings:
 
     @property
     def conversion(self) -> float:
-        """Seconds that one conversion takes."""
-        return conversion_time(self.prescaler)
+        """Seconds of one conversion on the slowest board."""
+        return BOARDS[DEFAULT_BOARD].converter.conversion(self.prescaler)
 
     @classmethod
     def of(cls, skin: Skin) -> Self:
@@ -137,3 +122,91 @@ class Timing:
     ping: float = 0.5
     silence: float = 1.0
     goodbye: float = 0.3
+
+
+def scan_time(
+    n_drives: int,
+    n_samples: int,
+    settings: ScanSettings,
+    board: BoardLimits | None = None,
+    periods: int = 0,
+) -> float:
+    """Seconds of one scan on ``board``; without one, on the slowest that there is.
+
+    An alternating drive has so many ``periods``, or else as many as a board may choose.
+    """
+    if settings.chop_frequency:
+        return n_drives * (periods or settings.oversampling // 2) / settings.chop_frequency
+    drives = n_drives * (settings.settling + settings.dead_time)
+    known = board_named(board.text) if board else BOARDS[DEFAULT_BOARD]
+    if board is not None and known is None:  # what it says of itself
+        conversion = board.conversion + board.clock * settings.prescaler
+        return drives + n_samples * (board.sample + settings.oversampling * conversion) * 1e-9
+    assert known is not None
+    conversions = n_samples * (settings.oversampling + known.converter.dropped)
+    return drives + conversions * known.converter.conversion(settings.prescaler)
+
+
+def half_time(
+    board: BoardLimits, settings: ScanSettings, periods: int, channels: int, tick_rate: float
+) -> int:
+    """ns that half a period takes at least; the firmware works it out in the same way.
+
+    ``channels`` that are read in each half; ``tick_rate`` of the board, Hz.
+    """
+    us_per_tick = round(1e6 / tick_rate)
+    ticks = -(-round(settings.settling * 1e6) // us_per_tick) + 1
+    conversion = board.conversion + board.clock * settings.prescaler
+    sample = board.sample + settings.oversampling // (2 * periods) * conversion
+    fixed = board.half + 1000 * round(settings.dead_time * 1e6) + 1000 * us_per_tick * ticks
+    return fixed + channels * sample
+
+
+def chop_limit(
+    board: BoardLimits, settings: ScanSettings, periods: int, channels: int, tick_rate: float
+) -> int:
+    """Hz: the highest frequency that the board can do with so many periods a drive."""
+    half = half_time(board, settings, periods, channels, tick_rate)
+    return min(500_000_000 // max(half, 1), board.max_chop)
+
+
+def choose_periods(
+    board: BoardLimits, settings: ScanSettings, channels: int, tick_rate: float, where: str
+) -> int:
+    """The fewest periods a drive with which the board can do ``settings``; 0 for a direct drive.
+
+    Raises
+    ------
+    SourceError
+        When the frequency is beyond the board's bounds, with the limit, or the conversions cannot
+        be shared between the two directions.
+    """
+    wanted, each = settings.chop_frequency, settings.oversampling // 2
+    if not wanted:
+        return 0
+    if settings.oversampling % 2:
+        raise SourceError(
+            f"an alternating drive reads as often in either direction: {settings.oversampling} "
+            "conversions a sample cannot be halved",
+            where=where,
+            hint="set [readout] oversampling to an even number, for a converter of 12 bits one "
+            "that 8 divides",
+        )
+    if wanted < board.min_chop:
+        raise SourceError(
+            f"the skin is driven alternately at {wanted} Hz, the {board.text} does at least "
+            f"{board.min_chop} Hz",
+            where=where,
+            hint="raise [drive] chop_frequency",
+        )
+    possible = [periods for periods in range(1, each + 1) if each % periods == 0]
+    limits = {p: chop_limit(board, settings, p, channels, tick_rate) for p in possible}
+    if wanted > max(limits.values()):
+        raise SourceError(
+            f"the skin is driven alternately at {wanted} Hz; with {channels} electrodes to read "
+            f"and {settings.settling * 1e6:.0f} µs to settle in each half period the {board.text} "
+            f"does at most {max(limits.values())} Hz",
+            where=where,
+            hint="lower [drive] chop_frequency, or [readout] settling if the skin settles faster",
+        )
+    return next(periods for periods in possible if wanted <= limits[periods])

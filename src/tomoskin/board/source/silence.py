@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from tomoskin.board.source.boards import BOARDS
 from tomoskin.core import SourceError
-
-PICO = "Raspberry Pi Pico"
-"""What a port with a Pico behind it is called: it is flashed by its boot drive, not by the port."""
 
 BAUD = 1_000_000
 """Rate that the firmware starts with: exact at 16 MHz."""
@@ -24,66 +20,37 @@ _TEXT = 0.9
 _SHOWN = 40
 
 
-@dataclass(frozen=True, slots=True)
-class Silence:
-    """What is known of a port behind which no board has said HELLO.
+def likely_cause(
+    port: str, board: str, *, rate: int, heard: bytes, bootloader: bytes, ports: str
+) -> SourceError:
+    """Why no board has said HELLO behind a ``port``, and what to do.
 
-    Attributes
-    ----------
-    port
-        Its name.
-    board
-        What is behind it by its USB identity; empty where nobody knows.
-    rate
-        Bd.
-    heard
-        The first bytes that came.
-    bootloader
-        What came when a bootloader was asked.
-    ports
-        The ports of this machine, in words.
+    ``board`` is what its USB identity says, or nothing; ``heard`` are the first bytes that came at
+    ``rate`` Bd, ``bootloader`` what came when a bootloader was asked. ``ports`` names those here.
     """
-
-    port: str
-    board: str
-    rate: int
-    heard: bytes
-    bootloader: bytes
-    ports: str
-
-    @property
-    def cause(self) -> SourceError:
-        """The likeliest, and what to do."""
-        target = "--board pico" if self.board == PICO else self.port
-        flash = f"tomoskin firmware flash {target}"
-        if is_bootloader(self.bootloader):
-            text, hint = "the board is in its bootloader and has no firmware", flash
-        elif is_text(self.heard):
-            letters = (chr(byte) if 32 <= byte < 127 else " " for byte in self.heard)
-            shown = " ".join("".join(letters).split())[:_SHOWN]
-            text = f'another program or device answers ("{shown}"), or this is the wrong port'
-            hint = f"{flash}, or {self.ports}"
-        elif self.heard and self.rate != BAUD:
-            text = (
-                f"the bytes that arrive at {self.rate:,} Bd are not messages: the rate is "
-                "probably wrong"
-            )
-            hint = f"leave out baud=: the firmware starts with {BAUD:,} Bd"
-        elif self.heard:
-            text = (
-                f"the bytes that arrive at {self.rate:,} Bd are not messages: probably another "
-                "program runs on the board"
-            )
-            hint = f"{flash}; firmware of another rate needs serial:{self.port},baud=RATE"
-        elif self.board:
-            text = f"the board ({self.board}) sends nothing: it probably has no firmware"
-            hint = f"{flash}; check also that it has power"
-        else:
-            text, hint = (
-                ("nothing arrives: this is probably the wrong port, or the board has no power"),
-                self.ports,
-            )
-        return SourceError(text, where=f"serial:{self.port}", hint=hint)
+    by_drive = [key for key, one in BOARDS.items() if one.text == board and one.flash == "uf2"]
+    flash = "tomoskin firmware flash " + (f"--board {by_drive[0]}" if by_drive else port)
+    not_messages = f"the bytes that arrive at {rate:,} Bd are not messages: "
+    if is_bootloader(bootloader):
+        text, hint = "the board is in its bootloader and has no firmware", flash
+    elif is_text(heard):
+        letters = (chr(byte) if 32 <= byte < 127 else " " for byte in heard)
+        shown = " ".join("".join(letters).split())[:_SHOWN]
+        text = f'another program or device answers ("{shown}"), or this is the wrong port'
+        hint = f"{flash}, or {ports}"
+    elif heard and rate != BAUD:
+        text = f"{not_messages}the rate is probably wrong"
+        hint = f"leave out baud=: the firmware starts with {BAUD:,} Bd"
+    elif heard:
+        text = f"{not_messages}probably another program runs on the board"
+        hint = f"{flash}; firmware of another rate needs serial:{port},baud=RATE"
+    elif board:
+        text = f"the board ({board}) sends nothing: it probably has no firmware"
+        hint = f"{flash}; check also that it has power"
+    else:
+        text = "nothing arrives: this is probably the wrong port, or the board has no power"
+        hint = ports
+    return SourceError(text, where=f"serial:{port}", hint=hint)
 
 
 def is_bootloader(answer: bytes) -> bool:

@@ -1,10 +1,23 @@
-"""What a link needs of a source: bytes in, bytes out."""
+"""Sources: what a link needs of one, opening them by name, and asking a board without a link."""
 
 from __future__ import annotations
 
-from typing import Protocol, runtime_checkable
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from importlib.metadata import entry_points
+from typing import TYPE_CHECKING, Protocol, TypeVar, runtime_checkable
 
+from tomoskin.board.wire import Ack, Command, Decoder, Message, encode
 from tomoskin.core import SourceError
+
+if TYPE_CHECKING:
+    from tomoskin.model.skin import Skin
+
+M = TypeVar("M", bound=Message)
+
+GROUP = "tomoskin.sources"
+"""Entry-point group: each entry is a function ``(argument, skin) -> Transport``."""
 
 
 @runtime_checkable
@@ -60,3 +73,72 @@ class Played(Protocol):
 
     def after_seek(self) -> bool:
         """Whether what was read last does not follow what was read before it."""
+
+
+def source_names() -> tuple[str, ...]:
+    """Names of the installed sources."""
+    return tuple(sorted({entry.name for entry in entry_points(group=GROUP)}))
+
+
+def open_source(spec: str, skin: Skin) -> Transport:
+    """Open ``name`` or ``name:argument``: ``twin``, ``twin:seed=3``, ``serial:/dev/ttyACM0``.
+
+    Raises
+    ------
+    SourceError
+        When there is no source of that name, or it cannot be opened.
+    """
+    name, _, argument = spec.partition(":")
+    for entry in entry_points(group=GROUP, name=name):
+        opener: Callable[[str, Skin], Transport] = entry.load()
+        return opener(argument, skin)
+    names = ", ".join(source_names()) or "none is installed"
+    raise SourceError(
+        f'expected a source ({names}), got "{name}"', hint="for example twin or serial:PORT"
+    )
+
+
+def read_options(argument: str, known: tuple[str, ...], where: str) -> dict[str, str]:
+    """``"seed=3,fast"`` as ``{"seed": "3", "fast": ""}``; SourceError for an unknown word."""
+    options = {}
+    for item in filter(None, (part.strip() for part in argument.split(","))):
+        key, _, value = item.partition("=")
+        if key not in known:
+            raise SourceError(
+                f'expected an option among {", ".join(known)}, got "{key}"', where=where
+            )
+        options[key] = value
+    return options
+
+
+class Exchange:
+    """Commands, one after the other, and what comes in between."""
+
+    def __init__(self, transport: Transport) -> None:
+        self.transport = transport
+        self._decoder = Decoder()
+        self._request = 200
+
+    def ask(
+        self, command: Command, kind: type[M], *, patience: float = 0.3, tries: int = 5
+    ) -> M | None:
+        """The answer, of a ``kind`` of message; None where ``tries`` of ``patience`` s bring none.
+
+        An acknowledgement is one of this very command.
+        """
+        self._request = self._request % 255 + 1
+        data = encode(replace(command, request=self._request))
+        for _ in range(tries):
+            self.transport.write(data)
+            for message in self.listen(patience):
+                others = isinstance(message, Ack) and message.request != self._request
+                if isinstance(message, kind) and not others:
+                    return message
+        return None
+
+    def listen(self, seconds: float) -> Iterator[Message]:
+        """What comes within ``seconds``."""
+        end = time.monotonic() + seconds
+        while (rest := end - time.monotonic()) > 0:
+            data = self.transport.read(rest)
+            yield from self._decoder.feed(data, time.monotonic())

@@ -1,14 +1,20 @@
 """Bytes ↔ messages, from one schema that the firmware shares. Sans-IO."""
 
-from tomoskin.board.wire.codec import decode_payload, encode, encode_payload, is_command, type_byte
-from tomoskin.board.wire.decoder import Counters, Decoder, Deframer
-from tomoskin.board.wire.framing import cobs_decode, cobs_encode, crc16, enclose
+from tomoskin.board.wire.codec import (
+    Counters,
+    Decoder,
+    decode_payload,
+    encode,
+    encode_payload,
+    is_command,
+    type_byte,
+)
+from tomoskin.board.wire.framing import Deframer, cobs_decode, cobs_encode, crc16, enclose
 from tomoskin.board.wire.messages import (
     ENUMS,
     RECORDS,
     Ack,
     BoardLimits,
-    ChoppedFrame,
     Command,
     Drive,
     DriveMode,
@@ -27,9 +33,7 @@ from tomoskin.board.wire.messages import (
     Hello,
     Info,
     Message,
-    PackedFrame,
     Ping,
-    Report,
     Reset,
     Result,
     SafeOff,
@@ -42,18 +46,15 @@ from tomoskin.board.wire.messages import (
     Start,
     Stop,
 )
-from tomoskin.board.wire.schema import OLDER, SCHEMA, SCHEMA_HASH, Schema
-from tomoskin.board.wire.tables import schema_tables
+from tomoskin.board.wire.schema import OLDER, SCHEMA, Schema
 
 __all__ = [
     "ENUMS",
     "OLDER",
     "RECORDS",
     "SCHEMA",
-    "SCHEMA_HASH",
     "Ack",
     "BoardLimits",
-    "ChoppedFrame",
     "Command",
     "Counters",
     "Decoder",
@@ -75,9 +76,7 @@ __all__ = [
     "Hello",
     "Info",
     "Message",
-    "PackedFrame",
     "Ping",
-    "Report",
     "Reset",
     "Result",
     "SafeOff",
@@ -98,6 +97,5 @@ __all__ = [
     "encode",
     "encode_payload",
     "is_command",
-    "schema_tables",
     "type_byte",
 ]

@@ -1,4 +1,4 @@
-"""Payload ↔ message, driven by the schema."""
+"""Payload ↔ message, driven by the schema; a stream of bytes, however torn or dirty, → messages."""
 
 from __future__ import annotations
 
@@ -9,31 +9,21 @@ from dataclasses import dataclass, replace
 from typing import Any, TypeGuard
 
 import numpy as np
+from numpy.typing import NDArray
 
-from tomoskin.board.wire.framing import enclose
-from tomoskin.board.wire.messages import (
-    ENUMS,
-    RECORDS,
-    STRUCTS,
-    ChoppedFrame,
-    Command,
-    Message,
-    PackedFrame,
-)
-from tomoskin.board.wire.packing import packed_size_fits
-from tomoskin.board.wire.schema import SCALARS, SCHEMA, FieldSpec, MessageSpec, Schema, StructSpec
+from tomoskin.board.wire.framing import Deframer, enclose
+from tomoskin.board.wire.messages import ENUMS, FRAMES, RECORDS, STRUCTS, Command, Message
+from tomoskin.board.wire.schema import SCALARS, SCHEMA, FieldSpec, MessageSpec
 from tomoskin.core import Frame, WireError
 
-_DTYPES = {"u8": "<u1", "u16": "<u2"}
-"""Of the samples of a frame."""
+_GROUP = 4
+"""Samples of ten bits that are packed together: four lower bytes, then their upper halves."""
 
-_NOT_SENT = ("host_time", "sums")
-"""Fields of a frame that are not on the wire as such: the host's own time of reading, and what
-:class:`ChoppedFrame` has among its samples."""
+_SHIFTS = np.array([0, 2, 4, 6], dtype=np.uint8)
 
 
 @dataclass(frozen=True)
-class Layout:
+class _Layout:
     """How one message lies in its payload, worked out once from the schema.
 
     ``head`` packs the type byte and every field but the tail; ``tail`` is the
@@ -41,153 +31,229 @@ class Layout:
     """
 
     spec: MessageSpec
-    record: type[Message]
     head: struct.Struct
-    names: tuple[str, ...]
     enums: tuple[tuple[int, Callable[[int], Any]], ...]
     tail: struct.Struct | None
     tail_record: type[Any] | None
 
-
-def _layout(spec: MessageSpec, structs: dict[str, StructSpec]) -> Layout:
-    record = RECORDS[spec.name]
-    names = tuple(field.name for field in spec.fields)
-    own = tuple(f.name for f in dataclasses.fields(record) if f.name not in _NOT_SENT)
-    if own != names:
-        raise WireError(f"expected the schema's fields {names}, got {own}", where=record.__name__)
-    fixed = [field for field in spec.fields if not field.is_tail]
-    tail = next((field for field in spec.fields if field.is_tail), None)
-    enums = tuple(
-        (number, ENUMS[field.enum])
-        for number, field in enumerate(fixed, start=1)
-        if field.enum and field.enum != "flag"
-    )
-    return Layout(
-        spec, record, struct.Struct("<B" + "".join(map(_code, fixed))), names, enums,
-        struct.Struct("<" + _item(tail, structs)) if tail else None,
-        STRUCTS.get(tail.item) if tail else None,
-    )  # fmt: skip
+    @classmethod
+    def of(cls, spec: MessageSpec) -> _Layout:
+        fixed = [field for field in spec.fields if not field.is_tail]
+        tail = next((field for field in spec.fields if field.is_tail), None)
+        enums = (
+            (number, ENUMS[field.enum])
+            for number, field in enumerate(fixed, start=1)
+            if field.enum and field.enum != "flag"
+        )
+        return cls(
+            spec, struct.Struct("<B" + "".join(map(_code, fixed))), tuple(enums),
+            struct.Struct("<" + _item(tail)) if tail else None,
+            STRUCTS.get(tail.item) if tail else None,
+        )  # fmt: skip
 
 
 def _code(field: FieldSpec) -> str:
     return SCALARS[field.item] if field.length == 1 else f"{field.length}s"
 
 
-def _item(field: FieldSpec, structs: dict[str, StructSpec]) -> str:
+def _item(field: FieldSpec) -> str:
     if field.item in SCALARS:
         return SCALARS[field.item]
-    return "".join(_code(part) for part in structs[field.item].fields)
+    return "".join(_code(part) for part in SCHEMA.structs[field.item].fields)
 
 
-def _layouts(schema: Schema) -> tuple[dict[int, Layout], dict[type[Message], Layout]]:
-    layouts = [_layout(spec, schema.structs) for spec in schema.messages]
-    return {x.spec.type: x for x in layouts}, {x.record: x for x in layouts}
+_LAYOUTS = {spec.name: _Layout.of(spec) for spec in SCHEMA.messages}
+_BY_TYPE = {layout.spec.type: layout for layout in _LAYOUTS.values()}
+_BY_RECORD = {RECORDS[name]: layout for name, layout in _LAYOUTS.items() if name not in FRAMES}
 
 
-_BY_TYPE, _BY_RECORD = _layouts(SCHEMA)
-
-
-def type_byte(record: type[Message]) -> int:
-    """The type byte of a message."""
+def type_byte(record: type[Command]) -> int:
+    """The type byte of a command."""
     return _BY_RECORD[record].spec.type
 
 
-def encode(message: Message) -> bytes:
-    """The bytes on the line for ``message``; WireError when a value does not fit its field."""
-    payload = encode_payload(message)
-    to_device = _BY_RECORD[type(message)].spec.to_device
-    limit = SCHEMA.to_device_bytes if to_device else SCHEMA.from_device_bytes
+def encode(message: Message, *, packed: bool = False) -> bytes:
+    """The bytes on the line for ``message``; a frame's samples may be ``packed``.
+
+    Raises WireError when a value does not fit its field, or all do not fit a message.
+    """
+    payload = encode_payload(message, packed=packed)
+    spec = _BY_TYPE[payload[0]].spec
+    limit = SCHEMA.to_device_bytes if spec.to_device else SCHEMA.from_device_bytes
     if len(payload) + 2 > limit:
         raise WireError(
             f"expected at most {limit} bytes with the checksum, got {len(payload) + 2}",
-            where=_BY_RECORD[type(message)].spec.name,
+            where=spec.name,
         )
     return enclose(payload)
 
 
-def encode_payload(message: Message) -> bytes:
+def encode_payload(message: Message, *, packed: bool = False) -> bytes:
     """Type byte and fields, without checksum."""
-    layout = _BY_RECORD[type(message)]
-    values = [getattr(message, name) for name in layout.names]
+    if isinstance(message, Frame):
+        layout, tail = _samples(message, packed=packed)
+        values = tuple(getattr(message, field.name) for field in layout.spec.fields[:-1])
+    else:
+        layout, values, tail = _BY_RECORD[type(message)], dataclasses.astuple(message), b""
     try:
-        if layout.tail is None:
-            return layout.head.pack(layout.spec.type, *values)
-        return layout.head.pack(layout.spec.type, *values[:-1]) + _pack_tail(layout, values[-1])
+        if layout.tail_record is not None and layout.tail is not None:
+            values, items = values[:-1], values[-1]
+            tail = b"".join(layout.tail.pack(*item) for item in items)
+        return layout.head.pack(layout.spec.type, *values) + tail
     except struct.error as error:
         raise WireError(f"{error} in {message!r}", where=layout.spec.name) from error
 
 
-def _pack_tail(layout: Layout, items: Any) -> bytes:
-    if layout.tail_record is None:
-        samples, expected = np.asarray(items), np.dtype(_DTYPES[layout.spec.fields[-1].item])
-        if samples.dtype != expected or samples.ndim != 1:
-            raise WireError(
-                f"expected samples (n,) of {expected}, got {samples.shape} of {samples.dtype}",
-                where=layout.spec.name,
-            )
-        return samples.tobytes()
-    assert layout.tail is not None
-    return b"".join(layout.tail.pack(*dataclasses.astuple(item)) for item in items)
+def _samples(frame: Frame, *, packed: bool) -> tuple[_Layout, bytes]:
+    """The message that a frame goes in, and its samples as they are sent."""
+    samples = frame.samples
+    if samples.dtype != np.dtype("<u2") or samples.ndim != 1:
+        raise WireError(
+            f"expected samples (n,) of uint16, got {samples.shape} of {samples.dtype}",
+            where="FRAME",
+        )
+    if frame.sums is not None:
+        both = np.column_stack([samples, frame.sums]).astype("<u2")
+        return _LAYOUTS["FRAME_CHOPPED"], both.tobytes()
+    if packed:
+        return _LAYOUTS["FRAME_PACKED"], pack(samples).tobytes()
+    return _LAYOUTS["FRAME"], samples.tobytes()
 
 
 def decode_payload(payload: bytes, host_time: float) -> Message | None:
-    """The message in a payload whose checksum was right; None when it is not of this schema.
-
-    Packed and chopped frames come out as frames.
-    """
+    """The message in a payload whose checksum was right; None when it is not of this schema."""
     layout = _BY_TYPE.get(payload[0]) if payload else None
     if layout is None or not _fits(layout, len(payload)):
         return None
+    size, name = layout.head.size, layout.spec.name
     values: list[Any] = list(layout.head.unpack_from(payload))
     try:
         for number, enum in layout.enums:
             values[number] = enum(values[number])
     except ValueError:
         return None
-    if layout.tail is None:
-        return layout.record(*values[1:])
-    if layout.record in _FRAMES:
-        return _FRAMES[layout.record](values, payload, layout.head.size, host_time)
-    record = layout.tail_record
-    assert record is not None
-    items = tuple(record(*item) for item in layout.tail.iter_unpack(payload[layout.head.size :]))
-    return layout.record(*values[1:], items)  # type: ignore[call-arg]
+    if name in FRAMES:
+        return _frame(name, values, np.frombuffer(payload, np.uint8, offset=size), host_time)
+    if layout.tail is not None and layout.tail_record is not None:
+        record = layout.tail_record
+        values.append(tuple(record(*item) for item in layout.tail.iter_unpack(payload[size:])))
+    made: Message = RECORDS[name](*values[1:])
+    return made
 
 
-def _fits(layout: Layout, length: int) -> bool:
+def _fits(layout: _Layout, length: int) -> bool:
     rest = length - layout.head.size
     return rest >= 0 and (rest % layout.tail.size == 0 if layout.tail else rest == 0)
 
 
-def _frame(values: list[Any], payload: bytes, size: int, host_time: float) -> Frame:
+def _frame(name: str, values: list[Any], data: NDArray[np.uint8], host_time: float) -> Frame | None:
+    """A frame of the samples in ``data``; None where so many bytes hold no samples."""
     sequence, ticks, configuration, flags, drops = values[1:]
-    samples = np.frombuffer(payload, dtype="<u2", offset=size)
-    return Frame(sequence, ticks, host_time, configuration, flags, drops, samples)
-
-
-def _packed_frame(values: list[Any], payload: bytes, size: int, host_time: float) -> Frame | None:
-    if not packed_size_fits(len(payload) - size):
-        return None
-    sequence, ticks, configuration, flags, drops = values[1:]
-    packed = np.frombuffer(payload, dtype=np.uint8, offset=size)
-    return PackedFrame(sequence, ticks, host_time, configuration, flags, drops, packed).frame
-
-
-def _chopped_frame(values: list[Any], payload: bytes, size: int, host_time: float) -> Frame | None:
-    frame = _frame(values, payload, size, host_time)
-    if len(frame.samples) % 2:
-        return None
-    return replace(frame, samples=frame.samples[::2], sums=frame.samples[1::2])
-
-
-_FRAMES: dict[type[Message], Callable[[list[Any], bytes, int, float], Frame | None]] = {
-    Frame: _frame,
-    PackedFrame: _packed_frame,
-    ChoppedFrame: _chopped_frame,
-}
-"""How the samples of each kind of frame are read."""
+    if name == "FRAME_PACKED":
+        if len(data) % (_GROUP + 1) == 1:
+            return None
+        samples = unpack(data)
+    else:
+        samples = data.view("<u2")
+    frame = Frame(sequence, ticks, host_time, configuration, flags, drops, samples)
+    if name != "FRAME_CHOPPED":
+        return frame
+    return None if len(samples) % 2 else replace(frame, samples=samples[::2], sums=samples[1::2])
 
 
 def is_command(message: Message) -> TypeGuard[Command]:
     """Whether ``message`` goes to the device."""
-    return _BY_RECORD[type(message)].spec.to_device
+    return not isinstance(message, Frame) and _BY_RECORD[type(message)].spec.to_device
+
+
+@dataclass(frozen=True, slots=True)
+class Counters:
+    """What a stream has held so far.
+
+    Attributes
+    ----------
+    messages
+        Whole messages passed on.
+    overlong
+        Blocks longer than any message: a line without 0x00, or another device.
+    torn
+        Blocks whose COBS code bytes do not add up.
+    checksum
+        Blocks whose CRC is wrong.
+    foreign
+        Blocks with a right CRC that are no message of this schema in this direction.
+    bytes_dropped
+        Bytes in the blocks that were not passed on.
+    """
+
+    messages: int = 0
+    overlong: int = 0
+    torn: int = 0
+    checksum: int = 0
+    foreign: int = 0
+    bytes_dropped: int = 0
+
+    @property
+    def corrupt(self) -> int:
+        """Blocks that were dropped, for whatever reason."""
+        return self.overlong + self.torn + self.checksum + self.foreign
+
+
+class Decoder:
+    """Bytes from a device → its messages.
+
+    Whatever is torn, corrupt, foreign or endless is dropped up to the next 0x00 and counted;
+    memory is bounded by one message, and no input raises.
+    """
+
+    def __init__(self) -> None:
+        """A decoder at the start of a stream."""
+        self._deframer = Deframer(SCHEMA.from_device_bytes)
+        self._messages = 0
+
+    def feed(self, data: bytes, host_time: float) -> list[Message]:
+        """Messages that ``data`` completes; frames carry ``host_time`` (monotonic s)."""
+        messages = []
+        for payload in self._deframer.feed(data):
+            message = decode_payload(payload, host_time)
+            if message is None or is_command(message):
+                self._deframer.drop("foreign", len(payload) + 2)
+            else:
+                messages.append(message)
+        self._messages += len(messages)
+        return messages
+
+    def forget(self) -> None:
+        """The stream goes on elsewhere: a message under way is given up, the counts stay."""
+        self._deframer.forget()
+
+    @property
+    def counters(self) -> Counters:
+        """What the stream has held so far."""
+        return Counters(messages=self._messages, **self._deframer.counts)
+
+
+def pack(samples: NDArray[np.uint16]) -> NDArray[np.uint8]:
+    """(n + ⌈n/4⌉,) uint8 for (n,) samples below 1,024."""
+    n = len(samples)
+    padded = np.zeros(-(-n // _GROUP) * _GROUP, dtype=np.uint16)
+    padded[:n] = samples
+    groups = padded.reshape(-1, _GROUP)
+    upper = np.bitwise_or.reduce((groups >> 8) << _SHIFTS, axis=1)
+    packed = np.column_stack([groups & 0xFF, upper]).astype(np.uint8).ravel()
+    return packed if n % _GROUP == 0 else np.append(packed[: n + n // _GROUP], packed[-1])
+
+
+def unpack(packed: NDArray[np.uint8]) -> NDArray[np.uint16]:
+    """(n,) samples of (n + ⌈n/4⌉,) bytes."""
+    n_groups = len(packed) // (_GROUP + 1)
+    groups = packed[: n_groups * (_GROUP + 1)].reshape(n_groups, _GROUP + 1)
+    samples = _join(groups[:, :_GROUP], groups[:, _GROUP:]).ravel()
+    rest = packed[n_groups * (_GROUP + 1) :]
+    return np.append(samples, _join(rest[:-1], rest[-1:])) if len(rest) else samples
+
+
+def _join(lower: NDArray[np.uint8], upper: NDArray[np.uint8]) -> NDArray[np.uint16]:
+    high = (upper >> _SHIFTS[: lower.shape[-1]] & 3).astype(np.uint16)
+    joined: NDArray[np.uint16] = np.left_shift(high, 8, dtype=np.uint16) | lower
+    return joined

@@ -1,8 +1,9 @@
-"""Payload ↔ bytes on the line: COBS(payload ‖ CRC-16/CCITT-FALSE, big-endian) ‖ 0x00."""
+"""Payloads ↔ bytes on the line: COBS(payload ‖ CRC-16/CCITT-FALSE, big-endian) ‖ 0x00."""
 
 from __future__ import annotations
 
 from binascii import crc_hqx
+from collections import Counter
 
 _FULL = 254
 """Longest run of data bytes behind one COBS code byte."""
@@ -58,6 +59,63 @@ def enclose(payload: bytes) -> bytes:
     return cobs_encode(payload + crc16(payload).to_bytes(2, "big")) + b"\0"
 
 
-def enclosed_size(size: int) -> int:
-    """Most bytes before the 0x00 for ``size`` bytes of payload and checksum."""
-    return size + 1 + size // _FULL
+class Deframer:
+    """Bytes → payloads with a right checksum. Holds at most one message; never raises."""
+
+    def __init__(self, limit: int) -> None:
+        """``limit``: most bytes of payload and checksum together."""
+        self._limit = limit + 1 + limit // _FULL  # before the 0x00
+        self._partial = b""
+        self._skipping = False
+        self.counts: Counter[str] = Counter()
+
+    def feed(self, data: bytes) -> list[bytes]:
+        """Payloads that ``data`` completes, in order."""
+        *blocks, rest = data.split(b"\0")
+        payloads = []
+        if blocks:
+            blocks[0] = self._partial + blocks[0]
+            self._partial = b""
+            for block in blocks:
+                payload = self._open(block)
+                if payload is not None:
+                    payloads.append(payload)
+        self._keep(rest)
+        return payloads
+
+    def forget(self) -> None:
+        """What comes next does not follow what came before: a message under way is given up."""
+        self._partial, self._skipping = b"", False
+
+    def drop(self, reason: str, size: int) -> None:
+        """Count a block of ``size`` bytes that is not passed on."""
+        self.counts[reason] += 1
+        self.counts["bytes_dropped"] += size
+
+    def _open(self, block: bytes) -> bytes | None:
+        if self._skipping:
+            self._skipping = False
+            self.counts["bytes_dropped"] += len(block)
+            return None
+        if not block:
+            return None
+        if len(block) > self._limit:
+            self.drop("overlong", len(block))
+            return None
+        data = cobs_decode(block)
+        if data is None:
+            self.drop("torn", len(block))
+            return None
+        if crc16(data):
+            self.drop("checksum", len(block))
+            return None
+        return data[:-2]
+
+    def _keep(self, rest: bytes) -> None:
+        if self._skipping:
+            self.counts["bytes_dropped"] += len(rest)
+        elif len(self._partial) + len(rest) > self._limit:
+            self.drop("overlong", len(self._partial) + len(rest))
+            self._partial, self._skipping = b"", True
+        else:
+            self._partial += rest

@@ -5,30 +5,37 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+import struct
 import tomllib
-from dataclasses import dataclass
 from functools import cached_property
 from importlib.resources import files
-from typing import Any, Self
+from typing import Any, Literal, Self
 
-from tomoskin.core import WireError
+import msgspec
 
 SCALARS = {"u8": "B", "u16": "H", "u32": "I", "u64": "Q"}
 """Scalar types of the schema and their codes for :mod:`struct`."""
 
-_TYPE = re.compile(r"^(?P<item>\w+?)(?P<array>\[(?P<length>\d*)\])?$")
 
-
-@dataclass(frozen=True)
-class FieldSpec:
-    """One field: ``item`` type; ``length`` 1 a scalar, n a fixed array, 0 fills the payload."""
+class FieldSpec(msgspec.Struct, frozen=True, rename={"type_name": "type"}):
+    """One field; its type is written ``u16``, ``u8[8]`` or ``drive[]``."""
 
     name: str
-    item: str
-    length: int
-    enum: str
-    unit: str
+    type_name: str
     text: str
+    enum: str = ""
+    unit: str = ""
+
+    @property
+    def item(self) -> str:
+        """The type without its length."""
+        return self.type_name.partition("[")[0]
+
+    @property
+    def length(self) -> int:
+        """1 for a scalar, n for a fixed array, 0 for one that fills the payload."""
+        array = re.search(r"\[(\d*)\]$", self.type_name)
+        return int(array[1] or 0) if array else 1
 
     @property
     def is_tail(self) -> bool:
@@ -36,65 +43,67 @@ class FieldSpec:
         return self.length == 0
 
     @property
-    def type_name(self) -> str:
-        """As the schema writes it: ``u16``, ``u8[8]`` or ``drive[]``."""
-        return self.item + {0: "[]", 1: ""}.get(self.length, f"[{self.length}]")
-
-    @classmethod
-    def read(cls, raw: dict[str, Any]) -> Self:
-        """From a table of the file."""
-        found = _TYPE.match(raw["type"])
-        if found is None:
-            raise WireError(f'expected a type such as u16, u8[8] or u16[], got "{raw["type"]}"')
-        length = 1 if found["array"] is None else int(found["length"] or 0)
-        return cls(
-            raw["name"], found["item"], length, raw.get("enum", ""), raw.get("unit", ""),
-            raw["text"],
-        )  # fmt: skip
+    def size(self) -> int:
+        """Bytes that it takes; 0 where it fills the payload."""
+        return struct.calcsize("<" + SCALARS[self.item]) * self.length if self.length else 0
 
 
-@dataclass(frozen=True)
-class EnumSpec:
-    """Names, values and sentences of an enumeration."""
+class EnumValue(msgspec.Struct, frozen=True):
+    """A value of an enumeration, with a sentence for a person to read."""
 
     name: str
+    value: int
     text: str
-    values: tuple[tuple[str, int, str], ...]
+
+
+class EnumSpec(msgspec.Struct, frozen=True):
+    """An enumeration."""
+
+    text: str
+    values: tuple[EnumValue, ...]
 
     def sentence(self, value: int) -> str:
         """The sentence for a value, for a person to read."""
-        return next((text for _, number, text in self.values if number == value), f"code {value}")
+        return next((one.text for one in self.values if one.value == value), f"code {value}")
 
 
-@dataclass(frozen=True)
-class StructSpec:
+class StructSpec(msgspec.Struct, frozen=True):
     """A group of fields that repeats."""
 
-    name: str
     text: str
     fields: tuple[FieldSpec, ...]
 
 
-@dataclass(frozen=True)
-class MessageSpec:
+class MessageSpec(msgspec.Struct, frozen=True):
     """A message: its type byte, direction and fields."""
 
     name: str
     type: int
-    to_device: bool
+    direction: Literal["to_device", "from_device"]
     text: str
     fields: tuple[FieldSpec, ...]
 
+    @property
+    def to_device(self) -> bool:
+        """Whether it is a command."""
+        return self.direction == "to_device"
 
-@dataclass(frozen=True)
-class Schema:
-    """Everything that board and host must agree on."""
 
+class _Protocol(msgspec.Struct, frozen=True):
     name: str
     major: int
     minor: int
-    to_device_bytes: int
-    from_device_bytes: int
+
+
+class Schema(msgspec.Struct, frozen=True, dict=True):
+    """Everything that board and host must agree on.
+
+    ``limits`` are the largest payload and checksum together, by direction, in bytes; ``hash`` is a
+    u32 over everything but the sentences, which board and host compare.
+    """
+
+    protocol: _Protocol
+    limits: dict[Literal["to_device", "from_device"], int]
     enums: dict[str, EnumSpec]
     structs: dict[str, StructSpec]
     messages: tuple[MessageSpec, ...]
@@ -102,43 +111,34 @@ class Schema:
 
     @classmethod
     def read(cls, text: str) -> Self:
-        """Parse a schema file; WireError when it contradicts itself."""
+        """Read the text of a schema file."""
         raw = tomllib.loads(text)
-        schema = cls(
-            name=raw["protocol"]["name"],
-            major=raw["protocol"]["major"],
-            minor=raw["protocol"]["minor"],
-            to_device_bytes=raw["limits"]["to_device"],
-            from_device_bytes=raw["limits"]["from_device"],
-            enums={name: _enum(name, table) for name, table in raw["enums"].items()},
-            structs={
-                name: StructSpec(name, table["text"], _fields(table))
-                for name, table in raw["structs"].items()
-            },
-            messages=tuple(_message(table) for table in raw["messages"]),
-            hash=_hash(raw),
-        )
-        _check(schema)
-        return schema
+        return msgspec.convert(raw | {"hash": _hash(raw)}, cls)
+
+    @property
+    def major(self) -> int:
+        """Boards and hosts of another major version do not understand each other."""
+        return self.protocol.major
+
+    @property
+    def minor(self) -> int:
+        """A host understands boards of its own and of older minor versions."""
+        return self.protocol.minor
+
+    @property
+    def to_device_bytes(self) -> int:
+        """The most that a board takes."""
+        return self.limits["to_device"]
+
+    @property
+    def from_device_bytes(self) -> int:
+        """The most that a board sends."""
+        return self.limits["from_device"]
 
     @cached_property
     def by_name(self) -> dict[str, MessageSpec]:
         """Messages by their name."""
         return {message.name: message for message in self.messages}
-
-
-def _enum(name: str, table: dict[str, Any]) -> EnumSpec:
-    values = tuple((v["name"], v["value"], v["text"]) for v in table["values"])
-    return EnumSpec(name, table["text"], values)
-
-
-def _fields(table: dict[str, Any]) -> tuple[FieldSpec, ...]:
-    return tuple(FieldSpec.read(field) for field in table["fields"])
-
-
-def _message(table: dict[str, Any]) -> MessageSpec:
-    to_device = {"to_device": True, "from_device": False}[table["direction"]]
-    return MessageSpec(table["name"], table["type"], to_device, table["text"], _fields(table))
 
 
 def _hash(raw: dict[str, Any]) -> int:
@@ -152,28 +152,10 @@ def _without_text(value: Any) -> Any:
     return [_without_text(item) for item in value] if isinstance(value, list) else value
 
 
-def _check(schema: Schema) -> None:
-    types = {message.type for message in schema.messages}
-    if min(len(types), len(schema.by_name)) != len(schema.messages):
-        raise WireError("two messages share a type byte or a name", where="protocol.toml")
-    for message in schema.messages:
-        where = f"protocol.toml: {message.name}"
-        if any(field.is_tail for field in message.fields[:-1]):
-            raise WireError("only the last field may fill the payload", where=where)
-        for field in message.fields:
-            if field.item not in SCALARS and not (field.is_tail and field.item in schema.structs):
-                raise WireError(f'unknown type "{field.type_name}" of {field.name}', where=where)
-            if field.enum and field.enum not in schema.enums:
-                raise WireError(f'unknown enumeration "{field.enum}"', where=where)
-
-
 SCHEMA = Schema.read(
     files("tomoskin.board.wire").joinpath("protocol.toml").read_text(encoding="utf-8")
 )
 """The schema that this host was made with."""
 
-SCHEMA_HASH = SCHEMA.hash
-"""u32 over everything in the schema but its sentences; board and host compare it."""
-
 OLDER = {(1, 0): 0x8B6ABBBD, (1, 1): 0xF17AB758}
-"""Hashes of the published versions, by major and minor, that this host speaks beside its own."""
+"""Hashes of the published versions, by major and minor, that this host speaks besides its own."""

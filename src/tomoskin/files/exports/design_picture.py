@@ -19,7 +19,7 @@ _TICKS = (*_LEVELS, 0.3, 0.7, 1.5, 3.0, 4.0, 7.0, 15.0, 30.0, 70.0)
 
 
 def write_promise(
-    path: StrPath, skin: Skin, found: ResolutionBounds, title: str, *, overwrite: bool = False
+    path: StrPath, skin: Skin, bounds: ResolutionBounds, title: str, *, overwrite: bool = False
 ) -> None:
     """Draw both maps side by side, with the electrodes and, within 85 % of the way out, contours.
 
@@ -31,11 +31,11 @@ def write_promise(
     figure = new_figure(path, 11.0, 4.7)
     left, right = figure.subplots(1, 2)
     maps = (
-        (left, _MM * found.rms, "least RMS error of the position (mm)"),
-        (right, 100 * found.faintest, "faintest press that is detected (% of the conductivity)"),
+        (left, _MM * bounds.rms, "least RMS error of the position (mm)"),
+        (right, 100 * bounds.faintest, "faintest press that is detected (% of the conductivity)"),
     )
     for ax, values, label in maps:
-        drawn = _draw(ax, skin, found, values)
+        drawn = _draw(ax, skin, bounds, values)
         ends = drawn.get_clim()
         ticks = [level for level in _TICKS if ends[0] <= level <= ends[1]]
         bar = figure.colorbar(drawn, ax=ax, shrink=0.9, extend="both", ticks=ticks, format="%g")
@@ -46,15 +46,15 @@ def write_promise(
     save_figure(path, figure, overwrite=overwrite)
 
 
-def _draw(ax: Any, skin: Skin, found: ResolutionBounds, values: FloatArray) -> Any:
+def _draw(ax: Any, skin: Skin, bounds: ResolutionBounds, values: FloatArray) -> Any:
     finite = np.where(np.isfinite(values), values, 1e6)
-    low, high = np.percentile(finite[found.inside], (2, 98))
+    low, high = np.percentile(finite[bounds.inside], (2, 98))
     ends = {"vmin": low / 1.2, "vmax": max(high, 1.5 * low) * 1.2}
-    x, y = _MM * found.mesh.points.T
+    x, y = _MM * bounds.mesh.points.T
     drawn = ax.tripcolor(
-        x, y, found.mesh.cells, facecolors=finite, cmap=AMOUNT.colormap(), norm="log", **ends
+        x, y, bounds.mesh.cells, facecolors=finite, cmap=AMOUNT.colormap(), norm="log", **ends
     )
-    middle, within = _MM * found.mesh.centroids[found.inside], finite[found.inside]
+    middle, within = _MM * bounds.mesh.centroids[bounds.inside], finite[bounds.inside]
     shown = [level for level in _LEVELS if within.min() < level < within.max()]
     if shown:
         lines = ax.tricontour(*middle.T, within, levels=shown, colors="black", linewidths=0.8)

@@ -41,7 +41,7 @@ class Display:
     limit: float | None = None
 
     def __post_init__(self) -> None:
-        """Check the numbers."""
+        """Refuse numbers that make no picture."""
         for name in ("conductivity", "limit"):
             value = getattr(self, name)
             if value is not None and not (np.isfinite(value) and value > 0):

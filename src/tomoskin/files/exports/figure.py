@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from tomoskin.core import DataError, StrPath, install_hint, written
+from tomoskin.core import DataError, StrPath, needed, written
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -19,18 +19,21 @@ def new_figure(path: StrPath, width: float, height: float) -> Figure:
 
     Raises DataError when matplotlib is not installed.
     """
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-        from matplotlib.layout_engine import ConstrainedLayoutEngine
-    except ImportError as error:
-        raise DataError(
-            "pictures need matplotlib", where=str(path), hint=install_hint("plot")
-        ) from error
-    layout = ConstrainedLayoutEngine(h_pad=_MARGIN, w_pad=_MARGIN, hspace=0.0, wspace=0.0)
-    figure = Figure(figsize=(width, height), layout=layout)
-    FigureCanvasAgg(figure)
+    parts = ("figure", "layout_engine", "backends.backend_agg")
+    plain, layouts, canvas = (needed(f"matplotlib.{part}", "plot", path) for part in parts)
+    layout = layouts.ConstrainedLayoutEngine(h_pad=_MARGIN, w_pad=_MARGIN, hspace=0.0, wspace=0.0)
+    figure: Figure = plain.Figure(figsize=(width, height), layout=layout)
+    canvas.FigureCanvasAgg(figure)
     return figure
+
+
+def dress(ax: Any, title: str, x: str, y: str) -> None:
+    """Give a plot of curves its title, the names of its axes, small numbers and a pale grid."""
+    ax.set_title(title, fontsize=10)
+    ax.set_xlabel(x, fontsize=8)
+    ax.set_ylabel(y, fontsize=8)
+    ax.tick_params(labelsize=7, which="both")
+    ax.grid(alpha=0.25)
 
 
 def save_figure(path: StrPath, figure: Figure, *, overwrite: bool = False) -> None:

@@ -7,8 +7,8 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from tomoskin.core import DataError, StrPath, install_hint, written
-from tomoskin.files.session import Advance, Block, Rows, SessionReader, all_blocks, told_touches
+from tomoskin.core import StrPath, needed, written
+from tomoskin.files.session import Advance, Block, Rows, SessionReader, all_blocks, session_touches
 from tomoskin.sensing.track import force_values
 
 _FRAMES = ("number", "time", "host_time", "sequence", "ticks", "mark", "samples", "voltages")
@@ -32,10 +32,7 @@ def write_hdf5(
     DataError
         When h5py is missing or the session is damaged, and as :func:`written` does.
     """
-    try:
-        import h5py
-    except ImportError as error:
-        raise DataError("HDF5 needs h5py", where=str(path), hint=install_hint("hdf5")) from error
+    h5py = needed("h5py", "hdf5", path)
     rows = Rows.of(session)
     with written(path, overwrite=overwrite) as part, h5py.File(part, "w") as file:
         file.attrs["skin"] = session.skin.to_toml()
@@ -70,7 +67,7 @@ def _touches(session: SessionReader) -> Any:
     table = [
         (-1 if frame is None else frame, time, t.id, t.said.encode(), t.since,
          r.x, r.y, r.sd_x, r.sd_y, r.area, r.peak, *force_values(r.force))
-        for frame, time, touches in told_touches(session)
+        for frame, time, touches in session_touches(session)
         for t in touches
         for r in [t.detection]
     ]  # fmt: skip

@@ -23,7 +23,7 @@ _FIXED = ("drive", "measure", "reference")
 
 
 def shard_path(folder: StrPath, shard: int) -> Path:
-    """File of a shard."""
+    """The file of one shard in the folder of a set."""
     return Path(folder) / f"part-{shard:05d}.npz"
 
 
@@ -46,12 +46,12 @@ def is_done(path: StrPath, identity: str, *, overwrite: bool = False) -> bool:
     """
     if not Path(path).exists():
         return False
-    found = _identity_in(Path(path))
-    if found.split()[:1] == identity.split()[:1]:
-        return found == identity
-    if found != _DAMAGED and not overwrite:
+    present = _identity_in(Path(path))
+    if present.split()[:1] == identity.split()[:1]:
+        return present == identity
+    if present != _DAMAGED and not overwrite:
         raise OutputError(
-            f"belongs to another set: expected {identity}, got {found or 'no part of a set'}",
+            f"belongs to another set: expected {identity}, got {present or 'no part of a set'}",
             where=str(path),
             hint="choose another folder, or remove the files in it",
         )

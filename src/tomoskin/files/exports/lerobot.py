@@ -12,7 +12,7 @@ import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,16 +21,21 @@ from tomoskin.core import (
     FloatArray,
     Output,
     StrPath,
-    Touch,
     check_outputs,
     encode_json,
-    install_hint,
+    needed,
     write_text,
 )
-from tomoskin.files.session import Advance, SessionReader, as_recorded, indexed_frames, replayed
-from tomoskin.model.mesh import Surface
+from tomoskin.files.exports.bag import recorded_stream
+from tomoskin.files.messages import Contacts, row_labels
+from tomoskin.files.session import as_recorded
+from tomoskin.model.pattern import Pattern
+
+if TYPE_CHECKING:
+    from tomoskin.files.exports.session_export import Export
 
 VOLTAGES, TOUCHES = "observation.tactile.voltages", "observation.tactile.touches"
+VALID = "observation.tactile.valid"
 """Names of the features."""
 
 MOST_TOUCHES = 5
@@ -46,30 +51,22 @@ _COUNTERS = ("frame_index", "episode_index", "index", "task_index")
 Columns = dict[str, Any]
 
 
-def write_lerobot(path: StrPath, session: SessionReader, every: float, advance: Advance) -> None:
-    """Write a row each ``every`` s, from the first frame with a reference on, into a new folder.
+def write_lerobot(job: Export, path: StrPath) -> None:
+    """Write a row each ``job.every`` s into a new folder, from the first frame with a reference on.
 
     Raises
     ------
     DataError
-        When pyarrow is missing, 1/``every`` is no whole number, the session is damaged or too
+        When pyarrow is missing, 1/``job.every`` is no whole number, the session is damaged or too
         short, or the disk refuses.
     OutputError
         When there is something of that name already.
     """
-    try:
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-    except ImportError as error:
-        raise DataError(
-            "the LeRobot format needs pyarrow",
-            where=str(path),
-            hint=install_hint("parquet"),
-        ) from error
-    rate = _rate(every, path)
-    rows = _rows(session, rate, advance)
+    pa, pq = (needed(name, "parquet", path) for name in ("pyarrow", "pyarrow.parquet"))
+    rate = _rate(job.every, path)
+    rows = _rows(job, rate)
     statistics = {name: _statistics(values) for name, values in rows.items()}
-    features = _features(session, rows)
+    features = _features(job.session.skin.pattern(), rows)
     with _folder(Path(path)) as part:
         (part / "data/chunk-000").mkdir(parents=True)
         (part / "meta/episodes/chunk-000").mkdir(parents=True)
@@ -93,19 +90,20 @@ def _rate(every: float, path: StrPath) -> int:
     return rate
 
 
-def _rows(session: SessionReader, rate: int, advance: Advance) -> Columns:
+def _rows(job: Export, rate: int) -> Columns:
     """Columns by name, a row at each even time: the newest frame that was there by then."""
-    prepared, total = as_recorded(session), indexed_frames(session)
-    surface = prepared.skin.surface
-    times, voltages, touches = [], [], []
-    for done, result in enumerate(replayed(prepared, session)):
-        advance(done, max(done + 1, total))
+    prepared = as_recorded(job.session)
+    stream = recorded_stream(job, prepared)
+    times, voltages, touches, valid = [], [], [], []
+    for result in job.results(prepared):
         if result.ready:
+            contacts = Contacts.of(stream, result)
             times.append(result.host_time)
             voltages.append(result.voltages - result.reference)
-            touches.append(_touches(result.touches, surface))
+            touches.append(_touches(contacts))
+            valid.append([float(contacts.valid)])
     if not times:
-        raise DataError("holds too few frames for a reference", where=str(session.path))
+        raise DataError("holds too few frames for a reference", where=str(job.session.path))
     count = 1 + int(np.floor((times[-1] - times[0]) * rate + 1e-9))
     even = np.arange(count) / rate
     newest = np.searchsorted(np.array(times) - times[0], even + 1e-9, side="right") - 1
@@ -114,29 +112,25 @@ def _rows(session: SessionReader, rate: int, advance: Advance) -> Columns:
     return {
         VOLTAGES: np.array(voltages, dtype=np.float32)[newest],
         TOUCHES: np.array(touches, dtype=np.float32)[newest],
+        VALID: np.array(valid, dtype=np.float32)[newest],
         "timestamp": even.astype(np.float32),
         **counters,
     }
 
 
-def _touches(touches: tuple[Touch, ...], surface: Surface) -> FloatArray:
+def _touches(contacts: Contacts) -> FloatArray:
     """(MOST_TOUCHES · 5,) zeros where there are fewer."""
     row = np.zeros((MOST_TOUCHES, len(FIELDS)))
-    strongest = sorted(touches, key=lambda touch: -abs(touch.detection.peak))[:MOST_TOUCHES]
-    for number, touch in enumerate(strongest):
-        seen = touch.detection
-        row[number] = 1.0, *surface.point([[seen.x, seen.y]])[0], seen.peak
+    for number, contact in enumerate(contacts.strongest(MOST_TOUCHES)):
+        row[number] = 1.0, *contact.position, contact.touch.detection.peak
     return row.ravel()
 
 
-def _features(session: SessionReader, rows: Columns) -> dict[str, Any]:
-    pattern = session.skin.pattern()
+def _features(pattern: Pattern, rows: Columns) -> dict[str, Any]:
     names = {
-        VOLTAGES: [
-            f"E{a}-E{b} E{c}-E{d}"
-            for a, b, c, d in (np.hstack([pattern.drive, pattern.measure]) + 1).tolist()
-        ],
+        VOLTAGES: row_labels(pattern),
         TOUCHES: [f"touch_{n}.{field}" for n in range(MOST_TOUCHES) for field in FIELDS],
+        VALID: ["valid"],
     }
     return {
         name: {
@@ -150,10 +144,10 @@ def _features(session: SessionReader, rows: Columns) -> dict[str, Any]:
 
 def _statistics(values: Any) -> dict[str, Any]:
     columns = values.reshape(len(values), -1)
-    found = {
+    extent = {
         name: getattr(np, name)(columns, axis=0).tolist() for name in ("min", "max", "mean", "std")
     }
-    return found | {"count": [len(values)]}
+    return extent | {"count": [len(values)]}
 
 
 def _arrays(pa: Any, rows: Columns) -> Columns:
@@ -194,9 +188,9 @@ def _episode(count: int, statistics: Mapping[str, Mapping[str, Any]]) -> dict[st
         "meta/episodes/chunk_index": 0,
         "meta/episodes/file_index": 0,
         **{
-            f"stats/{name}/{kind}": values
-            for name, found in statistics.items()
-            for kind, values in found.items()
+            f"stats/{name}/{kind}": numbers
+            for name, values in statistics.items()
+            for kind, numbers in values.items()
         },
     }
 

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import DataError, StrPath, install_hint, written
+from tomoskin.core import DataError, StrPath, needed, written
 
 Pictures = Iterable[NDArray[np.uint8]]
 
@@ -23,11 +23,8 @@ def write_gif(path: StrPath, pictures: Pictures, fps: float, *, overwrite: bool 
     DataError
         When Pillow is missing, and as :func:`written` does.
     """
-    try:
-        from PIL import Image
-    except ImportError as error:
-        raise DataError("a GIF needs Pillow", where=str(path), hint=install_hint("plot")) from error
-    images = (Image.fromarray(figure) for figure in pictures)
+    pillow = needed("PIL.Image", "plot", path)
+    images = (pillow.fromarray(figure) for figure in pictures)
     first = next(images)
     with written(path, overwrite=overwrite) as part:
         first.save(part, "GIF", save_all=True, append_images=images, duration=1e3 / fps, loop=0)

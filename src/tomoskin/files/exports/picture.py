@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -155,15 +155,17 @@ class _Sheet:
 
     def draw(self, ax: Axes, panel: Panel) -> Any:
         """One panel on ``ax``; what a colour bar is made for."""
-        return _draw(ax, self.mesh, replace(panel, values=self.factor * panel.values), self.end)
+        mesh, values, end = self.mesh, self.factor * panel.values, self.end
+        x, y = _MM * mesh.points[:, :2].T
+        drawn = ax.tripcolor(
+            x, y, mesh.cells, facecolors=values, cmap=CHANGE.colormap(), vmin=-end, vmax=end
+        )
+        _mark(ax, mesh, panel)
+        return drawn
 
 
-def _draw(ax: Axes, mesh: Mesh, panel: Panel, limit: float) -> Any:
-    x, y = _MM * mesh.points[:, :2].T
-    colours = CHANGE.colormap()
-    drawn = ax.tripcolor(
-        x, y, mesh.cells, facecolors=panel.values, cmap=colours, vmin=-limit, vmax=limit
-    )
+def _mark(ax: Axes, mesh: Mesh, panel: Panel) -> None:
+    """Electrodes, touches, and what stands around them."""
     for number, facets in enumerate(mesh.electrodes, start=1):
         middle = _MM * mesh.points[np.unique(facets)][:, :2].mean(axis=0)
         ax.plot(*middle, "s", color="0.25", markersize=2.5)
@@ -179,4 +181,3 @@ def _draw(ax: Axes, mesh: Mesh, panel: Panel, limit: float) -> Any:
     ax.set_xlabel("mm", fontsize=7)
     ax.tick_params(labelsize=6)
     ax.margins(0.09)
-    return drawn

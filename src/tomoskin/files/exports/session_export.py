@@ -10,15 +10,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tomoskin.core import DataError, StrPath
+from tomoskin.files.exports.bag import write_bag
 from tomoskin.files.exports.hdf5 import write_hdf5
 from tomoskin.files.exports.lerobot import write_lerobot
 from tomoskin.files.exports.matlab_file import write_matlab
 from tomoskin.files.exports.movie import FILMS
 from tomoskin.files.exports.picture import MOST_PANELS, Panel, rendered, write_picture
+from tomoskin.files.exports.rerun_file import write_rerun
 from tomoskin.files.exports.session_table import write_csv, write_parquet
 from tomoskin.files.exports.touch_csv import write_touches
 from tomoskin.files.exports.vtu import write_series
 from tomoskin.files.imports import write_interchange
+from tomoskin.files.messages import Every
 from tomoskin.files.session import (
     OWN_FILES,
     Advance,
@@ -29,7 +32,7 @@ from tomoskin.files.session import (
     message_counts,
     recording_of,
     replayed,
-    told_touches,
+    session_touches,
 )
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, colour_limit
@@ -52,28 +55,19 @@ class Export:
     advance: Advance
     overwrite: bool = False
 
+    def results(self, prepared: Prepared) -> Iterator[FrameResult]:
+        """What a replay makes of each frame; ``advance`` is called as it goes."""
+        total = indexed_frames(self.session)
+        for done, result in enumerate(replayed(prepared, self.session)):
+            self.advance(done, max(done + 1, total))
+            yield result
+
     def npz(self, path: StrPath) -> None:
-        """Write the interchange file."""
+        """Write all frames as an interchange file."""
         write_interchange(path, recording_of(self.session), overwrite=self.overwrite)
 
-    def csv(self, path: StrPath) -> None:
-        """Write a table of voltages."""
-        write_csv(path, self.session, self.advance, overwrite=self.overwrite)
-
-    def parquet(self, path: StrPath) -> None:
-        """Write a table of voltages for data tools."""
-        write_parquet(path, self.session, self.advance, overwrite=self.overwrite)
-
-    def hdf5(self, path: StrPath) -> None:
-        """Write all that the session holds."""
-        write_hdf5(path, self.session, self.advance, overwrite=self.overwrite)
-
-    def lerobot(self, path: StrPath) -> None:
-        """Write a LeRobot dataset, a row every ``every`` s."""
-        write_lerobot(path, self.session, self.every, self.advance)
-
     def matlab(self, path: StrPath) -> None:
-        """Write EIDORS' structures."""
+        """Write all frames as EIDORS' structures."""
         skin = self.session.skin
         recording = recording_of(self.session)
         write_matlab(path, recording, skin.current, skin.n_electrodes, overwrite=self.overwrite)
@@ -86,7 +80,7 @@ class Export:
         write_series(listing, prepared.mesh, moments, overwrite=self.overwrite)
 
     def film(self, path: StrPath) -> None:
-        """Write a film of the map."""
+        """Write a film of the images with their touches."""
         prepared = as_recorded(self.session)
         unit, limit = prepared.operator.unit, colour_limit(prepared)
         pictures = (
@@ -106,7 +100,7 @@ class Export:
 
     def touches(self, path: StrPath) -> None:
         """Write a table of the touches; of a session without any, those that a replay finds."""
-        rows, surface = list(told_touches(self.session)), self.session.skin.surface
+        rows, surface = list(session_touches(self.session)), self.session.skin.surface
         forces = has_forces(rows)
         begun = first_scan(self.session)
         write_touches(path, rows, surface, forces=forces, begun=begun, overwrite=self.overwrite)
@@ -120,13 +114,9 @@ class Export:
 
     def _images(self, prepared: Prepared) -> Iterator[FrameResult]:
         """A result every so often; those before the reference stands are left out."""
-        total = indexed_frames(self.session)
-        due = float("-inf")
-        shown = False
-        for done, result in enumerate(replayed(prepared, self.session)):
-            self.advance(done, max(done + 1, total))
-            if result.ready and not due - self.every <= result.host_time < due:
-                due = result.host_time + self.every
+        is_due, shown = Every(self.every), False
+        for result in self.results(prepared):
+            if result.ready and is_due(result.host_time):
                 shown = True
                 yield result
         if not shown:
@@ -136,13 +126,20 @@ class Export:
             )
 
 
+def _voltages(write: Callable[..., None]) -> Callable[[Export, Path], None]:
+    """A writer that goes through the frames block by block."""
+    return lambda job, path: write(path, job.session, job.advance, overwrite=job.overwrite)
+
+
 WRITERS: dict[str, Callable[[Export, Path], None]] = {
-    ".csv": Export.csv,
-    ".parquet": Export.parquet,
-    ".h5": Export.hdf5,
-    ".lerobot": Export.lerobot,
+    ".csv": _voltages(write_csv),
+    ".parquet": _voltages(write_parquet),
+    ".h5": _voltages(write_hdf5),
+    ".lerobot": write_lerobot,
     ".npz": Export.npz,
     ".mat": Export.matlab,
+    ".mcap": write_bag,
+    ".rrd": write_rerun,
     ".vtu": Export.series,
     ".pvd": Export.series,
     ".png": Export.picture,
@@ -154,7 +151,11 @@ WRITERS: dict[str, Callable[[Export, Path], None]] = {
 _TABLES = (".csv", ".parquet", ".npz", ".mat")
 """Files of voltages."""
 
-_BESIDE = {"/touches": "the touches (--touches X.csv)", "/events": "events", "/notes": "notes"}
+_SESSION_ONLY = {
+    "/touches": "the touches (--touches X.csv)",
+    "/events": "events",
+    "/notes": "notes",
+}
 """What only a session or a .h5 holds, by the topic of its messages."""
 
 
@@ -165,5 +166,5 @@ def omitted(session: SessionReader, ending: str) -> tuple[str, ...]:
     name = session.skin.name
     skin = f"the skin (--skin {name if name in Skin.names() else 'with its file'})"
     counts = message_counts(session)
-    beside = [words for topic, words in _BESIDE.items() if counts[topic]]
-    return skin, *beside, *(name for name in session.attachments() if name not in OWN_FILES)
+    extras = [words for topic, words in _SESSION_ONLY.items() if counts[topic]]
+    return skin, *extras, *(name for name in session.attachments() if name not in OWN_FILES)

@@ -9,7 +9,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import DataError, StrPath, install_hint, written
+from tomoskin.core import StrPath, needed, written
 from tomoskin.files.imports import column_names
 from tomoskin.files.session import (
     Advance,
@@ -24,7 +24,7 @@ from tomoskin.files.session import (
 Column = NDArray[Any]
 
 
-class _Beside:
+class _FrameColumns:
     """Columns beside the voltages; ``x_m`` and ``y_m`` where the file holds truth."""
 
     def __init__(self, session: SessionReader, rows: Rows) -> None:
@@ -51,14 +51,15 @@ def write_csv(
         When the session is damaged, and as :func:`written` does.
     """
     rows = Rows.of(session)
-    names, beside = column_names(rows.pattern.drive, rows.pattern.measure), _Beside(session, rows)
+    names = column_names(rows.pattern.drive, rows.pattern.measure)
+    columns_of = _FrameColumns(session, rows)
     with (
         written(path, overwrite=overwrite) as part,
         part.open("w", encoding="utf-8", newline="") as file,
     ):
-        file.write(",".join([*beside.names, *names]) + "\n")
+        file.write(",".join([*columns_of.names, *names]) + "\n")
         for block in all_blocks(session, rows, advance):
-            columns = [column.tolist() for column in beside(block)]
+            columns = [column.tolist() for column in columns_of(block)]
             for *first, voltages in zip(*columns, block.voltages.tolist(), strict=True):
                 file.write(",".join(map(_text, [*first, *voltages])) + "\n")
 
@@ -75,18 +76,12 @@ def write_parquet(
     DataError
         When pyarrow is missing or the session is damaged, and as :func:`written` does.
     """
-    try:
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-    except ImportError as error:
-        raise DataError(
-            "Parquet needs pyarrow", where=str(path), hint=install_hint("parquet")
-        ) from error
+    pa, pq = (needed(name, "parquet", path) for name in ("pyarrow", "pyarrow.parquet"))
     rows = Rows.of(session)
     n = rows.pattern.n_meas
-    beside = _Beside(session, rows)
+    columns_of = _FrameColumns(session, rows)
     kinds = {"time_s": pa.float64(), "ticks": pa.uint64(), "x_m": pa.float64(), "y_m": pa.float64()}
-    fields = [pa.field(name, kinds.get(name, pa.int64())) for name in beside.names]
+    fields = [pa.field(name, kinds.get(name, pa.int64())) for name in columns_of.names]
     fields.append(pa.field("voltages", pa.list_(pa.float64(), n)))
     schema = pa.schema(fields, metadata=_about(session, rows))
     with (
@@ -95,7 +90,7 @@ def write_parquet(
     ):
         for block in all_blocks(session, rows, advance):
             values = pa.FixedSizeListArray.from_arrays(pa.array(block.voltages.reshape(-1)), n)
-            arrays = [pa.array(column) for column in beside(block)]
+            arrays = [pa.array(column) for column in columns_of(block)]
             file.write_batch(pa.record_batch([*arrays, values], schema=schema))
 
 

@@ -11,15 +11,17 @@ import csv
 import re
 from array import array
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from tomoskin.core import DataError, FloatArray, IntArray, check_fits, most_bytes
-from tomoskin.sensing.signal import Recording, frame_times
+from tomoskin.files.imports.tables import voltages_of
+from tomoskin.sensing.signal import Recording
 
 _COLUMN = re.compile(r"(dv|v)_(\d+)_(\d+)_(\d+)_(\d+)")
 _KNOWN = ("time_s", "idle", "x_m", "y_m")
-_BESIDE = ("frame", "sequence", "ticks", "mark")
+_IGNORED = ("frame", "sequence", "ticks", "mark")
 """Columns that an export has beside them; not needed here."""
 
 
@@ -44,7 +46,7 @@ def parse(lines: Iterable[str], source: str) -> Recording:
     unknown = [
         name
         for name, match in zip(header, matches, strict=True)
-        if match is None and name not in (*_KNOWN, *_BESIDE)
+        if match is None and name not in (*_KNOWN, *_IGNORED)
     ]
     if unknown or len(set(header)) != len(header):
         raise DataError(
@@ -63,18 +65,16 @@ def parse(lines: Iterable[str], source: str) -> Recording:
     electrodes = np.array([[int(part) for part in m.groups()[1:]] for m in matches if m])
     by_name = {name: table[:, number] for number, name in enumerate(header)}
     has_place = "x_m" in by_name and "y_m" in by_name
-    return Recording(
-        voltages=table[:, used],
-        drive=electrodes[:, :2],
-        measure=electrodes[:, 2:],
-        time=by_name.get("time_s", frame_times(len(table))),
-        reference=None,
+    recording = voltages_of(
+        source,
+        table[:, used],
+        (electrodes[:, :2], electrodes[:, 2:]),
+        time=by_name.get("time_s"),
         labels=np.column_stack([by_name["x_m"], by_name["y_m"]]) if has_place else None,
         is_change=kinds == {"dv"},
-        source=source,
-        idle=_idle(by_name["idle"], source) if "idle" in by_name else 1,
-        timed="time_s" in by_name,
     )
+    idle = _idle(by_name["idle"], source) if "idle" in by_name else 1
+    return replace(recording, idle=idle)
 
 
 def column_names(drive: IntArray, measure: IntArray, kind: str = "v") -> list[str]:
@@ -103,7 +103,7 @@ def _check_separator(header: list[str], source: str) -> None:
 
 
 def _rows(lines: Iterable[str], source: str) -> Iterator[list[str]]:
-    """The fields of each line."""
+    """The fields of each line, the header first."""
     rows = csv.reader(lines)
     try:
         yield from rows

@@ -57,18 +57,17 @@ def parse(variables: Mapping[str, Any], source: str) -> Recording:
             where=source,
         )
     reference = _read(variables, _REFERENCE, select, len(drive), source)
+    idle = _numbers(variables, "idle", ())
+    is_count = idle is not None and idle in range(1, len(voltages) + 1)
     recording = voltages_of(
         source,
         voltages,
         (drive, measure),
         time=_numbers(variables, "time_s", (len(voltages),)),
         reference=None if reference is None else reference[0],
+        labels=_numbers(variables, "xy_m", (len(voltages), 2)),
     )
-    labels = _numbers(variables, "xy_m", (len(voltages), 2))
-    idle = _numbers(variables, "idle", ())
-    count = 1.0 if idle is None else float(idle)
-    is_count = count in range(1, len(voltages) + 1)
-    return replace(recording, labels=labels, idle=int(count) if is_count else 1)
+    return replace(recording, idle=int(idle)) if is_count and idle is not None else recording
 
 
 def _stimulation(variables: Any) -> list[Mapping[str, Any]] | None:

@@ -17,7 +17,8 @@ from __future__ import annotations
 import numpy as np
 
 from tomoskin.core import Arrays, DataError, FloatArray, electrode_table, real_numbers
-from tomoskin.sensing.signal import Recording, frame_times
+from tomoskin.files.imports.tables import voltages_of
+from tomoskin.sensing.signal import Recording
 
 _MM = 1e-3
 
@@ -45,17 +46,14 @@ def parse(arrays: Arrays, source: str) -> Recording:
         values = down - up
     else:
         values = _frames(arrays, kind, n_rows, source)
-    n = len(values)
-    return Recording(
-        voltages=values,
-        drive=electrode_table(arrays, "inj", source)[:, ::-1],
-        measure=electrode_table(arrays, "meas", source),
-        time=real_numbers(arrays, "t_s", source) if "t_s" in arrays else frame_times(n),
-        reference=None,
-        labels=_labels(arrays, n, source),
+    inj, meas = (electrode_table(arrays, key, source) for key in ("inj", "meas"))
+    return voltages_of(
+        source,
+        values,
+        (inj[:, ::-1], meas),
+        time=real_numbers(arrays, "t_s", source) if "t_s" in arrays else None,
+        labels=_labels(arrays, len(values), source),
         is_change=kind != "v",
-        source=source,
-        timed="t_s" in arrays,
     )
 
 

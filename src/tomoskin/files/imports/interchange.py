@@ -7,6 +7,7 @@ Keys: ``voltages`` (n_frames, n_meas) V, or ``dv``; ``drive`` (n_meas, 2) source
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,8 @@ from tomoskin.core import (
     save_arrays,
     whole_number,
 )
-from tomoskin.sensing.signal import Recording, frame_times
+from tomoskin.files.imports.tables import voltages_of
+from tomoskin.sensing.signal import Recording
 
 REQUIRED = frozenset({"drive", "measure"})
 
@@ -43,20 +45,18 @@ def parse(arrays: Arrays, source: str) -> Recording:
     if "voltages" in arrays and "dv" in arrays:
         raise DataError("holds both voltages and dv", where=source, hint="keep one of them")
     key = "voltages" if "voltages" in arrays else "dv"
-    voltages = np.atleast_2d(numbers(arrays, key, source))
-    n = len(voltages)
-    return Recording(
-        voltages=voltages,
-        drive=electrode_table(arrays, "drive", source),
-        measure=electrode_table(arrays, "measure", source),
-        time=real_numbers(arrays, "time_s", source) if "time_s" in arrays else frame_times(n),
+    drive, measure = (electrode_table(arrays, name, source) for name in ("drive", "measure"))
+    recording = voltages_of(
+        source,
+        np.atleast_2d(numbers(arrays, key, source)),
+        (drive, measure),
+        time=real_numbers(arrays, "time_s", source) if "time_s" in arrays else None,
         reference=numbers(arrays, "reference", source) if "reference" in arrays else None,
         labels=real_numbers(arrays, "xy_m", source) if "xy_m" in arrays else None,
         is_change=key == "dv",
-        source=source,
-        idle=whole_number(arrays, "idle", source) if "idle" in arrays else 1,
-        timed="time_s" in arrays,
     )
+    idle = whole_number(arrays, "idle", source) if "idle" in arrays else 1
+    return replace(recording, idle=idle)
 
 
 def write_interchange(path: StrPath, recording: Recording, *, overwrite: bool = False) -> None:

@@ -36,7 +36,7 @@ def load_matlab(path: Path) -> dict[str, Any]:
     where = str(path)
     try:
         _check_size(path)
-        found = loadmat(path, simplify_cells=True)
+        variables = loadmat(path, simplify_cells=True)
     except NotImplementedError as error:
         raise DataError(
             "is a MATLAB file of version 7.3", where=where, hint="save it with -v7"
@@ -48,7 +48,7 @@ def load_matlab(path: Path) -> dict[str, Any]:
     except Exception as error:
         # scipy raises whatever its parser meets in a damaged file
         raise DataError(f"is damaged, or not a MATLAB file: {error}", where=where) from error
-    return {key: value for key, value in found.items() if not key.startswith("__")}
+    return {key: value for key, value in variables.items() if not key.startswith("__")}
 
 
 def _check_size(path: Path) -> None:

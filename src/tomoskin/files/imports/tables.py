@@ -20,9 +20,11 @@ def voltages_of(
     *,
     time: FloatArray | None = None,
     reference: NDArray[Any] | None = None,
+    labels: FloatArray | None = None,
+    is_change: bool = False,
     notes: Sequence[str] = (),
 ) -> Recording:
-    """A recording of voltages (n_frames, n_rows) without labels; ``rows``: drive and measure.
+    """A recording of voltages (n_frames, n_rows), or their change; ``rows``: drive and measure.
 
     Where there is no ``time`` (n_frames,), s, the frames are numbered.
     """
@@ -33,8 +35,8 @@ def voltages_of(
         measure=measure,
         time=frame_times(len(voltages)) if time is None else time,
         reference=reference,
-        labels=None,
-        is_change=False,
+        labels=labels,
+        is_change=is_change,
         source=source,
         notes=tuple(notes),
         timed=time is not None,

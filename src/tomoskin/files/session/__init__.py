@@ -1,6 +1,5 @@
 """Session files: write, read, repair, replay."""
 
-from tomoskin.core import encode_json
 from tomoskin.files.session.blocks import (
     Advance,
     Block,
@@ -12,23 +11,13 @@ from tomoskin.files.session.blocks import (
     recording_of,
 )
 from tomoskin.files.session.channels import schema_of
-from tomoskin.files.session.foxglove import (
-    grid_message,
-    log_message,
-    scene_message,
-    touch_colour,
-    touch_width,
-)
 from tomoskin.files.session.info import OWN_FILES, SessionInfo, session_info
 from tomoskin.files.session.layout import (
     Mark,
     MarkedFrame,
-    RecordedTouches,
     Truth,
-    touch_row,
-    touches_message,
 )
-from tomoskin.files.session.message_log import errors_of
+from tomoskin.files.session.message_log import MessageLog, errors_of
 from tomoskin.files.session.playback import Timeline, read_timeline
 from tomoskin.files.session.recorder import (
     BoardInfo,
@@ -36,9 +25,15 @@ from tomoskin.files.session.recorder import (
     Recorder,
     RunMessage,
     RunSettings,
-    event_of,
 )
-from tomoskin.files.session.repair import Lost, Repaired, repair
+from tomoskin.files.session.repair import (
+    Lost,
+    Repaired,
+    repair,
+    split,
+    split_names,
+    split_targets,
+)
 from tomoskin.files.session.replay import ReplayTransport, open_replay, parse_replay
 from tomoskin.files.session.replayed import (
     advance,
@@ -46,9 +41,8 @@ from tomoskin.files.session.replayed import (
     reconstruct_session,
     recorded_calibrations,
     replayed,
-    told_touches,
+    session_touches,
 )
-from tomoskin.files.session.robot_log import LogPart, RobotLog
 from tomoskin.files.session.scanned import first_scan, idle_count, scanned_touches
 from tomoskin.files.session.session import Session
 from tomoskin.files.session.session_reader import (
@@ -60,8 +54,7 @@ from tomoskin.files.session.session_reader import (
     tick_rate,
     touches_before,
 )
-from tomoskin.files.session.session_writer import Log, SessionWriter
-from tomoskin.files.session.split import split, split_names, split_targets
+from tomoskin.files.session.session_writer import SessionWriter, robot_logs
 from tomoskin.sensing.track import Span
 
 __all__ = [
@@ -69,17 +62,14 @@ __all__ = [
     "Advance",
     "Block",
     "BoardInfo",
-    "Log",
-    "LogPart",
     "Lost",
     "Mark",
     "MarkedFrame",
+    "MessageLog",
     "RawRead",
-    "RecordedTouches",
     "Recorder",
     "Repaired",
     "ReplayTransport",
-    "RobotLog",
     "Rows",
     "RunMessage",
     "RunSettings",
@@ -93,15 +83,11 @@ __all__ = [
     "advance",
     "all_blocks",
     "as_recorded",
-    "encode_json",
     "end_time",
     "errors_of",
-    "event_of",
     "first_scan",
-    "grid_message",
     "idle_count",
     "indexed_frames",
-    "log_message",
     "message_counts",
     "no_report",
     "open_replay",
@@ -114,19 +100,15 @@ __all__ = [
     "recording_of",
     "repair",
     "replayed",
+    "robot_logs",
     "scanned_touches",
-    "scene_message",
     "schema_of",
     "session_info",
+    "session_touches",
     "split",
     "split_names",
     "split_targets",
     "start_time",
     "tick_rate",
-    "told_touches",
-    "touch_colour",
-    "touch_row",
-    "touch_width",
     "touches_before",
-    "touches_message",
 ]

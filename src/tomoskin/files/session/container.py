@@ -88,7 +88,7 @@ class ContainerWriter:
             return False
 
     def attach(self, name: str, media_type: str, data: bytes, log_time: int = 0) -> None:
-        """Add a whole file."""
+        """Add a whole file under a name."""
         self.flush()
         record = encode(Attachment(0, log_time, name, media_type, data))
         index = AttachmentIndex(
@@ -98,7 +98,7 @@ class ContainerWriter:
         self._totals.attachment_count += 1
 
     def describe(self, name: str, values: Mapping[str, str]) -> None:
-        """Add named strings."""
+        """Add named strings under a title."""
         self.flush()
         record = encode(Metadata(name, dict(values)))
         index = MetadataIndex(self._write(record), len(record), name)
@@ -123,7 +123,7 @@ class ContainerWriter:
             self.flush()
 
     def flush(self) -> None:
-        """Write the open chunk."""
+        """Write the open chunk, however short it is."""
         if self._span is None or self._broken:
             return
         records, (first, last), totals = bytes(self._records), self._span, self._totals

@@ -70,7 +70,7 @@ class ContainerReader:
             raise
 
     def close(self) -> None:
-        """Close the file."""
+        """Close the file; nothing can be read afterwards."""
         self._file.close()
 
     def description(self, name: str) -> dict[str, str] | None:

@@ -128,15 +128,17 @@ class SessionInfo:
 
 @dataclass
 class _Frames:
-    count: int = 0
+    """Counts frames; what has no underscore is told of the session by the same name."""
+
+    frames: int = 0
     held: int = 0
     skipped: int = 0
     lost: int = 0
     gaps: int = 0
     dropped: int = 0
-    longest: float = 0.0
-    first: float = 0.0
-    last: float = 0.0
+    longest_pause: float = 0.0
+    _first: float = 0.0
+    _last: float = 0.0
     _sequence: int = 0
     _drops: int = 0
 
@@ -148,22 +150,25 @@ class _Frames:
         self.held += bool(mark & Mark.HELD)
         self.skipped += bool(mark & Mark.SKIPPED)
         missing = (frame.sequence - self._sequence - 1) % _MODULUS
-        if self.count and not mark & Mark.OPENED and 0 < missing < _MODULUS // 2:
+        if self.frames and not mark & Mark.OPENED and 0 < missing < _MODULUS // 2:
             self.lost, self.gaps = self.lost + missing, self.gaps + 1
-        if self.count:
-            self.longest = max(self.longest, frame.host_time - self.last)
+        if self.frames:
+            self.longest_pause = max(self.longest_pause, frame.host_time - self._last)
         else:
-            self.first = frame.host_time
+            self._first = frame.host_time
         begun_anew = frame.drops < self._drops
         self.dropped += frame.drops if begun_anew else frame.drops - self._drops
-        self._sequence, self._drops, self.last = frame.sequence, frame.drops, frame.host_time
-        self.count += 1
+        self._sequence, self._drops, self._last = frame.sequence, frame.drops, frame.host_time
+        self.frames += 1
 
-    @property
-    def rate(self) -> float:
-        """Frames per second from the first to the last."""
-        span = self.last - self.first
-        return (self.count - 1) / span if span > 0 else float("nan")
+    def summary(self, epoch: float) -> dict[str, Any]:
+        """The counts by name, with when the frames began, how long they took, and their rate."""
+        span = self._last - self._first
+        return {name: value for name, value in vars(self).items() if name[0] != "_"} | {
+            "begun": epoch + self._first if epoch else None,
+            "duration": span,
+            "rate": (self.frames - 1) / span if span > 0 else float("nan"),
+        }
 
 
 def _begun(counts: Sequence[int]) -> int:
@@ -197,20 +202,11 @@ def session_info(path: StrPath, advance: Advance = no_report) -> SessionInfo:
             path=str(path),
             size=size,
             torn=session.torn,
-            begun=session.epoch + frames.first if session.epoch else None,
-            duration=frames.last - frames.first,
             skin=session.skin.name,
             skin_identity=session.skin.identity,
             electrodes=session.skin.n_electrodes,
             rows=session.skin.pattern().n_meas,
-            frames=frames.count,
-            rate=frames.rate,
-            longest_pause=frames.longest,
-            held=frames.held,
-            skipped=frames.skipped,
-            lost=frames.lost,
-            gaps=frames.gaps,
-            dropped=frames.dropped,
+            **frames.summary(session.epoch),
             touches=len(spans),
             presses=_begun([len(item.presses) for item in session.truth()]),
             events=dict(Counter(event.kind for event in session.events())),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import IntFlag
 from typing import Any
@@ -143,31 +143,6 @@ class RecordedTouches:
     host_time: float
     sequence: int
     touches: tuple[Touch, ...]
-
-
-def touches_message(host_time: float, sequence: int, touches: Sequence[Touch]) -> dict[str, Any]:
-    """A ``tomoskin.Touches``: those of the frame ``sequence``; m, m², the image's unit."""
-    rows = [touch_row(touch) for touch in touches]
-    return {"host_time": host_time, "sequence": sequence, "touches": rows}
-
-
-def touch_row(touch: Touch) -> dict[str, Any]:
-    """One touch as plain values by name; its force, N, only where a calibration tells it."""
-    r, force = touch.detection, touch.detection.force
-    return ({} if force is None else _newtons(force)) | {
-        "id": touch.id, "kind": touch.kind, "since": touch.since,
-        "x": r.x, "y": r.y, "sd_x": r.sd_x, "sd_y": r.sd_y, "area": r.area, "peak": r.peak,
-        "cov_xy": r.cov_xy, "close": r.close, "merged": touch.merged,
-        "possible": touch.possible,
-    }  # fmt: skip
-
-
-def _newtons(force: Force) -> dict[str, Any]:
-    return {
-        "force": force.newtons,
-        "force_interval": (force.low, force.high),
-        "force_calibrated": force.calibrated,
-    }
 
 
 def touches_of(content: Mapping[str, Any]) -> RecordedTouches:

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from copy import copy
+from dataclasses import dataclass, field
 from pathlib import Path
+from threading import Lock
+from typing import Self
 
 from mcap.records import Channel
 
 from tomoskin import __version__
 from tomoskin.core import DataError, Output, OutputError, StrPath, check_outputs
-from tomoskin.files.session.channels import CHANNELS, SCHEMAS
+from tomoskin.files.session.channels import CHANNELS, SCHEMAS, SPAN
 from tomoskin.files.session.container import ContainerWriter
 
 LIBRARY = f"tomoskin {__version__}"
@@ -53,52 +57,68 @@ class MessageLog:
 
     def __init__(
         self,
-        path: Path,
+        path: StrPath,
         *,
         epoch: float,
         start: float,
         channels: Sequence[Channel] = CHANNELS,
     ) -> None:
+        path = Path(path)
         self.path, self.epoch = path, epoch
-        self._now = start
-        self._flushed = 0
+        self._now, self._prefix, self._first, self._is_open = start, "", 0, True
         check_outputs([Output(path)])
         with errors_of(path):
             file = path.open("xb", buffering=0)
-            self._file = ContainerWriter(file, LIBRARY, SCHEMAS, channels)
+            self._file = _File(ContainerWriter(file, LIBRARY, SCHEMAS, channels))
+
+    def parts(self, names: Sequence[str]) -> dict[str, Self]:
+        """A log for each of several sessions in this file, by name; the last to close ends it.
+
+        They may be written from different threads.
+        """
+        parts = {}
+        self._file.users = len(names)
+        for number, name in enumerate(names):
+            parts[name] = part = copy(self)
+            part._prefix, part._first = f"{name}/", SPAN * number
+        return parts
 
     def describe(self, name: str, about: Mapping[str, str]) -> None:
         """Put named strings inside: what the file says of itself."""
-        with errors_of(self.path):
-            self._file.describe(name, about)
+        with self._writing() as file:
+            file.container.describe(self._prefix + name, about)
 
     def put(self, channel: int, host_time: float, data: bytes) -> None:
         """Add a message that is logged at ``host_time``."""
         log_time = self.log_time(host_time)
         self._now = host_time
-        with errors_of(self.path):
-            self._file.message(channel, log_time, data)
-            if log_time - self._flushed >= _SECOND:
-                self._file.flush()
-                self._flushed = log_time
+        with self._writing() as file:
+            file.container.message(self._first + channel, log_time, data)
+            if log_time - file.flushed >= _SECOND:
+                file.container.flush()
+                file.flushed = log_time
 
     def attach(self, name: str, media_type: str, data: bytes) -> None:
         """Put a file inside: a calibration, a photograph."""
-        with errors_of(self.path):
-            self._file.attach(name, media_type, data, self.log_time(self._now))
+        log_time = self.log_time(self._now)
+        with self._writing() as file:
+            file.container.attach(self._prefix + name, media_type, data, log_time)
 
     def settle(self) -> None:
         """Write the open chunk, and see that the file is still in its folder."""
-        with errors_of(self.path):
-            self._file.flush()
-        self._flushed = self.log_time(self._now)
-        if not self._file.is_linked:
+        with self._writing() as file:
+            file.container.flush()
+            file.flushed = self.log_time(self._now)
+        if not file.container.is_linked:
             raise DataError("was removed during the recording", where=str(self.path))
 
     def close(self) -> None:
         """End the file with its index; a second call does nothing."""
-        with errors_of(self.path):
-            self._file.close()
+        with self._writing() as file:
+            file.users -= self._is_open
+            self._is_open = False
+            if not file.users:
+                file.container.close()
 
     def log_time(self, host_time: float) -> int:
         """Ns of a message; DataError for a time that is none or before the epoch."""
@@ -109,6 +129,21 @@ class MessageLog:
                 where=str(self.path),
             )
         return round(seconds * 1e9)
+
+    @contextmanager
+    def _writing(self) -> Iterator[_File]:
+        with self._file.lock, errors_of(self.path):
+            yield self._file
+
+
+@dataclass
+class _File:
+    """A file that several logs may write: when it was last flushed, and how many are open."""
+
+    container: ContainerWriter
+    flushed: int = 0
+    users: int = 1
+    lock: Lock = field(default_factory=Lock)
 
 
 @contextmanager

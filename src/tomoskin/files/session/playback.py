@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import chain, islice
 
 from tomoskin.board.wire import SCHEMA, Deframer, decode_payload, encode
@@ -66,8 +66,8 @@ class Piece:
 
     host_time: float
     data: bytes
-    follows: bool
-    frames: tuple[MarkedFrame, ...]
+    follows: bool = True
+    frames: list[MarkedFrame] = field(default_factory=list)
 
     @property
     def is_earlier(self) -> bool:
@@ -77,14 +77,6 @@ class Piece:
     def mark(self, sequence: int) -> Mark | None:
         """What became of a frame of it; None for one that is not in it."""
         return next((i.mark for i in self.frames if i.frame.sequence == sequence), None)
-
-
-@dataclass
-class _Read:
-    host_time: float
-    data: bytes
-    frames: list[MarkedFrame] = field(default_factory=list)
-    was_recorded: bool = True
 
 
 class Playhead:
@@ -159,38 +151,36 @@ def pieces(items: Iterable[Item], since: float = float("-inf")) -> Iterator[Piec
     early = b""
     follows = False
     for read in reads:
-        is_later = any(item.frame.host_time >= since for item in read.frames)
-        if not follows and read.was_recorded and not is_later:
-            early = (early + read.data)[-_LONGEST:]
-        elif not read.was_recorded:
-            if is_later:
-                yield Piece(read.host_time, read.data, False, tuple(read.frames))
+        later = [item.frame for item in read.frames if item.frame.host_time >= since]
+        if not read.follows:
+            if later:
+                yield read
                 follows, early = False, b""
         elif follows:
-            yield Piece(read.host_time, read.data, True, tuple(read.frames))
-        else:
-            first = next(item.frame for item in read.frames if item.frame.host_time >= since)
-            data = _from_frame(early + read.data, first)
-            yield Piece(read.host_time, data, False, tuple(read.frames))
+            yield read
+        elif later:
+            data = _from_frame(early + read.data, later[0])
+            yield replace(read, data=data, follows=False)
             follows, early = True, b""
+        else:
+            early = (early + read.data)[-_LONGEST:]
 
 
-def _reads(items: Iterable[Item]) -> Iterator[_Read]:
-    """Each read with the frames of it, in the order of the file."""
-    current: _Read | None = None
+def _reads(items: Iterable[Item]) -> Iterator[Piece]:
+    """Each read with the frames of it, in the order of the file; it follows if it was recorded."""
+    current: Piece | None = None
     for item in items:
         if not isinstance(item, MarkedFrame):
             if current is not None:
                 yield current
-            current = _Read(*item)
+            current = Piece(*item)
         elif current is not None and item.frame.host_time == current.host_time:
             current.frames.append(item)
         else:
             if current is not None:
                 yield current
-            again = encode(item.frame)
             current = None
-            yield _Read(item.frame.host_time, again, [item], was_recorded=False)
+            yield Piece(item.frame.host_time, encode(item.frame), follows=False, frames=[item])
     if current is not None:
         yield current
 

@@ -10,11 +10,11 @@ from typing import Any
 
 from tomoskin.board.source import ClockFitter
 from tomoskin.board.wire import Info
-from tomoskin.core import DataError, Event, Image, PixelMap, StrPath, Touch
-from tomoskin.files.session.layout import Mark, MarkedFrame, Truth
+from tomoskin.core import Consumer, DataError, Event, PixelMap, StrPath
+from tomoskin.files.messages import Every, event_of
+from tomoskin.files.session.layout import Mark, MarkedFrame, RecordedTouches, Truth
 from tomoskin.files.session.session_writer import SessionWriter
 from tomoskin.pipeline import FrameResult
-from tomoskin.sensing.track import TouchEvent
 
 IMAGE_PERIOD = 0.2
 """Seconds between two images in the file, by host time."""
@@ -58,24 +58,11 @@ RunMessage = RawRead | MarkedFrame | FrameResult | Event | Truth | BoardInfo | R
 what becomes of it, then its result. A person's remark is an event of the kind "note"."""
 
 
-def event_of(happened: TouchEvent) -> Event:
-    """What happened to a touch as an event: "touch-onset", "touch-move", "touch-release", …"""
-    return Event(happened.host_time, f"touch-{happened.kind}", happened.text)
+_Part = RunMessage | RecordedTouches
+"""What becomes one record of the file, or an image and its touches."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Outcome:
-    """What is kept of a result; None: not worth a message."""
-
-    host_time: float
-    sequence: int
-    touches: tuple[Touch, ...] | None
-    image: Image | None
-    events: tuple[Event, ...]
-    shown: tuple[Touch, ...]
-
-
-class Recorder:
+class Recorder(Consumer):
     """Takes the messages of a run into a session file; a consumer of a worker of its own.
 
     When the file cannot be written any further the recording ends, which is said; the file stays
@@ -94,8 +81,7 @@ class Recorder:
         Called with the kind and text of an event.
     """
 
-    kind = "recording"
-    slow, ready = "the disk is too slow, and messages are lost", ""
+    kind, slow = "recording", "the disk is too slow, and messages are lost"
 
     def __init__(
         self,
@@ -109,71 +95,36 @@ class Recorder:
         self._make, self._pixels, self._say = make, pixels, say
         self._session: SessionWriter
         self._made = self._broken = False
-        self._last_image = float("-inf")
+        self._image_is_due = Every(IMAGE_PERIOD)
         self._had_touches = False
         self._clock, self._next_fit = ClockFitter(), float("-inf")
 
-    def admit(self, message: RunMessage) -> RunMessage | _Outcome | None:
+    def admit(self, message: RunMessage) -> list[_Part] | None:
         """What of ``message`` is to be written; by the thread that puts it."""
         if not isinstance(message, FrameResult):
-            return message
-        touches, image = None, None
+            return [message]
+        parts: list[_Part] = []
         if message.ready:
-            touches = message.touches if message.touches or self._had_touches else None
+            if message.touches or self._had_touches:
+                parts.append(RecordedTouches(message.host_time, message.sequence, message.touches))
             self._had_touches = bool(message.touches)
-            image = message.image if self._image_is_due(message.host_time) else None
-        events = tuple(map(event_of, message.events))
-        if touches is None and image is None and not events:
-            return None
-        return _Outcome(
-            message.host_time, message.sequence, touches, image, events, message.touches
-        )
+            if self._pixels is not None and self._image_is_due(message.host_time):
+                parts.append(message)
+        parts += map(event_of, message.events)
+        return parts or None
 
-    def size(self, item: RunMessage | _Outcome) -> int:
+    def size(self, item: list[_Part]) -> int:
         """Bytes that it takes while it waits."""
-        match item:
-            case RawRead():
-                return _OBJECT + len(item.data)
-            case MarkedFrame():
-                return _OBJECT + item.frame.samples.nbytes
-            case _Outcome():
-                image = item.image.values.nbytes if item.image is not None else 0
-                return _OBJECT + image + 200 * len(item.shown)
-            case Truth():
-                return _OBJECT + 100 * (len(item.presses) + len(item.bends))
-            case _:
-                return _OBJECT
-
-    def durable(self, item: object) -> bool:
-        """All is written, what came before the file was open too."""
-        del item
-        return True
+        return sum(map(_size, item))
 
     def open(self) -> None:
         """Make the file. Raises DataError."""
         self._session, self._made = self._make(), True
 
-    def take(self, item: RunMessage | _Outcome) -> None:
-        """Write one message. Raises DataError."""
-        session = self._session
-        match item:
-            case RawRead():
-                session.raw(item.host_time, item.data)
-            case MarkedFrame():
-                self._fit_clock(item)
-                session.frame(item.frame, item.mark)
-            case _Outcome():
-                self._write_outcome(item)
-            case Event(kind="note"):
-                session.note(item.host_time, item.text)
-            case Event():
-                session.event(item)
-            case Truth():
-                session.truth(item.host_time, item.presses, item.bends)
-            case BoardInfo():
-                session.device(item.host_time, item.info, item.name)
-            case RunSettings():
-                session.settings(item.host_time, item.values)
+    def take(self, item: list[_Part]) -> None:
+        """Write what was admitted of one message. Raises DataError."""
+        for part in item:
+            self._write(part)
 
     def tend(self) -> None:
         """Write the open chunk, to lose a second at most. Raises DataError."""
@@ -197,14 +148,26 @@ class Recorder:
             why = f"internal error, {type(error).__name__}: {error}"
         self._say("recording-stopped", f"the recording has ended: {why}")
 
-    def _write_outcome(self, item: _Outcome) -> None:
+    def _write(self, part: _Part) -> None:
         session = self._session
-        if item.touches is not None:
-            session.touches(item.host_time, item.sequence, item.touches)
-        if item.image is not None and self._pixels is not None:
-            session.image(item.host_time, item.image, self._pixels, item.shown)
-        for event in item.events:
-            session.event(event)
+        match part:
+            case RawRead():
+                session.raw(part.host_time, part.data)
+            case MarkedFrame():
+                self._fit_clock(part)
+                session.frame(part.frame, part.mark)
+            case RecordedTouches():
+                session.touches(part.host_time, part.sequence, part.touches)
+            case FrameResult() if self._pixels is not None:
+                session.image(part.host_time, part.image, self._pixels, part.touches)
+            case Event():
+                session.event(part)
+            case Truth():
+                session.truth(part.host_time, part.presses, part.bends)
+            case BoardInfo():
+                session.device(part.host_time, part.info, part.name)
+            case RunSettings():
+                session.settings(part.host_time, part.values)
 
     def _fit_clock(self, item: MarkedFrame) -> None:
         """Now and then a fit of the device's clock."""
@@ -216,9 +179,18 @@ class Recorder:
             self._session.clock(frame.host_time, fit)
             self._next_fit = frame.host_time + CLOCK_PERIOD
 
-    def _image_is_due(self, host_time: float) -> bool:
-        """Whether a period has gone by, or the time has been set back."""
-        if self._pixels is None or 0 <= host_time - self._last_image < IMAGE_PERIOD:
-            return False
-        self._last_image = host_time
-        return True
+
+def _size(part: _Part) -> int:
+    match part:
+        case RawRead():
+            return _OBJECT + len(part.data)
+        case MarkedFrame():
+            return _OBJECT + part.frame.samples.nbytes
+        case FrameResult():
+            return _OBJECT + part.image.values.nbytes + part.voltages.nbytes
+        case RecordedTouches():
+            return _OBJECT + 200 * len(part.touches)
+        case Truth():
+            return _OBJECT + 100 * (len(part.presses) + len(part.bends))
+        case _:
+            return _OBJECT

@@ -1,15 +1,18 @@
-"""What is whole in a damaged session file → a new file; the damaged one is only read."""
+"""What is whole in a session file → a mended one, or one for each of several skins.
+
+The file itself is only read.
+"""
 
 from __future__ import annotations
 
 import math
 import re
 from collections import Counter, deque
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import closing
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import BinaryIO, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
 from mcap import records
 from mcap.opcode import Opcode
@@ -26,10 +29,17 @@ from tomoskin.core import (
     written,
 )
 from tomoskin.files.session.blocks import Advance, no_report
-from tomoskin.files.session.channels import CHANNELS, SCHEMAS, TOPICS
+from tomoskin.files.session.channels import CHANNELS, SCHEMAS, SPAN, TOPICS
 from tomoskin.files.session.container import ContainerWriter
 from tomoskin.files.session.layout import host_time_of
-from tomoskin.files.session.mcap_records import LARGEST, PREFIX, decode, decode_chunk, messages_in
+from tomoskin.files.session.mcap_records import (
+    LARGEST,
+    PREFIX,
+    LoggedMessage,
+    decode,
+    decode_chunk,
+    messages_in,
+)
 from tomoskin.files.session.message_log import LIBRARY, errors_of
 from tomoskin.files.session.session_reader import epoch_of
 from tomoskin.files.session.session_writer import (
@@ -106,29 +116,102 @@ def repair(
         When the source cannot be read or nothing in it is whole, the target cannot be written, or
         the skin is lost and none is given.
     """
-    source = Path(source)
-    target = Path(target)
+    source, target = Path(source), Path(target)
     check_outputs([Output(target)], [source])
     if not source.exists():
         raise DataError("there is no such file", where=str(source))
     result = Repaired(target)
+    about, attachments = _front(source, skin)
+    with _new_file(target) as mended:
+        mended.describe(ABOUT, about)
+        for item in attachments:
+            mended.attach(item.name, item.media_type, item.data)
+        _copy(source, mended, result, advance)
+        if not result.chunks:
+            raise DataError("holds no whole chunk, so nothing can be recovered", where=str(source))
+    return result
+
+
+def split_names(source: StrPath) -> tuple[str, ...]:
+    """Names of the skins in a robot's recording. DataError where it is none."""
+    source = Path(source)
+    about: dict[str, str] = next(
+        (r.metadata for r in _about(source) if isinstance(r, Metadata) and r.name == ABOUT), {}
+    )
+    if SKINS not in about:
+        raise DataError("is not a recording of several skins", where=str(source))
+    return tuple(about[SKINS].split())
+
+
+def split_targets(source: StrPath) -> dict[str, Path]:
+    """The files that a split makes, by the names of the skins."""
+    source = Path(source)
+    return {name: source.with_stem(f"{source.stem}-{name}") for name in split_names(source)}
+
+
+def split(source: StrPath, advance: Advance = no_report) -> dict[str, int]:
+    """Write the session of each skin to a file of its own; messages by the names of the skins.
+
+    What is whole in a torn or damaged file is kept.
+
+    Raises
+    ------
+    OutputError
+        When one of :func:`split_targets` exists.
+    DataError
+        When the file is no recording of several skins, or cannot be read or written.
+    """
+    source = Path(source)
+    targets = split_targets(source)
+    check_outputs([Output(path) for path in targets.values()], [source])
+    counts, names = dict.fromkeys(targets, 0), tuple(targets)
+    with ExitStack() as stack:
+        parts = {name: stack.enter_context(_new_file(path)) for name, path in targets.items()}
+        for record in _about(source):
+            name, _, rest = record.name.partition("/")
+            if name in parts and isinstance(record, Attachment):
+                parts[name].attach(rest, record.media_type, record.data, record.log_time)
+            elif name in parts and isinstance(record, Metadata):
+                parts[name].describe(rest, record.metadata)
+        for stretch, size in _stretches(source):
+            for message in _messages(stretch.record):
+                number, channel = divmod(message.channel, SPAN)
+                if number < len(names) and channel in TOPICS:
+                    parts[names[number]].message(channel, message.log_time, message.data)
+                    counts[names[number]] += 1
+            advance(stretch.stop, size)
+    return counts
+
+
+@contextmanager
+def _new_file(path: Path) -> Iterator[ContainerWriter]:
+    """A session file that appears when the block ends without an error."""
+    with written(path) as part:
+        output = part.open("wb", buffering=0)
+        with closing(ContainerWriter(output, LIBRARY, SCHEMAS, CHANNELS)) as container:
+            yield container
+
+
+def _stretches(source: Path) -> Iterator[tuple[Stretch, int]]:
+    """Each stretch of a file, and the file's size."""
     with errors_of(source), source.open("rb") as file:
         if not (size := file.seek(0, 2)):
             raise DataError(EMPTY, where=str(source))
-        about, attachments = _front(stretches(file, size), skin, str(source))
-        with written(target) as part:
-            output = part.open("wb", buffering=0)
-            with closing(ContainerWriter(output, LIBRARY, SCHEMAS, CHANNELS)) as mended:
-                mended.describe(ABOUT, about)
-                for item in attachments:
-                    mended.attach(item.name, item.media_type, item.data)
-                for stop in _copy(stretches(file, size), mended, result):
-                    advance(stop, size)
-            if not result.chunks:
-                raise DataError(
-                    "holds no whole chunk, so nothing can be recovered", where=str(source)
-                )
-    return result
+        for stretch in stretches(file, size):
+            yield stretch, size
+
+
+def _about(source: Path) -> Iterator[Any]:
+    """The files inside and the named strings."""
+    for stretch, _ in _stretches(source):
+        if isinstance(stretch.record, Attachment | Metadata):
+            yield stretch.record
+
+
+def _messages(record: McapRecord | None) -> Iterator[LoggedMessage]:
+    """Those of a chunk; of anything else there are none."""
+    if isinstance(record, Chunk):
+        yield from messages_in(record, 0)
 
 
 def stretches(file: BinaryIO, size: int) -> Iterator[Stretch]:
@@ -153,17 +236,16 @@ def stretches(file: BinaryIO, size: int) -> Iterator[Stretch]:
         place = stop
 
 
-def _front(
-    stretches: Iterable[Stretch], skin: Skin | None, where: str
-) -> tuple[dict[str, str], list[Attachment]]:
+def _front(source: Path, skin: Skin | None) -> tuple[dict[str, str], list[Attachment]]:
     """The named strings and the attachments, wherever they are in the file.
 
     The strings have no CRC: they are made again of the skin, and of the clock as messages tell it.
     """
     about: dict[str, str] = {}
     attachments: dict[str, Attachment] = {}
+    where = str(source)
     is_session, epoch = False, math.inf
-    for _, _, record in stretches:
+    for (_, _, record), _ in _stretches(source):
         is_session |= isinstance(record, Chunk | Attachment | Metadata)
         if isinstance(record, Attachment) and record.name != OLD_INDEX_FILE:
             attachments[record.name] = record
@@ -220,28 +302,22 @@ def _epoch(about: Mapping[str, str], told: float) -> float:
     return 0.0 if math.isinf(told) else told
 
 
-def _copy(
-    stretches: Iterable[Stretch], container: ContainerWriter, result: Repaired
-) -> Iterator[int]:
-    """Write the messages of every chunk, and note what is lost; how far it is, byte by byte."""
+def _copy(source: Path, container: ContainerWriter, result: Repaired, advance: Advance) -> None:
+    """Write the messages of every chunk, and note what is lost."""
     after = 0
-    for start, stop, record in stretches:
+    for (start, stop, record), size in _stretches(source):
         if isinstance(record, Chunk):
             if result.lost and result.lost[-1].before is None:
                 result.lost[-1] = replace(result.lost[-1], before=record.message_start_time)
-            _copy_messages(record, container, result)
             result.chunks, after = result.chunks + 1, record.message_end_time
         elif record is None:
             result.lost.append(Lost(start, stop, after, None))
+        for message in _messages(record):
+            if message.channel in TOPICS:
+                container.message(message.channel, message.log_time, message.data)
+                result.messages[TOPICS[message.channel]] += 1
         result.ended |= isinstance(record, DataEnd)
-        yield stop
-
-
-def _copy_messages(chunk: Chunk, container: ContainerWriter, result: Repaired) -> None:
-    for message in messages_in(chunk, 0):
-        if message.channel in TOPICS:
-            container.message(message.channel, message.log_time, message.data)
-            result.messages[TOPICS[message.channel]] += 1
+        advance(stop, size)
 
 
 def _head(file: BinaryIO, place: int, size: int) -> tuple[int, int]:

@@ -119,7 +119,7 @@ class ReplayTransport:
         return last.mark(sequence) if last else None
 
     def pause(self, on: bool) -> None:
-        """Pause the replay, or go on."""
+        """Let the replay stand still, or go on."""
         with self._condition:
             self.paused = on
             self._condition.notify()
@@ -169,7 +169,7 @@ class ReplayTransport:
             self._condition.notify()
 
     def close(self) -> None:
-        """Close the file."""
+        """Close the file, and end every read that waits."""
         with self._condition:
             self._closed = True
             self._session.close()

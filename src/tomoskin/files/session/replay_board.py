@@ -5,31 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from tomoskin.board.wire import (
-    SCHEMA,
-    Ack,
-    BoardLimits,
-    Command,
-    Deframer,
-    GetBoard,
-    GetInfo,
-    GetMode,
-    GetPattern,
-    GetScan,
-    Hello,
-    Message,
-    Result,
-    SetFormat,
-    SetMode,
-    SetPattern,
-    SetScan,
-    Start,
-    Stop,
-    decode_payload,
-    encode,
-    is_command,
-    type_byte,
-)
+from tomoskin.board import wire
 from tomoskin.files.session.session_reader import stated_rate
 from tomoskin.twin import Board, HeldScanning
 
@@ -49,16 +25,18 @@ class ReplayBoard:
         """``device`` is what the session holds of the board, perhaps nothing."""
         self._board = _board(skin, device)
         self._held = HeldScanning(self._board)
-        self._deframer = Deframer(SCHEMA.to_device_bytes)
-        self._out = bytearray(encode(Hello(SCHEMA.major, SCHEMA.minor, SCHEMA.hash)))
+        self._deframer = wire.Deframer(wire.SCHEMA.to_device_bytes)
+        self._out = bytearray(
+            wire.encode(wire.Hello(wire.SCHEMA.major, wire.SCHEMA.minor, wire.SCHEMA.hash))
+        )
         self.scanning = False
 
     def obey(self, data: bytes) -> None:
-        """Carry out the commands."""
+        """Carry out the commands that these bytes hold."""
         for payload in self._deframer.feed(data):
-            command = decode_payload(payload, 0.0)
-            if command is not None and is_command(command):
-                self._out += encode(self._answer(command))
+            command = wire.decode_payload(payload, 0.0)
+            if command is not None and wire.is_command(command):
+                self._out += wire.encode(self._answer(command))
 
     def answer(self) -> bytes:
         """The answers that wait, each once."""
@@ -66,19 +44,19 @@ class ReplayBoard:
         self._out.clear()
         return data
 
-    def _answer(self, command: Command) -> Message:
+    def _answer(self, command: wire.Command) -> wire.Message:
         match command:
-            case GetInfo():
+            case wire.GetInfo():
                 return self._board.info(command.request)
-            case GetBoard():
+            case wire.GetBoard():
                 return replace(self._board.limits, request=command.request)
-            case GetScan() | GetPattern() | GetMode():
+            case wire.GetScan() | wire.GetPattern() | wire.GetMode():
                 return self._held.answer(command)
-            case SetScan() | SetPattern() | SetFormat() | SetMode():
+            case wire.SetScan() | wire.SetPattern() | wire.SetFormat() | wire.SetMode():
                 self._held.set(command)
-            case Start() | Stop():
-                self.scanning = isinstance(command, Start)
-        return Ack(command.request, type_byte(type(command)), Result.OK, 0)
+            case wire.Start() | wire.Stop():
+                self.scanning = isinstance(command, wire.Start)
+        return wire.Ack(command.request, wire.type_byte(type(command)), wire.Result.OK, 0)
 
 
 def _board(skin: Skin, device: dict[str, Any]) -> Board:
@@ -97,7 +75,7 @@ def _board(skin: Skin, device: dict[str, Any]) -> Board:
         max_samples=_MOST,
         firmware=_version(device.get("firmware")),
         unique_id=_identity(device.get("unique_id")),
-        limits=BoardLimits(0, name.ljust(24, b"\0"), 0, _MOST, 0, 0, 0, 0),
+        limits=wire.BoardLimits(0, name.ljust(24, b"\0"), 0, _MOST, 0, 0, 0, 0),
     )
 
 

@@ -103,7 +103,7 @@ def replayed(prepared: Prepared, session: SessionReader) -> Iterator[FrameResult
             yield result
 
 
-def told_touches(session: SessionReader) -> Iterator[TouchedFrame]:
+def session_touches(session: SessionReader) -> Iterator[TouchedFrame]:
     """(frame, time, touches) as they were recorded; as a replay tells them where none were."""
     counts = message_counts(session)
     if counts["/touches"] or counts["/image"]:
@@ -159,7 +159,7 @@ def reconstruct_session(
         else:
             ended = True
 
-    found = Reconstruction.of(pipeline, prepared, wanted())
+    whole = Reconstruction.of(pipeline, prepared, wanted())
     if ended and pipeline.reference is None:
         state = pipeline.reference_state
         raise DataError(
@@ -167,4 +167,4 @@ def reconstruct_session(
             where=str(session.path),
             hint="choose untouched frames with --reference",
         )
-    return replace(found, unseen=np.array(without, dtype=np.int64))
+    return replace(whole, unseen=np.array(without, dtype=np.int64))

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import msgspec
 
@@ -30,6 +30,7 @@ from tomoskin.files.session.mcap_records import LoggedMessage
 from tomoskin.files.session.session_writer import ABOUT, FORMAT, SKIN_FILE, SKINS
 from tomoskin.model.skin import Skin
 
+T = TypeVar("T")
 _RAW, _FRAMES = frozenset({channels.RAW}), frozenset({channels.FRAMES})
 
 
@@ -67,11 +68,11 @@ class SessionReader(AbstractContextManager["SessionReader"]):
             raise
 
     def __exit__(self, *_: object) -> None:
-        """Close the file."""
+        """Close the file; nothing can be read afterwards."""
         self.close()
 
     def close(self) -> None:
-        """Close the file."""
+        """Close the file; nothing can be read afterwards."""
         self.container.close()
 
     @property
@@ -101,19 +102,19 @@ class SessionReader(AbstractContextManager["SessionReader"]):
 
     def touches(self) -> Iterator[RecordedTouches]:
         """Touches of every frame that had some, or none after some."""
-        return map(touches_of, _documents(self, channels.TOUCHES))
+        return _documents(self, channels.TOUCHES, touches_of)
 
     def truth(self) -> Iterator[Truth]:
         """The twin's presses and bends, each time that they changed."""
-        return map(truth_of, _documents(self, channels.TRUTH))
+        return _documents(self, channels.TRUTH, truth_of)
 
     def events(self) -> Iterator[Event]:
-        """The events of the run."""
-        return map(event_of, _documents(self, channels.EVENTS))
+        """The events of the run, in their order."""
+        return _documents(self, channels.EVENTS, event_of)
 
     def notes(self) -> Iterator[Event]:
         """The notes that a person made."""
-        return map(event_of, _documents(self, channels.NOTES))
+        return _documents(self, channels.NOTES, event_of)
 
     def device(self) -> dict[str, Any]:
         """What the board last said of itself; empty when it did not."""
@@ -124,7 +125,7 @@ class SessionReader(AbstractContextManager["SessionReader"]):
         return _last(self, channels.CLOCK)
 
     def settings(self) -> dict[str, Any]:
-        """The settings of the run."""
+        """The settings of the run, as they were last."""
         return _last(self, channels.SETTINGS)
 
 
@@ -237,20 +238,24 @@ def _log_time(session: SessionReader, host_time: float | None) -> int:
     return round(1e9 * seconds) if seconds > 0 else 0
 
 
-def _documents(session: SessionReader, channel: int) -> Iterator[dict[str, Any]]:
+def _documents(
+    session: SessionReader, channel: int, convert: Callable[[dict[str, Any]], T]
+) -> Iterator[T]:
     for message in session.container.messages(frozenset({channel})):
-        yield _document(session, message)
+        yield _document(session, message, convert)
 
 
 def _last(session: SessionReader, channel: int) -> dict[str, Any]:
     message = session.container.last(channel)
-    return _document(session, message) if message else {}
+    return _document(session, message, dict) if message else {}
 
 
-def _document(session: SessionReader, message: LoggedMessage) -> dict[str, Any]:
+def _document(
+    session: SessionReader, message: LoggedMessage, convert: Callable[[dict[str, Any]], T]
+) -> T:
     try:
-        return msgspec.json.decode(message.data, type=dict[str, Any])
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        return convert(msgspec.json.decode(message.data, type=dict[str, Any]))
+    except (KeyError, TypeError, ValueError) as error:
         topic = channels.TOPICS[message.channel]
         raise DataError(
             f"a message of {topic} cannot be decoded: {error}", where=_place(session, message)

@@ -6,13 +6,15 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from tomoskin.core import Event, Frame, Image, PixelMap, StrPath, Touch, encode_json, plain_values
+from tomoskin.files.messages import Contact, grid_message, log_message, scene_message, touch_row
 from tomoskin.files.session import channels
-from tomoskin.files.session.foxglove import grid_message, log_message, scene_message
-from tomoskin.files.session.layout import Mark, encode_frame, encode_raw, touches_message
+from tomoskin.files.session.channels import robot_channels
+from tomoskin.files.session.layout import Mark, encode_frame, encode_raw
 from tomoskin.files.session.message_log import MessageLog
+from tomoskin.model.mesh import Plane
 
 if TYPE_CHECKING:
     from tomoskin.board.wire import Info
@@ -30,6 +32,8 @@ SKINS = "skins"
 SKIN_FILE = "skin.toml"
 """Name of the attachment that holds the skin."""
 
+_FLAT = Plane()
+
 OLD_INDEX_FILE = "tomoskin.seek"
 """Name of an attachment in files of 0.1: offsets in the file, which a copy must not keep."""
 
@@ -45,29 +49,18 @@ def about_session(skin: Skin, epoch: float) -> dict[str, str]:
     }
 
 
-class Log(Protocol):
-    """Where the messages of a session go: a file of its own, or a part of one."""
+def robot_logs(
+    path: StrPath, names: Sequence[str], *, epoch: float, start: float
+) -> dict[str, MessageLog]:
+    """One new file for the sessions of a robot's skins: a log for each, by its name.
 
-    path: Path
-    epoch: float
-
-    def describe(self, name: str, about: Mapping[str, str]) -> None:
-        """Add named strings to the file."""
-
-    def attach(self, name: str, media_type: str, data: bytes) -> None:
-        """Add a whole file."""
-
-    def put(self, channel: int, host_time: float, data: bytes) -> None:
-        """Add one message."""
-
-    def log_time(self, host_time: float) -> int:
-        """Time of a message, ns."""
-
-    def settle(self) -> None:
-        """Write what is buffered."""
-
-    def close(self) -> None:
-        """Close the log: no more messages come."""
+    The file ends when the last has. Raises OutputError when it exists or cannot be made.
+    """
+    channels = robot_channels(names)
+    whole = MessageLog(path, epoch=epoch, start=start, channels=channels)
+    about = {"format": str(FORMAT), "epoch_s": repr(float(epoch)), SKINS: " ".join(names)}
+    whole.describe(ABOUT, about)
+    return whole.parts(names)
 
 
 class SessionWriter(AbstractContextManager["SessionWriter"]):
@@ -104,7 +97,7 @@ class SessionWriter(AbstractContextManager["SessionWriter"]):
         *,
         epoch: float = 0.0,
         start: float = 0.0,
-        log: Log | None = None,
+        log: MessageLog | None = None,
     ) -> None:
         self.path = path if isinstance(path, Path) else Path(path)
         self._start = start
@@ -125,7 +118,7 @@ class SessionWriter(AbstractContextManager["SessionWriter"]):
         self._log.close()
 
     def __exit__(self, *_: object) -> None:
-        """Close the file."""
+        """End the session at the end of the block."""
         self.close()
 
     def raw(self, host_time: float, data: bytes) -> None:
@@ -141,19 +134,18 @@ class SessionWriter(AbstractContextManager["SessionWriter"]):
 
     def touches(self, host_time: float, sequence: int, touches: Sequence[Touch]) -> None:
         """Touches of the frame ``sequence``; none is worth saying when there were some before."""
-        _put_json(
-            self._log, channels.TOUCHES, host_time, touches_message(host_time, sequence, touches)
-        )
+        rows = [touch_row(touch) for touch in touches]
+        content = {"host_time": host_time, "sequence": sequence, "touches": rows}
+        _put(self._log, channels.TOUCHES, host_time, content)
 
     def image(
         self, host_time: float, image: Image, pixels: PixelMap, touches: Sequence[Touch] = ()
     ) -> None:
         """One image for tools that show it, with its touches; the frames give it exactly."""
         log_time = self._log.log_time(host_time)
-        _put_json(
-            self._log, channels.IMAGE, host_time, grid_message(image, pixels, host_time, log_time)
-        )
-        _put_json(self._log, channels.SCENE, host_time, scene_message(touches, log_time))
+        shown = [Contact.of(touch, _FLAT) for touch in touches]
+        _put(self._log, channels.IMAGE, host_time, grid_message(image, pixels, host_time, log_time))
+        _put(self._log, channels.SCENE, host_time, scene_message(shown, log_time))
 
     def truth(self, host_time: float, presses: Sequence[Any], bends: Sequence[Any] = ()) -> None:
         """What presses on the twin, and how it is bent, from ``host_time`` on.
@@ -165,17 +157,17 @@ class SessionWriter(AbstractContextManager["SessionWriter"]):
         content = {"host_time": host_time, "presses": [plain_values(press) for press in presses]}
         if bends:
             content["bends"] = [plain_values(bend) for bend in bends]
-        _put_json(self._log, channels.TRUTH, host_time, content)
+        _put(self._log, channels.TRUTH, host_time, content)
 
     def event(self, event: Event) -> None:
-        """Write an event of the run."""
+        """Write an event of the run; a person's remark is one of the kind "note"."""
         content = log_message(event, self._log.log_time(event.host_time))
-        _put_json(self._log, channels.EVENTS, event.host_time, content)
+        channel = channels.NOTES if event.kind == "note" else channels.EVENTS
+        _put(self._log, channel, event.host_time, content)
 
     def note(self, host_time: float, text: str) -> None:
         """A person's remark at ``host_time``."""
-        content = log_message(Event(host_time, "note", text), self._log.log_time(host_time))
-        _put_json(self._log, channels.NOTES, host_time, content)
+        self.event(Event(host_time, "note", text))
 
     def device(self, host_time: float, info: Info, name: str = "") -> None:
         """What the board says that it is, and what it calls itself, if anything."""
@@ -188,20 +180,16 @@ class SessionWriter(AbstractContextManager["SessionWriter"]):
         if name:
             content["name"] = name
         del content["request"]
-        _put_json(self._log, channels.DEVICE, host_time, content)
+        _put(self._log, channels.DEVICE, host_time, content)
 
     def clock(self, host_time: float, fit: Any) -> None:
         """A fit of the device's clock to the host's: a mapping or record, see the schema."""
-        _put_json(
-            self._log, channels.CLOCK, host_time, {"host_time": host_time} | plain_values(fit)
-        )
+        _put(self._log, channels.CLOCK, host_time, {"host_time": host_time} | plain_values(fit))
 
     def settings(self, host_time: float, settings: Mapping[str, Any]) -> None:
         """How the run was set: plain values by name."""
-        _put_json(
-            self._log, channels.SETTINGS, host_time, {"host_time": host_time} | dict(settings)
-        )
+        _put(self._log, channels.SETTINGS, host_time, {"host_time": host_time} | dict(settings))
 
 
-def _put_json(log: Log, channel: int, host_time: float, content: Mapping[str, Any]) -> None:
+def _put(log: MessageLog, channel: int, host_time: float, content: Mapping[str, Any]) -> None:
     log.put(channel, host_time, encode_json(content))

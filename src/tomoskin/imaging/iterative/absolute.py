@@ -20,10 +20,9 @@ from tomoskin.imaging.iterative.unknowns import (
     Unknowns,
     others,
 )
-from tomoskin.imaging.priors.named import PriorLike, penalty_of
-from tomoskin.imaging.priors.penalty import Diagonal, Penalty
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Mesh
+from tomoskin.model.prior import Diagonal, Penalty, PriorLike, penalty_of
 
 STEPS = 20
 """Most iterations."""
@@ -163,7 +162,7 @@ class AbsoluteImaging:
         image = Cells(len(self.model.mesh.cells))
         unknowns, begin = medium(self.model, data, image, self.contacts, background)
         descent = descend(
-            Goal(unknowns, self._cost(unknowns), data.target),
+            self._goal(unknowns, data.target),
             begin,
             most=self.steps,
             tolerance=self.tolerance,
@@ -171,28 +170,14 @@ class AbsoluteImaging:
         )
         return Absolute.of(unknowns.at(descent.unknowns), descent)
 
-    def _cost(self, unknowns: Unknowns) -> Quadratic | Sharp:
+    def _goal(self, unknowns: Unknowns, target: FloatArray) -> Goal:
         mesh, strength, rest = self.model.mesh, self.alpha**2, others(unknowns.n_contacts)
         if hasattr(self.prior, "touching"):
-            return Sharp(self.prior, mesh, strength, rest)
+            cost = Sharp(self.prior, mesh, strength, rest)
+            return Goal(unknowns.at, target, cost.penalty, cost.energy)
         start = unknowns.at(np.zeros(unknowns.size)).by_contrast
-        return Quadratic(Joint(penalty_of(self.prior, mesh, start), strength, rest))
-
-
-@dataclass(frozen=True, eq=False)
-class Quadratic:
-    """A cost xᵀQx that does not change with x."""
-
-    joint: Penalty
-
-    def penalty(self, unknowns: FloatArray, jacobian: FloatArray) -> Penalty:
-        """The matrix Q, which is the same everywhere."""
-        del unknowns, jacobian
-        return self.joint
-
-    def energy(self, unknowns: FloatArray, force: FloatArray) -> float:
-        """xᵀQx, without Q: the force is Qx."""
-        return float(unknowns @ force)
+        joint = Joint(penalty_of(self.prior, mesh, start), strength, rest)
+        return Goal(unknowns.at, target, lambda _: joint)
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,15 +189,13 @@ class Sharp:
     strength: float
     others: Diagonal
 
-    def penalty(self, unknowns: FloatArray, jacobian: FloatArray) -> Penalty:
+    def penalty(self, unknowns: FloatArray) -> Penalty:
         """The quadratic that touches it at ``unknowns``."""
-        del jacobian
         image = unknowns[: len(self.mesh.cells)]
         return Joint(self.prior.touching(self.mesh, image), self.strength, self.others)
 
-    def energy(self, unknowns: FloatArray, force: FloatArray) -> float:
-        """Value of the sharp cost."""
-        del force
+    def energy(self, unknowns: FloatArray) -> float:
+        """The cost of ``unknowns``, edges at their full length."""
         n = len(self.mesh.cells)
         rest = unknowns[n:]
         return float(
@@ -242,7 +225,7 @@ def _uniform(
         background = _of_right_size(model, data.target, data.rows)
     unknowns = Unknowns(model, _Nothing(len(model.mesh.cells)), background, contacts, data.rows)
     descent = descend(
-        Goal(unknowns, Quadratic(others(unknowns.n_contacts)), data.target),
+        Goal(unknowns.at, data.target, lambda _: others(unknowns.n_contacts)),
         Descent.begin(unknowns.size),
         most=STEPS,
         tolerance=TOLERANCE,

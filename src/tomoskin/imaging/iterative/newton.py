@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Protocol
@@ -11,7 +11,7 @@ import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from tomoskin.core import FloatArray, ModelError
-from tomoskin.imaging.priors.penalty import Penalty
+from tomoskin.model.prior import Penalty
 
 _HALVINGS = 12
 """Shorter steps tried before a direction counts as leading nowhere."""
@@ -28,26 +28,6 @@ class Point(Protocol):
     @property
     def jacobian(self) -> FloatArray:
         """(m, n) their derivative by the unknowns."""
-        ...
-
-
-class Forward(Protocol):
-    """Unknowns → values of unit noise."""
-
-    def at(self, unknowns: FloatArray) -> Point:
-        """The problem at ``unknowns`` (n,)."""
-        ...
-
-
-class Regulariser(Protocol):
-    """What unknowns cost beside the misfit."""
-
-    def penalty(self, unknowns: FloatArray, jacobian: FloatArray) -> Penalty:
-        """The quadratic that touches the cost at ``unknowns``."""
-        ...
-
-    def energy(self, unknowns: FloatArray, force: FloatArray) -> float:
-        """The cost; ``force`` (n,) is Q times the unknowns, for those that need it."""
         ...
 
 
@@ -100,16 +80,19 @@ class Goal:
     Attributes
     ----------
     forward
-        f.
-    regulariser
-        The cost.
+        f at x (n,).
     target
         (m,) values of unit noise.
+    penalty
+        The quadratic that touches the cost at x.
+    energy
+        The cost at x, where it is not that quadratic itself.
     """
 
-    forward: Forward
-    regulariser: Regulariser
+    forward: Callable[[FloatArray], Point]
     target: FloatArray
+    penalty: Callable[[FloatArray], Penalty]
+    energy: Callable[[FloatArray], float] | None = None
 
 
 def descend(
@@ -121,7 +104,7 @@ def descend(
     far along as lowers the objective (Nocedal & Wright 2006, 10.3), and no further than changes
     an unknown by ``reach``. It stops when a step gains less than ``tolerance`` of the objective.
     """
-    here = _Here(begin.unknowns, begin.force, goal.forward.at(begin.unknowns))
+    here = _Here(begin.unknowns, begin.force, goal.forward(begin.unknowns))
     steps = [here.step(goal, 0.0)]
     reason, converged = f"reached the limit of {most} steps", False
     for _ in range(most):
@@ -151,7 +134,9 @@ class _Here:
 
     def step(self, goal: Goal, length: float) -> Iteration:
         residual = goal.target - self.point.predicted
-        energy = goal.regulariser.energy(self.unknowns, self.force)
+        energy = float(self.unknowns @ self.force)
+        if goal.energy is not None:
+            energy = goal.energy(self.unknowns)
         return Iteration(float(residual @ residual), energy, length)
 
 
@@ -159,14 +144,14 @@ def _moved(here: _Here, goal: Goal, reach: float) -> tuple[_Here, Iteration] | N
     """As far along one Gauss–Newton step as lowers the objective; None if nothing does."""
     x, jacobian = here.unknowns, here.point.jacobian
     rhs = goal.target - here.point.predicted + jacobian @ x
-    end, pull = minimiser(goal.regulariser.penalty(x, jacobian), jacobian, rhs)
+    end, pull = minimiser(goal.penalty(x), jacobian, rhs)
     before = here.step(goal, 0.0).objective
     longest = min(1.0, reach / max(float(np.abs(end - x).max()), 1e-300))
     for halving in range(_HALVINGS):
         length = longest * 0.5**halving
         trial, force = x + length * (end - x), here.force + length * (pull - here.force)
         with suppress(ModelError):  # too far: no model has such a conductivity
-            there = _Here(trial, force, goal.forward.at(trial))
+            there = _Here(trial, force, goal.forward(trial))
             step = there.step(goal, length)
             if step.objective < before:
                 return there, step

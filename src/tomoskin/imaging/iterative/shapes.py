@@ -20,7 +20,7 @@ from scipy.spatial.distance import cdist
 from scipy.special import expit, ndtr
 
 from tomoskin.core import FloatArray, IntArray, ModelError
-from tomoskin.imaging.iterative.absolute import Absolute, Quadratic, medium
+from tomoskin.imaging.iterative.absolute import Absolute, medium
 from tomoskin.imaging.iterative.newton import Goal, descend
 from tomoskin.imaging.iterative.observation import Observation
 from tomoskin.imaging.iterative.unknowns import (
@@ -30,10 +30,9 @@ from tomoskin.imaging.iterative.unknowns import (
     ModelPoint,
     others,
 )
-from tomoskin.imaging.priors.penalty import Diagonal
-from tomoskin.imaging.priors.smooth import matern_correlation
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Mesh
+from tomoskin.model.prior import Diagonal, matern_correlation
 
 LEFT_OUT = 0.02
 """Part of the field's variance that the modes may lack, at the worst point."""
@@ -192,7 +191,7 @@ class Segmented:
 
     Attributes
     ----------
-    found
+    absolute
         Conductivity per cell, background, contacts and how they were found.
     field, latent
         The random field, and its numbers (k,).
@@ -201,7 +200,7 @@ class Segmented:
         where the edges are softest, since sharp ones hide what a new region would change.
     """
 
-    found: Absolute
+    absolute: Absolute
     field: RandomField
     latent: FloatArray
     covariance: FloatArray
@@ -301,13 +300,13 @@ class ShapeImaging:
         softest = Phases(field, self.softness[0], self.most)
         unknowns, descent = medium(self.model, data, softest, self.contacts, background)
         rest = others(unknowns.n_contacts, self.drift)
-        cost = Quadratic(Joint(Diagonal(np.ones(field.size)), 1.0, rest))
+        joint = Joint(Diagonal(np.ones(field.size)), 1.0, rest)
         again = {round(part * last) for part in CENTRED}
         for step, softness in enumerate(self.softness):
             if step in again:
                 field = self._centred(field, descent.unknowns[: field.size])
             unknowns = replace(unknowns, image=Phases(field, softness, self.most))
-            goal = Goal(unknowns, cost, data.target)
+            goal = Goal(unknowns.at, data.target, lambda _: joint)
             descent = descend(goal, descent, most=1, tolerance=0.0)
         point = unknowns.at(descent.unknowns)
         softest = replace(softest, field=field)

@@ -11,9 +11,8 @@ from tomoskin.core import FloatArray, Image, ModelError
 from tomoskin.imaging.iterative.absolute import STEPS, TOLERANCE, Sharp
 from tomoskin.imaging.iterative.newton import Descent, Goal, Iteration, descend, table
 from tomoskin.imaging.iterative.observation import Observation
-from tomoskin.imaging.priors.named import SharpPrior
-from tomoskin.imaging.priors.penalty import Diagonal
 from tomoskin.model.forward import ForwardModel
+from tomoskin.model.prior import Diagonal, SharpPrior
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,11 +82,16 @@ class SharpDifference:
     def __call__(self, observation: Observation) -> SharpImage:
         """Image of difference data. Raises DataError when they are not of this pattern."""
         data = observation.whitened(self.model.pattern.n_meas)
-        forward = _Linear(data.rows @ self.jacobian)
+        jacobian = data.rows @ self.jacobian
         mesh = self.model.mesh
         cost = Sharp(self.prior, mesh, self.alpha**2, Diagonal(np.empty(0)))
         descent = descend(
-            Goal(forward, cost, data.target),
+            Goal(
+                lambda x: _Prediction(jacobian @ x, jacobian),
+                data.target,
+                cost.penalty,
+                cost.energy,
+            ),
             Descent.begin(len(mesh.cells)),
             most=self.steps,
             tolerance=self.tolerance,
@@ -98,16 +102,8 @@ class SharpDifference:
 
 
 @dataclass(frozen=True, eq=False)
-class _Linear:
-    """The linear model f(x) = Jx."""
-
-    jacobian: FloatArray
-
-    def at(self, unknowns: FloatArray) -> _Prediction:
-        return _Prediction(self.jacobian @ unknowns, self.jacobian)
-
-
-@dataclass(frozen=True, eq=False)
 class _Prediction:
+    """What the linear model gives at one image."""
+
     predicted: FloatArray
     jacobian: FloatArray

@@ -9,8 +9,8 @@ from typing import Literal, Protocol
 import numpy as np
 
 from tomoskin.core import FloatArray, ModelError
-from tomoskin.imaging.priors.penalty import Carried, Diagonal, Penalty
 from tomoskin.model.forward import ForwardModel, State
+from tomoskin.model.prior import Carried, Diagonal, Penalty
 
 Contacts = Literal["fixed", "one", "each"]
 """Which contact impedances are looked for: none, a common factor, a factor per electrode."""

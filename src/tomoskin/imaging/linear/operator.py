@@ -15,6 +15,9 @@ from tomoskin.core import DataError, DeferredImage, Image
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.pattern import Pattern
 
+MOST_EXCLUDED = 0.25
+"""Above this fraction of excluded measurements a frame gives no image: mostly prior."""
+
 
 def expected(
     dv: NDArray[Any],
@@ -133,15 +136,12 @@ class Operator:
         """
         return self._image(self.matrix @ self.check(dv))
 
-    def quick(self, dv: NDArray[Any]) -> Image:
-        """As a call, from the matrix in single precision: half the bytes, for the frame flow.
-
-        The product reads all of the matrix once, so its time is that of the memory.
-        """
-        return self._image(self._quick_values(self.check(dv)))
-
     def deferred(self, dv: NDArray[Any]) -> Image:
-        """:meth:`quick` where nobody may look at it: checked at once, computed when asked for."""
+        """The image, checked at once and computed when it is asked for, for the frame flow.
+
+        In single precision: the product reads all of the matrix once, so that half the bytes
+        take half the time.
+        """
         checked = self.check(dv)
         make = partial(self._quick_values, checked)
         return DeferredImage(make, self.unit, self.model.mesh.identity)

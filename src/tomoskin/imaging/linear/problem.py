@@ -1,4 +1,4 @@
-"""The linear problem that every one-step operator, spectrum and choice of alpha starts from."""
+"""The linear problem that spectrum and choice of alpha start from, and its one-step operator."""
 
 from __future__ import annotations
 
@@ -12,50 +12,15 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from tomoskin.core import DataError, FloatArray, ModelError
 from tomoskin.imaging.linear.operator import Operator
-from tomoskin.imaging.priors.named import PriorLike, penalty_of
-from tomoskin.imaging.priors.penalty import Carried, Penalty
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.pattern import Pattern
-
-_QUIETEST = 0.1
-"""No row is taken for quieter than this part of the median: a row that never moves is dead, not
-exact."""
+from tomoskin.model.prior import Carried, Penalty, PriorLike, penalty_of
 
 _ZERO = 1e-9
 """A voltage below this part of the largest is zero by symmetry, and its value is rounding."""
 
 _ILL_CONDITIONED = 1e12
 """Above this condition number a product with the inverse has lost digits worth getting back."""
-
-
-def noise_weights(noise: NDArray[np.floating], default: FloatArray) -> FloatArray:
-    """Diagonal of W from the standard deviation of each row, W ∝ 1/sd².
-
-    Scaled so that the weights have the geometric mean of the default ones: where the noise is as
-    those suppose, they stay as they are, and alpha keeps its meaning.
-
-    Parameters
-    ----------
-    noise
-        (n_meas,) standard deviation of the difference data, V or a ratio.
-    default
-        (n_meas,) weights of a problem without known noise; see :class:`LinearProblem`.
-
-    Raises
-    ------
-    DataError
-        When there are more or fewer values than rows, or one is negative or not finite.
-    """
-    if noise.shape != default.shape:
-        raise DataError(f"expected noise of shape {default.shape}, got {noise.shape}")
-    good = np.isfinite(noise) & (noise >= 0)
-    if not good.all():
-        row = int(np.argmin(good))
-        raise DataError(f"expected noise of at least 0, got {noise[row]}", where=f"row {row}")
-    if not noise.any():
-        return default
-    sd = np.maximum(noise, _QUIETEST * np.median(noise[noise > 0]))
-    return np.asarray(np.exp(np.mean(np.log(default * sd**2))) / sd**2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,10 +86,6 @@ class LinearProblem:
         """Q⁻¹Jᴴ (n_cells, n_meas) and JQ⁻¹Jᴴ (n_meas, n_meas), which hold for every alpha."""
         return self.prior.carry(self.jacobian)
 
-    def weighted(self, noise: NDArray[np.floating]) -> Self:
-        """The problem with weights from the noise of each row; see :func:`noise_weights`."""
-        return replace(self, weights=noise_weights(noise, self.weights))
-
     def without(self, rows: NDArray[Any]) -> Self:
         """The problem of a pattern that never had ``rows``; prior and linearisation stay.
 
@@ -182,6 +143,65 @@ class LinearProblem:
             reference=self.reference,
             difference=self.difference,
         )
+
+
+class OneStep(Operator):
+    """Linear difference imaging: x = (JᵀWJ + α²Q)⁻¹JᵀW dv, the thesis's (3.54) and (3.55).
+
+    Parameters
+    ----------
+    model
+        The forward model to linearise.
+    prior
+        A name from :data:`tomoskin.imaging.PRIORS`, a prior such as ``Noser(exponent=1.0)``, or
+        a symmetric (n_cells, n_cells) matrix Q, dense or sparse, or its diagonal.
+    alpha
+        Hyper-parameter; it enters squared.
+    conductivity
+        Where to linearise: (n_cells,) or one number, S or S/m; real or complex.
+    difference
+        "plain": dv in V. "normalised": dv is a ratio; the rows of J are divided by the model's
+        voltages |v₀| and W = diag(|v₀|²), so that a gain of the read-out cancels.
+    weights
+        (n_meas,) diagonal of W, instead of the default.
+
+    Attributes
+    ----------
+    alpha
+        As given.
+    problem
+        What the operator solves: Jacobian, weights and prior.
+
+    Raises
+    ------
+    ModelError
+        For an unknown prior or difference, alpha ≤ 0, weights that are not positive, or a
+        tensor conductivity.
+    """
+
+    def __init__(
+        self,
+        model: ForwardModel,
+        prior: PriorLike = "noser",
+        *,
+        alpha: float,
+        conductivity: ArrayLike = 1.0,
+        difference: str = "plain",
+        weights: ArrayLike | None = None,
+    ) -> None:
+        problem = LinearProblem.of(
+            model, prior, conductivity=conductivity, difference=difference, weights=weights
+        )
+        made = problem.operator(alpha)
+        super().__init__(
+            model,
+            made.matrix,
+            precision=made.precision,
+            reference=made.reference,
+            difference=difference,
+        )
+        self.problem = problem
+        self.alpha = alpha
 
 
 def _fitted(precision: NDArray[Any], response: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:

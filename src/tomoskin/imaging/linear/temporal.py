@@ -13,17 +13,64 @@ nothing is remembered, and the image is that of the operator.
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import DataError, FloatArray, Image, ModelError
-from tomoskin.imaging.linear.modes import Modes
-from tomoskin.imaging.linear.one_step import OneStep
+from tomoskin.imaging.linear.operator import Operator
+from tomoskin.imaging.linear.spectrum import Spectrum
+
+_NOTHING = 1e-12
+"""A mode whose image is this far below the strongest one is none: half of them when every row
+has a reciprocal."""
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """Modes of a one-step operator B: neither noise nor prior couples two of them.
+
+    A mode of the spectrum with eigenvalue λ is trusted by e = λ/(λ + α²), where λ is its prior
+    variance in units of its noise, up to α².
+
+    Attributes
+    ----------
+    operator
+        B.
+    analysis
+        (k, n_meas) difference data → modes.
+    synthesis
+        (n_cells, k) modes → image, what B makes of each.
+    trust
+        (k,) e, from 0 (only noise) to 1 (no noise).
+    """
+
+    operator: Operator
+    analysis: NDArray[Any]
+    synthesis: NDArray[Any]
+    trust: FloatArray
+
+    @classmethod
+    def of(cls, spectrum: Spectrum, alpha: float, operator: Operator | None = None) -> Self:
+        """Those of ``spectrum.operator(alpha)``, which ``operator`` is where it is at hand."""
+        synthesis = spectrum.modes * spectrum.gains(alpha)
+        size = np.linalg.norm(synthesis, axis=0)
+        kept = size > _NOTHING * size.max()
+        return cls(
+            spectrum.operator(alpha) if operator is None else operator,
+            np.ascontiguousarray(spectrum.analysis[kept]),
+            np.ascontiguousarray(synthesis[:, kept]),
+            np.clip(spectrum.filters(alpha)[kept], 0.0, 1.0),
+        )
+
+    @cached_property
+    def quick_synthesis(self) -> NDArray[Any]:
+        """``synthesis`` in single precision: half the bytes per frame."""
+        kind = np.complex64 if np.iscomplexobj(self.synthesis) else np.float32
+        return self.synthesis.astype(kind)
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,15 +78,12 @@ class Belief:
     """The state of the filter after a frame.
 
     ``time`` s; ``mean`` (k,) the modes as the operator would have had to measure them;
-    ``variance`` (k,) as a part of the prior's, and ``expected`` (k,) the same before the frame;
-    ``kept`` φ since the frame before.
+    ``variance`` (k,) as a part of the prior's.
     """
 
     time: float
     mean: NDArray[Any]
     variance: FloatArray
-    expected: FloatArray
-    kept: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,13 +94,10 @@ class Steady:
     ----------
     gain, pole
         (k,) mode ← pole · mode + gain · data.
-    noise
-        (k,) variance of each mode under white measurement noise, as a part of the operator's.
     """
 
     gain: FloatArray
     pole: FloatArray
-    noise: FloatArray
 
 
 class Temporal:
@@ -64,9 +105,9 @@ class Temporal:
 
     Parameters
     ----------
-    operator
-        Whose prior, weights and alpha state what an image is and how large the noise is; or its
-        modes, for several filters.
+    modes
+        Of the operator whose prior, weights and alpha state what an image is and how large the
+        noise is.
     time_constant
         τ, s: how long an image lasts. 0 gives the operator's own images.
 
@@ -76,9 +117,11 @@ class Temporal:
         When the time constant is below 0 or not finite.
     """
 
-    def __init__(self, operator: OneStep | Modes, time_constant: float) -> None:
-        self.modes = Modes.taken_from(operator)
-        self.time_constant = checked_time_constant(time_constant)
+    def __init__(self, modes: Modes, time_constant: float) -> None:
+        self.modes = modes
+        if not (np.isfinite(time_constant) and time_constant >= 0):
+            raise ModelError(f"expected a time constant of 0 s or more, got {time_constant}")
+        self.time_constant = time_constant
         self.belief: Belief | None = None
 
     def push(self, dv: NDArray[Any], time: float) -> Image:
@@ -90,8 +133,32 @@ class Temporal:
             When the time does not increase, or the data do not fit; the filter then stays as
             it was.
         """
-        self.belief = advance(self.modes, self.time_constant, self.belief, dv, time)
-        return image_of(self.modes, self.belief.mean)
+        self.belief = self._advanced(dv, time)
+        values = self.modes.quick_synthesis @ self.belief.mean.astype(
+            self.modes.quick_synthesis.dtype
+        )
+        operator = self.modes.operator
+        values = values.astype(np.result_type(values, np.float64))
+        return Image(values, operator.unit, operator.model.mesh.identity)
+
+    def _advanced(self, dv: NDArray[Any], time: float) -> Belief:
+        """The scalar Kalman update of every mode, written in e so that e = 0 and e = 1 hold too."""
+        last, trust = self.belief, self.modes.trust
+        data = self.modes.analysis @ self.modes.operator.check(dv)
+        if not np.isfinite(time):
+            raise DataError(f"expected a finite time, got {time}")
+        if last is None:
+            before, expected = np.zeros_like(data), np.ones(len(data))
+        elif time > last.time:
+            kept = _kept(time - last.time, self.time_constant)
+            before, expected = kept * last.mean, kept**2 * last.variance + (1.0 - kept**2)
+        else:
+            raise DataError(
+                f"expected frames in order of time, got {time:g} s after {last.time:g} s",
+                hint="leave out repeated frames, or reset the filter",
+            )
+        gain = _gain(expected, trust)
+        return Belief(time, before + gain * (data - trust * before), gain * (1.0 - trust))
 
     def reset(self) -> None:
         """Forget every frame, for instance with a new reference."""
@@ -105,12 +172,7 @@ class Temporal:
         trust = self.modes.trust
         gain = _gain(_steady_variance(trust, 1.0 - kept**2), trust)
         pole = kept * (1.0 - trust * gain)
-        return Steady(gain, pole, gain**2 / (1.0 - pole**2))
-
-    def noise_left(self, interval: float) -> FloatArray:
-        """(n_cells,) deviation of each cell under white noise, as a part of the operator's."""
-        power = np.abs(self.modes.synthesis) ** 2
-        return np.asarray(np.sqrt(power @ self.steady(interval).noise / power.sum(axis=1)))
+        return Steady(gain, pole)
 
     def spread(self, noise: FloatArray, interval: float) -> FloatArray:
         """(n_cells, k) S with S·Sᵀ the covariance of the image, frames every ``interval`` s.
@@ -128,48 +190,6 @@ class Temporal:
         return np.asarray(self.modes.synthesis @ (vectors * np.sqrt(np.maximum(values, 0.0))))
 
 
-def advance(
-    modes: Modes, time_constant: float, last: Belief | None, dv: NDArray[Any], time: float
-) -> Belief:
-    """One step of the filter; see :meth:`Temporal.push`."""
-    data = modes.analysis @ modes.operator.check(dv)
-    if not np.isfinite(time):
-        raise DataError(f"expected a finite time, got {time}")
-    if last is None:
-        unknown = np.ones(len(data))
-        nothing = Belief(time, np.zeros_like(data), unknown, unknown, 0.0)
-        return _updated(nothing, data, modes.trust)
-    if time <= last.time:
-        raise DataError(
-            f"expected frames in order of time, got {time:g} s after {last.time:g} s",
-            hint="leave out repeated frames, or reset the filter",
-        )
-    kept = _kept(time - last.time, time_constant)
-    expected = kept**2 * last.variance + (1.0 - kept**2)
-    return _updated(Belief(time, kept * last.mean, expected, expected, kept), data, modes.trust)
-
-
-def image_of(modes: Modes, mean: NDArray[Any]) -> Image:
-    """The image of the state's ``mean`` (k,)."""
-    values = modes.quick_synthesis @ mean.astype(modes.quick_synthesis.dtype)
-    values = values.astype(np.result_type(values, np.float64))
-    return Image(values, modes.operator.unit, modes.operator.model.mesh.identity)
-
-
-def checked_time_constant(value: float) -> float:
-    """``value``; raises ModelError unless it is a time, s."""
-    if not (np.isfinite(value) and value >= 0):
-        raise ModelError(f"expected a time constant of 0 s or more, got {value}")
-    return value
-
-
-def _updated(before: Belief, data: NDArray[Any], trust: FloatArray) -> Belief:
-    """The scalar Kalman update of every mode, written in e so that e = 0 and e = 1 hold too."""
-    gain = _gain(before.expected, trust)
-    mean = before.mean + gain * (data - trust * before.mean)
-    return replace(before, mean=mean, variance=gain * (1.0 - trust))
-
-
 def _gain(expected: FloatArray, trust: FloatArray) -> FloatArray:
     spread = expected * trust + (1.0 - trust)
     return np.divide(expected, spread, out=np.zeros_like(expected), where=spread > 0)
@@ -185,84 +205,3 @@ def _steady_variance(trust: FloatArray, lost: float) -> FloatArray:
     root = np.sqrt(b**2 + 4.0 * trust * lost * (1.0 - trust))
     with np.errstate(divide="ignore", invalid="ignore"):  # each form where it is stable
         return np.where(b >= 0, 2.0 * lost * (1.0 - trust) / (b + root), (root - b) / (2.0 * trust))
-
-
-@dataclass(frozen=True, eq=False)
-class Smoothed:
-    """An image of ``time`` s; ``variance`` (k,) of its modes, as a part of the prior's."""
-
-    time: float
-    image: Image
-    variance: FloatArray
-
-
-class Smoother:
-    """The filter of :class:`Temporal`, followed by a pass back over the last ``lag`` frames.
-
-    The pass is that of Rauch, Tung & Striebel (1965), mode by mode.
-
-    Raises
-    ------
-    ModelError
-        When the lag is not a whole number of frames from 0, or the time constant no time.
-    """
-
-    def __init__(self, operator: OneStep | Modes, time_constant: float, lag: int) -> None:
-        if not (isinstance(lag, int) and lag >= 0):
-            raise ModelError(f"expected a lag of 0 frames or more, got {lag}")
-        self.modes = Modes.taken_from(operator)
-        self.time_constant = checked_time_constant(time_constant)
-        self.lag = lag
-        self._beliefs: deque[Belief] = deque(maxlen=lag + 1)
-
-    def push(self, dv: NDArray[Any], time: float) -> Smoothed | None:
-        """Image of the frame ``lag`` frames ago; None until there were so many.
-
-        Raises DataError as :meth:`Temporal.push`.
-        """
-        last = self._beliefs[-1] if self._beliefs else None
-        self._beliefs.append(advance(self.modes, self.time_constant, last, dv, time))
-        if len(self._beliefs) <= self.lag:
-            return None
-        *_, oldest = self._backwards()
-        return self._shown(oldest)
-
-    def finish(self) -> tuple[Smoothed, ...]:
-        """Images of the frames that are still waiting, oldest first; then it starts afresh."""
-        waiting = list(self._backwards())[::-1]
-        if len(self._beliefs) > self.lag:
-            del waiting[0]
-        self._beliefs.clear()
-        return tuple(self._shown(belief) for belief in waiting)
-
-    def _shown(self, belief: Belief) -> Smoothed:
-        return Smoothed(belief.time, image_of(self.modes, belief.mean), belief.variance)
-
-    def _backwards(self) -> Iterator[Belief]:
-        """Every frame in the window given all of them, newest first."""
-        smoothed: Belief | None = None
-        later: Belief | None = None
-        for belief in reversed(self._beliefs):
-            smoothed = (
-                belief if smoothed is None or later is None else _given(belief, later, smoothed)
-            )
-            later = belief
-            yield smoothed
-
-
-def _given(belief: Belief, later: Belief, smoothed: Belief) -> Belief:
-    """``belief``, given ``smoothed``: that of the frame after it in the light of all later ones.
-
-    ``later`` is that belief as the filter had it.
-    """
-    share = np.divide(
-        later.kept * belief.variance,
-        later.expected,
-        out=np.zeros_like(later.expected),
-        where=later.expected > 0,
-    )
-    return replace(
-        belief,
-        mean=belief.mean + share * (smoothed.mean - later.kept * belief.mean),
-        variance=belief.variance + share**2 * (smoothed.variance - later.expected),
-    )

@@ -52,8 +52,8 @@ class Memory:
             return np.concatenate([z, curved])
         width = self._size * np.array(_WIDTHS)[:, None]
         self._plays = np.clip(self._plays, z - width, z + width)
-        left = np.exp(-step / np.array(_LAGS))[:, None]
-        self._late = z + (self._late - z) * left
+        kept = np.exp(-step / np.array(_LAGS))[:, None]
+        self._late = z + (self._late - z) * kept
         lead = slice(0, min(3, len(z)))  # what is small has no past to speak of
         past = (self._plays[:, lead].ravel(), self._late[:, lead].ravel())
         return np.concatenate([z, curved, *past])
@@ -138,8 +138,11 @@ class BendModel:
         Raises
         ------
         DataError
-            When the bends do not show above the noise.
+            When the bends do not show above the noise, or the covariance is of other rows.
         """
+        n_meas = examples.dv.shape[1]
+        if covariance.shape != (n_meas, n_meas):
+            raise DataError(f"expected {n_meas} rows of covariance, got shape {covariance.shape}")
         whiten = Whitener.of(covariance)
         whitened = whiten(examples.dv)
         _, singular, rows = np.linalg.svd(whitened, full_matrices=False)
@@ -165,9 +168,9 @@ class BendModel:
 
         Raises DataError when the bends do not show in these.
         """
-        left = np.delete(np.arange(len(self.covariance)), rows)
-        examples = replace(self.examples, dv=self.examples.dv[:, left])
-        return self.learn(examples, self.covariance[np.ix_(left, left)])
+        kept = np.delete(np.arange(len(self.covariance)), rows)
+        examples = replace(self.examples, dv=self.examples.dv[:, kept])
+        return self.learn(examples, self.covariance[np.ix_(kept, kept)])
 
     @property
     def remembers(self) -> bool:

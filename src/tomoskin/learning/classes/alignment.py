@@ -95,11 +95,11 @@ def _fitted(prior: Mixture, x: FloatArray, numbers: IntArray) -> Mixture:
     Labels name what was found without them, and each template is tried as they alone give it: one
     that has changed much is not found from where it was. The likeliest of these fits is taken.
     """
-    found = prior.moved_to(x).adapted(x, np.full(len(x), -1))
+    unnamed = prior.moved_to(x).adapted(x, np.full(len(x), -1))
     labelled = numbers >= 0
     if not labelled.any():
-        return found
-    named = _named(prior, found, x[labelled], numbers[labelled])
+        return unnamed
+    named = _named(prior, unnamed, x[labelled], numbers[labelled])
     starts = [named, *_from_labels(named, x[labelled], numbers[labelled])]
     fits = [start.adapted(x, numbers) for start in starts]
     return max(fits, key=lambda fit: fit.log_likelihood(x, numbers))
@@ -114,9 +114,9 @@ def _from_labels(named: Mixture, x: FloatArray, numbers: IntArray) -> Iterator[M
                 others = np.delete(design, name, axis=1) @ np.delete(
                     named.templates[1:], name, axis=0
                 )
-                left = x - x.mean(axis=0) - others
+                residual = x - x.mean(axis=0) - others
                 effects = named.templates[1:].copy()
-                effects[name] = flag @ left / (flag @ flag)
+                effects[name] = flag @ residual / (flag @ flag)
                 yield named.about(x, numbers, effects)
     for frames in _PRIOR_FRAMES:
         weigh = design.T @ design + frames * np.eye(design.shape[1])

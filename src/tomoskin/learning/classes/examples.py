@@ -17,7 +17,7 @@ from tomoskin.learning.touch.presses import frames
 _MOST_FLAGS = 10
 """All combinations are weighed, so each flag doubles the work."""
 
-_LISTED = 8
+_LISTED, _MOST_SESSIONS = 8, 1000
 
 
 @dataclass(frozen=True)
@@ -108,8 +108,11 @@ class Examples:
     session: IntArray
 
     @classmethod
-    def of(cls, codes: Codes, dv: ArrayLike, flags: ArrayLike) -> Self:
-        """Examples of one session. Raises DataError for arrays that do not belong together."""
+    def checked(
+        cls, codes: Codes, dv: ArrayLike, flags: ArrayLike, session: IntArray | None = None
+    ) -> Self:
+        """Examples, of one session unless more are given. Raises DataError for arrays that do not
+        belong together."""
         data, given = frames(dv), np.asarray(flags, dtype=np.float64)
         if given.shape != (len(data), len(codes.names)):
             expected = (len(data), len(codes.names))
@@ -121,7 +124,13 @@ class Examples:
                 f"expected 0 or 1 for each of {', '.join(codes.names)}, got {given[row].tolist()}",
                 where=f"frame {row}",
             )
-        return cls(codes, data, given, np.zeros(len(data), dtype=np.int64))
+        number = np.zeros(len(data), dtype=np.int64) if session is None else session
+        if number.shape != (len(data),) or not np.isin(number, range(_MOST_SESSIONS)).all():
+            raise DataError(
+                f"expected a session from 0 to {_MOST_SESSIONS - 1} for each of {len(data)} "
+                f"frames, got shape {number.shape}"
+            )
+        return cls(codes, data, given, number)
 
     def __len__(self) -> int:
         """Number of frames."""
@@ -172,7 +181,7 @@ class Examples:
             session=np.append(self.session, later),
         )
 
-    def checked(self) -> Self:
+    def enough(self) -> Self:
         """These, or DataError that names the state that has too few labelled frames."""
         flags = self.flags[self.labelled]
         counts = np.stack([flags.sum(axis=0), (1 - flags).sum(axis=0)])

@@ -1,10 +1,5 @@
-"""The kind of calibration that tells which class a frame belongs to, from labelled examples.
-
-Keys of the .npz: ``kind``, ``version``; ``dv`` (n, n_meas), ``flags`` (n, f) 0 or 1, NaN where a
-frame has no label, ``session`` (n,) from 0; ``names`` (f,), ``exclusive`` 0 or 1; ``drive``,
-``measure`` (n_meas, 2), ``n_electrodes``; ``skin`` identity, ``skin_name``. As with touch, what was
-learnt is learnt again when the file is read.
-"""
+"""The classifier, examples → which class a frame shows, how sure, or none of them; and the kind of
+calibration that it makes."""
 
 from __future__ import annotations
 
@@ -12,20 +7,40 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import stdtrit
 
-from tomoskin.core import (
-    Arrays,
-    DataError,
-    Detection,
-    FloatArray,
-    IntArray,
-    real_numbers,
-    whole_number,
-)
-from tomoskin.learning.classes.classifier import Classifier
+from tomoskin.core import DataError, Detection, FloatArray, IntArray
+from tomoskin.learning.classes.alignment import Alignment, aligned, shows
 from tomoskin.learning.classes.examples import Codes, Examples
-from tomoskin.learning.kind import Applied, Conditions, FrameView, Kind, Progress, located
+from tomoskin.learning.classes.mixture import Mixture, Subspace, posterior, session_mean
+from tomoskin.learning.kind import Applied, Conditions, FrameView, Kind
+from tomoskin.learning.touch.presses import frames
 from tomoskin.model.pattern import Pattern
+
+_FOLDS = 5
+_KNOWN = 0.99
+"""Part of the frames of known classes that are not called unknown."""
+
+_SHARPNESS = np.geomspace(0.05, 1.6, 16)
+_TEMPERED = np.geomspace(1e-3, 1.6, 60)
+_ENOUGH = 10
+"""Unlabelled frames of a session below which it is not fitted."""
+
+
+@dataclass(frozen=True, eq=False)
+class Answers:
+    """What frames show.
+
+    ``flags`` (n, f) 0 or 1; ``label`` in words; ``probability`` (n,) of that combination, of
+    ``each`` flag or state (n, f); ``rejected`` (n,) frames that look like none of them.
+    """
+
+    flags: FloatArray
+    label: tuple[str, ...]
+    probability: FloatArray
+    each: FloatArray
+    rejected: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,106 +70,274 @@ class ClassReading:
 
 
 @dataclass(frozen=True, eq=False)
-class FrameClassifier:
-    """A classifier for the frames of one skin, of which some measurements may be missing.
+class Classifier:
+    """States or flags of frames, learnt from examples; made by :meth:`fit`.
 
     Attributes
     ----------
-    classifier
-        What was learnt, of all measurements.
+    examples
+        What it was learnt from, session by session; answers are for the newest.
+    skin_id
+        Identity of the skin, "" where it is not known.
+    right
+        Part of the labelled frames of the newest session that has them all whose state is told
+        when they are left out of the learning.
+    alignment
+        How the newest session was taken over; None where it has all its labels.
     rows
-        (n_meas,) the classifier's measurement of each one of a frame.
+        (n_meas,) of the examples' measurements, each one's number in a frame, where frames lack
+        some; None where they have all.
     """
 
-    classifier: Classifier
-    rows: IntArray
+    examples: Examples
+    skin_id: str
+    subspace: Subspace
+    mixture: Mixture
+    sharpness: float
+    limit: float
+    right: float
+    alignment: Alignment | None = None
+    rows: IntArray | None = None
 
     @classmethod
-    def of(cls, classifier: Classifier) -> Self:
-        """With all measurements."""
-        return cls(classifier, np.arange(classifier.examples.dv.shape[1]))
+    def fit(
+        cls,
+        dv: ArrayLike,
+        labels: ArrayLike,
+        *,
+        names: tuple[str, ...] = (),
+        pattern: Pattern | None = None,
+        skin_id: str = "",
+    ) -> Self:
+        """Learn from frames (n, n_meas) minus untouched frames, in any one unit.
 
-    def without(self, measurements: IntArray) -> FrameClassifier:
-        """For frames that lack ``measurements``."""
-        return replace(self, rows=np.delete(self.rows, measurements))
+        Parameters
+        ----------
+        labels
+            (n,) names of classes of which one holds, or (n, f) flags 0 or 1 of which any may.
+        names
+            Of the flags; by default 1, 2, ….
+        pattern, skin_id
+            What was measured, and on which skin.
 
-    def __call__(self, change: FloatArray) -> ClassReading:
-        """Of a frame minus the reference, (n_meas,) V, NaN where a measurement is excluded."""
-        complete = np.full(self.classifier.examples.dv.shape[1], np.nan)
-        complete[self.rows] = change
-        answers = self.classifier.predict(complete[None])
+        Raises
+        ------
+        DataError
+            For arrays that do not belong together, and too few examples of a state.
+        """
+        given = np.asarray(labels)
+        if given.ndim == 1:
+            codes = Codes.of_labels(given.tolist())
+            flags = codes.flags_of(given.tolist())
+        else:
+            count = given.shape[1] if given.ndim == 2 else 0
+            codes = Codes(names or tuple(map(str, range(1, count + 1))), exclusive=False)
+            flags = given.astype(np.float64)
+        if pattern is not None:
+            frames(dv, pattern.n_meas)
+        return cls.learn(Examples.checked(codes, dv, flags), skin_id)
+
+    @classmethod
+    def learn(cls, examples: Examples, skin_id: str = "") -> Self:
+        """Learn from checked examples of the skin of that identity."""
+        taught = examples.taught().enough()
+        distances, strange = _left_out(taught)
+        truth = examples.codes.numbers(taught.flags[taught.newest])
+        subspace = Subspace.of(examples)
+        made = cls(
+            examples,
+            skin_id,
+            subspace,
+            _mixture(subspace, taught, examples),
+            sharpness=_sharpness(distances, truth),
+            limit=_limit(strange),
+            right=float(np.mean(distances.argmin(axis=1) == truth)),
+        )
+        return made if examples.labelled[examples.newest].all() else made._settled(strange)
+
+    def _settled(self, usual: FloatArray) -> Self:
+        """Fitted to the newest session, not all of whose frames have a label."""
+        newest = self.examples.part(self.examples.newest)
+        x = self.subspace.whitened(newest.dv) @ self.subspace.axes
+        numbers = self.examples.codes.numbers(newest.flags)
+        older = self.examples.part(~self.examples.newest)
+        if len(x) < _ENOUGH or not older.labelled.any():
+            return self._with(self.mixture.adapted(x, numbers), newest.dv, usual)
+        fitted, alignment = aligned(self.mixture, x, numbers, self._rest())
+        made = self._with(fitted, newest.dv, usual)
+        if alignment.holds:
+            sharpness = min(self.sharpness, _tempered(fitted.distances(x), alignment.reliability))
+            return replace(made, sharpness=sharpness, alignment=alignment)
+        before = type(self).learn(older, self.skin_id)
+        better = max((before, made), key=lambda known: known._flags_right(newest))
+        return replace(better, examples=self.examples, alignment=alignment)
+
+    def _with(self, mixture: Mixture, dv: FloatArray, usual: FloatArray) -> Self:
+        """With a mixture fitted to frames (n, n_meas); ``usual`` (m,) strangeness of known ones."""
+        strange = _compared(self.subspace, mixture, dv)[1]
+        limit = self.limit * max(float(np.median(strange) / np.median(usual)), 1.0)
+        return replace(self, mixture=mixture, limit=limit)
+
+    def _flags_right(self, examples: Examples) -> float:
+        """Part of the flags of labelled examples that are told, 0 where none has a label."""
+        some = examples.part(examples.labelled)
+        return float((self.predict(some.dv).flags == some.flags).mean()) if len(some) else 0.0
+
+    def _rest(self) -> FloatArray | None:
+        """(1, d) an untouched frame of the newest session; None where that has had flags set."""
+        zeros = np.zeros((1, self.examples.dv.shape[1]))
+        if self.examples.codes.exclusive:
+            return None
+        taught = self.examples.taught()
+        for number in np.unique(taught.session):
+            middle = session_mean(self.examples.dv[self.examples.session == number])
+            group = np.zeros(int((taught.session == number).sum()), dtype=np.int64)
+            x = self.subspace.whitened(taught.dv[taught.session == number], middle)
+            flags = taught.flags[taught.session == number]
+            mixture = Mixture.of(self.mixture.table, x @ self.subspace.axes, flags, group)
+            if shows(mixture, self.subspace.whitened(zeros, middle) @ self.subspace.axes):
+                return None
+        return np.asarray(self.subspace.whitened(zeros) @ self.subspace.axes)
+
+    def predict(self, dv: ArrayLike) -> Answers:
+        """What frames (n, n_meas) show; values that are not finite are left out.
+
+        Raises DataError for another number of rows.
+        """
+        codes = self.examples.codes
+        data = frames(dv, self.examples.dv.shape[1])
+        distances, strange = _compared(self.subspace, self.mixture, data)
+        lost = self.alignment is not None and not self.alignment.holds
+        weights = posterior(distances, 0.0 if lost else self.sharpness)
+        best = distances.argmin(axis=1)
+        empty = ~np.isfinite(data).any(axis=1)
+        return Answers(
+            codes.table[best],
+            tuple(codes.text(int(number)) for number in best),
+            weights.max(axis=1),
+            weights @ codes.table,
+            (strange > self.limit) | empty | lost,
+        )
+
+    def in_session(self, dv: ArrayLike, flags: ArrayLike | None = None) -> Self:
+        """Classifier for a new session, from its frames (n, n_meas), labelled or not.
+
+        ``flags`` (n, f) as far as they are known, rows of NaN otherwise. The frames should show
+        the classes as they come: which ones they show is found while the rest is fitted. Where
+        that cannot be believed (:attr:`alignment`), the classifier stays as it was and calls the
+        session's frames unknown. Raises DataError as :meth:`fit`, and for fewer than ten frames
+        without a label.
+        """
+        codes = self.examples.codes
+        data = frames(dv, self.examples.dv.shape[1])
+        unknown = np.full((len(data), len(codes.names)), np.nan)
+        more = Examples.checked(codes, data, unknown if flags is None else flags)
+        if not more.labelled.any() and len(more) < _ENOUGH:
+            raise DataError(f"expected at least {_ENOUGH} frames of the session, got {len(more)}")
+        return self.learn(self.examples.and_then(more), self.skin_id)
+
+    def without(self, measurements: IntArray) -> Self:
+        """The same for frames that lack ``measurements``."""
+        rows = np.arange(self.examples.dv.shape[1]) if self.rows is None else self.rows
+        return replace(self, rows=np.delete(rows, measurements))
+
+    def read(self, change: FloatArray) -> ClassReading:
+        """The class of a frame minus the reference, (n_meas,) V, NaN where one is excluded."""
+        complete = np.full(self.examples.dv.shape[1], np.nan)
+        complete[slice(None) if self.rows is None else self.rows] = change
+        answers = self.predict(complete[None])
         return ClassReading(
             answers.label[0], float(answers.probability[0]), bool(answers.rejected[0])
         )
+
+
+def _mixture(subspace: Subspace, taught: Examples, complete: Examples) -> Mixture:
+    """Learnt from labelled frames, each session about the mean of the whole of it."""
+    x = np.empty((len(taught), subspace.axes.shape[1]))
+    for number in np.unique(taught.session):
+        middle = session_mean(complete.dv[complete.session == number])
+        chosen = taught.session == number
+        x[chosen] = subspace.whitened(taught.dv[chosen], middle) @ subspace.axes
+    group = np.unique(taught.session, return_inverse=True)[1].reshape(-1)
+    return Mixture.of(complete.codes.table, x, taught.flags, group)
+
+
+def _compared(
+    subspace: Subspace, mixture: Mixture, dv: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """(n, k) squared distances of frames to the combinations; (n,) their strangeness.
+
+    A frame is strange by how far it is from the nearest combination, inside and beside the
+    directions.
+    """
+    white = subspace.whitened(dv)
+    x = white @ subspace.axes
+    distances = mixture.distances(x)
+    inside = distances.min(axis=1) / x.shape[1]
+    return distances, inside + subspace.outside(white, x)
+
+
+def _left_out(taught: Examples) -> tuple[FloatArray, FloatArray]:
+    """Distances and strangeness of the newest session's frames, learnt from the others."""
+    asked = taught.part(taught.newest)
+    distances = np.zeros((len(asked), len(taught.codes.table)))
+    strange = np.zeros(len(asked))
+    fold = np.full(len(taught), -1)
+    fold[taught.newest] = np.arange(len(asked)) % _FOLDS
+    for number in range(min(_FOLDS, len(asked))):
+        kept, out = taught.part(fold != number), fold[taught.newest] == number
+        subspace = Subspace.of(kept)
+        mixture = _mixture(subspace, kept, kept)
+        distances[out], strange[out] = _compared(subspace, mixture, asked.dv[out])
+    return distances, strange
+
+
+def _sharpness(distances: FloatArray, truth: IntArray) -> float:
+    """Temperature of the probabilities at which left-out labels are likeliest (Guo et al. 2017)."""
+    rows = np.arange(len(truth))
+    likely = [np.log(posterior(distances, s)[rows, truth] + 1e-12).mean() for s in _SHARPNESS]
+    return float(_SHARPNESS[int(np.argmax(likely))])
+
+
+def _tempered(distances: FloatArray, reliability: float) -> float:
+    """Temperature of the probabilities at which their mean is at most ``reliability``."""
+    said = np.array([posterior(distances, s).max(axis=1).mean() for s in _TEMPERED])
+    return float(_TEMPERED[max(int((said <= reliability).sum()) - 1, 0)])
+
+
+def _limit(strange: FloatArray) -> float:
+    """Strangeness that one known frame in a hundred exceeds, from left-out ones (log-normal)."""
+    log = np.log(strange)
+    n = len(log)
+    reach = stdtrit(n - 1, _KNOWN) * np.sqrt(1 + 1 / n)
+    return float(np.exp(log.mean() + reach * log.std(ddof=1)))
 
 
 class ClassesApplied(Applied):
     """Classifies each frame against the reference as it was taken: a class that lasts is not to be
     learnt as the skin's rest."""
 
-    def __init__(self, frames: FrameClassifier) -> None:
-        self._frames = frames
+    def __init__(self, classifier: Classifier) -> None:
+        self._classifier = classifier
 
     def read(self, view: FrameView, detections: list[Detection], *, touched: bool) -> ClassReading:
         """The class of this frame."""
         del detections, touched
-        return self._frames(view.differences.since_reference)
+        return self._classifier.read(view.differences.since_reference)
 
 
-def _pack(frames: FrameClassifier) -> Arrays:
-    classifier = frames.classifier
-    examples = classifier.examples
-    return {
-        "dv": examples.dv,
-        "flags": examples.flags,
-        "session": examples.session,
-        "names": np.array(examples.codes.names),
-        "exclusive": np.array(int(examples.codes.exclusive)),
-        "skin": np.array(classifier.skin_id),
-    }
+def _apply(classifier: Classifier, _conditions: Conditions) -> Applied:
+    return ClassesApplied(classifier)
 
 
-def _unpack(arrays: Arrays, pattern: Pattern, where: str, _progress: Progress) -> FrameClassifier:
-    with located(where):
-        examples = _examples(arrays, where)
-        if examples.dv.shape[1] != pattern.n_meas:
-            raise DataError(f"expected {pattern.n_meas} rows of dv, got {examples.dv.shape[1]}")
-        identities = (pattern.identity, str(arrays.get("skin", "")))
-        return FrameClassifier.of(Classifier.learn(examples, identities))
-
-
-def _examples(arrays: Arrays, where: str) -> Examples:
-    exclusive = bool(whole_number(arrays, "exclusive", where))
-    codes = Codes(tuple(map(str, arrays["names"].ravel().tolist())), exclusive)
-    examples = Examples.of(
-        codes, real_numbers(arrays, "dv", where), real_numbers(arrays, "flags", where)
-    )
-    session = real_numbers(arrays, "session", where)
-    if session.shape != (len(examples),) or not np.isin(session, range(1000)).all():
-        raise DataError(
-            f"expected a session from 0 to 999 for each of {len(examples)} frames, "
-            f"got shape {session.shape}"
-        )
-    return replace(examples, session=session.astype(np.int64))
-
-
-def _apply(frames: FrameClassifier, _conditions: Conditions) -> Applied:
-    return ClassesApplied(frames)
-
-
-CLASSES = Kind(
+CLASSES: Kind[Classifier] = Kind(
     name="class",
     title="tomoskin states calibration",
-    version=1,
     subject="classes",
-    command="class",
     attachment="states.npz",
-    keys=frozenset({"dv", "flags", "session", "names", "exclusive"}),
-    pack=_pack,
-    unpack=_unpack,
-    exclude=FrameClassifier.without,
+    learn=Classifier.learn,
+    exclude=Classifier.without,
     apply=_apply,
-    skin_id=lambda frames: frames.classifier.skin_id,
     own_settings=True,
 )
-"""Classes of frames; its model is a :class:`FrameClassifier`."""
+"""Classes of frames; its model is a :class:`Classifier`."""

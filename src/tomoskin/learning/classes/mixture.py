@@ -48,18 +48,18 @@ class Subspace:
         stacked = np.vstack(parts)
         d = int(np.clip(len(stacked) // _FRAMES_EACH, 2, min(_MOST, *stacked.shape)))
         axes = _largest(stacked, d)
-        beside = (stacked**2).sum() - ((stacked @ axes) ** 2).sum()
+        outside = (stacked**2).sum() - ((stacked @ axes) ** 2).sum()
         free = max(len(stacked) * (stacked.shape[1] - d), 1)
-        return cls(middles[-1], scale, axes, max(float(beside / free), 1e-12))
+        return cls(middles[-1], scale, axes, max(float(outside / free), 1e-12))
 
     def whitened(self, dv: FloatArray, middle: FloatArray | None = None) -> FloatArray:
         """(n, n_meas) about a middle, of the newest session by default, in units of noise."""
         return _filled((dv - (self.middle if middle is None else middle)) / self.scale)
 
-    def beside(self, white: FloatArray, inside: FloatArray) -> FloatArray:
+    def outside(self, white: FloatArray, inside: FloatArray) -> FloatArray:
         """(n,) mean square of what the directions leave, 1 where it is as in the examples."""
-        left = (white**2).sum(axis=1) - (inside**2).sum(axis=1)
-        return np.asarray(left / (self.rest * max(white.shape[1] - self.axes.shape[1], 1)))
+        residual = (white**2).sum(axis=1) - (inside**2).sum(axis=1)
+        return np.asarray(residual / (self.rest * max(white.shape[1] - self.axes.shape[1], 1)))
 
 
 def _noise(examples: Examples) -> FloatArray:
@@ -98,9 +98,9 @@ def _largest(data: FloatArray, d: int) -> FloatArray:
     n, rows = data.shape
     if rows <= n:
         return np.asarray(eigh(data.T @ data, subset_by_index=(rows - d, rows - 1))[1])
-    size, left = eigh(data @ data.T, subset_by_index=(n - d, n - 1))
+    size, residual = eigh(data @ data.T, subset_by_index=(n - d, n - 1))
     kept = size > 1e-12 * size[-1]
-    return np.asarray(data.T @ (left[:, kept] / np.sqrt(size[kept])))
+    return np.asarray(data.T @ (residual[:, kept] / np.sqrt(size[kept])))
 
 
 _TRUST = 2.0
@@ -128,9 +128,9 @@ class Mixture:
         share = np.stack([flags[group == g].mean(axis=0) for g in range(group.max() + 1)])
         design = flags - share[group]
         effect = np.linalg.lstsq(design, x - middle[group], rcond=None)[0]
-        left = x - middle[group] - design @ effect
+        residual = x - middle[group] - design @ effect
         templates = np.vstack([middle[-1] - share[-1] @ effect, effect])
-        return cls(table, templates, shrunk(left))
+        return cls(table, templates, shrunk(residual))
 
     @property
     def exclusive(self) -> bool:
@@ -207,10 +207,10 @@ class Mixture:
         normal = codes.T @ (codes * count[:, None]) + prior
         right = codes.T @ (weights.T @ x) + prior @ self.templates
         templates = np.linalg.solve(normal, right)
-        means, left = codes @ templates, x - weights @ (codes @ templates)
+        means, residual = codes @ templates, x - weights @ (codes @ templates)
         mixed = weights @ means
         unsure = means.T @ (means * count[:, None]) - mixed.T @ mixed
-        covariance = (left.T @ left + unsure + d * self.covariance) / (n + d)
+        covariance = (residual.T @ residual + unsure + d * self.covariance) / (n + d)
         return type(self)(self.table, templates, covariance)
 
 
@@ -220,12 +220,12 @@ def posterior(distances: FloatArray, sharpness: float = 1.0) -> FloatArray:
     return np.asarray(weights / weights.sum(axis=1, keepdims=True))
 
 
-def shrunk(left: FloatArray) -> FloatArray:
+def shrunk(residual: FloatArray) -> FloatArray:
     """(d, d) covariance of residuals (n, d), drawn to a sphere (Ledoit & Wolf 2004)."""
-    n, d = left.shape
-    raw = left.T @ left / n
+    n, d = residual.shape
+    raw = residual.T @ residual / n
     size = max(np.trace(raw) / d, 1e-12)
     away = ((raw - size * np.eye(d)) ** 2).sum()
-    noise = (((left**2).sum(axis=1) ** 2).sum() / n - (raw**2).sum()) / n
+    noise = (((residual**2).sum(axis=1) ** 2).sum() / n - (raw**2).sum()) / n
     part = float(np.clip(noise / away, 0.01, 1.0)) if away > 0 else 1.0
     return np.asarray((1 - part) * raw + part * size * np.eye(d))

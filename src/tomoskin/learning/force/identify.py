@@ -83,10 +83,10 @@ def identify(
     creep, last = np.zeros(len(times)), np.inf
     for _ in range(_ROUNDS):
         plays, broken = series.without_creep(creep, y / size)
-        creep, left = series.with_plays(plays, broken, y / size)
-        if last - left < _ENOUGH * len(y):
+        creep, residual = series.with_plays(plays, broken, y / size)
+        if last - residual < _ENOUGH * len(y):
             break
-        last = left
+        last = residual
     memory, gauge = _named(grid, size * plays, creep, size * broken)
     left_over = responses(memory, t, x, gauge) - y
     return MaterialFit(memory, gauge, float(np.sqrt((left_over**2).mean())))
@@ -135,15 +135,15 @@ class _Series:
         self, plays: FloatArray, broken: FloatArray, y: FloatArray
     ) -> tuple[FloatArray, float]:
         """Weights of creep given those of plays and breakdown; the squared residual."""
-        whole = plays @ self.prompt
-        rest = y - whole - broken @ self.broken
-        basis = np.einsum("p,cpn->cn", plays, self.late) - whole
+        prompt = plays @ self.prompt
+        rest = y - prompt - broken @ self.broken
+        basis = np.einsum("p,cpn->cn", plays, self.late) - prompt
         if not len(basis):
             return np.zeros(0), float(rest @ rest)
         weights, _ = nnls(basis.T, rest)
         weights /= max(1.0, weights.sum())
-        left = rest - weights @ basis
-        return weights, float(left @ left)
+        residual = rest - weights @ basis
+        return weights, float(residual @ residual)
 
 
 def _named(

@@ -1,33 +1,89 @@
-"""The kind of calibration that tells the force of touches, from presses with known weights.
-
-Keys of the .npz: ``kind``, ``version``; of n touches in the order of time ``xy_m`` (n, 2),
-``area_m2``, ``peak_s``, ``snr``, ``force_n`` (NaN where not known), ``press``, ``time_s`` (n,);
-``conductivity_s``, ``unit_m``; ``method``; ``drive``, ``measure`` (n_meas, 2), ``n_electrodes``;
-``skin`` identity, ``skin_name``. What was learnt is learnt again when the file is read.
-"""
+"""The kind of calibration that tells the force of touches, from presses with known weights; and
+what its model says of itself."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tomoskin.core import Arrays, DataError, Detection, FloatArray, IntArray, real_numbers
-from tomoskin.learning.force.model import ForceModel, PressedSpots
-from tomoskin.learning.force.presses import WeighedPresses
-from tomoskin.learning.kind import (
-    Applied,
-    Calibration,
-    Conditions,
-    FrameView,
-    Kind,
-    Progress,
-    located,
-)
-from tomoskin.model.pattern import Pattern
+from tomoskin.core import DataError, Detection, FloatArray, IntArray
+from tomoskin.learning.force.curve import basis
+from tomoskin.learning.force.model import ForceModel, LabelRemark, PressedSpots
+from tomoskin.learning.kind import Applied, Calibration, Conditions, FrameView, Kind
 from tomoskin.model.skin import Skin
 
-_COLUMNS = ("area_m2", "peak_s", "snr", "force_n", "press", "time_s")
+
+@dataclass(frozen=True)
+class ForceReport:
+    """How well labelled touches are weighed, each with its press left out.
+
+    Attributes
+    ----------
+    touches, presses
+        How many were labelled.
+    from_n, to_n
+        Smallest and largest force, N.
+    mean_error, median_error
+        Relative errors of the forces.
+    held
+        Part of the forces that lie in their own 90 % intervals.
+    memory
+        Whether the sheet was found to remember.
+    remarks
+        What is wrong with labels.
+    """
+
+    touches: int
+    presses: int
+    from_n: float
+    to_n: float
+    mean_error: float
+    median_error: float
+    held: float
+    memory: bool
+    remarks: tuple[LabelRemark, ...]
+
+    @classmethod
+    def of(cls, model: ForceModel) -> ForceReport:
+        """Of a model that has learnt."""
+        rows = model.presses.labelled
+        errors, force = np.abs(model.errors), model.presses.force[rows]
+        return cls(
+            touches=len(rows),
+            presses=len(np.unique(model.presses.press[rows])),
+            from_n=float(force.min()),
+            to_n=float(force.max()),
+            mean_error=float(errors.mean()),
+            median_error=float(np.median(errors)),
+            held=model.held,
+            memory=bool(model.memory.play),
+            remarks=model.remarks,
+        )
+
+    @property
+    def text(self) -> str:
+        """In a sentence."""
+        return (
+            f"{self.touches} touches of {self.presses} presses, {self.from_n:.2g} to "
+            f"{self.to_n:.2g} N; left out of the learning their forces are missed by "
+            f"{100 * self.mean_error:.0f} % (median {100 * self.median_error:.0f} %), and "
+            f"their 90 % intervals hold {100 * self.held:.0f} %"
+        )
+
+
+def least_known(model: ForceModel, xy: FloatArray) -> FloatArray:
+    """(2,) m: that of the positions ``xy`` (n, 2) m at which a further press tells most.
+
+    It is where the curve's level is least certain for a touch of the usual size.
+    """
+    curve = model.curve
+    terms = basis(xy, np.zeros(len(xy)), model.unit)
+    levels = terms @ curve.mean.T
+    own = ((terms @ curve.covariance) * terms).sum(axis=2).T
+    middle = levels @ curve.weight
+    variance = (own + (levels - middle[:, None]) ** 2) @ curve.weight
+    return np.asarray(xy[int(np.argmax(variance))])
 
 
 class ForceApplied(Applied):
@@ -44,57 +100,6 @@ class ForceApplied(Applied):
             replace(detection, force=force)
             for detection, force in zip(detections, forces, strict=True)
         ]
-
-
-def _pack(model: ForceModel) -> Arrays:
-    p = model.presses
-    columns = (p.area, p.peak, p.snr, p.force, p.press, p.time)
-    return {
-        "xy_m": p.xy,
-        **dict(zip(_COLUMNS, columns, strict=True)),
-        "conductivity_s": np.array(model.conductivity),
-        "unit_m": np.array(model.unit),
-        "method": np.array(model.method),
-        "skin": np.array(model.skin_id),
-    }
-
-
-def _unpack(arrays: Arrays, _pattern: Pattern, where: str, _progress: Progress) -> ForceModel:
-    xy, *columns = (real_numbers(arrays, key, where) for key in ("xy_m", *_COLUMNS))
-    if xy.shape[1:] != (2,) or any(column.shape != xy.shape[:1] for column in columns):
-        raise DataError(
-            f"expected xy_m and {', '.join(_COLUMNS)} of each touch, got shapes "
-            f"{', '.join(str(column.shape) for column in (xy, *columns))}",
-            where=where,
-        )
-    conductivity, unit = (real_numbers(arrays, key, where) for key in ("conductivity_s", "unit_m"))
-    if conductivity.shape or unit.shape or not (conductivity > 0 and unit > 0):
-        raise DataError(
-            f"expected a conductivity and a unit above 0, got {conductivity} and {unit}",
-            where=where,
-        )
-    area, peak, snr, force, press, time = columns
-    with located(where):
-        _check_touches(xy, area, peak)
-        detections = [_detection(*row) for row in np.column_stack([xy, area, peak, snr]).tolist()]
-        presses = WeighedPresses.of(detections, force, press, time)
-        return ForceModel.learn(
-            presses,
-            float(conductivity),
-            float(unit),
-            str(arrays.get("skin", "")),
-            str(arrays.get("method", "fit")),
-        )
-
-
-def _check_touches(*columns: FloatArray) -> None:
-    if not all(np.isfinite(column).all() for column in columns):
-        raise DataError("expected finite xy_m, area_m2 and peak_s of every touch, got others")
-
-
-def _detection(x: float, y: float, area: float, peak: float, snr: float) -> Detection:
-    nothing = np.empty(0, dtype=np.int64)
-    return Detection(x, y, np.nan, np.nan, area, peak, nothing, snr=snr)
 
 
 def _check(calibration: Calibration[ForceModel], skin: Skin) -> None:
@@ -126,16 +131,11 @@ def _apply(model: ForceModel, conditions: Conditions) -> Applied:
 FORCE = Kind(
     name="force",
     title="tomoskin force calibration",
-    version=1,
     subject="forces",
-    command="force",
     attachment="force.npz",
-    keys=frozenset({"xy_m", *_COLUMNS, "conductivity_s", "unit_m", "method"}),
-    pack=_pack,
-    unpack=_unpack,
+    learn=ForceModel.learn,
     check=_check,
     exclude=_exclude,
     apply=_apply,
-    skin_id=lambda model: model.skin_id,
 )
 """Forces of touches from known weights; its model is a :class:`ForceModel`."""

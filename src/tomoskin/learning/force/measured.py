@@ -8,12 +8,12 @@ from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.linalg import cho_factor, cho_solve, eigh
+from scipy.linalg import eigh
 from scipy.special import ndtri
 
 from tomoskin.core import DataError, FloatArray
 from tomoskin.learning.touch.presses import Features, frames
-from tomoskin.learning.touch.process import Process, squared_distances
+from tomoskin.learning.touch.process import Process, nine_in_ten, squared_distances
 
 _TERMS = (("change", "rest"), ("pressed",), ("rest",))
 _COMPONENTS = {"change": 60, "pressed": 60, "rest": 10}
@@ -22,8 +22,7 @@ _COMPONENTS = {"change": 60, "pressed": 60, "rest": 10}
 _ROUNDING = 1e-9
 _FEWEST = 20
 _WHERE = "force labels"
-_NINE_IN_TEN = 0.9
-_HALF = float(ndtri(0.5 + _NINE_IN_TEN / 2))
+_HALF = float(ndtri(0.95))
 _RECENT, _LEAST = 8, 30
 """The last eighth of the presses, or so many, tell whether the skin has changed."""
 
@@ -83,22 +82,14 @@ class ForceProcess:
     blocks
         What is read of each of these, by name.
     process
-        What tells the force; ``factor`` is the Cholesky factor of its covariance.
-    centre, size
-        N: mean and deviation of the labels.
+        What tells the force.
     scale
         By which the process's deviations are widened.
-    left_out
-        (n,) N: force of each press as the others tell it.
     """
 
     blocks: Mapping[str, FeatureBlock]
     process: Process
-    factor: tuple[FloatArray, bool]
-    centre: float
-    size: float
     scale: float
-    left_out: FloatArray
 
     @classmethod
     def fit(cls, before: ArrayLike, during: ArrayLike, force: ArrayLike) -> Self:
@@ -135,17 +126,13 @@ class ForceProcess:
             for name, data in _named(rest, pressed).items()
         }
         squares = {name: block.squares(block.inputs) for name, block in blocks.items()}
-        centre, size = float(newtons.mean()), float(newtons.std())
-        targets = ((newtons - centre) / size)[:, None]
-        process = Process.of(_TERMS, squares, targets)
-        kernel = process.covariance(squares)
-        kernel[np.diag_indices(len(kernel))] += process.noise
-        factor = cho_factor(kernel, lower=True)
-        missed = (process.left_out - targets)[:, 0]
-        own = np.sqrt(1 / np.diag(cho_solve(factor, np.eye(len(kernel)))))
-        left_out = centre + size * process.left_out[:, 0]
-        scale = _scale(np.abs(missed) / own)
-        return cls(blocks, process, factor, centre, size, scale, left_out)
+        process = Process.of(_TERMS, squares, newtons[:, None])
+        return cls(blocks, process, _scale(np.abs(process.missed[:, 0])))
+
+    @property
+    def left_out(self) -> FloatArray:
+        """(n,) N: force of each press as the others tell it."""
+        return self.process.left_out[:, 0]
 
     def predict(
         self, before: ArrayLike, during: ArrayLike
@@ -160,11 +147,8 @@ class ForceProcess:
         n_meas = len(self.blocks["rest"].middle)
         data = _named(frames(before, n_meas), frames(during, n_meas))
         squares = {name: block.squares(block(data[name])) for name, block in self.blocks.items()}
-        cross = self.process.covariance(squares)
-        known = (cross * cho_solve(self.factor, cross.T).T).sum(axis=1)
-        variance = np.maximum(self.process.variance - known, 0.0) + self.process.noise
-        middle = self.centre + self.size * (cross @ self.process.weights)[:, 0]
-        half = _HALF * self.scale * self.size * np.sqrt(variance)
+        middle = self.process(squares)[:, 0]
+        half = _HALF * self.scale * self.process.deviation(squares)
         return middle, middle - half, middle + half
 
 
@@ -184,8 +168,4 @@ def _named(rest: FloatArray, pressed: FloatArray) -> dict[str, FloatArray]:
 def _scale(away: FloatArray) -> float:
     """Of deviations, by how many of which (n,) each left-out press is missed."""
     last = away[-max(len(away) // _RECENT, _LEAST) :]
-    return max(_high(away), _high(last) / _CHANCE) / _HALF
-
-
-def _high(away: FloatArray) -> float:
-    return float(np.quantile(away, min(1.0, _NINE_IN_TEN * (1 + 1 / len(away)))))
+    return max(nine_in_ten(away), nine_in_ten(last) / _CHANCE) / _HALF

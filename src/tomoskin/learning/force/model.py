@@ -14,6 +14,7 @@ from tomoskin.core import DataError, Detection, FloatArray, Force, IntArray
 from tomoskin.learning.force.curve import ForceCurve, basis
 from tomoskin.learning.force.memory import SHALLOW, averaged_memory, without_memory
 from tomoskin.learning.force.presses import WeighedPresses, check_rising
+from tomoskin.learning.touch.process import nine_in_ten
 from tomoskin.model.skin import MaterialMemory, MemoryState, Skin, advanced, load_of
 from tomoskin.sensing.segment import Region
 
@@ -119,6 +120,10 @@ class ForceModel:
         DataError
             When the weights contradict, or a labelled touch makes the sheet conduct better.
         """
+        if not (conductivity > 0 and unit > 0):
+            raise DataError(
+                f"expected a conductivity and a unit above 0, got {conductivity} and {unit}"
+            )
         rows = presses.labelled
         radius = float(np.exp(np.log(_radius(presses.area[rows])).mean()))
         depth = depth_of(presses.peak, presses.area, conductivity, radius)
@@ -164,13 +169,13 @@ class ForceModel:
         under, rest = _goes_on(spots.xy, xy, 0.5 * self.radius)
         before = spots.memory
         if under != list(range(len(spots))):
-            before = before.beside(self._fresh).of_pieces(np.array(under))
+            before = before.joined(self._fresh).of_pieces(np.array(under))
         load, now = load_of(before, self.memory, depth, dt)
         terms = basis(xy, np.log(_radius(area) / self.radius), self.unit)
         forces = self._forces(terms, np.maximum(load, least), self._beyond(snr))
         if rest:
             others = np.array(rest[: max(_MOST_SPOTS - len(xy), 0)], dtype=np.intp)
-            now = now.beside(self._released(spots, others, dt))
+            now = now.joined(self._released(spots, others, dt))
             xy = np.concatenate([xy, spots.xy[others]])
         return forces, PressedSpots(xy, time, now)
 
@@ -246,10 +251,8 @@ def _left_out(presses: WeighedPresses, terms: FloatArray, free: FloatArray) -> F
 
 
 def _scale(left_out: FloatArray, force: FloatArray) -> float:
-    """What nine in ten labels need of their intervals (split-conformal: Vovk et al. 2005)."""
-    needed = _half_intervals(left_out, force)
-    n = len(needed)
-    return float(np.clip(np.quantile(needed, min(1.0, 0.9 * (1 + 1 / n))), *_SCALES))
+    """What nine in ten labels need of their intervals."""
+    return float(np.clip(nine_in_ten(_half_intervals(left_out, force)), *_SCALES))
 
 
 def _half_intervals(left_out: FloatArray, force: FloatArray) -> FloatArray:

@@ -1,15 +1,64 @@
-"""Touches that something of known weight made, checked: what is wrong with labels, in words."""
+"""Weights as people name them, in newtons; touches that something of known weight made, checked:
+what is wrong with labels, in words."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from tomoskin.core import DataError, Detection, FloatArray, IntArray
+
+NEWTONS: Mapping[str, float] = MappingProxyType({"N": 1.0, "g": 9.80665e-3, "kg": 9.80665})
+"""Newtons in one of each unit."""
+
+_HEAVY, _LIGHT = 15.0, 0.02
+"""Newtons above which "N", and below which "g", was probably meant otherwise: a hand presses with
+0.1 to 15 N, and what is lighter than 2 g hardly shows."""
+
+_MEANT = {"N": "g", "g": "kg"}
+
+
+@dataclass(frozen=True)
+class Weight:
+    """What lies on the skin: ``value`` in ``unit``, one of :data:`NEWTONS`."""
+
+    value: float
+    unit: str
+
+    def checked(self) -> Self:
+        """Itself. Raises DataError where nothing can be learnt from such a weight."""
+        if 0 < self.newtons <= MOST_NEWTONS:
+            return self
+        raise DataError(
+            f"expected a weight above 0 and up to {MOST_NEWTONS:g} N, got {self.text}",
+            hint="1 N is the weight of 102 g: check the unit",
+        )
+
+    @property
+    def newtons(self) -> float:
+        """Force, N."""
+        return self.value * NEWTONS[self.unit]
+
+    @property
+    def text(self) -> str:
+        """For people, with the force where another unit was given."""
+        own = f"{self.value:.6g} {self.unit}"
+        return own if self.unit == "N" else f"{own} ({self.newtons:.3g} N)"
+
+    @property
+    def meant(self) -> Weight | None:
+        """The weight that was probably meant, where this one is unusual; else None."""
+        newtons = self.newtons
+        unusual = newtons > _HEAVY if self.unit == "N" else newtons < _LIGHT
+        if not unusual or self.unit not in _MEANT:
+            return None
+        return Weight(self.value, _MEANT[self.unit])
+
 
 _WHERE = "force labels"
 FEWEST = 5
@@ -54,13 +103,9 @@ class WeighedPresses:
 
     @classmethod
     def of(
-        cls,
-        detections: Sequence[Detection],
-        force: ArrayLike,
-        press: ArrayLike,
-        time: ArrayLike,
+        cls, detections: Sequence[Detection], force: ArrayLike, press: ArrayLike, time: ArrayLike
     ) -> Self:
-        """Check touches and their labels: ``force`` (n,) N, ``press`` (n,), ``time`` (n,) s.
+        """Of touches with their labels: ``force`` (n,) N, ``press`` (n,), ``time`` (n,) s.
 
         Raises
         ------
@@ -68,32 +113,44 @@ class WeighedPresses:
             For labels that do not belong together or to a press, times that go back within one,
             fewer than five forces, forces that are no newtons, or weights that contradict.
         """
+        n = len(detections)
+        rows = np.array([(d.x, d.y, d.area, d.peak, d.snr) for d in detections]).reshape(n, 5)
+        area, peak, snr = rows[:, 2:].T
         newtons, times = (np.asarray(values, dtype=np.float64) for values in (force, time))
         number = np.asarray(press)
-        n = len(detections)
-        if not newtons.shape == number.shape == times.shape == (n,):
+        return cls.checked(
+            xy=rows[:, :2], area=area, peak=peak, snr=snr, force=newtons, press=number, time=times
+        )
+
+    @classmethod
+    def checked(
+        cls,
+        *,
+        xy: FloatArray,
+        area: FloatArray,
+        peak: FloatArray,
+        snr: FloatArray,
+        force: FloatArray,
+        press: IntArray,
+        time: FloatArray,
+    ) -> Self:
+        """The same of the columns; raises as :meth:`of` does."""
+        n = len(xy)
+        if not force.shape == press.shape == time.shape == (n,):
             raise DataError(
                 f"expected a force, a press and a time for each of {n} touches, got shapes "
-                f"{newtons.shape}, {number.shape}, {times.shape}",
+                f"{force.shape}, {press.shape}, {time.shape}",
                 where=_WHERE,
             )
-        if not np.isfinite(times).all() or np.isinf(newtons).any():
-            raise DataError(
-                "expected finite times and forces, got values that are not finite", where=_WHERE
-            )
-        order = np.lexsort((np.arange(n), number))
-        back = (np.diff(times[order]) < 0) & (np.diff(number[order]) == 0)
-        if back.any():
-            raise DataError(
-                f"the time decreases within press {number[order][int(np.argmax(back))]}",
-                where=_WHERE,
-                hint="give the touches of each press in the order of their times",
-            )
-        _check_newtons(newtons[np.isfinite(newtons)])
-        rows = np.array([(d.x, d.y, d.area, d.peak, d.snr) for d in detections]).reshape(n, 5)
-        return cls(
-            rows[:, :2], rows[:, 2], rows[:, 3], rows[:, 4], newtons, number.astype(int), times
-        )
+        about = (xy, area, peak)
+        if xy.shape != (n, 2) or not area.shape == peak.shape == snr.shape == (n,):
+            shapes = ", ".join(str(column.shape) for column in (*about, snr))
+            raise DataError(f"expected xy, area, peak and snr of each touch, got shapes {shapes}")
+        if not all(np.isfinite(column).all() for column in about):
+            raise DataError("expected finite xy, area and peak of every touch, got others")
+        _check_order(force, press, time)
+        _check_newtons(force[np.isfinite(force)])
+        return cls(xy, area, peak, snr, force, press.astype(int), time)
 
     def __len__(self) -> int:
         """Number of touches."""
@@ -104,13 +161,20 @@ class WeighedPresses:
         """Touches under a known force."""
         return np.flatnonzero(np.isfinite(self.force))
 
-    def without(self, press: int) -> Self:
-        """The same without one press."""
-        keep = self.press != press
-        return type(self)(
-            self.xy[keep], self.area[keep], self.peak[keep], self.snr[keep],
-            self.force[keep], self.press[keep], self.time[keep],
-        )  # fmt: skip
+
+def _check_order(force: FloatArray, press: IntArray, time: FloatArray) -> None:
+    if not np.isfinite(time).all() or np.isinf(force).any():
+        raise DataError(
+            "expected finite times and forces, got values that are not finite", where=_WHERE
+        )
+    order = np.lexsort((np.arange(len(press)), press))
+    back = (np.diff(time[order]) < 0) & (np.diff(press[order]) == 0)
+    if back.any():
+        raise DataError(
+            f"the time decreases within press {press[order][int(np.argmax(back))]}",
+            where=_WHERE,
+            hint="give the touches of each press in the order of their times",
+        )
 
 
 def _check_newtons(force: FloatArray) -> None:

@@ -100,6 +100,18 @@ class MappingAnswer:
         """Whether too many presses look as if they were elsewhere."""
         return len(self.contradicted) > _DOUBTFUL * self.presses
 
+    @property
+    def reason(self) -> str:
+        """Why it is not sure, in words."""
+        if self.doubtful:
+            return "too many of these presses fit other positions better: check the labels"
+        if self.unexplained > 1 - self.probability - self.unexplained:
+            return "no channel mapping explains these presses well enough"
+        return (
+            "these presses do not decide it: the most likely channel mapping has a probability of "
+            f"{self.probability:.2f}"
+        )
+
 
 def solve_channel_mapping(
     dv: ArrayLike,

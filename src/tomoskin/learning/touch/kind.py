@@ -1,20 +1,14 @@
-"""The kind of calibration that tells where a touch is, from labelled presses.
-
-Keys of the .npz: ``kind``, ``version``; ``dv`` (n, n_meas), ``xy_m`` (n, 2), optional ``strength``
-(n,) and, of labels that were estimated, ``spread_m2`` (n, 2, 2); ``outline_m`` (k, 2); ``drive``,
-``measure`` (n_meas, 2), ``n_electrodes``; ``pattern``,
-``skin`` identities, ``skin_name``. What was learnt is learnt again when the file is read, which
-gives the same locator: a file outlives the method.
-"""
+"""The kind of calibration that tells where a touch is, from labelled presses."""
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import Arrays, DataError, Detection, FloatArray, IntArray, real_numbers
+from tomoskin.core import Detection, FloatArray, IntArray
 from tomoskin.learning.kind import (
     Applied,
     Calibration,
@@ -22,18 +16,74 @@ from tomoskin.learning.kind import (
     FrameView,
     Kind,
     Progress,
-    located,
 )
-from tomoskin.learning.touch.correction import FitCorrection
-from tomoskin.learning.touch.health import CalibrationHealth
+from tomoskin.learning.touch.health import CalibrationHealth, FitCorrection
 from tomoskin.learning.touch.locator import Locator
-from tomoskin.learning.touch.lost_rows import LIVE
 from tomoskin.learning.touch.presses import Presses
-from tomoskin.learning.touch.standing import Standing
-from tomoskin.learning.touch.watch import Watch
+from tomoskin.learning.touch.watch import LIVE, Watch
 from tomoskin.model.pattern import Pattern
 from tomoskin.model.skin import Skin
 from tomoskin.sensing.segment import Region
+
+_FRAMES = 8
+"""Frames in a mean: as many as a guided press is learnt from."""
+
+_MOVED = 1.5
+"""How many times what noise explains frames may differ by that are of one position."""
+
+_NOISES = 30
+"""Newest frames that tell the noise."""
+
+
+class Standing:
+    """The mean of the newest frames in which a touch stood still.
+
+    The noise is told from second differences over time, in which an even motion does not show.
+    """
+
+    def __init__(self) -> None:
+        self._frames: deque[FloatArray] = deque(maxlen=_FRAMES)
+        self._newest: deque[FloatArray] = deque(maxlen=3)
+        self._noises: deque[float] = deque(maxlen=_NOISES)
+
+    def clear(self) -> None:
+        """The touch has ended."""
+        self._frames.clear()
+        self._newest.clear()
+
+    @property
+    def stands(self) -> bool:
+        """Whether the mean is one of as many frames as it can be."""
+        return len(self._frames) == _FRAMES
+
+    def push(self, dv: FloatArray) -> FloatArray:
+        """(n_meas,) mean of the newest frame ``dv`` (n_meas,), NaN where a value is missing, and
+        of those before it that differ from it by noise alone."""
+        frames = self._frames
+        if frames and (np.isfinite(frames[-1]) != np.isfinite(dv)).any():
+            self.clear()
+        frames.append(dv)
+        self._newest.append(dv)
+        if len(self._newest) == self._newest.maxlen:
+            first, second, third = self._newest
+            self._noises.append(float(np.nanmean((first - 2 * second + third) ** 2)) / 6)
+        while len(frames) > 1 and self._moves():
+            frames.popleft()
+        return np.asarray(np.mean(frames, axis=0))
+
+    def _moves(self) -> bool:
+        """Whether the newest frame, or the newer half, is unlike those before."""
+        if not self._noises:
+            return True
+        frames, noise = np.array(self._frames), float(np.median(self._noises))
+        n = len(frames)
+        for newer in {1, n // 2}:
+            step = frames[-newer:].mean(axis=0) - frames[:-newer].mean(axis=0)
+            expected = noise * (1 / newer + 1 / (n - newer))
+            if float(np.nanmean(step**2)) > _MOVED**2 * expected:
+                return True
+        return False
+
 
 _ALL = 0.999
 """Part of a measurement that is taken for all of it."""
@@ -124,32 +174,10 @@ def _at(detection: Detection, position: FloatArray, covariance: FloatArray) -> D
     return replace(detection, x=x, y=y, sd_x=sd_x, sd_y=sd_y, cov_xy=cov_xy, bias=0.0)
 
 
-def _pack(locator: Locator) -> Arrays:
-    arrays: Arrays = {
-        "dv": locator.presses.dv,
-        "xy_m": locator.presses.xy,
-        "outline_m": locator.region.outline,
-        "pattern": np.array(locator.pattern_id),
-        "skin": np.array(locator.skin_id),
-    }
-    presses = locator.presses
-    optional = {"strength": presses.strength, "spread_m2": presses.spread}
-    return {**arrays, **{key: v for key, v in optional.items() if v is not None}}
-
-
-def _unpack(arrays: Arrays, pattern: Pattern, where: str, progress: Progress) -> Locator:
-    strength, spread = (
-        real_numbers(arrays, key, where) if key in arrays else None
-        for key in ("strength", "spread_m2")
-    )
-    dv = real_numbers(arrays, "dv", where)
-    if dv.shape[1:] != (pattern.n_meas,):
-        raise DataError(f"expected {pattern.n_meas} rows of dv, got shape {dv.shape}", where=where)
-    with located(where):
-        presses = Presses.of(dv, real_numbers(arrays, "xy_m", where), strength, spread)
-        region = Region.checked(real_numbers(arrays, "outline_m", where))
-        skin_id = str(arrays.get("skin", ""))
-        return Locator.learn(presses.within(region), region, pattern, skin_id, progress)
+def _learn(
+    presses: Presses, region: Region, pattern: Pattern, progress: Progress, skin_id: str = ""
+) -> Locator:
+    return Locator.learn(presses.within(region), region, pattern, skin_id, progress)
 
 
 def _check(calibration: Calibration[Locator], skin: Skin) -> None:
@@ -193,17 +221,12 @@ def _excluded(nuisance: FloatArray) -> NDArray[np.bool_]:
 TOUCH = Kind(
     name="touch",
     title="tomoskin touch calibration",
-    version=1,
     subject="touch",
-    command="touch",
     attachment="calibration.npz",
-    keys=frozenset({"dv", "xy_m", "outline_m"}),
-    pack=_pack,
-    unpack=_unpack,
+    learn=_learn,
     check=_check,
     exclude=_exclude,
     apply=_apply,
-    skin_id=lambda locator: locator.skin_id,
     locates=True,
 )
 """Touch positions from labelled presses; its model is a :class:`Locator`."""

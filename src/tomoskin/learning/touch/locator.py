@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 from threadpoolctl import threadpool_limits
 
-from tomoskin.core import DataError, FloatArray
+from tomoskin.core import Detection, FloatArray
 from tomoskin.learning.kind import Progress, silent
-from tomoskin.learning.touch.posterior import FEW, Estimates, widening
+from tomoskin.learning.touch.per_channel import Rotations
+from tomoskin.learning.touch.posterior import Estimates, widening
 from tomoskin.learning.touch.presses import Features, Presses, Strength, frames, mean_about
-from tomoskin.learning.touch.rotations import Rotations
 from tomoskin.learning.touch.session_alignment import SessionAlignment
 from tomoskin.learning.touch.stacking import (
     NINE_IN_TEN,
@@ -31,8 +31,8 @@ from tomoskin.sensing.segment import Region
 
 _STEPS = 4
 
-_COARSE = 600
-"""Places in the grid of few presses: what they know is less than that."""
+_PLACES = 600
+"""Positions in the grid; what is between them is their mean."""
 
 _MISSING = 2.0
 """Power of the part of the rows that a frame has, by which its covariance is divided: filled in,
@@ -121,7 +121,7 @@ class Locator:
             skin, presses on one line, data that never change.
         """
         table = pattern or (skin.pattern() if skin else None)
-        presses = Presses.of(dv, xy, strength)
+        presses = Presses.checked(dv, xy, strength)
         if table is not None:
             frames(presses.dv, table.n_meas)
         region = Region.of(skin) if skin else Region.around(presses.xy)
@@ -154,7 +154,7 @@ class Locator:
         data = features(presses.dv)
         progress(0, _STEPS)
         rotations = Rotations.of(origin[0]) if origin[0] else Rotations.none(presses.dv.shape[1])
-        grid = region.lattice(_COARSE) if len(presses) < FEW else region.grid
+        grid = region.lattice(_PLACES)
         estimates = Estimates.of(data, positions, grid, rotations.of_rows(features.rows))
         progress(1, _STEPS)
         stacking = Stacking.of(data, estimates.left_out, positions)
@@ -194,9 +194,9 @@ class Locator:
         that are not finite are left out. Raises DataError for another number of rows, and for a
         frame without any value that is used.
         """
-        return self.told(dv)[:2]
+        return self.posterior(dv)[:2]
 
-    def told(self, dv: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def posterior(self, dv: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
         """What :meth:`predict` and :meth:`strangeness` say of frames (n, n_meas)."""
         given = frames(dv, self.presses.dv.shape[1])
         data = self.features(given)
@@ -261,11 +261,6 @@ class Locator:
         return self.learn(presses.within(region), region, self.pattern, self.skin_id, progress)
 
     @property
-    def pattern_id(self) -> str:
-        """Identity of the pattern, "" where it is not known."""
-        return self.pattern.identity if self.pattern else ""
-
-    @property
     def errors(self) -> FloatArray:
         """(n,) m by which each press is missed when it is left out."""
         return np.asarray(
@@ -277,15 +272,9 @@ class Locator:
         """(2,) m where the next labelled press tells most: the maps are least certain there."""
         return self.region.metres(self.estimates.least_known)
 
-    def check(self, pattern: Pattern | None = None, skin: Skin | None = None) -> None:
-        """Refuse data of another pattern or skin. Raises DataError."""
-        pairs = (
-            ("pattern", self.pattern_id, pattern and pattern.identity),
-            ("skin", self.skin_id, skin and skin.identity),
-        )
-        for name, mine, other in pairs:
-            if mine and other and mine != other:
-                raise DataError(
-                    f"the calibration is for {name} {mine}, but the data are of {name} {other}",
-                    hint=f"calibrate this {name}: tomoskin calibrate touch",
-                )
+
+def detection_at(position: FloatArray, covariance: FloatArray, strength: float) -> Detection:
+    """A touch at a position (2,) m with a covariance (2, 2) m², as presses tell it."""
+    (x, y), (sd_x, sd_y) = position.tolist(), np.sqrt(np.diag(covariance)).tolist()
+    nothing = np.empty(0, dtype=np.int64)
+    return Detection(x, y, sd_x, sd_y, np.nan, strength, nothing, cov_xy=float(covariance[0, 1]))

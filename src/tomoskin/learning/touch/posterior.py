@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from itertools import product
-from typing import Self, TypeVar
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import FloatArray
+from tomoskin.core import FloatArray, IntArray
 from tomoskin.learning.touch.maps import ResponseMaps, principal
-from tomoskin.learning.touch.per_channel import ChannelLikelihood, ChannelMaps
-from tomoskin.learning.touch.process import LENGTHS, Likeness, squared_distances
-from tomoskin.learning.touch.rotations import Rotations
+from tomoskin.learning.touch.per_channel import ChannelLikelihood, ChannelMaps, Rotations
+from tomoskin.learning.touch.process import LENGTHS, Likeness, moments, squared_distances
 
 BoolArray = NDArray[np.bool_]
 
@@ -62,19 +61,13 @@ class GridLikelihood:
         """(n, g) log-likelihood of each place, up to a constant of the frame."""
         return np.asarray(-len(self.precision) * np.log1p(misfit) - self.volume)
 
-    def __call__(self, features: FloatArray) -> FloatArray:
-        """The same of frames (n, k)."""
-        return self.of_misfit(self.misfit(features))
-
 
 def pooled(log_likelihoods: Sequence[FloatArray], powers: FloatArray) -> FloatArray:
     """(n, g) probabilities of the grid's positions: the product of powers of each likelihood.
 
     A logarithmic opinion pool (Genest & Zidek 1986); a single one is tempered by its power.
     """
-    scaled = powers[0] * log_likelihoods[0]
-    for power, part in zip(powers[1:], log_likelihoods[1:], strict=False):
-        scaled += power * part
+    scaled = sum(power * part for power, part in zip(powers, log_likelihoods, strict=False))
     weight = np.exp(scaled - scaled.max(axis=1, keepdims=True))
     return np.asarray(weight / weight.sum(axis=1, keepdims=True))
 
@@ -88,24 +81,16 @@ def powers_of(
     """
     nearest = squared_distances(xy, grid).argmin(axis=1)
     rows = np.arange(len(xy))
-    tried = POWERS if len(log_likelihoods) == 1 else np.append(0.0, POWERS)
-    choices = [np.array(powers) for powers in product(tried, repeat=len(log_likelihoods))]
+    choices = [np.array(powers) for powers in product(np.append(0.0, POWERS), repeat=2)]
     score = [
         np.log(pooled(log_likelihoods, powers)[rows, nearest] + _LEAST).sum() for powers in choices
     ]
     return choices[int(np.argmax(score))]
 
 
-def moments(probability: FloatArray, grid: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Mean (n, 2) and covariance (n, 2, 2) of ``probability`` (n, g) on ``grid`` (g, 2)."""
-    mean = probability @ grid
-    pairs = (grid[:, :, None] * grid[:, None, :]).reshape(-1, 4)
-    second = (probability @ pairs).reshape(-1, 2, 2)
-    return mean, second - mean[:, :, None] * mean[:, None, :]
-
-
-FEW = 80
-"""So few presses are asked row by row too; with more, all rows together know better."""
+_MOST = 200
+"""Presses that maps of single rows are learnt from: more tell a row little more of its noise, and
+the work grows with their cube."""
 
 _SCARCE = 20
 _FOLDS = (8, 5)
@@ -113,11 +98,6 @@ _FOLDS = (8, 5)
 
 _NEAR = 0.5
 """Mean squared step, in parts of that between any two presses, below which they are in an order."""
-
-Likelihood = Callable[[FloatArray], FloatArray]
-"""Features (n, k) → log-likelihood (n, g) of the grid's positions."""
-
-L = TypeVar("L", bound=Likelihood)
 
 _WIDENS = 1.5
 """Power of a frame's strangeness by which its covariance grows: chosen on the two sessions of
@@ -151,30 +131,22 @@ class Estimates:
         rotations: Rotations,
     ) -> Self:
         """Learn the maps; length scales by evidence, powers by left-out presses."""
-        directions = principal(features)
+        directions, n = principal(features), len(positions)
         maps = _likeliest(positions, features, directions)
-        together = maps.basis.likeness
-
-        def joint(some: FloatArray, theirs: FloatArray) -> GridLikelihood:
-            learnt = ResponseMaps.of(together, some, theirs, directions)
-            return GridLikelihood.of(learnt, grid)
-
-        folds = _folds(positions)
-        of_others = _without(joint, folds, positions, features)
-        misfit = _read(folds, [part.misfit(x) for part, x in of_others])
-        parts = [of_others[0][0].of_misfit(misfit)]
-        alone = None
-        if len(positions) < FEW:
-            alone = channels = ChannelMaps.of(positions, features, rotations)
-
-            def single(some: FloatArray, theirs: FloatArray) -> ChannelLikelihood:
-                return ChannelLikelihood.of(channels.again(some, theirs), grid)
-
-            alone_of_others = _without(single, folds, positions, features)
-            parts.append(_read(folds, [part(x) for part, x in alone_of_others]))
+        few = _some(n)
+        channels = ChannelMaps.of(positions[few], features[few], rotations)
+        misfit, alone, folds = np.empty((n, len(grid))), np.empty((n, len(grid))), []
+        for out in _folds(positions):
+            some, theirs = positions[~out], features[~out]
+            learnt = ResponseMaps.of(maps.basis.likeness, some, theirs, directions)
+            folds.append(GridLikelihood.of(learnt, grid))
+            few = _some(len(some))
+            single = ChannelLikelihood.of(channels.again(some[few], theirs[few]), grid)
+            misfit[out], alone[out] = folds[-1].misfit(features[out]), single(features[out])
+        parts = [folds[0].of_misfit(misfit), alone]
         powers = powers_of(parts, grid, positions)
         left_out = moments(pooled(parts, powers), grid)
-        per_channel = ChannelLikelihood.of(alone, grid) if alone and powers[1] else None
+        per_channel = ChannelLikelihood.of(channels, grid) if powers[1] else None
         usual = float(np.median(misfit.min(axis=1)))
         return cls(grid, GridLikelihood.of(maps, grid), per_channel, powers, usual, *left_out)
 
@@ -237,20 +209,9 @@ def _folds(positions: FloatArray) -> list[BoolArray]:
     return [fold == k for k in range(folds)]
 
 
-def _without(
-    learn: Callable[[FloatArray, FloatArray], L],
-    folds: Sequence[BoolArray],
-    positions: FloatArray,
-    features: FloatArray,
-) -> list[tuple[L, FloatArray]]:
-    """What was learnt without each fold, and the features of that fold."""
-    return [(learn(positions[~out], features[~out]), features[out]) for out in folds]
-
-
-def _read(folds: Sequence[BoolArray], values: Sequence[FloatArray]) -> FloatArray:
-    """(n, g) values of each fold, in the order of the presses."""
-    order = np.argsort(np.concatenate([np.flatnonzero(out) for out in folds]))
-    return np.asarray(np.concatenate(values)[order])
+def _some(n: int) -> IntArray:
+    """Presses of n, spread over the time in which they were made, that are not too many."""
+    return np.unique(np.linspace(0, n - 1, min(n, _MOST)).astype(int))
 
 
 def _in_any_order(positions: FloatArray) -> bool:

@@ -42,7 +42,7 @@ class Presses:
     spread: FloatArray | None = None
 
     @classmethod
-    def of(
+    def checked(
         cls,
         dv: ArrayLike,
         xy: ArrayLike,
@@ -129,6 +129,17 @@ def frames(dv: ArrayLike, n_meas: int | None = None) -> FloatArray:
     if data.ndim != 2 or n_meas not in (None, data.shape[1]):
         raise DataError(f"expected dv of shape (n, {n_meas or 'n_meas'}), got {data.shape}")
     return np.where(np.abs(data) <= _MOST, data, np.nan)
+
+
+def labelled_touches(
+    dv: ArrayLike, xy: ArrayLike | None, n_meas: int
+) -> tuple[FloatArray, FloatArray]:
+    """Frames (n, n_meas) and their labels (n, 2) m, rows of NaN where there is none."""
+    data = frames(dv, n_meas)
+    labels = np.full((len(data), 2), np.nan) if xy is None else np.asarray(xy, dtype=np.float64)
+    if labels.shape != (len(data), 2):
+        raise DataError(f"expected xy of shape ({len(data)}, 2), got {labels.shape}")
+    return data, labels
 
 
 def _name(rows: ArrayLike, what: str, hint: str = "") -> None:

@@ -89,21 +89,38 @@ class Basis:
 
 def _pivots(likeness: Likeness, positions: FloatArray) -> list[int]:
     """Rows whose likeness to all others explains the rest."""
-    left = np.full(len(positions), likeness.variance)
+    unexplained = np.full(len(positions), likeness.variance)
     factor = np.zeros((len(positions), min(_MOST, len(positions))))
     chosen: list[int] = []
     while len(chosen) < factor.shape[1]:
-        pivot = int(left.argmax())
-        if left[pivot] < _TOLERANCE * likeness.variance:
+        pivot = int(unexplained.argmax())
+        if unexplained[pivot] < _TOLERANCE * likeness.variance:
             break
         k = len(chosen)
         column = likeness(positions, positions[pivot : pivot + 1])[:, 0]
         column -= factor[:, :k] @ factor[pivot, :k]
-        factor[:, k] = column / np.sqrt(left[pivot])
-        left = np.maximum(left - factor[:, k] ** 2, 0.0)
-        left[pivot] = 0.0
+        factor[:, k] = column / np.sqrt(unexplained[pivot])
+        unexplained = np.maximum(unexplained - factor[:, k] ** 2, 0.0)
+        unexplained[pivot] = 0.0
         chosen.append(pivot)
     return chosen
+
+
+def moments(probability: FloatArray, grid: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Mean (n, 2) and covariance (n, 2, 2) of ``probability`` (n, g) on ``grid`` (g, 2)."""
+    mean = probability @ grid
+    pairs = (grid[:, :, None] * grid[:, None, :]).reshape(-1, 4)
+    second = (probability @ pairs).reshape(-1, 2, 2)
+    return mean, second - mean[:, :, None] * mean[:, None, :]
+
+
+_HOLDS = 0.9
+
+
+def nine_in_ten(values: FloatArray) -> float:
+    """What nine in ten values to come, as ``values`` (n,) are, keep to (split-conformal: Vovk,
+    Gammerman & Shafer 2005)."""
+    return float(np.quantile(values, min(1.0, _HOLDS * (1 + 1 / len(values)))))
 
 
 _PRIOR = {"amplitude": (-2.0, 2.0), "length": (0.3, 1.0), "noise": (-3.5, 2.0)}
@@ -124,20 +141,27 @@ class Process:
     """A sum of products of squared-exponential kernels, one for each named block of inputs.
 
     ``terms`` names the blocks of each product; ``logs`` holds, term by term, the logarithm of
-    the amplitude and of the lengths, and last that of the noise. ``weights`` (n, 2) is
-    (K + noise)⁻¹ targets; ``left_out`` (n, 2) what each press would be told without itself
-    (Rasmussen & Williams 2006, 5.12).
+    the amplitude and of the lengths, and last that of the noise. Targets count about ``centre``
+    (q,) in units of ``scale``; ``weights`` (n, q) is (K + noise)⁻¹ of them, by the Cholesky
+    ``factor``. ``left_out`` (n, q) is what each press would be told without itself (Rasmussen &
+    Williams 2006, 5.12), ``missed`` (n, q) by how many of its own deviations that is off.
     """
 
     terms: tuple[tuple[str, ...], ...]
     logs: FloatArray
+    centre: FloatArray
+    scale: float
+    factor: tuple[FloatArray, bool]
     weights: FloatArray
     left_out: FloatArray
+    missed: FloatArray
 
     @classmethod
     def of(cls, terms: Sequence[tuple[str, ...]], squares: Distances, targets: FloatArray) -> Self:
-        """Fit ``targets`` (n, 2), of order one, from squared distances (n, n) of each block."""
-        n = len(targets)
+        """Fit ``targets`` (n, q) from squared distances (n, n) of each block."""
+        n, centre = len(targets), targets.mean(axis=0)
+        scale = float((targets - centre).std()) or 1.0
+        targets = (targets - centre) / scale
         chosen = np.unique(np.linspace(0, n - 1, min(n, _LEARNT_ON)).astype(int))
         few = {name: square[np.ix_(chosen, chosen)] for name, square in squares.items()}
         logs = _learn(terms, few, targets[chosen])
@@ -145,28 +169,26 @@ class Process:
         kernel[np.diag_indices(n)] += _noise(logs)
         factor = cho_factor(kernel, lower=True, overwrite_a=True, check_finite=False)
         weights = cho_solve(factor, targets, check_finite=False)
-        inverse, _ = dpotri(factor[0], lower=1, overwrite_c=0)
-        left_out = targets - weights / np.diag(inverse)[:, None]
-        return cls(tuple(terms), logs, weights, left_out)
+        own = np.diag(dpotri(factor[0], lower=1, overwrite_c=0)[0])
+        left_out = centre + scale * (targets - weights / own[:, None])
+        missed = weights / np.sqrt(own)[:, None]
+        return cls(tuple(terms), logs, centre, scale, factor, weights, left_out, missed)
 
     def __call__(self, squares: Distances) -> FloatArray:
-        """(m, 2) answers for frames at squared distances (m, n) from the presses."""
-        return np.asarray(self.covariance(squares) @ self.weights)
+        """(m, q) answers for frames at squared distances (m, n) from the presses."""
+        return np.asarray(self.centre + self.scale * (self._cross(squares) @ self.weights))
 
-    def covariance(self, squares: Distances) -> FloatArray:
+    def deviation(self, squares: Distances) -> FloatArray:
+        """(m,) of what a target of such frames may be about the answer, its noise included."""
+        cross = self._cross(squares)
+        known = (cross * cho_solve(self.factor, cross.T).T).sum(axis=1)
+        firsts = np.cumsum([0, *(1 + len(term) for term in self.terms)])[:-1]
+        prior = float(np.exp(self.logs[firsts]).sum())
+        return np.asarray(self.scale * np.sqrt(np.maximum(prior - known, 0.0) + _noise(self.logs)))
+
+    def _cross(self, squares: Distances) -> FloatArray:
         """(m, n) prior covariance of inputs at squared distances (m, n), without noise."""
         return _kernel(self.terms, self.logs, squares)
-
-    @property
-    def noise(self) -> float:
-        """Variance of the noise."""
-        return _noise(self.logs)
-
-    @property
-    def variance(self) -> float:
-        """Prior variance of an answer, without noise."""
-        firsts = np.cumsum([0, *(1 + len(term) for term in self.terms)])[:-1]
-        return float(np.exp(self.logs[firsts]).sum())
 
 
 def _noise(logs: FloatArray) -> float:

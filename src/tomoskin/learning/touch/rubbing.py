@@ -13,7 +13,7 @@ from tomoskin.core import DataError, FloatArray, IntArray
 from tomoskin.learning.kind import Progress, silent
 from tomoskin.learning.touch.locator import Locator
 from tomoskin.learning.touch.posterior import BoolArray
-from tomoskin.learning.touch.presses import Presses, frames
+from tomoskin.learning.touch.presses import Presses, labelled_touches
 from tomoskin.learning.touch.unlabelled import UnlabelledFit, from_labels, missed_labels
 from tomoskin.model.pattern import Pattern
 from tomoskin.model.skin import Skin
@@ -133,10 +133,7 @@ class Rubbing:
                 f"{skin.pattern().n_electrodes}",
                 hint="give the skin that was rubbed: --skin",
             )
-        data = frames(dv, table.n_meas)
-        labels = np.full((len(data), 2), np.nan) if xy is None else np.asarray(xy, dtype=float)
-        if labels.shape != (len(data), 2):
-            raise DataError(f"expected xy of shape ({len(data)}, 2), got {labels.shape}")
+        data, labels = labelled_touches(dv, xy, table.n_meas)
         if len(data) < FEWEST:
             raise DataError(
                 f"expected at least {FEWEST} touches, got {len(data)}",
@@ -159,7 +156,7 @@ class Rubbing:
         found = cls(
             skin,
             pattern,
-            Presses.of(dv, region.metres(alone.positions), spread=_spread(alone, region)),
+            Presses.checked(dv, region.metres(alone.positions), spread=_spread(alone, region)),
             region.unit * alone.disagreement,
             region.unit * alone.moved,
             alone.alike,
@@ -262,7 +259,7 @@ def _presses(dv: FloatArray, xy: FloatArray, positions: FloatArray, spread: Floa
     """Frames at labels ``xy`` (n, 2) m, without spread; at ``positions`` where these are NaN."""
     known: BoolArray = np.asarray(np.isfinite(xy).all(axis=1))
     spread = np.where(known[:, None, None], 0.0, spread)
-    return Presses.of(dv, np.where(known[:, None], xy, positions), spread=spread)
+    return Presses.checked(dv, np.where(known[:, None], xy, positions), spread=spread)
 
 
 def _spread(fit: UnlabelledFit, region: Region) -> FloatArray:

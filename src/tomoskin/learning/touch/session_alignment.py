@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
@@ -12,15 +14,9 @@ from threadpoolctl import threadpool_limits
 from tomoskin.core import DataError, FloatArray, IntArray
 from tomoskin.learning.touch.matching import CHANCE, distance, matched, prevalence
 from tomoskin.learning.touch.posterior import BoolArray
-from tomoskin.learning.touch.presses import Presses, frames
-from tomoskin.learning.touch.process import nearness, squared_distances
-from tomoskin.learning.touch.topographic import (
-    TopographicMap,
-    covariances,
-    learnt_surface,
-    likeliest_power,
-    surface_basis,
-)
+from tomoskin.learning.touch.presses import Presses, labelled_touches
+from tomoskin.learning.touch.process import Basis, Likeness, moments, nearness, squared_distances
+from tomoskin.learning.touch.topographic import TopographicMap, coefficients_of, whitening
 
 if TYPE_CHECKING:
     from tomoskin.learning.touch.locator import Locator
@@ -32,6 +28,10 @@ _LEARNT_ON = 800
 """Presses of the calibration that make its maps here."""
 
 _PLACES, _FOLDS = 600, 3
+
+_LENGTH, _RIDGE, _DIAGONAL = 0.4, 0.1, 0.1
+"""Length scale of a response, in radii of the region; noise over signal of the maps; part of the
+noise's covariance that is taken as diagonal."""
 
 _COVERED = 0.5
 """Part of the sheet that touches must cover to be taken for spread over all of it."""
@@ -131,10 +131,7 @@ class SessionAlignment:
 
         Raises DataError for fewer than fifty frames, and arrays that do not belong together.
         """
-        data = frames(dv, locator.presses.dv.shape[1])
-        labels = np.full((len(data), 2), np.nan) if xy is None else np.asarray(xy, dtype=float)
-        if labels.shape != (len(data), 2):
-            raise DataError(f"expected xy of shape ({len(data)}, 2), got {labels.shape}")
+        data, labels = labelled_touches(dv, xy, locator.presses.dv.shape[1])
         if len(data) < _FEWEST:
             raise DataError(
                 f"expected at least {_FEWEST} touches of the session, got {len(data)}",
@@ -146,7 +143,7 @@ class SessionAlignment:
     @classmethod
     def _of(cls, locator: Locator, dv: FloatArray, xy: FloatArray) -> Self:
         region, before = locator.region, locator.presses
-        positions, _, strangeness = locator.told(dv)
+        positions, _, strangeness = locator.posterior(dv)
         strange = float(np.median(strangeness))
         fits = strange <= _AS_BEFORE
         touches = region.scaled(positions)
@@ -154,11 +151,11 @@ class SessionAlignment:
         if fits:  # where they are is known, so they need not be everywhere
             weight = prevalence(region.scaled(before.xy), touches)
         apart = distance(before.dv, dv, weight)
-        known: BoolArray = np.asarray(np.isfinite(xy).all(axis=1))
-        session = _Frames(dv, xy, known)
+        session = _Session(locator, dv, xy, region.lattice(_PLACES))
         found = _Found(before, touches, 0.0, 1.0, 1.0)
         if not fits or apart > CHANCE:
-            found = _found(locator, session, weight if fits else None, touches)
+            found = session.found(weight if fits else None, touches)
+        known = session.known
         missed = _missed(found.positions[known], region.scaled(xy[known]))
         believed = found.moved < _MOVED and found.covered > _COVERED
         return cls(
@@ -209,15 +206,6 @@ class SessionAlignment:
 
 
 @dataclass(frozen=True, eq=False)
-class _Frames:
-    """Frames ``dv`` (n, n_meas) of a session, with labels ``xy`` (n, 2) m where ``known``."""
-
-    dv: FloatArray
-    xy: FloatArray
-    known: BoolArray
-
-
-@dataclass(frozen=True, eq=False)
 class _Found:
     """What is learnt from, ``positions`` (n, 2) of the session's frames in radii of the region
     before labels correct them, and what a :class:`SessionAlignment` says of these."""
@@ -229,117 +217,132 @@ class _Found:
     covered: float
 
 
-def _found(
-    locator: Locator, session: _Frames, weight: FloatArray | None, touches: FloatArray
-) -> _Found:
-    """Align frames by their channels' distributions, and where that does not do by a mapping.
+@dataclass(frozen=True, eq=False)
+class _Session:
+    """Frames ``dv`` (n, n_meas) of a session, with labels ``xy`` (n, 2) m, NaN where there is
+    none, for a ``locator``; positions are those of ``grid`` (g, 2)."""
 
-    ``weight`` of the presses where the ``touches`` (n, 2) that the locator finds are believed.
+    locator: Locator
+    dv: FloatArray
+    xy: FloatArray
+    grid: FloatArray
+
+    @cached_property
+    def known(self) -> BoolArray:
+        """(n,) whether a frame has a label."""
+        return np.asarray(np.isfinite(self.xy).all(axis=1))
+
+    def found(self, weight: FloatArray | None, touches: FloatArray) -> _Found:
+        """Align frames by their channels' distributions, and where that does not do by a mapping.
+
+        ``weight`` of the presses where the ``touches`` (n, 2) that the locator finds are believed.
+        """
+        locator, known, dv = self.locator, self.known, self.dv
+        maps = _SessionMaps.of(locator, self.grid)
+        weights = maps.surface.posterior(maps.white(dv))
+        start = weights @ self.grid
+        covered = float(np.exp(_entropy(weights.mean(axis=0))) / len(self.grid))
+        if weight is not None or covered > _COVERED:
+            even = np.full(len(locator.presses), 1 / len(locator.presses))
+            like = matched(locator.presses.dv, dv, even if weight is None else weight)
+            presses = replace(locator.presses, dv=like)
+            locator = locator.learn(presses, locator.region, locator.pattern, locator.skin_id)
+            positions, _, strangeness = locator.posterior(dv)
+            if float(np.median(strangeness)) <= _AS_BEFORE:
+                given = Presses.of_more(dv[known], self.xy[known])
+                both = presses.and_then(given) if known.any() else presses
+                answers = locator.region.scaled(positions)
+                way = _way(answers, start if weight is None else touches)
+                return _Found(both, answers, way, 1.0, 1.0)
+            maps = _SessionMaps.of(locator, self.grid)
+        return self._mapped(maps, locator.presses, start, covered)
+
+    def _mapped(
+        self, maps: _SessionMaps, presses: Presses, start: FloatArray, covered: float
+    ) -> _Found:
+        """Positions by a mapping that begins with the ``maps`` of ``presses`` like the session's.
+
+        ``start`` (n, 2) in radii without any alignment; part of the sheet that is ``covered``.
+        """
+        region, known, grid = self.locator.region, self.known, self.grid
+        labels = region.scaled(self.xy[known])
+        white = maps.white(self.dv)
+        named = np.full(len(white), -1)
+        if known.any():
+            named[known] = _numbers(labels, grid)
+        fit, noise = maps.surface.fitted(white, named, everywhere=covered > _COVERED)
+        grown = noise / maps.noise
+        mean = answers = fit.posterior(white) @ grid
+        if known.sum() >= _CORRECTS:
+            mean = answers + _correction(answers, known, labels)
+        spread = _spread(fit.tempered(grown).posterior(white), mean, grid)
+        spread[known] = 0.0
+        label = np.where(known[:, None], self.xy, region.metres(mean))
+        estimated = Presses.checked(self.dv, label, spread=region.unit**2 * spread)
+        return _Found(presses.and_then(estimated), answers, _way(answers, start), grown, covered)
+
+
+@dataclass(frozen=True, eq=False)
+class _SessionMaps:
+    """Maps of a calibration in features whose gains and offsets drop out with the session.
+
+    ``whiten`` (n_meas, k) makes their noise white; ``middle`` (k,) is that of a sheet that is
+    touched everywhere; ``noise`` that of its own frames without their labels.
     """
-    grid = locator.region.lattice(_PLACES)
-    start, covered = _start(locator, session.dv, grid)
-    known = session.known
-    like = locator
-    if weight is not None or covered > _COVERED:
-        even = np.full(len(locator.presses), 1 / len(locator.presses))
-        dv = matched(locator.presses.dv, session.dv, even if weight is None else weight)
-        presses = replace(locator.presses, dv=dv)
-        like = locator.learn(presses, locator.region, locator.pattern, locator.skin_id)
-        positions, _, strangeness = like.told(session.dv)
-        if float(np.median(strangeness)) <= _AS_BEFORE:
-            given = Presses.of_more(session.dv[known], session.xy[known])
-            both = presses.and_then(given) if known.any() else presses
-            answers = locator.region.scaled(positions)
-            before = start if weight is None else touches
-            return _Found(both, answers, _way(answers, before), 1.0, 1.0)
-    return _mapped(like, session, grid, (start, covered))
 
+    surface: TopographicMap
+    whiten: FloatArray
+    middle: FloatArray
+    noise: float = 1.0
 
-def _mapped(
-    like: Locator, session: _Frames, grid: FloatArray, begun: tuple[FloatArray, float]
-) -> _Found:
-    """Positions by a mapping that begins with the responses of a locator ``like`` the session.
+    @classmethod
+    def of(cls, locator: Locator, grid: FloatArray) -> Self:
+        """Of some of the presses; folds of them say how sharp the maps are."""
+        presses = locator.presses
+        chosen = np.unique(np.linspace(0, len(presses) - 1, _LEARNT_ON).astype(int))
+        dv, positions = presses.dv[chosen], locator.region.scaled(presses.xy[chosen])
+        fold = np.arange(len(dv)) % _FOLDS
+        parts = []
+        for k in range(_FOLDS):
+            part = cls._plain(dv[fold != k], positions[fold != k], grid)
+            white = part.white(dv[fold == k])
+            parts.append((part.surface, white, _numbers(positions[fold == k], grid)))
+        maps = cls._plain(dv, positions, grid)
+        surface = replace(maps.surface, power=_likeliest_power(parts))
+        _, noise = surface.fitted(maps.white(dv), np.full(len(dv), -1), everywhere=True)
+        return replace(maps, surface=surface, noise=noise)
 
-    ``begun``: positions (n, 2) in radii without any alignment, and the part of the sheet covered.
-    """
-    start, covered = begun
-    region, known = like.region, session.known
-    labels = region.scaled(session.xy[known])
-    before, features = _learnt(like, grid)
-    white = SessionFeatures.of(session.dv)(session.dv) @ features.whiten + before.middle
-    named = np.full(len(white), -1)
-    if known.any():
-        named[known] = _numbers(labels, grid)
-    fit, noise = before.surface.fitted(white, named, everywhere=covered > _COVERED)
-    grown = noise / before.noise
-    mean = found = fit.posterior(white) @ grid
-    if known.sum() >= _CORRECTS:
-        mean = found + _correction(found, known, labels)
-    spread = _spread(fit.tempered(grown).posterior(white), mean, grid)
-    spread[known] = 0.0
-    label = np.where(known[:, None], session.xy, region.metres(mean))
-    estimated = Presses.of(session.dv, label, spread=region.unit**2 * spread)
-    presses = like.presses.and_then(estimated)
-    return _Found(presses, found, _way(found, start), grown, covered)
+    @classmethod
+    def _plain(cls, dv: FloatArray, positions: FloatArray, grid: FloatArray) -> Self:
+        basis = Basis.of(Likeness(_LENGTH), grid)
+        features = SessionFeatures.of(dv)(dv)
+        there = basis(positions)
+        coefficients = coefficients_of(there, features, _RIDGE)
+        residual = features - there @ coefficients
+        whiten = whitening(residual.T @ residual / len(residual), _DIAGONAL)
+        coefficients = coefficients @ whiten
+        values = basis(grid)
+        surface = TopographicMap(values, coefficients, np.ones(whiten.shape[1]), 1.0)
+        return cls(surface, whiten, (values @ coefficients).mean(axis=0))
+
+    def white(self, dv: FloatArray) -> FloatArray:
+        """(n, k) features of all frames (n, n_meas) of a session."""
+        return SessionFeatures.of(dv)(dv) @ self.whiten + self.middle
 
 
 def _way(positions: FloatArray, before: FloatArray) -> float:
     return float(np.linalg.norm(positions - before, axis=1).mean())
 
 
-@dataclass(frozen=True, eq=False)
-class _Before:
-    """Maps of a calibration in its own whitened features; ``middle`` (k,) of a sheet that is
-    touched everywhere; ``noise`` of its own frames without their labels."""
-
-    surface: TopographicMap
-    middle: FloatArray
-    noise: float
-
-
-@dataclass(frozen=True, eq=False)
-class _Whitened:
-    """Features of one ``session``, and what whitens them, (n_meas, k)."""
-
-    session: SessionFeatures
-    whiten: FloatArray
-
-
-def _learnt(locator: Locator, grid: FloatArray) -> tuple[_Before, _Whitened]:
-    presses = locator.presses
-    chosen = np.unique(np.linspace(0, len(presses) - 1, _LEARNT_ON).astype(int))
-    dv, positions = presses.dv[chosen], locator.region.scaled(presses.xy[chosen])
-    fold = np.arange(len(dv)) % _FOLDS
-    parts = []
-    for k in range(_FOLDS):
-        surface, used, middle = _surface(dv[fold != k], positions[fold != k], grid)
-        white = SessionFeatures.of(dv[fold == k])(dv[fold == k]) @ used.whiten + middle
-        parts.append((surface, white, _numbers(positions[fold == k], grid)))
-    power = likeliest_power(parts)
-    surface, used, middle = _surface(dv, positions, grid)
-    surface = replace(surface, power=power)
-    white = used.session(dv) @ used.whiten + middle
-    _, noise = surface.fitted(white, np.full(len(dv), -1), everywhere=True)
-    return _Before(surface, middle, noise), used
-
-
-def _start(locator: Locator, dv: FloatArray, grid: FloatArray) -> tuple[FloatArray, float]:
-    """Positions (n, 2) of a session's frames by the calibration's maps of features whose gains and
-    offsets have dropped out, and the part of the sheet that they cover."""
-    before, features = _learnt(locator, grid)
-    theirs = SessionFeatures.of(dv)
-    weights = before.surface.posterior(theirs(dv) @ features.whiten + before.middle)
-    return weights @ grid, float(np.exp(_entropy(weights.mean(axis=0))) / len(grid))
-
-
-def _surface(
-    dv: FloatArray, positions: FloatArray, grid: FloatArray
-) -> tuple[TopographicMap, _Whitened, FloatArray]:
-    session, basis = SessionFeatures.of(dv), surface_basis(grid)
-    coefficients, whiten = learnt_surface(basis, positions, session(dv))
-    values = basis(grid)
-    surface = TopographicMap(values, coefficients, np.ones(whiten.shape[1]), 1.0)
-    return surface, _Whitened(session, whiten), (values @ coefficients).mean(axis=0)
+def _likeliest_power(parts: Sequence[tuple[TopographicMap, FloatArray, IntArray]]) -> float:
+    """The power at which left-out presses are likeliest: maps, features and numbers on the grid."""
+    powers = np.geomspace(0.01, 1.0, 14)
+    score = np.zeros(len(powers))
+    for surface, features, numbers in parts:
+        for k, power in enumerate(powers):
+            weights = replace(surface, power=float(power)).posterior(features)
+            score[k] += np.log(weights[np.arange(len(numbers)), numbers] + 1e-6).sum()
+    return float(powers[int(score.argmax())])
 
 
 def _numbers(positions: FloatArray, grid: FloatArray) -> IntArray:
@@ -368,5 +371,5 @@ def _correction(positions: FloatArray, known: BoolArray, labels: FloatArray) -> 
 def _spread(weights: FloatArray, mean: FloatArray, grid: FloatArray) -> FloatArray:
     """(n, 2, 2) mean square of the grid's positions about ``mean`` (n, 2)."""
     off = weights @ grid - mean
-    about = covariances(weights, grid) + off[:, :, None] * off[:, None]
+    about = moments(weights, grid)[1] + off[:, :, None] * off[:, None]
     return np.asarray(about + _FLOOR**2 * np.eye(2))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
 
@@ -11,11 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tomoskin.core import Detection, FloatArray, IntArray
-from tomoskin.learning.touch.locator import Locator
+from tomoskin.learning.touch.locator import Locator, detection_at
 from tomoskin.learning.touch.maps import ResponseMaps
-from tomoskin.learning.touch.posterior import moments
 from tomoskin.learning.touch.presses import Features, frames
-from tomoskin.learning.touch.process import squared_distances
+from tomoskin.learning.touch.process import moments, squared_distances
 
 _PLACES = 160
 """Places that a touch is looked for at; what is between them is their mean."""
@@ -107,22 +106,23 @@ class Several:
         data = frames(dv, self.locator.presses.dv.shape[1])
         positions, covariance = self.locator.predict(data)
         strength = self.locator.strength(data)
-        detections: list[tuple[Detection, ...]] = []
-        for k, frame in enumerate(self._features(data)):
-            alone = _reading(positions[k], covariance[k], float(strength[k]))
-            if self._single(frame).max() >= self.usual:
-                detections.append((alone,))
-                continue
-            evidence = self.evidence(frame)
-            if evidence.says == "two":
-                pair = zip(evidence.positions, evidence.spread, evidence.gains, strict=True)
-                detections.append(tuple(_reading(at, cov, float(gain)) for at, cov, gain in pair))
-            else:
-                close = evidence.says == "close"
-                detections.append(
-                    (_reading(positions[k], covariance[k], float(strength[k]), close),)
-                )
-        return detections
+        return [
+            self._of_frame(frame, positions[k], covariance[k], float(strength[k]))
+            for k, frame in enumerate(self._features(data))
+        ]
+
+    def _of_frame(
+        self, frame: FloatArray, position: FloatArray, covariance: FloatArray, strength: float
+    ) -> tuple[Detection, ...]:
+        """Of features (k,); the others are what the locator says of one touch."""
+        if self._single(frame).max() >= self.usual:
+            return (detection_at(position, covariance, strength),)
+        evidence = self.evidence(frame)
+        if evidence.says == "two":
+            pair = zip(evidence.positions, evidence.spread, evidence.gains.tolist(), strict=True)
+            return tuple(detection_at(*one) for one in pair)
+        close = evidence.says == "close"
+        return (replace(detection_at(position, covariance, strength), close=close),)
 
     def evidence(self, frame: FloatArray) -> TouchHypotheses:
         """What the features (k,) of one frame say."""
@@ -156,9 +156,9 @@ class Several:
         """(g · gains,) log-likelihood of one touch; index place · gains + gain."""
         return self._likely(frame, self._alone)
 
-    def _log_likelihood(self, frame: FloatArray, beside: int) -> FloatArray:
+    def _log_likelihood(self, frame: FloatArray, other: int) -> FloatArray:
         """The same of a touch beside another of that index."""
-        changes: NDArray[np.float32] = np.arcsinh(self._stronger + self._stronger[beside])
+        changes: NDArray[np.float32] = np.arcsinh(self._stronger + self._stronger[other])
         return self._likely(frame, changes @ self._whiten)
 
     def _likely(self, frame: FloatArray, expected: NDArray[np.float32]) -> FloatArray:
@@ -229,20 +229,3 @@ def _spread_out(positions: FloatArray, count: int, first: int = 0) -> IntArray:
         chosen.append(int(nearest.argmax()))
         nearest = np.minimum(nearest, squared_distances(positions, positions[[chosen[-1]]])[:, 0])
     return np.array(chosen)
-
-
-def _reading(
-    place: FloatArray, covariance: FloatArray, strength: float, close: bool = False
-) -> Detection:
-    sd = np.sqrt(np.diag(covariance))
-    return Detection(
-        x=float(place[0]),
-        y=float(place[1]),
-        sd_x=float(sd[0]),
-        sd_y=float(sd[1]),
-        area=float("nan"),
-        peak=strength,
-        cells=np.empty(0, dtype=np.int64),
-        cov_xy=float(covariance[0, 1]),
-        close=close,
-    )

@@ -11,7 +11,7 @@ from scipy.optimize import minimize, nnls
 from scipy.special import chdtri
 
 from tomoskin.core import FloatArray
-from tomoskin.learning.touch.process import Distances, Process, squared_distances, squared_norms
+from tomoskin.learning.touch.process import Process, nine_in_ten, squared_distances, squared_norms
 
 _SPREAD = 1e-3
 """Deviation, in radii of the region, below which no place is known."""
@@ -19,8 +19,7 @@ _SPREAD = 1e-3
 _FREEDOM = 5.0
 """Degrees of freedom of the errors: their tail is heavier than a Gaussian's."""
 
-_HOLDS = 0.9
-NINE_IN_TEN = float(chdtri(2, 1 - _HOLDS))
+NINE_IN_TEN = float(chdtri(2, 0.1))
 """Squared length within which nine in ten of a Gaussian's errors lie."""
 
 _RECENT, _FEWEST = 8, 30
@@ -63,7 +62,7 @@ class CalibratedCovariance:
         optimum = np.exp(minimize(cost, start, method="Nelder-Mead", options={"maxiter": 150}).x)
         far = squared_lengths(errors, cls(*optimum)(posterior, disagreement))
         last = far[-max(len(far) // _RECENT, _FEWEST) :]
-        factor = max(_high(far), _high(last) / _CHANCE) / NINE_IN_TEN
+        factor = max(nine_in_ten(far), nine_in_ten(last) / _CHANCE) / NINE_IN_TEN
         spent = (len(errors) + _SPENT) / max(len(errors) - _SPENT, 1)
         return cls(*(float(x) for x in factor * spent * optimum))
 
@@ -77,11 +76,6 @@ def disagreement_of(by_expert: FloatArray, answer: FloatArray) -> FloatArray:
     """(n, 2, 2) scatter of what the experts say, (experts, n, 2), about the answer (n, 2)."""
     away = by_expert - answer
     return np.asarray(np.einsum("eni,enj->nij", away, away) / len(by_expert))
-
-
-def _high(far: FloatArray) -> float:
-    """The length that nine in ten of such presses keep to."""
-    return float(np.quantile(far, min(1.0, _HOLDS * (1 + 1 / len(far)))))
 
 
 def squared_lengths(errors: FloatArray, covariance: FloatArray) -> FloatArray:
@@ -105,39 +99,6 @@ _TOGETHER = 1e3
 
 
 @dataclass(frozen=True, eq=False)
-class Expert:
-    """A process that predicts a place about ``centre``, in units of ``scale``."""
-
-    process: Process
-    centre: FloatArray
-    scale: float
-
-    @classmethod
-    def of(
-        cls,
-        terms: tuple[tuple[str, ...], ...],
-        squares: Distances,
-        xy: FloatArray,
-    ) -> Self:
-        """Learn ``xy`` (n, 2)."""
-        centre = xy.mean(axis=0)
-        scale = float((xy - centre).std()) or 1.0
-        return cls(Process.of(terms, squares, (xy - centre) / scale), centre, scale)
-
-    @property
-    def left_out(self) -> FloatArray:
-        """(n, 2) what each press would be told without itself."""
-        return self._placed(self.process.left_out)
-
-    def __call__(self, squares: Distances) -> FloatArray:
-        """(m, 2) places of frames."""
-        return self._placed(self.process(squares))
-
-    def _placed(self, answer: FloatArray) -> FloatArray:
-        return np.asarray(self.centre + self.scale * answer)
-
-
-@dataclass(frozen=True, eq=False)
 class Stacking:
     """The weighted mean of the maps' estimate and of processes on features and estimate.
 
@@ -148,7 +109,7 @@ class Stacking:
     features: FloatArray
     estimates: FloatArray
     unit: float
-    experts: tuple[Expert, ...]
+    experts: tuple[Process, ...]
     weights: FloatArray
     left_out_by_expert: FloatArray
 
@@ -166,7 +127,7 @@ class Stacking:
             "features": between / unit,
             "estimate": squared_distances(estimates, estimates) / _NEAR**2,
         }
-        experts = (Expert.of(_PLAIN, squares, xy), Expert.of(_BOTH, squares, xy))
+        experts = (Process.of(_PLAIN, squares, xy), Process.of(_BOTH, squares, xy))
         by_expert = np.stack([estimates, *(expert.left_out for expert in experts)])
         weights = _weights(by_expert, xy)
         return cls(features, estimates, unit, experts, weights, by_expert)

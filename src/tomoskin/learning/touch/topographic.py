@@ -2,20 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
 
-from tomoskin.core import FloatArray, IntArray
+from tomoskin.core import FloatArray, IntArray, reach
 from tomoskin.learning.touch.process import Basis, Likeness, squared_distances
-
-_LENGTH = 0.4
-"""Length scale of a response, in radii of the region."""
-
-_RIDGE = 0.1
-"""Noise over signal of maps learnt from labels."""
 
 _KEPT = 30.0
 """Weight of the earlier maps in those of another session: each coefficient's, as frames."""
@@ -25,15 +18,20 @@ _TEMPERING = 0.75
 """Power of the noise's growth by which likelihoods lose weight. This and the weight of the earlier
 maps were chosen on the two sessions of eskin_hydrogel_round."""
 
-_DIAGONAL = 0.1
-"""Part of the noise's covariance that is taken as diagonal."""
+_LENGTHS, _REFINED = (0.5, 0.3), 10
+"""Length scales of responses that are refined, one after the other, and rounds with each."""
+
+_ROUGH = 0.15
+"""Deviation, in radii, of the positions that this begins with."""
+
+_POWER, _REFINED_DIAGONAL, _REFINED_RIDGE = 0.3, 0.2, 0.3
+"""Power of a frame's likelihood, part of the noise's covariance that is taken as diagonal, and
+noise over signal of the responses. Chosen on two skins."""
+
+_LABEL = 10.0
+"""Frames that a labelled one counts for."""
 
 _LEAST = 1e-12
-
-
-def surface_basis(grid: FloatArray) -> Basis:
-    """Functions of the position that hold a response."""
-    return Basis.of(Likeness(_LENGTH), grid)
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,8 +108,8 @@ class TopographicMap:
         normal = (self.values * count).T @ self.values + _KEPT * np.eye(self.values.shape[1])
         coefficients = np.linalg.solve(normal, self.values.T @ pull + _KEPT * kept)
         answers = self.values @ coefficients
-        left = frames @ features**2 - 2 * (pull * answers).sum(axis=0)
-        variance = (left + (count * answers**2).sum(axis=0)) / frames.sum()
+        residual = frames @ features**2 - 2 * (pull * answers).sum(axis=0)
+        variance = (residual + (count * answers**2).sum(axis=0)) / frames.sum()
         return replace(self, coefficients=coefficients, variance=np.maximum(variance, _LEAST))
 
     def tempered(self, grown: float) -> Self:
@@ -128,38 +126,69 @@ def balanced(weights: FloatArray) -> FloatArray:
     return weights
 
 
-def covariances(weights: FloatArray, grid: FloatArray) -> FloatArray:
-    """(n, 2, 2) of positions that are those of ``grid`` (g, 2) with probabilities (n, g)."""
-    mean = weights @ grid
-    second = (weights @ (grid[:, :, None] * grid[:, None]).reshape(-1, 4)).reshape(-1, 2, 2)
-    return np.asarray(second - mean[:, :, None] * mean[:, None])
+def whitening(covariance: FloatArray, diagonal: float) -> FloatArray:
+    """(k, k) what makes noise of the ``covariance`` independent, with variance 1.
 
-
-def learnt_surface(
-    basis: Basis, positions: FloatArray, features: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Coefficients (m, k) of whitened responses, and the whitening (k, k), from labelled presses.
-
-    ``features`` (n, k) about their mean, ``positions`` (n, 2) in radii of the region.
+    So large a part of it is taken as ``diagonal``: it was learnt from few frames.
     """
-    values = basis(positions)
-    normal = values.T @ values + _RIDGE * np.eye(values.shape[1])
-    coefficients = np.linalg.solve(normal, values.T @ features)
-    left = features - values @ coefficients
-    covariance = left.T @ left / len(left)
-    diagonal = np.diag(covariance) + _LEAST
-    covariance = (1 - _DIAGONAL) * covariance + _DIAGONAL * np.diag(diagonal)
-    size, axes = np.linalg.eigh(covariance)
-    whiten = axes / np.sqrt(np.maximum(size, _LEAST))
-    return coefficients @ whiten, whiten
+    own = np.diag(np.diag(covariance) + _LEAST)
+    size, axes = np.linalg.eigh((1 - diagonal) * covariance + diagonal * own)
+    return np.asarray(axes / np.sqrt(np.maximum(size, _LEAST)))
 
 
-def likeliest_power(parts: Sequence[tuple[TopographicMap, FloatArray, IntArray]]) -> float:
-    """The power at which left-out presses are likeliest: maps, features and numbers on the grid."""
-    powers = np.geomspace(0.01, 1.0, 14)
-    score = np.zeros(len(powers))
-    for surface, features, numbers in parts:
-        for k, power in enumerate(powers):
-            weights = replace(surface, power=float(power)).posterior(features)
-            score[k] += np.log(weights[np.arange(len(numbers)), numbers] + 1e-6).sum()
-    return float(powers[int(score.argmax())])
+def coefficients_of(
+    values: FloatArray, features: FloatArray, ridge: float, weights: FloatArray | None = None
+) -> FloatArray:
+    """(m, k) of the functions with ``values`` (g, m), by which ``features`` (n, k) are nearest.
+
+    ``weights`` (n, g) say how much each frame counts at each position; without them the n
+    positions are the frames' own.
+    """
+    count = 1.0 if weights is None else weights.sum(axis=0)[:, None]
+    pull = features if weights is None else weights.T @ features
+    normal = (values * count).T @ values + ridge * np.eye(values.shape[1])
+    return np.asarray(np.linalg.solve(normal, values.T @ pull))
+
+
+def refined(
+    features: FloatArray, positions: FloatArray, labels: FloatArray, grid: FloatArray
+) -> FloatArray:
+    """(n, g) probabilities of the grid's positions for frames with ``features`` (n, k).
+
+    Expectation maximisation begins at ``positions`` (n, 2), all in radii. Responses are smooth
+    over the sheet, their noise has a covariance, and touches are everywhere equally frequent.
+    ``labels`` (n, 2) are NaN where there is none.
+    """
+    known = np.flatnonzero(np.isfinite(labels).all(axis=1))
+    named = squared_distances(labels[known], grid).argmin(axis=1)
+    off = squared_distances(positions, grid)
+    weights = np.exp(-0.5 * (off - off.min(axis=1, keepdims=True)) / _ROUGH**2)
+    weights = _named(balanced(weights), known, named)
+    for length in _LENGTHS:
+        values = Basis.of(Likeness(length), grid)(grid)
+        for _ in range(_REFINED):
+            reach()
+            surface, white = _responses(features, weights, values, known)
+            weights = _named(balanced(surface.posterior(white)), known, named)
+    return weights
+
+
+def _named(weights: FloatArray, known: IntArray, named: IntArray) -> FloatArray:
+    weights[known] = np.eye(weights.shape[1])[named]
+    return weights
+
+
+def _responses(
+    features: FloatArray, weights: FloatArray, values: FloatArray, known: IntArray
+) -> tuple[TopographicMap, FloatArray]:
+    """Responses of frames at positions, and the features in which their noise is white."""
+    counted = weights.copy()
+    counted[known] *= _LABEL
+    coefficients = coefficients_of(values, features, _REFINED_RIDGE, counted)
+    answers = values @ coefficients
+    mean = weights @ answers
+    residual = features - mean
+    within = (answers * weights.sum(axis=0)[:, None]).T @ answers - mean.T @ mean
+    whiten = whitening((residual.T @ residual + within) / len(features), _REFINED_DIAGONAL)
+    ones = np.ones(whiten.shape[1])
+    return TopographicMap(values, coefficients @ whiten, ones, _POWER), features @ whiten

@@ -9,12 +9,19 @@ import numpy as np
 
 from tomoskin.core import FloatArray
 from tomoskin.learning.touch.locator import Locator
-from tomoskin.learning.touch.modelled import ModelFit, model_responses
-from tomoskin.learning.touch.presses import Presses
-from tomoskin.learning.touch.ranks import Ranked, expected_sizes, inside
-from tomoskin.learning.touch.refining import refined, signed_features
-from tomoskin.learning.touch.topographic import covariances
-from tomoskin.learning.touch.unfolding import laid_over, unfolded
+from tomoskin.learning.touch.presses import Features, Presses
+from tomoskin.learning.touch.process import moments
+from tomoskin.learning.touch.rough import (
+    ModelFit,
+    Ranked,
+    expected_sizes,
+    inside,
+    laid_over,
+    levels,
+    model_responses,
+    unfolded,
+)
+from tomoskin.learning.touch.topographic import refined
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.pattern import Pattern
 from tomoskin.model.skin import Skin
@@ -26,6 +33,20 @@ _NEIGHBOURS = (10, 14)
 
 _FOLDS = 3
 """Into which labels are divided, to see how far left-out ones are missed."""
+
+
+_MOST = 256
+"""Features from which only so many directions of largest variance are used."""
+
+
+def signed_features(dv: FloatArray) -> FloatArray:
+    """(n, k) features of the shape of frames (n, n_meas), with their sign, about their mean."""
+    shape = dv / levels(dv)
+    features: FloatArray = Features.of(shape)(shape)
+    features = np.asarray(features - features.mean(axis=0))
+    if features.shape[1] <= _MOST:
+        return features
+    return np.asarray(features @ np.linalg.svd(features, full_matrices=False)[2][:_MOST].T)
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,15 +106,15 @@ class UnlabelledFit:
         cls,
         fits: list[FloatArray],
         grid: FloatArray,
-        found: tuple[float, float, bool],
+        about: tuple[float, float, bool],
     ) -> Self:
         means = np.stack([weights @ grid for weights in fits])
         middle = means.mean(axis=0)
         off = means - middle
         between = np.einsum("fna,fnb->nab", off, off) / len(fits)
-        within = np.mean([covariances(weights, grid) for weights in fits], axis=0)
+        within = np.mean([moments(weights, grid)[1] for weights in fits], axis=0)
         apart = float(np.sqrt(np.trace(between, axis1=1, axis2=2).mean()))
-        return cls(middle, within + between, apart, *found)
+        return cls(middle, within + between, apart, *about)
 
 
 def from_labels(dv: FloatArray, labels: FloatArray, region: Region, pattern: Pattern) -> FloatArray:
@@ -102,7 +123,7 @@ def from_labels(dv: FloatArray, labels: FloatArray, region: Region, pattern: Pat
     It begins where a calibration from the labels puts the frames, and asks the model nothing.
     """
     known = np.isfinite(labels).all(axis=1)
-    presses = Presses.of(dv[known], region.metres(labels[known]))
+    presses = Presses.checked(dv[known], region.metres(labels[known]))
     start = region.scaled(Locator.learn(presses, region, pattern).predict(dv)[0])
     grid = region.lattice(_POSITIONS)
     return np.asarray(refined(signed_features(dv), start, labels, grid) @ grid)

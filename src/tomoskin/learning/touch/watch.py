@@ -1,17 +1,95 @@
-"""Frames one after another, without the rows that have jumped since the calibration."""
+"""Frames one after another, without the rows that have jumped since the calibration, and by what
+was learnt without those that are missing for good."""
 
 from __future__ import annotations
 
 from collections import deque
+from concurrent.futures import Future
+from dataclasses import replace
+from threading import Thread
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tomoskin.core import FloatArray, IntArray
+from tomoskin.core import DataError, FloatArray, IntArray
 from tomoskin.learning.touch.health import CalibrationHealth
 from tomoskin.learning.touch.locator import Locator
-from tomoskin.learning.touch.lost_rows import OFFLINE, LostRows
 from tomoskin.learning.touch.presses import frames
+
+OFFLINE, LIVE = (3, 0), (8, 100)
+"""Patience where frames wait for the answer, and where they do not."""
+
+_MOST_MISSING = 0.8
+"""Part of the rows without which nothing is learnt."""
+
+
+def without(locator: Locator, rows: IntArray) -> Locator:
+    """Locator that has learnt from the same presses without some ``rows`` of the pattern.
+
+    It locates frames that lack these rows, without values that are filled in. Raises DataError
+    where no other row says anything.
+    """
+    dv = locator.presses.dv.copy()
+    dv[:, rows] = np.nan
+    presses = replace(locator.presses, dv=dv)
+    return locator.learn(presses, locator.region, locator.pattern, locator.skin_id)
+
+
+class LostRows:
+    """Chooses what answers a frame: the locator, or what it is without the rows that are missing.
+
+    Values that are filled in make a calibration worse and its ellipses too small, so it learns
+    again once the same rows have been missing for some frames. That takes up to seconds, in a
+    thread of its own. Its answers begin at a frame, not at a moment, so that a replay says the
+    same.
+
+    Parameters
+    ----------
+    locator
+        With all rows.
+    patience
+        Frames that lack the same rows before it learns, and from then on until it must be ready.
+    """
+
+    def __init__(self, locator: Locator, patience: tuple[int, int]) -> None:
+        self._locator, self._patience = locator, patience
+        self._missing = b""
+        self._count = 0
+        self._learnt: Future[Locator] | None = None
+
+    def __call__(self, frame: FloatArray) -> Locator:
+        """What answers the next ``frame`` (n_meas,), NaN where a value is missing."""
+        rows = self._locator.features.rows
+        missing = ~np.isfinite(frame[rows])
+        if not missing.any() or missing.mean() > _MOST_MISSING:
+            return self._locator
+        key = missing.tobytes()
+        if key != self._missing:
+            if self._learnt is not None and not self._learnt.done():
+                return self._locator  # one at a time
+            self._missing, self._count, self._learnt = key, 0, None
+        self._count += 1
+        begin, wait = self._patience
+        if self._count == begin:
+            self._learnt = self._learn(rows[missing])
+        if self._learnt is None or self._count < begin + wait:
+            return self._locator
+        return self._learnt.result()
+
+    def _learn(self, rows: IntArray) -> Future[Locator]:
+        future: Future[Locator] = Future()
+
+        def learn() -> None:
+            try:
+                future.set_result(without(self._locator, rows))
+            except DataError:  # nothing is left to learn from
+                future.set_result(self._locator)
+            except BaseException as error:
+                future.set_exception(error)
+
+        Thread(target=learn, daemon=True, name="learning without rows").start()
+        return future
+
 
 _PRESSES = 40
 """Presses that are looked back on."""
@@ -106,7 +184,7 @@ class Watch:
         return np.concatenate(positions), np.concatenate(covariances)
 
     def _next(self, frame: FloatArray, *, settled: bool) -> tuple[FloatArray, FloatArray]:
-        answer = self._told(frame)
+        answer = self._answer(frame)
         if not settled:
             return answer[:2]
         place = self._locator.region.scaled(answer[0])
@@ -124,7 +202,7 @@ class Watch:
         if jumped.mean() > _MOST or (jumped == self._jumped).all():
             return answer[:2]
         self._jumped = jumped
-        return self._told(frame)[:2]
+        return self._answer(frame)[:2]
 
     def _changed(self) -> NDArray[np.bool_]:
         """(k,) whether each row has changed, by any of the looks back."""
@@ -139,12 +217,12 @@ class Watch:
             if apart > _STRANGE:
                 return self._jumped
             least = _LEAST * float(np.sqrt(_PRESSES / n))
-            beside = max(least, min(_BESIDE * apart, _SURELY))
-            changed |= np.abs(by) > np.maximum(beside, _CHANCE / np.sqrt(n) * self._usual)
+            limit = max(least, min(_BESIDE * apart, _SURELY))
+            changed |= np.abs(by) > np.maximum(limit, _CHANCE / np.sqrt(n) * self._usual)
         return changed
 
-    def _told(self, frame: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        return self._reduced(frame).told(self._kept(frame))
+    def _answer(self, frame: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        return self._reduced(frame).posterior(self._kept(frame))
 
     def _fit(self) -> float:
         """How strange the last presses are: medians of each, and over them."""

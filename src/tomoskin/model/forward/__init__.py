@@ -2,8 +2,7 @@
 
 from tomoskin.model.forward.engine import Engine
 from tomoskin.model.forward.engine_choice import choose_engine
-from tomoskin.model.forward.model import ForwardModel, State
+from tomoskin.model.forward.model import ForwardModel, State, Terminals
 from tomoskin.model.forward.solution import Solution
-from tomoskin.model.forward.terminals import Terminals
 
 __all__ = ["Engine", "ForwardModel", "Solution", "State", "Terminals", "choose_engine"]

@@ -1,18 +1,118 @@
-"""Which engine runs: tomoskin_core where it works, else scipy and numpy."""
+"""Which engine runs: tomoskin_core where it works, here by a trial of it, else scipy and numpy."""
 
 from __future__ import annotations
 
 import importlib
 import os
+from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
-from tomoskin.core import ModelError
-from tomoskin.model.forward.engine import Engine
-from tomoskin.model.forward.native import Native
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from tomoskin.core import FloatArray, ModelError
+from tomoskin.model.forward.engine import (
+    BaseState,
+    Compressed,
+    Engine,
+    Factor,
+    Factorise,
+    Patches,
+    singular,
+)
 from tomoskin.model.forward.plain import Scipy
+from tomoskin.model.pattern import Pattern
 
 VARIABLE = "TOMOSKIN_ENGINE"
 """Environment variable that asks for one engine: scipy or native."""
+
+INTERFACE = 6
+"""The interface of tomoskin_core that is called here and in ``touch``; raised with its own."""
+
+
+@dataclass(frozen=True)
+class Native:
+    """Cholesky, products and rows of ``core``, the module tomoskin_core."""
+
+    core: Any
+    reason: str
+    name: str = "native"
+
+    @property
+    def vectors(self) -> str:
+        """The widest that the processor has."""
+        return str(self.core.vector_code)
+
+    def analyse(self, indptr: NDArray[np.int32], indices: NDArray[np.int32]) -> Factorise:
+        """Order the unknowns and lay out the factor, once for all matrices of this structure."""
+        symbolic = self.core.Symbolic(len(indptr) - 1, indptr, indices)
+
+        def factorise_natively(values: NDArray[Any]) -> Factor:
+            try:
+                factor: Factor = symbolic.factor(values)
+            except ValueError as error:
+                raise singular() from error
+            return factor
+
+        return factorise_natively
+
+    def fields(self, operator: csr_array, vectors: NDArray[Any], out: NDArray[Any]) -> None:
+        """See :class:`Engine`."""
+        indptr, indices = (
+            part.astype(np.int32, copy=False) for part in (operator.indptr, operator.indices)
+        )
+        self.core.transposed_product(indptr, indices, operator.data, vectors, out)
+
+    def jacobian(
+        self, gradient: NDArray[Any], pattern: Pattern, current: FloatArray
+    ) -> NDArray[Any]:
+        """See :class:`Engine`."""
+        rows: NDArray[Any] = self.core.jacobian(
+            gradient, pattern.drives, current, pattern.drive_index, pattern.measure
+        )
+        return rows
+
+    def patches(self, base: BaseState) -> Patches:
+        """See :class:`Engine`."""
+        made: Patches = self.core.Patches(
+            base.cells, base.local, base.held, base.conductivity, base.fields, base.grounded
+        )
+        return made
+
+    def check(self) -> None:
+        """Let it do a sum of each kind.
+
+        Raises
+        ------
+        Exception
+            Of any kind, when it has another interface, a part is missing or a result wrong.
+        """
+        found = getattr(self.core, "interface", 1)
+        if found != INTERFACE:
+            raise ModelError(
+                f"it was built for another tomoskin (interface {found}, expected {INTERFACE}); "
+                "build it again: make native"
+            )
+        starts, rows = (np.array(part, dtype=np.int32) for part in ([0, 2, 4], [0, 1, 0, 1]))
+        matrix = Compressed(np.array([2.0, 1.0, 1.0, 3.0]), rows, starts)
+        factor, both = self.analyse(starts, rows)(matrix.values), np.arange(2)
+        inverse = factor.columns(both)
+        _, lost, _ = factor.checked_columns(0.5 * matrix.values, both)
+        fields = np.empty((2, 2))
+        self.fields(matrix.matrix.tocsr(), inverse, fields)
+        pattern = Pattern.adjacent(4)
+        jacobian = self.jacobian(np.ones((4, 2, 3)), pattern, np.ones(pattern.n_drive))
+        right: list[tuple[Any, Any]] = [
+            (inverse, [[0.6, -0.2], [-0.2, 0.4]]),
+            (fields, np.eye(2)),
+            (lost, 0.5 * inverse),
+            (jacobian, 0.0),
+            (self.core.standing(np.eye(2)[:1], np.ones((4, 2)), np.eye(2)[:1], 0.0), 0.5),
+        ]
+        if not all(np.allclose(*pair) for pair in right):
+            raise ModelError("its results differ from those of scipy")
 
 
 def choose_engine() -> Engine:

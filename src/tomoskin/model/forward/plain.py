@@ -19,8 +19,7 @@ from tomoskin.model.forward.engine import (
     Patches,
     singular,
 )
-from tomoskin.model.forward.small_patches import stack_change, stacks, summed
-from tomoskin.model.forward.touches import Touches
+from tomoskin.model.forward.touches import Touches, stack_change, stacks
 from tomoskin.model.pattern import Pattern
 
 
@@ -120,7 +119,6 @@ class PlainPatches:
         """Prepare for touches of ``base``."""
         n = len(base.held)
         self._base = base
-        self._valence = np.bincount(base.cells.ravel(), minlength=n) + base.cells.size * base.held
         self._slot = np.full(n, -1)
         self._columns: NDArray[Any] = np.empty((0, n), base.fields.dtype)
 
@@ -146,66 +144,11 @@ class PlainPatches:
         grounded, lost = np.empty(shape, kind), np.zeros(shape, kind)
         grounded[:] = base.grounded
         missing: list[IntArray] = []
-        alone = np.ones(len(touches), dtype=bool)
-        for stack in stacks(base.cells, touches) if len(touches) > 1 else ():
-            alone[stack.numbers] = False
+        for stack in stacks(base.cells, touches):
             slots = self._slot[stack.nodes]
             missing.append(stack.nodes[slots < 0])
             if not len(missing[-1]):
                 between = self._columns[slots[:, :, None], stack.nodes[:, None]]
                 less, lost[stack.numbers] = stack_change(base, between, stack, touches)
                 grounded[stack.numbers] -= less
-        for number in np.flatnonzero(alone).tolist():
-            index, sigma = touches[number]
-            rim, change = self._condensed(index, sigma)
-            missing.append(rim[self._slot[rim] < 0])
-            if len(rim) > 1 and not len(missing[-1]):
-                less, lost[number] = self._woodbury(rim, change)
-                grounded[number] -= less
         return grounded, lost, np.unique(np.concatenate([starts[:0], *missing]))
-
-    def _condensed(self, index: IntArray, sigma: NDArray[Any]) -> tuple[IntArray, NDArray[Any]]:
-        """Nodes of the patch's rim (m,), and the change of the system seen from there (m, m)."""
-        base = self._base
-        nodes, position, touched = np.unique(
-            base.cells[index], return_inverse=True, return_counts=True
-        )
-        inside = touched == self._valence[nodes]
-        position = position.reshape(-1, base.cells.shape[1])
-        before, after = (
-            _condensed(_block(base.local[index], position, unit, len(nodes)), inside)
-            for unit in (base.conductivity[index], sigma)
-        )
-        return nodes[~inside], after - before
-
-    def _woodbury(self, rim: IntArray, change: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Uᵀ (I + A C)⁻¹ A U, and what rounding may cost it."""
-        between = self._columns[self._slot[rim][:, None], rim]
-        between = between[1:] - between[:1]
-        between = between[:, 1:] - between[:, :1]
-        fields = self._base.fields[rim[1:]] - self._base.fields[rim[:1]]
-        leak, change = change[1:].sum(axis=1, keepdims=True), change[1:, 1:]
-        system = change @ between
-        system[np.diag_indices_from(system)] += 1.0
-        current = np.linalg.solve(system, change @ fields)
-        changed = fields - between @ current
-        residual = change @ changed - current + leak * changed
-        return fields.T @ current, changed.T @ residual
-
-
-def _block(
-    local: FloatArray, position: IntArray, conductivity: NDArray[Any], n: int
-) -> NDArray[Any]:
-    """(n, n): the sum of the cells' matrices."""
-    keys = position[:, :, None] * n + position[:, None, :]
-    return summed(local * conductivity[:, None, None], keys, (n, n))
-
-
-def _condensed(block: NDArray[Any], inside: NDArray[np.bool_]) -> NDArray[Any]:
-    """``block`` without the nodes inside, which no current enters (Schur complement)."""
-    outer, across, inner = (
-        block[~inside][:, ~inside],
-        block[inside][:, ~inside],
-        block[inside][:, inside],
-    )
-    return np.asarray(outer - across.T @ np.linalg.solve(inner, across))

@@ -11,7 +11,8 @@ dense system (Woodbury 1950):
 where C = (K⁻¹) between them and U the basis fields on them. A constant changes nothing, so all
 three are taken against the first node: what the nodes have in common would cost digits, and does
 not enter. How many digits remain shows in the residual, and in the current that a constant drives
-through A, which should be none.
+through A, which should be none. The engine of scipy eliminates nothing and takes all nodes of the
+patch, which is the same formula.
 """
 
 from __future__ import annotations

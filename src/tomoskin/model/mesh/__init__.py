@@ -3,14 +3,13 @@
 from tomoskin.model.mesh.boundary import ElectrodeArc, check_arcs
 from tomoskin.model.mesh.box import BoxPatch, box
 from tomoskin.model.mesh.choose import Places
-from tomoskin.model.mesh.domed import Cap, Saddle
 from tomoskin.model.mesh.draped import Draped
-from tomoskin.model.mesh.extrude import cylinder, extrude, extrude_mesh
-from tomoskin.model.mesh.mesh import Mesh, MeshFile, read_mesh
+from tomoskin.model.mesh.extrude import cylinder, extrude
+from tomoskin.model.mesh.mesh import Mesh, MeshFile
 from tomoskin.model.mesh.outline import Disc, Ellipse, Outline
 from tomoskin.model.mesh.patch import FacePatch, Patch, WallPatch, ring
 from tomoskin.model.mesh.polygon import Polygon, Rectangle
-from tomoskin.model.mesh.surface import Plane, Surface, laid_on
+from tomoskin.model.mesh.surface import Cap, Plane, Saddle, Surface, laid_on
 from tomoskin.model.mesh.triangles import simplex_measure
 from tomoskin.model.mesh.triangulate import Quality, quality, triangulate
 from tomoskin.model.mesh.wrapped import Arm, Cylinder, Hinge
@@ -42,10 +41,8 @@ __all__ = [
     "check_arcs",
     "cylinder",
     "extrude",
-    "extrude_mesh",
     "laid_on",
     "quality",
-    "read_mesh",
     "ring",
     "simplex_measure",
     "triangulate",

@@ -64,13 +64,13 @@ def choose(
 
 def _numbered(groups: Mapping[str, IntArray]) -> list[str]:
     """Names of the groups that are called after an electrode, by its number."""
-    found = {name: m for name in groups if (m := _NUMBERED.fullmatch(name.strip()))}
-    if not found:
+    numbered = {name: m for name in groups if (m := _NUMBERED.fullmatch(name.strip()))}
+    if not numbered:
         raise GeometryError(
             f"no group is named as an electrode (E1, E2, …); {_listing(groups)}",
             hint="say which facets are electrodes: electrodes=…",
         )
-    return sorted(found, key=lambda name: int(found[name][1]))
+    return sorted(numbered, key=lambda name: int(numbered[name][1]))
 
 
 def _named(groups: Mapping[str, IntArray], names: Sequence[str]) -> list[IntArray]:

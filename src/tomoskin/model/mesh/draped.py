@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 
 from tomoskin.core import FloatArray, GeometryError, IntArray
 from tomoskin.model.mesh.check import check_cells
+from tomoskin.model.mesh.files import at_source
 from tomoskin.model.mesh.flatten import flattened, rim_of, same_turn
 from tomoskin.model.mesh.mesh import MeshFile
 from tomoskin.model.mesh.polygon import Polygon
@@ -85,8 +86,7 @@ class Draped(Surface):
         try:
             return cls.of(points, compact.reshape(file.cells.shape))
         except GeometryError as error:
-            where = f"{file.source}, {error.where}" if error.where else file.source
-            raise GeometryError(error.message, where=where, hint=error.hint) from error
+            raise at_source(error, file.source) from error
 
     @cached_property
     def outline(self) -> Polygon:
@@ -169,10 +169,10 @@ def _upright(points: FloatArray, cells: IntArray, flat: FloatArray) -> FloatArra
     up = np.array([0.0, 1.0, 0.0]) if np.abs(normal).argmax() == 2 else np.array([0.0, 0.0, 1.0])
     right = np.cross(up, normal)
     right /= np.linalg.norm(right)
-    seen = (points - points.mean(axis=0)) @ np.column_stack([right, np.cross(normal, right)])
-    seen[:, 1] /= np.linalg.norm(normal)
+    frontal = (points - points.mean(axis=0)) @ np.column_stack([right, np.cross(normal, right)])
+    frontal[:, 1] /= np.linalg.norm(normal)
     middle = flat - flat.mean(axis=0)
-    both = middle.T @ seen
+    both = middle.T @ frontal
     angle = np.arctan2(both[0, 1] - both[1, 0], both[0, 0] + both[1, 1])
     c, s = np.cos(angle), np.sin(angle)
     return np.asarray(middle @ np.array([[c, s], [-s, c]]))

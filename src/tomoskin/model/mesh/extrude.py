@@ -130,29 +130,6 @@ def extrude(
     return body.mesh(_facets(body, outline, patches))
 
 
-def extrude_mesh(flat: Mesh, planes: Sequence[float]) -> Mesh:
-    """Raise ``flat`` through the heights ``planes`` m, ascending.
-
-    Its electrodes go from the bottom to the top of the wall. Cells come layer by layer, three
-    for each triangle in turn; point i of plane k has the number k·n + i.
-
-    Raises
-    ------
-    GeometryError
-        When the mesh is not flat, or ``planes`` are not at least two ascending heights.
-    """
-    z = np.array(planes, dtype=np.float64)
-    if flat.cells.shape[1] != 3 or flat.points.shape[1] != 2:
-        raise GeometryError(
-            f"expected triangles in the plane, got points of {flat.points.shape[1]} coordinates "
-            f"and cells of {flat.cells.shape[1]} corners"
-        )
-    if z.ndim != 1 or len(z) < 2 or not (np.isfinite(z).all() and (np.diff(z) > 0).all()):
-        raise GeometryError(f"expected at least 2 ascending heights, got {z.tolist()}")
-    body = Body(flat.points, flat.cells, z)
-    return body.mesh([body.wall(edges, z[0], z[-1]) for edges in flat.electrodes])
-
-
 @dataclass(frozen=True, eq=False)
 class Body:
     """Prisms over flat triangles, cut into tetrahedra.

@@ -120,10 +120,10 @@ def groups_of(raw: Any, corners: int) -> dict[str, IntArray]:
     """Name → (n, corners) facets, for all groups that hold any."""
     parts: dict[str, list[IntArray]] = {}
     for source in (_sets, _physical, _marked):
-        found: dict[str, list[IntArray]] = {}
+        groups: dict[str, list[IntArray]] = {}
         for name, facets in source(raw, corners):
-            found.setdefault(name, []).append(facets)
-        parts = {**found, **parts}  # what is a set already is not read twice
+            groups.setdefault(name, []).append(facets)
+        parts = {**groups, **parts}  # what is a set already is not read twice
     joined = {name: np.concatenate(tables).astype(np.int64) for name, tables in parts.items()}
     return {name: facets for name, facets in joined.items() if len(facets)}
 

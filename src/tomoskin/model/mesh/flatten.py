@@ -86,12 +86,12 @@ def same_turn(cells: IntArray) -> IntArray:
     turns = np.where(_turn_alike(cells, pairs), 1.0, -1.0)
     n = len(cells)
     half = coo_array((turns, (pairs[:, 0], pairs[:, 1])), shape=(n, n))
-    beside = csr_array(half + half.T)
-    order, before = breadth_first_order(beside, 0, directed=False)
+    joined = csr_array(half + half.T)
+    order, before = breadth_first_order(joined, 0, directed=False)
     sign = np.ones(n)
     for cell in order[1:].tolist():
         came = before[cell]
-        sign[cell] = sign[came] * beside[cell, came]
+        sign[cell] = sign[came] * joined[cell, came]
     if (sign[pairs[:, 0]] * sign[pairs[:, 1]] != turns).any():
         raise GeometryError(
             "the surface has one side only, as a Möbius strip has",

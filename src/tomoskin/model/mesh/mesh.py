@@ -76,8 +76,17 @@ class Mesh:
 
     @classmethod
     def read(cls, path: str | Path, electrodes: Electrodes = None, *, scale: float = 1.0) -> Mesh:
-        """Read a .msh, .vtu, .stl or .obj file; see :func:`read_mesh`. Raises GeometryError."""
-        return read_mesh(path, electrodes, scale=scale)
+        """Read a .msh, .vtu, .stl or .obj file.
+
+        See :class:`MeshFile` for what is read and :data:`Electrodes` for the choice.
+
+        Raises
+        ------
+        GeometryError
+            When meshio is not installed, the file cannot be read or holds no usable cells, it
+            seems to be in millimetres, a cell repeats another one, or an electrode has no facet.
+        """
+        return MeshFile.read(path, scale=scale).mesh(electrodes)
 
     @property
     def dimension(self) -> int:
@@ -196,18 +205,6 @@ class MeshFile:
             return Mesh(self.points[used], compact.reshape(self.cells.shape), tuple(tables))
         except GeometryError as error:
             raise at_source(error, self.source) from error
-
-
-def read_mesh(path: str | Path, electrodes: Electrodes = None, *, scale: float = 1.0) -> Mesh:
-    """Read a mesh; see :class:`MeshFile` for what is read and :data:`Electrodes` for the choice.
-
-    Raises
-    ------
-    GeometryError
-        When meshio is not installed, the file cannot be read or holds no usable cells, it seems
-        to be in millimetres, a cell repeats another one, or an electrode has no facet.
-    """
-    return MeshFile.read(path, scale=scale).mesh(electrodes)
 
 
 def _frozen(value: object, dtype: DTypeLike, where: str) -> NDArray[Any]:

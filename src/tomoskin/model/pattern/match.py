@@ -51,14 +51,14 @@ def match_rows(pattern: Pattern, drive: ArrayLike, measure: ArrayLike) -> RowMat
         key, sign = _canonical(d, m)
         table.setdefault(key, (row, sign))
         table.setdefault(_as_it_stands(d, m), (row, 1.0))
-    found = [_find(table, d, m) for d, m in _rows(pattern)]
-    missing = [row for row, hit in enumerate(found) if hit is None]
+    located = [_find(table, d, m) for d, m in _rows(pattern)]
+    missing = [row for row, hit in enumerate(located) if hit is None]
     if missing:
         raise PatternError(
             _describe(pattern, missing),
             hint="name the skin of this recording with --skin, and use the same pattern",
         )
-    hits = [hit for hit in found if hit is not None]
+    hits = [hit for hit in located if hit is not None]
     rows = np.array([row for row, _ in hits], dtype=np.int64)
     unused = np.setdiff1d(np.arange(foreign.n_meas), rows)
     return RowMatch(rows, np.array([sign for _, sign in hits]), unused)

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import Literal
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from tomoskin.core import FloatArray, GeometryError
+from tomoskin.core import FloatArray, GeometryError, SkinError
 from tomoskin.model.mesh import MeshFile
-from tomoskin.model.robot.elements import name_of, numbers_of, origin_of
 from tomoskin.model.robot.pose import Pose
 
 MOST_TRIANGLES = 20_000
@@ -21,102 +23,134 @@ _AROUND, _UPWARDS = 32, 16
 """Sides of a round shape."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Box:
-    """Of ``size`` (3,) m, about its middle."""
-
-    size: FloatArray
-
-    def triangles(self) -> FloatArray:
-        """Triangles (12, 3, 3) m of the faces."""
-        corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
-        sides = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
-        table = [part for a, b, c, d in sides for part in ((a, b, c), (a, c, d))]
-        return np.asarray(corners[np.array(table)] * self.size / 2)
+def name_of(element: Element, where: str) -> str:
+    """Its name; SkinError where it has none."""
+    name = element.get("name") or ""
+    if not name:
+        raise SkinError(f"a <{element.tag}> element has no name", where=where)
+    return name
 
 
-@dataclass(frozen=True, slots=True)
-class Rod:
-    """A cylinder about its middle, along z; m."""
-
-    radius: float
-    length: float
-
-    def triangles(self) -> FloatArray:
-        """(n, 3, 3) m: the side, and both ends."""
-        r, half = self.radius, self.length / 2
-        return _turned(np.array([0, r, r, 0.0]), np.array([-half, -half, half, half]))
+def origin_of(element: Element, where: str) -> Pose:
+    """The pose that its <origin> says."""
+    origin = element.find("origin")
+    given = {} if origin is None else origin.attrib
+    return Pose.of(
+        *(numbers_of(given.get(key, "0 0 0"), 3, "<origin>", where) for key in ("xyz", "rpy"))
+    )
 
 
-@dataclass(frozen=True, slots=True)
-class Ball:
-    """A sphere, measures in m."""
+def numbers_of(text: str, count: Literal[1, 3], what: str, where: str) -> list[float]:
+    """So many finite numbers between spaces; SkinError that names ``what`` they are of."""
+    try:
+        numbers = [float(word) for word in text.split()]
+    except ValueError:
+        numbers = []
+    if len(numbers) != count or not all(map(math.isfinite, numbers)):
+        words = "a number" if count == 1 else "three numbers"
+        raise SkinError(f'expected {words} in {what}, got "{text}"', where=where)
+    return numbers
 
-    radius: float
 
-    def triangles(self) -> FloatArray:
-        """Triangles (n, 3, 3) m of the surface."""
-        up = np.linspace(-np.pi / 2, np.pi / 2, _UPWARDS + 1)
-        return _turned(self.radius * np.cos(up), self.radius * np.sin(up))
+def box(size: FloatArray) -> FloatArray:
+    """(12, 3, 3) m: the faces of a box of ``size`` (3,) m, about its middle."""
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+    sides = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+    table = [part for a, b, c, d in sides for part in ((a, b, c), (a, c, d))]
+    return np.asarray(corners[np.array(table)] * size / 2)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class LinkMesh:
-    """A mesh file, ``path`` as the URDF has it, and its scale (3,)."""
+def rod(radius: float, length: float) -> FloatArray:
+    """(n, 3, 3) m: side and ends of a cylinder about its middle, along z."""
+    half = length / 2
+    return _turned(np.array([0, radius, radius, 0.0]), np.array([-half, -half, half, half]))
 
-    path: str
-    scale: FloatArray
-    urdf: Path
 
-    def triangles(self) -> FloatArray:
-        """(n, 3, 3) m. Raises GeometryError, which names no folder, where it cannot be read."""
-        unit = abs(float(self.scale[0]))
-        try:
-            file = MeshFile.read(self._found(), scale=unit)
-        except GeometryError as error:
-            raise GeometryError(error.message, where=self.path, hint=error.hint) from error
-        if file.cells.shape[1] != 3:
-            raise GeometryError("expected triangles, got a volume", where=self.path)
-        points = np.zeros((len(file.points), 3))
-        points[:, : file.points.shape[1]] = file.points
-        return np.asarray((points * (self.scale / unit))[file.cells])
+def ball(radius: float) -> FloatArray:
+    """(n, 3, 3) m: a sphere about its middle."""
+    up = np.linspace(-np.pi / 2, np.pi / 2, _UPWARDS + 1)
+    return _turned(radius * np.cos(up), radius * np.sin(up))
 
-    def _found(self) -> Path:
-        """``package://NAME/FILE`` lies in a folder above the URDF, as packages of ROS have it."""
-        scheme, _, rest = self.path.rpartition("://")
-        if scheme != "package":
-            return self.urdf.parent / rest
-        within = rest.partition("/")[2]
-        folders = self.urdf.absolute().parents
-        tried = [folder / part for folder in folders for part in (rest, within)]
-        return next((file for file in tried if file.is_file()), self.urdf.parent / within)
+
+def mesh_file(path: str, scale: FloatArray, urdf: Path) -> FloatArray:
+    """(n, 3, 3) m of a file, ``path`` as the URDF has it, times ``scale`` (3,).
+
+    Raises GeometryError, which names no folder, where it cannot be read.
+    """
+    unit = abs(float(scale[0]))
+    try:
+        file = MeshFile.read(_located(path, urdf), scale=unit)
+    except GeometryError as error:
+        raise GeometryError(error.message, where=path, hint=error.hint) from error
+    if file.cells.shape[1] != 3:
+        raise GeometryError("expected triangles, got a volume", where=path)
+    points = np.zeros((len(file.points), 3))
+    points[:, : file.points.shape[1]] = file.points
+    return np.asarray((points * (scale / unit))[file.cells])
+
+
+def _located(path: str, urdf: Path) -> Path:
+    """``package://NAME/FILE`` lies in a folder above the URDF, as packages of ROS have it."""
+    scheme, _, rest = path.rpartition("://")
+    if scheme != "package":
+        return urdf.parent / rest
+    within = rest.partition("/")[2]
+    folders = urdf.absolute().parents
+    tried = [folder / part for folder in folders for part in (rest, within)]
+    return next((file for file in tried if file.is_file()), urdf.parent / within)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinkShape:
-    """One part of a ``link``, its frame at ``pose`` there; ``seen``: not only for collisions."""
+    """One part of a ``link``, its frame at ``pose`` there.
+
+    ``kind`` is "visual" or "collision". ``form`` makes its triangles (n, 3, 3) m in its own frame;
+    ``is_mesh``: from a file.
+    """
 
     link: str
     pose: Pose
-    form: Box | Rod | Ball | LinkMesh
-    seen: bool
+    kind: str
+    form: Callable[[], FloatArray]
+    is_mesh: bool
 
     def triangles(self) -> FloatArray:
         """(n, 3, 3) m, in the link's frame. Raises GeometryError."""
-        corners = self.form.triangles()
+        corners = self.form()
         return self.pose(corners.reshape(-1, 3)).reshape(corners.shape)
 
 
 def read_shapes(root: Element, urdf: Path) -> Iterator[LinkShape]:
-    """Those of each link, seen ones first; SkinError for numbers that cannot be meant."""
+    """Those of each link, visual ones first; SkinError for numbers that cannot be meant."""
     for link in root.findall("link"):
         name = name_of(link, str(urdf))
         where = f'{urdf}: link "{name}"'
         for kind in ("visual", "collision"):
             for part in link.findall(kind):
-                form = _form(part.find("geometry"), where, urdf)
-                if form is not None:
-                    yield LinkShape(name, origin_of(part, where), form, kind == "visual")
+                geometry = part.find("geometry")
+                form = None if geometry is None or not len(geometry) else geometry[0]
+                if form is not None and (make := _form(form, where, urdf)) is not None:
+                    pose = origin_of(part, where)
+                    yield LinkShape(name, pose, kind, make, form.tag == "mesh")
+
+
+def _form(form: Element, where: str, urdf: Path) -> Callable[[], FloatArray] | None:
+    """What makes its triangles; None for a shape that URDFs do not have."""
+
+    def numbers(key: str, count: Literal[1, 3], default: str = "") -> list[float]:
+        return numbers_of(form.get(key, default), count, f"<{form.tag}> {key}", where)
+
+    match form.tag:
+        case "box":
+            return partial(box, np.array(numbers("size", 3)))
+        case "cylinder":
+            return partial(rod, *numbers("radius", 1), *numbers("length", 1))
+        case "sphere":
+            return partial(ball, *numbers("radius", 1))
+        case "mesh":
+            scale = np.array(numbers("scale", 3, "1 1 1"))
+            return partial(mesh_file, form.get("filename", ""), scale, urdf)
+    return None
 
 
 def thinned(triangles: FloatArray, most: int) -> FloatArray:
@@ -130,23 +164,6 @@ def thinned(triangles: FloatArray, most: int) -> FloatArray:
         triangles = np.unique(grid[~same], axis=0) * step
         lines *= 0.7
     return triangles[:most]
-
-
-def _form(geometry: Element | None, where: str, urdf: Path) -> Box | Rod | Ball | LinkMesh | None:
-    """None: of a shape that URDFs do not have."""
-    form = None if geometry is None or not len(geometry) else geometry[0]
-    match None if form is None else form.tag, {} if form is None else form.attrib:
-        case "box", given:
-            return Box(np.array(numbers_of(given.get("size", ""), 3, "<box> size", where)))
-        case "cylinder", given:
-            radius = numbers_of(given.get("radius", ""), 1, "<cylinder> radius", where)
-            return Rod(*radius, *numbers_of(given.get("length", ""), 1, "<cylinder> length", where))
-        case "sphere", given:
-            return Ball(*numbers_of(given.get("radius", ""), 1, "<sphere> radius", where))
-        case "mesh", given:
-            scale = numbers_of(given.get("scale", "1 1 1"), 3, "<mesh> scale", where)
-            return LinkMesh(given.get("filename", ""), np.array(scale), urdf)
-    return None
 
 
 def _turned(radii: FloatArray, heights: FloatArray) -> FloatArray:

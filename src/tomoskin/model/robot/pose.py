@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import warnings
 from dataclasses import dataclass, field
 from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
 
 from tomoskin.core import FloatArray
 from tomoskin.model.mesh import Surface
-
-_UPRIGHT = 1e-9
-"""Cosine of the pitch below which it is a right angle."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,25 +36,20 @@ class Pose:
 
         That is roll, pitch and yaw as a URDF has them.
         """
-        rotation = np.eye(3)
-        for axis, angle in enumerate(np.asarray(angles, dtype=np.float64).tolist()):
-            rotation = turn(np.eye(3)[axis], angle) @ rotation
-        return cls(np.asarray(position, dtype=np.float64), rotation)
+        rotation = Rotation.from_euler("xyz", np.asarray(angles, dtype=np.float64))
+        return cls(np.asarray(position, dtype=np.float64), rotation.as_matrix())
 
     def degrees(self) -> tuple[float, float, float]:
         """Roll, pitch and yaw, as :meth:`of` takes them but in degrees."""
-        r = self.rotation
-        pitch = np.arctan2(-r[2, 0], np.hypot(r[0, 0], r[1, 0]))
-        if np.hypot(r[0, 0], r[1, 0]) > _UPRIGHT:
-            roll, yaw = np.arctan2(r[2, 1], r[2, 2]), np.arctan2(r[1, 0], r[0, 0])
-        else:  # x points along z: only the sum or difference of the two is told
-            roll, yaw = 0.0, np.arctan2(-r[0, 1], r[1, 1])
-        found: list[float] = np.degrees([roll, pitch, yaw]).tolist()
-        return found[0], found[1], found[2]
+        with warnings.catch_warnings():
+            # where x points along z, the data give only the sum or difference of roll and yaw
+            warnings.simplefilter("ignore", UserWarning)
+            roll, pitch, yaw = Rotation.from_matrix(self.rotation).as_euler("xyz", degrees=True)
+        return float(roll), float(pitch), float(yaw)
 
     def quaternion(self) -> tuple[float, ...]:
         """The rotation as x, y, z, w."""
-        return quaternion(self.rotation.T.tolist())
+        return quaternion(self.rotation.T)
 
     def __call__(self, points: FloatArray) -> FloatArray:
         """(n, 3) m: points of the inner frame, in the outer one."""
@@ -82,25 +75,10 @@ def pose_numbers(text: str, units: str) -> tuple[float, ...]:
     return (*numbers, 0.0, 0.0, 0.0)[:6]
 
 
-def quaternion(axes: Sequence[Sequence[float]]) -> tuple[float, ...]:
-    """X, y, z, w of the rotation to three ``axes``; of 4 q qᵀ the row that is best conditioned."""
-    (xx, yx, zx), (xy, yy, zy), (xz, yz, zz) = axes
-    rows = (
-        (1 + xx - yy - zz, xy + yx, xz + zx, zy - yz),
-        (xy + yx, 1 - xx + yy - zz, yz + zy, xz - zx),
-        (xz + zx, yz + zy, 1 - xx - yy + zz, yx - xy),
-        (zy - yz, xz - zx, yx - xy, 1 + xx + yy + zz),
-    )
-    best = max(enumerate(rows), key=lambda item: item[1][item[0]])[1]
-    length = math.hypot(*best)
-    return tuple(value / length for value in best)
-
-
-def turn(axis: FloatArray, angle: float) -> FloatArray:
-    """(3, 3) rotation by ``angle`` rad about a unit vector (Rodrigues 1840)."""
-    x, y, z = axis.tolist()
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross)
+def quaternion(axes: ArrayLike) -> tuple[float, ...]:
+    """X, y, z, w of the rotation to three ``axes`` (3, 3), one a row."""
+    xyzw: list[float] = Rotation.from_matrix(np.transpose(axes)).as_quat().tolist()
+    return tuple(xyzw)
 
 
 @dataclass(frozen=True)

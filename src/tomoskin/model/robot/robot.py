@@ -13,7 +13,7 @@ import numpy as np
 from tomoskin.core import SkinError, StrPath
 from tomoskin.model.robot.pose import Place, Pose
 from tomoskin.model.robot.urdf import Urdf
-from tomoskin.model.skin import (
+from tomoskin.model.section import (
     OneOrMore,
     Quantity,
     Row,
@@ -22,10 +22,10 @@ from tomoskin.model.skin import (
     check_names,
     key,
     literal,
-    read_text,
     show,
 )
-from tomoskin.model.skin import toml_tables as tables_of
+from tomoskin.model.section import toml_tables as tables_of
+from tomoskin.model.skin import read_text
 
 FORMAT = 1
 """Version of the file that this code reads, the top-level key ``format``."""
@@ -176,12 +176,12 @@ def _each(tables: Mapping[str, Any], source: str) -> list[tuple[SkinSection, str
         raise SkinError(
             f"expected a list of tables, got {show(given)}", where=source, hint="write [[skin]]"
         )
-    found = []
+    sections = []
     for number, table in enumerate(given, 1):
         title = table.get("name") if isinstance(table, Mapping) else None
         where = f"{source}: skin {number}" + (f' "{title}"' if title else "")
-        found.append((SkinSection.read(table, where), where))
-    return found
+        sections.append((SkinSection.read(table, where), where))
+    return sections
 
 
 def _placed(given: SkinSection, where: str, folder: Path, urdf: Urdf | None) -> PlacedSkin:

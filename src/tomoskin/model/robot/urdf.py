@@ -12,11 +12,11 @@ from xml.etree import ElementTree
 import numpy as np
 
 from tomoskin.core import FloatArray, GeometryError, SkinError, StrPath
-from tomoskin.model.robot.elements import name_of, origin_of
 from tomoskin.model.robot.link_shapes import (
     MOST_TRIANGLES,
-    LinkMesh,
     LinkShape,
+    name_of,
+    origin_of,
     read_shapes,
     thinned,
 )
@@ -61,7 +61,7 @@ class Urdf:
     joints
         By the name of the link that each holds.
     shapes
-        Of all links, those that are seen before those for collisions.
+        Of all links, visual ones before those for collisions.
     """
 
     source: str
@@ -100,9 +100,9 @@ class Urdf:
         links = tuple(name_of(link, where) for link in root.findall("link"))
         joints = [_joint(joint, where) for joint in root.findall("joint")]
         shapes = tuple(read_shapes(root, path))
-        found = cls(where, root.get("name", ""), links, {j.child: j for j in joints}, shapes)
-        found._check(joints)
-        return found
+        urdf = cls(where, root.get("name", ""), links, {j.child: j for j in joints}, shapes)
+        urdf._check(joints)
+        return urdf
 
     def check_link(self, link: str, where: str) -> None:
         """Raise SkinError where there is no such link, with the one that may have been meant."""
@@ -125,19 +125,19 @@ class Urdf:
     @property
     def meshes(self) -> dict[str, Pose]:
         """Pose on its link of the first mesh of each link that has one."""
-        return {s.link: s.pose for s in self.shapes[::-1] if isinstance(s.form, LinkMesh)}
+        return {s.link: s.pose for s in self.shapes[::-1] if s.is_mesh}
 
     def solids(self) -> tuple[LinkSolid, ...]:
-        """What is drawn of each link that has a shape: what is seen, else what may collide.
+        """What is drawn of each link that has a shape: its visual parts, else those that collide.
 
         Mesh files are read here; one that cannot be is a problem of its link.
         """
-        found = []
+        drawn = []
         for link in self.links:
             shapes = [s for s in self.shapes if s.link == link]
-            found.append([s for s in shapes if s.seen] or shapes)
-        most = MOST_TRIANGLES // max(1, sum(map(len, found)))
-        return tuple(_solid(shapes, most) for shapes in found if shapes)
+            drawn.append([s for s in shapes if s.kind == "visual"] or shapes)
+        most = MOST_TRIANGLES // max(1, sum(map(len, drawn)))
+        return tuple(_solid(shapes, most) for shapes in drawn if shapes)
 
     def bones(self, without: Container[str] = ()) -> FloatArray:
         """(n, 2, 3) m: from each link's origin, but those ``without``, to those that it holds."""

@@ -4,8 +4,18 @@ from __future__ import annotations
 
 from typing import Any
 
-from tomoskin.model.skin.kinds import Choice, Number, OneOrEach, Quantity, Row, Table, Text, Whole
-from tomoskin.model.skin.section import Section, key
+from tomoskin.model.section import (
+    Choice,
+    Number,
+    OneOrEach,
+    Quantity,
+    Row,
+    Section,
+    Table,
+    Text,
+    Whole,
+    key,
+)
 
 _SIZE = Quantity("length", "mm", 1, 5000)
 _COORDINATE = Quantity("length", "mm", -5000, 5000)

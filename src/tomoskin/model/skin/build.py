@@ -31,6 +31,7 @@ from tomoskin.model.mesh import (
     triangulate,
 )
 from tomoskin.model.pattern import Pattern, named
+from tomoskin.model.section import Section
 from tomoskin.model.skin.body import (
     DriveSection,
     ElectrodesSection,
@@ -48,7 +49,6 @@ from tomoskin.model.skin.processing import (
     TouchSettings,
     TwinChoice,
 )
-from tomoskin.model.skin.section import Section
 
 FORMAT = 1
 """Version of the file that this code reads, the top-level key ``format``."""

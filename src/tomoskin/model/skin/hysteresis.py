@@ -179,7 +179,7 @@ class MemoryState:
         """What the pieces ``which`` (k,) remember, in that order."""
         return MemoryState(*(part[..., which] for part in self._parts))
 
-    def beside(self, others: MemoryState) -> MemoryState:
+    def joined(self, others: MemoryState) -> MemoryState:
         """What these pieces remember, and then the ``others``."""
         pairs = zip(self._parts, others._parts, strict=True)
         return MemoryState(*(np.concatenate(pair, axis=-1) for pair in pairs))

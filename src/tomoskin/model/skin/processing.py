@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from tomoskin.model.skin.kinds import Choice, Number, NumberOrWord, Quantity, Whole
-from tomoskin.model.skin.section import Section, key
+from tomoskin.model.prior import PRIORS
+from tomoskin.model.section import Choice, Number, NumberOrWord, Quantity, Section, Whole, key
 
 _ONE_STEP = "one-step"
 _IN_IMAGE = ("method", ("image",))
@@ -29,24 +29,10 @@ class InverseSettings(Section, section="inverse"):
         default=_ONE_STEP,
     )
     prior: str = key(
-        Choice(("identity", "laplace", "gaussian", "noser", "exponential", "matern")),
+        Choice(tuple(PRIORS)),
         "Prior: the changes of conductivity that are assumed to be likely.",
         default="noser",
-        method=_ONE_STEP,
-    )
-    exponent: float = key(
-        Number(0, 2),
-        "For noser: the power of a cell's sensitivity by which its change is penalised.",
-        default=0.5,
-        effective=("prior", ("noser",)),
-        method=_ONE_STEP,
-    )
-    correlation_length: float | None = key(
-        Quantity("length", "mm", 0.1, 5000),
-        "For exponential and matern: the distance over which changes are similar. Default: a "
-        "tenth of the sheet's extent.",
-        default=None,
-        effective=("prior", ("exponential", "matern")),
+        options=PRIORS,
         method=_ONE_STEP,
     )
     alpha: float | str = key(

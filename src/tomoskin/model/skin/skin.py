@@ -15,6 +15,7 @@ import numpy as np
 from tomoskin.core import FloatArray
 from tomoskin.model.mesh import ElectrodeArc, Mesh, Outline, Surface, laid_on
 from tomoskin.model.pattern import Pattern
+from tomoskin.model.section import Document, check_names, toml_tables, toml_text
 from tomoskin.model.skin.body import ReadoutSettings
 from tomoskin.model.skin.build import (
     BODY,
@@ -33,7 +34,6 @@ from tomoskin.model.skin.processing import (
     TouchSettings,
     TwinChoice,
 )
-from tomoskin.model.skin.section import Document, check_names, toml_tables, toml_text
 
 _BODY = ("outline", "surface", "electrodes", "material", "drive", "readout", "mesh", "twin")
 """Sections that sheet, mesh and scan rest on; the others only make images of it."""

@@ -1,89 +1,19 @@
-"""Sinks by name, and what of a run goes to one."""
+"""What of a run goes to a sink, and how the sink is doing."""
 
 from __future__ import annotations
 
 import contextlib
-import importlib
 import logging
-from collections.abc import Iterable
 from dataclasses import dataclass
-from importlib.metadata import entry_points
 from typing import Any
 
-from tomoskin.core import Event, SinkError, TomoskinError, install_hint
+from tomoskin.core import Capacity, Consumer, Event, Say, TomoskinError, Worker
+from tomoskin.files.messages import Reporter, Stream
 from tomoskin.pipeline import FrameResult
-from tomoskin.run.sinks.sink import Item, Moment, Sink, Stream
-from tomoskin.run.sinks.worker import Capacity, Consumer, Say, Worker
-
-GROUP = "tomoskin.sinks"
-"""Entry-point group: each entry is a function ``argument -> Sink`` that does no I/O."""
-
-
-def sink_names() -> tuple[str, ...]:
-    """Names of the installed sinks."""
-    return tuple(sorted(entry_points(group=GROUP).names))
-
-
-def make_sink(spec: str) -> Sink:
-    """Sink of ``name`` or ``name:argument``, not opened: ``lsl``, ``mqtt://host/topic``.
-
-    Raises
-    ------
-    SinkError
-        When there is no sink of that name, its argument is none, or its package is missing.
-    """
-    name, _, argument = spec.partition(":")
-    entries = tuple(entry_points(group=GROUP, name=name))
-    if not entries:
-        raise SinkError(
-            f'there is no sink "{name}"', hint=f"sinks: {', '.join(sink_names()) or 'none'}"
-        )
-    sink: Sink = entries[0].load()(argument)
-    return sink
-
-
-def needed(module: str, extra: str) -> Any:
-    """A module that a sink cannot do without.
-
-    Raises
-    ------
-    SinkError
-        When it is not installed, or cannot be loaded; names the extra that brings it.
-    """
-    try:
-        return importlib.import_module(module)
-    except (ImportError, OSError, RuntimeError) as error:
-        raise SinkError(
-            f"needs the package {module.partition('.')[0]}: {error}",
-            where=f"sink {extra}",
-            hint=install_hint(extra),
-        ) from error
-
-
-def port_of(text: str, where: str) -> int:
-    """A port number; SinkError where ``text`` is none."""
-    if text.isascii() and text.isdigit() and 0 < int(text) < 65536:
-        return int(text)
-    raise SinkError(f'expected a port from 1 to 65535, got "{text}"', where=where)
-
-
-def options_of(words: Iterable[str], known: tuple[str, ...], where: str) -> dict[str, str]:
-    """``a=1`` and ``b=2`` by name; SinkError for what is not known."""
-    options = {}
-    for word in words:
-        key, _, value = word.partition("=")
-        if key not in known or not value:
-            form = ", ".join(f"{name}=…" for name in known)
-            raise SinkError(f'expected {form}, got "{word}"', where=where)
-        options[key] = value
-    return options
-
+from tomoskin.run.sinks.sink import Sink
 
 MOST_WAITING = 256
 """Results and events that may wait for one sink; the oldest make room, and are counted."""
-
-IMAGE_PERIOD = 0.1
-"""Seconds between two images, by host time."""
 
 GRACE = 2.0
 """Seconds in which a sink must send what waits when it is stopped."""
@@ -124,9 +54,9 @@ class SinkConsumer(Consumer):
     def __init__(self, sink: Sink, stream: Stream, say: Say) -> None:
         self.name = sink.name
         self.trouble = "connecting"
-        self._sink, self._stream, self._say = sink, stream, say
+        self._sink, self._stream, self._say = sink, stream.named(sink.naming), say
+        self._reporter = Reporter(self._stream, period=sink.period)
         self._newest: FrameResult | None = None
-        self._last_image = float("-inf")
         self._delay = _FIRST_DELAY
 
     def admit(self, message: Any) -> FrameResult | Event | None:
@@ -141,14 +71,25 @@ class SinkConsumer(Consumer):
         return isinstance(item, Event)
 
     def open(self) -> None:
-        """Open the sink."""
+        """Open the sink, which gets what comes next in full."""
         self._sink.open(self._stream)
         self.trouble = ""
+        self._reporter.repeat()
 
     def take(self, item: FrameResult | Event) -> None:
-        """Send it."""
-        self._sink.publish(self._item(item))
+        """Send it; and of an event that the source is lost what that means for touches."""
+        if isinstance(item, FrameResult):
+            self._sink.publish(self._reporter.of(item, with_image=item is self._newest))
+        else:
+            self._sink.publish(item)
+            if (last := self._reporter.lost(item)) is not None:
+                self._sink.publish(last)
         self._delay = _FIRST_DELAY
+
+    def tend(self) -> None:
+        """Report that the source is still lost, where it is."""
+        if (report := self._reporter.still_lost()) is not None:
+            self._sink.publish(report)
 
     def close(self) -> None:
         """Close the sink, which may be what has failed."""
@@ -166,15 +107,6 @@ class SinkConsumer(Consumer):
         self._delay = min(2 * delay, _LONGEST_DELAY)
         return delay
 
-    def _item(self, item: FrameResult | Event) -> Item:
-        if isinstance(item, Event):
-            return item
-        due = item is self._newest and not 0 <= item.host_time - self._last_image < IMAGE_PERIOD
-        due = due and item.ready and item.has_image
-        if due:
-            self._last_image = item.host_time
-        return Moment.of(item, with_image=due)
-
 
 def sink_worker(sink: Sink, stream: Stream, say: Say) -> Worker[SinkConsumer]:
     """A worker before ``sink``, not started."""
@@ -183,7 +115,7 @@ def sink_worker(sink: Sink, stream: Stream, say: Say) -> Worker[SinkConsumer]:
 
 
 def sink_report(worker: Worker[SinkConsumer]) -> SinkReport:
-    """How a sink is doing now."""
+    """How a sink is doing at this moment."""
     consumer = worker.consumer
     text = consumer.trouble or f"{worker.taken} sent"
     if (silent := worker.silent) > _LONG:

@@ -7,20 +7,23 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from tomoskin.core import Event, SinkError, encode_json
-from tomoskin.files.session import (
+from tomoskin.core import Event, SinkError, encode_json, needed
+from tomoskin.files.messages import (
+    Contacts,
+    Item,
+    Naming,
+    Stream,
     grid_message,
     log_message,
     scene_message,
-    schema_of,
-    touches_message,
 )
-from tomoskin.run.sinks.consumer import needed, port_of
-from tomoskin.run.sinks.sink import Item, Moment, Stream, TouchPace
+from tomoskin.files.session import schema_of
+from tomoskin.run.sinks.sink import Sink, port_of
 
 DEFAULT_PORT = 8766
 """Foxglove's own default is the port of our page."""
 
+_WHERE = "sink foxglove"
 _TOPICS = ("/touches", "/scene", "/image", "/events")
 
 
@@ -38,26 +41,27 @@ _robots_lock = threading.Lock()
 """Foxglove shows one connection at a time: all skins of a robot are behind one port."""
 
 
-class FoxgloveSink:
+class FoxgloveSink(Sink):
     """Serves ``ws://host:port`` by Foxglove's SDK; what nobody has subscribed to is not made."""
+
+    naming = Naming("")
 
     def __init__(self, host: str, port: int) -> None:
         self.name = f"foxglove at ws://{host}:{port}"
         self._address = host, port
-        self._sdk = needed("foxglove", "foxglove")
+        self._sdk = needed("foxglove", "foxglove", _WHERE, SinkError)
         self._server: _Server | None = None
         self._channels: dict[str, Any] = {}
 
     def open(self, stream: Stream) -> None:
-        """Begin to serve."""
-        sdk, prefix = self._sdk, "" if stream.place is None else f"/{stream.place.name}"
-        self._stream, self._pace = stream, TouchPace()
+        """Begin to serve the channels of one skin."""
+        sdk, self._stream = self._sdk, stream
         self._server = self._joined(stream)
         for topic in _TOPICS:
-            found = schema_of(topic)
-            schema = sdk.Schema(name=found.name, encoding=found.encoding, data=found.data)
+            ours = schema_of(topic)
+            schema = sdk.Schema(name=ours.name, encoding=ours.encoding, data=ours.data)
             self._channels[topic] = sdk.Channel(
-                prefix + topic,
+                stream.naming.namespace + topic,
                 schema=schema,
                 message_encoding="json",
                 context=self._server.context,
@@ -66,25 +70,24 @@ class FoxgloveSink:
     def publish(self, item: Item) -> None:
         """Send the messages of ``item``."""
         now = self._stream.log_time(item.host_time)
-        for event in (item,) if isinstance(item, Event) else item.messages:
+        for event in (item,) if isinstance(item, Event) else item.events:
             self._send("/events", log_message(event, now), now)
         if isinstance(item, Event):
             return
-        if self._pace.is_due(item):
-            content = touches_message(item.host_time, item.sequence, item.touches)
-            self._send("/touches", content, now)
+        if item.is_due:
+            self._send("/touches", item.content(), now)
         self._show(item, now)
 
-    def _show(self, item: Moment, now: int) -> None:
-        pixels = self._stream.pixels
-        if item.image is None:
-            return
-        self._send("/scene", scene_message(item.touches, now, self._stream.surface), now)
-        if pixels is not None and self._channels["/image"].has_sinks():
-            self._send("/image", grid_message(item.image, pixels, item.host_time, now), now)
+    def _show(self, contacts: Contacts, now: int) -> None:
+        """The touches in space, as often as the image, and where there are none for good."""
+        pixels, image = self._stream.pixels, contacts.image
+        if image is not None or contacts.voltages is None:
+            self._send("/scene", scene_message(contacts.touches, now), now)
+        if image is not None and pixels is not None and self._channels["/image"].has_sinks():
+            self._send("/image", grid_message(image, pixels, contacts.host_time, now), now)
 
     def close(self) -> None:
-        """Serve no longer."""
+        """Close the channels, and with the last skin the server."""
         server, self._server = self._server, None
         for channel in self._channels.values():
             channel.close()
@@ -130,5 +133,5 @@ class FoxgloveSink:
 def open_foxglove(argument: str) -> FoxgloveSink:
     """``foxglove``, ``foxglove:8766``, ``foxglove:ADDRESS:8766``."""
     host, _, port = argument.rpartition(":")
-    number = port_of(port, "sink foxglove") if port else DEFAULT_PORT
+    number = port_of(port, _WHERE) if port else DEFAULT_PORT
     return FoxgloveSink(host or "127.0.0.1", number)

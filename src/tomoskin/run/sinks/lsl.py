@@ -7,41 +7,39 @@ from typing import Any
 
 import numpy as np
 
-from tomoskin.core import Event, FloatArray, SinkError, clock_ahead, encode_json
-from tomoskin.model.pattern import Pattern
-from tomoskin.run.sinks.consumer import needed
-from tomoskin.run.sinks.sink import Item, Moment, Stream, TouchPace
+from tomoskin.core import Event, FloatArray, SinkError, clock_ahead, encode_json, needed
+from tomoskin.files.messages import Contacts, Item, Naming, Stream, row_labels
+from tomoskin.run.sinks.sink import Sink
 
 MOST_TOUCHES = 5
 """Touches that a sample has room for, the strongest first."""
 
 _FIELDS = (("id", ""), ("x", "m"), ("y", "m"), ("peak", "image"))
+_WHERE = "sink lsl"
 _IRREGULAR = 0.0
 
 
-class LslSink:
+class LslSink(Sink):
     """Streams ``NAME-voltages``, ``-dv``, ``-touches`` and ``-events``, on LSL's own clock."""
 
     def __init__(self, prefix: str) -> None:
         self.name = f"lsl {prefix}"
-        self._root = prefix
-        self._lsl = needed("pylsl", "lsl")
+        self.naming = Naming(prefix)
+        self._lsl = needed("pylsl", "lsl", _WHERE, SinkError)
         self._outlets: dict[str, Any] = {}
 
     def open(self, stream: Stream) -> None:
-        """Announce the streams."""
-        place = stream.place
-        self._prefix = self._root if place is None else f"{self._root}-{place.name}"
+        """Announce the streams of one skin."""
         # both are the machine's monotonic clock, but LSL may count from elsewhere
         self._offset = clock_ahead(self._lsl.local_clock)
-        self._pace = TouchPace()
-        rows = [(label, "V") for label in _row_labels(stream.pattern)]
+        rows = [(label, "V") for label in row_labels(stream.pattern)]
         touches = [
             (f"{name} {number}", unit)
             for number in range(1, MOST_TOUCHES + 1)
             for name, unit in _FIELDS
         ]
         touches += [(f"force {number}", "N") for number in range(1, MOST_TOUCHES + 1)]
+        touches.append(("valid", ""))
         double, string = self._lsl.cf_double64, self._lsl.cf_string
         self._announce(stream, "voltages", "EIT", rows, double)
         self._announce(stream, "dv", "EIT", rows, double)
@@ -50,19 +48,20 @@ class LslSink:
 
     def publish(self, item: Item) -> None:
         """Push the samples of ``item``."""
-        for event in (item,) if isinstance(item, Event) else item.messages:
+        for event in (item,) if isinstance(item, Event) else item.events:
             text = encode_json({"kind": event.kind, "text": event.text}).decode()
             self._push("events", [text], item)
         if isinstance(item, Event):
             return
-        self._push("voltages", item.voltages, item)
-        if item.ready:
-            self._push("dv", item.voltages - item.reference, item)
-        if self._pace.is_due(item):
+        if item.voltages is not None:
+            self._push("voltages", item.voltages, item)
+            if item.reference is not None:
+                self._push("dv", item.voltages - item.reference, item)
+        if item.is_due:
             self._push("touches", _touch_row(item), item)
 
     def close(self) -> None:
-        """Withdraw the streams."""
+        """Withdraw the streams that were announced."""
         self._outlets = {}
 
     def _push(self, name: str, sample: FloatArray | list[str], item: Item) -> None:
@@ -76,7 +75,7 @@ class LslSink:
         channels: Sequence[tuple[str, str]],
         number_format: int,
     ) -> None:
-        full = f"{self._prefix}-{name}"
+        full = f"{stream.naming.namespace.replace('/', '-')}-{name}"
         # one identity for a stream of a skin: receivers find it again after a restart
         identity = f"{full}-{stream.skin}"
         info = self._lsl.StreamInfo(full, kind, len(channels), _IRREGULAR, number_format, identity)
@@ -92,24 +91,15 @@ class LslSink:
 def open_lsl(argument: str) -> LslSink:
     """``lsl``, or ``lsl:NAME`` for streams called ``NAME-voltages`` and so on."""
     if any(not (c.isalnum() or c in "-_.") for c in argument):
-        raise SinkError(
-            f'expected a name of letters and digits, got "{argument}"', where="sink lsl"
-        )
+        raise SinkError(f'expected a name of letters and digits, got "{argument}"', where=_WHERE)
     return LslSink(argument or "tomoskin")
 
 
-def _row_labels(pattern: Pattern) -> list[str]:
-    """``E2-E1 E4-E5``: source and sink, plus and minus."""
-    tables = np.hstack((pattern.drive, pattern.measure)) + 1
-    return [f"E{a}-E{b} E{c}-E{d}" for a, b, c, d in tables.tolist()]
-
-
-def _touch_row(moment: Moment) -> FloatArray:
-    strongest = sorted(moment.touches, key=lambda t: -abs(t.detection.peak))[:MOST_TOUCHES]
-    row = np.full((MOST_TOUCHES, len(_FIELDS)), np.nan)
-    forces = np.full(MOST_TOUCHES, np.nan)
-    for number, touch in enumerate(strongest):
-        detection = touch.detection
-        row[number] = touch.id, detection.x, detection.y, detection.peak
-        forces[number] = np.nan if detection.force is None else detection.force.newtons
-    return np.concatenate((row.ravel(), forces))
+def _touch_row(contacts: Contacts) -> FloatArray:
+    """Each touch, then the forces, then 1 where touches are valid and 0 where they are not."""
+    row, forces = np.full((MOST_TOUCHES, len(_FIELDS)), np.nan), np.full(MOST_TOUCHES, np.nan)
+    for number, contact in enumerate(contacts.strongest(MOST_TOUCHES)):
+        detection = contact.touch.detection
+        row[number] = contact.touch.id, detection.x, detection.y, detection.peak
+        forces[number] = np.nan if contact.force is None else contact.force
+    return np.concatenate((row.ravel(), forces, [float(contacts.valid)]))

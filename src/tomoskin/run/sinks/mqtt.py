@@ -7,38 +7,39 @@ from dataclasses import replace
 from typing import Any
 from urllib.parse import SplitResult, unquote, urlsplit
 
-from tomoskin.core import Event, SinkError, encode_json
-from tomoskin.run.sinks.consumer import needed, options_of
-from tomoskin.run.sinks.contact import Contacts, contact_of, event_content
-from tomoskin.run.sinks.naming import Naming
-from tomoskin.run.sinks.sink import Item, Stream, TouchPace
+from tomoskin.core import Event, SinkError, encode_json, needed
+from tomoskin.files.messages import Item, Naming, Stream, event_content
+from tomoskin.run.sinks.sink import Sink, options_of
 
 DEFAULT_PORT = 1883
 
 PERIOD = 0.05
 """Seconds between two messages of touches that go on; beginnings and ends are sent at once."""
 
+_WHERE = "sink mqtt"
 _PATIENCE = 5.0
 _KEEPALIVE = 10
 
 
-class MqttSink:
+class MqttSink(Sink):
     """Publishes below one topic: ``touch``, ``touches``, ``events``, and ``status``.
 
     ``touch`` is what happens to one: onset, move, release. ``status``, online or offline, is kept
-    by the broker, which turns it to offline by itself when we vanish.
+    by the broker: it is offline while no frames come, and the broker turns it so when we vanish.
     """
 
+    period = PERIOD
+
     def __init__(self, url: SplitResult, port: int, naming: Naming) -> None:
-        self._root = self._naming = naming
+        self.naming = naming
         self.name = f"mqtt://{url.hostname}:{port}/{naming.namespace}"
         self._url, self._port = url, port
-        self._paho = needed("paho.mqtt.client", "mqtt")
+        self._paho = needed("paho.mqtt.client", "mqtt", _WHERE, SinkError)
         self._client: Any = None
 
     def open(self, stream: Stream) -> None:
         """Connect; SinkError when the broker does not let us in."""
-        self._stream, self._naming = stream, self._root.of_skin(stream)
+        self._stream, self._status = stream, ""
         paho = self._paho
         client = paho.Client(paho.CallbackAPIVersion.VERSION2, reconnect_on_failure=False)
         self._client = client
@@ -46,44 +47,45 @@ class MqttSink:
             password = unquote(self._url.password) if self._url.password else None
             client.username_pw_set(unquote(self._url.username), password)
         client.connect_timeout = _PATIENCE
-        client.will_set(f"{self._naming.namespace}/status", "offline", retain=True)
+        client.will_set(stream.naming.topic("status"), "offline", retain=True)
         answer = _Answer()
         client.on_connect = answer
         client.connect(self._url.hostname, self._port, keepalive=_KEEPALIVE)
         client.loop_start()
         answer.check(self.name)
-        self._pace = TouchPace(PERIOD)
-        self._put("status", b"online", keep=True)
+        self._say("online")
 
     def publish(self, item: Item) -> None:
         """Send what is worth a message."""
         if isinstance(item, Event):
-            self._put("events", encode_json(event_content(self._stream, self._naming, item)))
+            self._put("events", encode_json(event_content(self._stream, item)))
             return
-        due = self._pace.is_due(item)
-        if not (due or item.happened):
-            return
-        contacts = Contacts.of(self._stream, self._naming, item)
-        for event in item.happened:
-            about = {"time_s": event.host_time, "event": event.kind, **contacts.header()}
-            row = contact_of(self._stream, event.touch).content()
-            self._put("touch", encode_json(about | row))
-        if due:
-            self._put("touches", encode_json(contacts.content()))
+        self._say("offline" if item.voltages is None else "online")
+        for content in item.happenings():
+            self._put("touch", encode_json(content))
+        if item.is_due:
+            self._put("touches", encode_json(item.content()))
 
     def close(self) -> None:
-        """Say that we go, and go."""
+        """Say that we are offline, and disconnect."""
         client, self._client = self._client, None
         if client is None:
             return
         if client.is_connected():
-            last = client.publish(f"{self._naming.namespace}/status", "offline", retain=True)
+            topic = self._stream.naming.topic("status")
+            last = client.publish(topic, "offline", retain=True)
             last.wait_for_publish(_PATIENCE)
             client.disconnect()
         client.loop_stop()
 
+    def _say(self, status: str) -> None:
+        """Have the broker keep whether frames come, where that has changed."""
+        if status != self._status:
+            self._put("status", status.encode(), keep=True)
+            self._status = status
+
     def _put(self, name: str, data: bytes, *, keep: bool = False) -> None:
-        sent = self._client.publish(f"{self._naming.namespace}/{name}", data, retain=keep)
+        sent = self._client.publish(self._stream.naming.topic(name), data, retain=keep)
         if sent.rc:
             raise SinkError(self._paho.error_string(sent.rc), where=self.name)
 
@@ -101,7 +103,7 @@ class _Answer:
         self._came.set()
 
     def check(self, where: str) -> None:
-        """Wait for it."""
+        """Wait for the answer; SinkError where it is no."""
         if not self._came.wait(_PATIENCE):
             raise SinkError(f"the broker did not answer within {_PATIENCE:.0f} s", where=where)
         if self._refused:
@@ -110,19 +112,18 @@ class _Answer:
 
 def open_mqtt(argument: str) -> MqttSink:
     """``mqtt://[USER:PASSWORD@]HOST[:1883][/TOPIC][?frame=NAME]``."""
-    where = "sink mqtt"
     try:
         url = urlsplit(f"mqtt:{argument}")
         port = url.port or DEFAULT_PORT
     except ValueError as error:
-        raise SinkError(str(error), where=where) from None
+        raise SinkError(str(error), where=_WHERE) from None
     if not url.hostname or "#" in argument or "+" in url.path or "@" in url.query:
         raise SinkError(
             f'expected mqtt://HOST:PORT/TOPIC, got "mqtt:{argument.rpartition("@")[2]}"',
-            where=where,
+            where=_WHERE,
             hint="for example mqtt://127.0.0.1:1883/robot/skin",
         )
-    options = options_of(filter(None, url.query.split("&")), ("frame",), where)
-    naming = Naming.of(options, where)
+    options = options_of(filter(None, url.query.split("&")), ("frame",), _WHERE)
+    naming = Naming.of(options, _WHERE)
     topic = url.path.strip("/") or naming.namespace  # MQTT's may be called anything
     return MqttSink(url, port, replace(naming, namespace=topic))

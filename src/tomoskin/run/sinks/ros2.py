@@ -7,13 +7,22 @@ import os
 from collections.abc import Mapping
 from typing import Any
 
-from tomoskin.core import SinkError
-from tomoskin.run.sinks.cdr import encode_cdr
-from tomoskin.run.sinks.consumer import needed, options_of
-from tomoskin.run.sinks.naming import NAMES, Naming
-from tomoskin.run.sinks.ros import KEPT, TOPICS, RosView
-from tomoskin.run.sinks.ros_types import TYPES, Field, dds_name, type_hash
-from tomoskin.run.sinks.sink import Item, Stream
+from tomoskin.core import SinkError, needed
+from tomoskin.files.messages import (
+    KEPT,
+    NAMES,
+    TOPICS,
+    TYPES,
+    Field,
+    Item,
+    Naming,
+    Stream,
+    dds_name,
+    encode_cdr,
+    ros_messages,
+    type_hash,
+)
+from tomoskin.run.sinks.sink import Sink, options_of
 
 _WHERE = "sink ros2"
 _DEPTH = 10
@@ -25,8 +34,8 @@ _BLOCKING = 100_000_000
 _MOST_DOMAINS = 232
 
 
-class Ros2Sink:
-    """Publishes messages of :data:`~tomoskin.run.sinks.ros.TOPICS` by CycloneDDS.
+class Ros2Sink(Sink):
+    """Publishes messages of :data:`~tomoskin.files.messages.TOPICS` by CycloneDDS.
 
     Topics, types and their hashes are as ROS 2 has them, in user data as its own middlewares put
     them there.
@@ -41,9 +50,9 @@ class Ros2Sink:
 
     def __init__(self, domain: int, naming: Naming) -> None:
         self.name = f"ros2 /{naming.namespace}, domain {domain}"
-        self._domain, self._naming = domain, naming
+        self.naming, self._domain = naming, domain
         self._dds = {
-            name: needed(f"cyclonedds.{name}", "ros2")
+            name: needed(f"cyclonedds.{name}", "ros2", _WHERE, SinkError)
             for name in ("core", "domain", "pub", "topic", "idl")
         }
         self._writers: dict[str, Any] = {}
@@ -55,19 +64,20 @@ class Ros2Sink:
             participant = self._dds["domain"].DomainParticipant(
                 self._domain, qos=core.Qos(core.Policy.Userdata(b"enclave=/;"))
             )
-            naming = self._naming.of_skin(stream)
-            self._writers = {topic: self._writer(participant, naming, topic) for topic in TOPICS}
+            self._writers = {
+                topic: self._writer(participant, stream.naming, topic) for topic in TOPICS
+            }
         except core.DDSException as error:
             raise SinkError(
                 f"cannot join domain {self._domain}: {error}",
                 where=self.name,
                 hint="set CYCLONEDDS_URI to choose the network interface",
             ) from error
-        self._view = RosView(stream, naming)
+        self._stream = stream
 
     def publish(self, item: Item) -> None:
         """Write the messages of ``item``; the source time is that of the measurement."""
-        for message in self._view.of(item):
+        for message in ros_messages(self._stream, item):
             writer = self._writers[message.topic]
             if message.topic not in KEPT and not writer.get_matched_subscriptions():
                 continue  # bytes are the dear part, and nobody listens
@@ -109,15 +119,15 @@ def open_ros2(argument: str) -> Ros2Sink:
 
 @functools.cache
 def struct_of(kind: str) -> Any:
-    """CycloneDDS' class of a message by its name (:data:`~tomoskin.run.sinks.ros_types.TYPES`)."""
-    idl = needed("cyclonedds.idl", "ros2")
+    """CycloneDDS' class of a message by its name (:data:`~tomoskin.files.messages.TYPES`)."""
+    idl = needed("cyclonedds.idl", "ros2", _WHERE, SinkError)
     fields = {name: _type_of(Field.of(text)) for name, text in TYPES[kind].items()}
     name = dds_name(kind)
     return idl.make_idl_struct(name.rpartition(":")[2], name.replace("::", "."), fields)
 
 
 def _type_of(field: Field) -> Any:
-    types = needed("cyclonedds.idl.types", "ros2")
+    types = needed("cyclonedds.idl.types", "ros2", _WHERE, SinkError)
     plain: Mapping[str, Any] = {"string": str, "bool": bool}
     if field.kind in TYPES:
         kind = struct_of(field.kind)

@@ -19,7 +19,7 @@ from tomoskin.sensing.signal.load_ring import LoadRing
 from tomoskin.sensing.signal.monitor import Monitor
 from tomoskin.sensing.signal.nuisance import NuisanceSubspace
 from tomoskin.sensing.signal.power_up import STAGES, MeterStep, meter_steps
-from tomoskin.sensing.signal.readout import FIGURES, BoardFigures, Readout, directions
+from tomoskin.sensing.signal.readout import FIGURES, Readout, directions
 from tomoskin.sensing.signal.recording import Recording, frame_times, time_notes
 from tomoskin.sensing.signal.reference import Reference
 from tomoskin.sensing.signal.scatter import Scatter
@@ -30,7 +30,6 @@ __all__ = [
     "STAGES",
     "Baseline",
     "BaselineState",
-    "BoardFigures",
     "Consecutive",
     "CountScale",
     "Diagnosis",

@@ -1,7 +1,6 @@
 """The board's real firmware on a simulated processor, before the twin's sheet."""
 
 from tomoskin.twin.emulator.flash import (
-    BoardIdentity,
     check_current,
     read_identity,
     say_board,
@@ -9,15 +8,6 @@ from tomoskin.twin.emulator.flash import (
     sense_resistor,
     write_firmware,
     write_identity,
-)
-from tomoskin.twin.emulator.pico import (
-    PicoPrograms,
-    build_pico_programs,
-    build_uf2,
-    find_boot_drive,
-    pico_image,
-    settings_uf2,
-    write_uf2,
 )
 from tomoskin.twin.emulator.process import (
     BoardFaults,
@@ -27,16 +17,12 @@ from tomoskin.twin.emulator.process import (
     OwnVoltages,
     SkinMemory,
 )
-from tomoskin.twin.emulator.program import Programs, build_elf, build_programs, firmware_image
-from tomoskin.twin.emulator.source import BOARDS, DEFAULT, BoardKind, emulate_board, emulate_load
-from tomoskin.twin.emulator.transport import EmulatorTransport
+from tomoskin.twin.emulator.program import PicoPrograms, Programs, build_firmware, programs_of
+from tomoskin.twin.emulator.source import EmulatorTransport, emulate_board, emulate_load
+from tomoskin.twin.emulator.uf2 import find_boot_drive, settings_uf2, write_uf2
 
 __all__ = [
-    "BOARDS",
-    "DEFAULT",
     "BoardFaults",
-    "BoardIdentity",
-    "BoardKind",
     "BoardProcess",
     "BoardPrograms",
     "EmulatorTransport",
@@ -45,16 +31,12 @@ __all__ = [
     "PicoPrograms",
     "Programs",
     "SkinMemory",
-    "build_elf",
-    "build_pico_programs",
-    "build_programs",
-    "build_uf2",
+    "build_firmware",
     "check_current",
     "emulate_board",
     "emulate_load",
     "find_boot_drive",
-    "firmware_image",
-    "pico_image",
+    "programs_of",
     "read_identity",
     "say_board",
     "say_identity",

@@ -1,23 +1,24 @@
-"""What is written into a board: its firmware, and what the board is, by avrdude."""
+"""What is written into a board: its firmware, and by avrdude what the board is."""
 
 from __future__ import annotations
 
-import secrets
 import shutil
-import struct
 import subprocess
 import tempfile
-from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Self
 
-from tomoskin.board.source import BOARDS_SINCE, Exchange, SerialTransport, Transport
+from tomoskin.board.source import (
+    BOARDS_SINCE,
+    BoardRecord,
+    Exchange,
+    SerialTransport,
+    Transport,
+)
 from tomoskin.board.wire import BoardLimits, GetBoard, GetInfo, Info
 from tomoskin.core import SourceError
+from tomoskin.twin.emulator.process import BoardIdentity
 from tomoskin.twin.emulator.program import firmware_image
-
-MOST_CURRENT = 0.1
-"""A, that the parts of the board are made for."""
+from tomoskin.twin.emulator.uf2 import find_boot_drive, uf2_of, write_uf2
 
 _REFERENCE = 1.225
 """V across the board's sense resistor."""
@@ -26,39 +27,6 @@ _AVRDUDE = ("avrdude", "-q", "-q", "-p", "atmega2560", "-c", "wiring", "-b", "11
 _LONGEST = 60.0
 _HINT = "is it the board's port, and does nothing else use it?"
 _AGAIN, _TRIES = 0.5, 10
-_EEPROM = struct.Struct("<I8s")
-_NEVER_WRITTEN = b"\xff" * 8
-
-
-@dataclass(frozen=True, slots=True)
-class BoardIdentity:
-    """What only the one who built a board knows: the setting of its current limiter, and its id.
-
-    ``current`` A; ``unique_id``: eight bytes. They are the first bytes of its EEPROM. ``board``:
-    what its firmware calls it; empty before protocol 1.2.
-    """
-
-    current: float
-    unique_id: bytes
-    board: str = ""
-
-    @classmethod
-    def of(cls, info: Info, board: str) -> Self:
-        """The identity that the firmware reports."""
-        return cls(info.current / 1e6, info.unique_id, board)
-
-    def change(self, current: float | None, name: str | None) -> Self:
-        """With what is not None; a board that never had an id gets one."""
-        unique_id = self.unique_id if name is None else name.encode().ljust(8, b"\0")
-        if unique_id == _NEVER_WRITTEN:
-            unique_id = secrets.token_bytes(8)
-        return replace(
-            self, current=self.current if current is None else current, unique_id=unique_id
-        )
-
-    def pack(self) -> bytes:
-        """As the firmware reads it: µA, then the id."""
-        return _EEPROM.pack(round(self.current * 1e6), self.unique_id)
 
 
 def sense_resistor(current: float) -> float:
@@ -66,9 +34,9 @@ def sense_resistor(current: float) -> float:
     return _REFERENCE / current
 
 
-def check_current(current: float, of_skin: float | None) -> None:
+def check_current(current: float, record: BoardRecord, of_skin: float | None) -> None:
     """SourceError when ``current`` is none, or above what board and skin may carry, A."""
-    limits = {"the board's parts": MOST_CURRENT, "the skin": of_skin or MOST_CURRENT}
+    limits = {"the board's parts": record.current, "the skin": of_skin or record.current}
     for who, most in limits.items():
         if not 1e-6 <= current <= most:
             raise SourceError(
@@ -80,11 +48,28 @@ def check_current(current: float, of_skin: float | None) -> None:
             )
 
 
-def write_firmware(port: str, channels: int) -> None:
-    """Write the firmware of a board with ``channels`` to the one at ``port``; SourceError."""
+def write_firmware(record: BoardRecord, channels: int, place: str | None) -> str:
+    """Write the firmware of a board with ``channels`` to its port or boot drive; which it was.
+
+    Raises
+    ------
+    SourceError
+        When there is no such place, the firmware cannot be built, or it cannot be written.
+    """
+    if record.flash == "uf2":
+        drive = find_boot_drive() if place is None else Path(place)
+        write_uf2(uf2_of(firmware_image(record, channels)), drive)
+        return str(drive)
+    if record.flash != "avrdude" or place is None:
+        raise SourceError(
+            f"nothing here flashes the {record.text}"
+            if place
+            else "expected the port of the board, such as /dev/ttyACM0, got none",
+            where="firmware flash",
+        )
     _need_avrdude()
-    image = firmware_image(channels)
-    _avrdude(port, "-U", f"flash:w:{image}:{'e' if image.suffix == '.elf' else 'i'}")
+    _avrdude(place, "-U", f"flash:w:{firmware_image(record, channels)}:i")
+    return place
 
 
 def write_identity(port: str, identity: BoardIdentity) -> None:
@@ -174,9 +159,9 @@ def _avrdude(port: str, *words: str) -> None:
     except subprocess.TimeoutExpired:
         raise SourceError(f"nothing after {_LONGEST:.0f} s", where=where, hint=_HINT) from None
     if done.returncode:
-        said = "; ".join(line.strip() for line in done.stderr.splitlines() if line.strip())
+        complaint = "; ".join(line.strip() for line in done.stderr.splitlines() if line.strip())
         raise SourceError(
-            f"could not write: {said or 'it did not say why'}",
+            f"could not write: {complaint or 'it did not say why'}",
             where=where,
             hint=_HINT,
         )

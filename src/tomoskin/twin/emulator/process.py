@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import mmap
+import secrets
 import struct
 import subprocess
 import tempfile
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import astuple, dataclass, field
+from dataclasses import astuple, dataclass, field, replace
 from pathlib import Path
-from typing import IO, Protocol
+from typing import IO, Protocol, Self
 
 import numpy as np
 
+from tomoskin.board.wire import Info
 from tomoskin.core import FloatArray, SourceError, StrPath
-from tomoskin.twin.emulator.flash import BoardIdentity
 
 MOST_ELECTRODES = 32
 _MAGIC = 0x31306E696B736F74
@@ -143,13 +144,48 @@ class SkinMemory:
         self._map.close()
 
 
+_EEPROM = struct.Struct("<I8s")
+_NEVER_WRITTEN = b"\xff" * 8
+
+
+@dataclass(frozen=True, slots=True)
+class BoardIdentity:
+    """What only the one who built a board knows: the setting of its current limiter, and its id.
+
+    ``current`` A; ``unique_id``: eight bytes. They are the first bytes of its EEPROM. ``board``:
+    what its firmware calls it; empty before protocol 1.2.
+    """
+
+    current: float
+    unique_id: bytes
+    board: str = ""
+
+    @classmethod
+    def of(cls, info: Info, board: str) -> Self:
+        """The identity that the firmware reports."""
+        return cls(info.current / 1e6, info.unique_id, board)
+
+    def change(self, current: float | None, name: str | None) -> Self:
+        """With what is not None; a board that never had an id gets one."""
+        unique_id = self.unique_id if name is None else name.encode().ljust(8, b"\0")
+        if unique_id == _NEVER_WRITTEN:
+            unique_id = secrets.token_bytes(8)
+        return replace(
+            self, current=self.current if current is None else current, unique_id=unique_id
+        )
+
+    def pack(self) -> bytes:
+        """As the firmware reads it: µA, then the id."""
+        return _EEPROM.pack(round(self.current * 1e6), self.unique_id)
+
+
 class BoardPrograms(Protocol):
     """The firmware of a board, and the emulator that runs it."""
 
     def power_on(
-        self, options: Sequence[str | Path], said: IO[bytes]
+        self, options: Sequence[str | Path], stderr: IO[bytes]
     ) -> tuple[subprocess.Popen[bytes], str]:
-        """The emulator's process, whose stderr goes to ``said``, and the board's serial port.
+        """The emulator's process, whose stderr goes to ``stderr``, and the board's serial port.
 
         The port is empty when it does not start.
         """
@@ -168,9 +204,9 @@ class BoardProcess:
         memory = Path(memory)
         eeprom = memory.with_name("eeprom")
         eeprom.write_bytes(BoardIdentity(current, b"emulated").pack())
-        self._said = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as the process
+        self._stderr = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as the process
         own = ("-d", "-s", memory, "-e", eeprom)
-        self._process, self.port = programs.power_on((*own, *options), self._said)
+        self._process, self.port = programs.power_on((*own, *options), self._stderr)
         if not self.port:
             self.close()
             raise SourceError(f"the emulator does not start: {self.last_words}", where="emulator")
@@ -183,12 +219,12 @@ class BoardProcess:
     @property
     def complaints(self) -> str:
         """What the emulator has said of switches that were misused; empty when none were."""
-        self._said.seek(0)
-        return self._said.read().decode(errors="replace")
+        self._stderr.seek(0)
+        return self._stderr.read().decode(errors="replace")
 
     def close(self) -> None:
         """Switch the board off."""
-        if self._said.closed:
+        if self._stderr.closed:
             return
         self._process.kill()
         self._process.wait()
@@ -196,4 +232,4 @@ class BoardProcess:
             assert pipe is not None
             pipe.close()
         self.last_words = self.complaints.strip()
-        self._said.close()
+        self._stderr.close()

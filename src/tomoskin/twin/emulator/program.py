@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import fcntl
+import os
 import shutil
 import subprocess
-from collections.abc import Iterator, Sequence
+import sys
+import tty
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
-from tomoskin.core import SourceError
+from tomoskin.board.source import BOARDS, BoardRecord, FirmwareFiles
+from tomoskin.core import SourceError, written
+from tomoskin.twin.emulator.process import BoardPrograms
+from tomoskin.twin.emulator.uf2 import uf2_of
 
 FOLDER = Path(__file__).resolve().parents[4] / "firmware"
 """Where the sources are, in a checkout."""
@@ -19,46 +25,122 @@ FOLDER = Path(__file__).resolve().parents[4] / "firmware"
 IMAGES = Path(__file__).parent / "images"
 """Where a wheel has the firmware, built: ``tomoskin-8.hex`` for a board with 8 channels."""
 
-CHANNELS = (8, 16)
-"""That the firmware is built for; what is emulated has the most."""
-
 BUILD = FOLDER.parent / "build" / "firmware"
-_PACKAGES = "make gcc gcc-avr avr-libc libsimavr-dev libelf-dev"
-_NEEDED = ("make", "cc", "avr-gcc", "avr-size")
+_NODE_EMULATOR = FOLDER / "pico" / "emulator" / "main.mjs"
+_NODE_SET_UP = FOLDER.parent / "scripts" / "pico.py"
 _LONGEST = 300.0
+_NO_SOURCES = "the firmware's sources are not here"
 
 
 @dataclass(frozen=True, slots=True)
 class Programs:
-    """``elf`` for the board; ``emulator`` runs it."""
+    """``elf`` for an ATmega2560; ``emulator`` runs it."""
 
     elf: Path
     emulator: Path
 
     def power_on(
-        self, options: Sequence[str | Path], said: IO[bytes]
+        self, options: Sequence[str | Path], stderr: IO[bytes]
     ) -> tuple[subprocess.Popen[bytes], str]:
-        """The emulator's process, and the board's serial port; empty when it does not start.
-
-        ``options``: as in ``firmware/emulator/emulator.c``; ``said``: what takes its stderr.
-        """
-        process = subprocess.Popen(
-            [self.emulator, *options, self.elf],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=said,
-        )
+        """See :class:`BoardPrograms`; options as in ``firmware/emulator/emulator.c``."""
+        process = _started([self.emulator, *options, self.elf], stderr)
         assert process.stdout is not None
         return process, process.stdout.readline().decode().strip()
 
 
-def build_elf(channels: int = CHANNELS[-1]) -> Path:
-    """The firmware of a board with ``channels``, built if it is not up to date; SourceError."""
-    make_firmware(_NEEDED, _PACKAGES, "avr", f"CHANNELS={channels}")
-    return BUILD / f"tomoskin-{channels}.elf"
+@dataclass(frozen=True, slots=True)
+class PicoPrograms:
+    """``image``, a UF2, for an RP2040; ``node`` runs the emulator that runs it."""
+
+    image: Path
+    node: Path
+
+    def power_on(
+        self, options: Sequence[str | Path], stderr: IO[bytes]
+    ) -> tuple[subprocess.Popen[bytes], str]:
+        """See :class:`BoardPrograms`; options as in ``firmware/pico/emulator/main.mjs``."""
+        line, port = os.openpty()
+        tty.setraw(port)
+        os.set_blocking(line, False)
+        name = os.ttyname(port)
+        words = [self.node, _NODE_EMULATOR, "-p", str(line), *options, self.image]
+        process = _started(words, stderr, line, port)  # with its port open the line stays up
+        os.close(line)
+        os.close(port)
+        assert process.stdout is not None
+        return process, name if process.stdout.readline() else ""
 
 
-def firmware_image(channels: int) -> Path:
+def _started(words: Sequence[str | Path], stderr: IO[bytes], *fds: int) -> subprocess.Popen[bytes]:
+    pipe = subprocess.PIPE
+    return subprocess.Popen(words, stdin=pipe, stdout=pipe, stderr=stderr, pass_fds=fds)
+
+
+def programs_of(board: str) -> BoardPrograms:
+    """Firmware and emulator of one of ``BOARDS``, built if they are not up to date.
+
+    Raises
+    ------
+    SourceError
+        When this is no checkout, a tool is missing, the build fails, or nothing runs this board.
+    """
+    record = BOARDS[board]
+    if record.emulator not in _EMULATORS:
+        raise SourceError(
+            f"there is no emulator of the {record.text}",
+            where="emulator",
+            hint=f"twin:board={board} has its converter and its speed",
+        )
+    return _EMULATORS[record.emulator](build_firmware(record, record.channels[-1]))
+
+
+def _simavr(elf: Path) -> Programs:
+    make_firmware(("make", "cc"), "make gcc libsimavr-dev libelf-dev", "emulator")
+    return Programs(elf, BUILD / "tomoskin-emulator")
+
+
+def _rp2040js(uf2: Path) -> PicoPrograms:
+    """Node, with the emulator's package installed beside it."""
+    if not _NODE_SET_UP.is_file():
+        raise SourceError(_NO_SOURCES, where="firmware", hint="use a git checkout")
+    done = subprocess.run(
+        [sys.executable, _NODE_SET_UP],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=_LONGEST,
+    )
+    if done.returncode:
+        lines = done.stderr.strip().splitlines() or ["it did not say why"]
+        raise SourceError(lines[0], where="firmware", hint="on Debian: apt-get install nodejs npm")
+    return PicoPrograms(uf2, Path(done.stdout.strip()))
+
+
+_EMULATORS: dict[str, Callable[[Path], BoardPrograms]] = {
+    "simavr": _simavr,
+    "rp2040js": _rp2040js,
+}
+"""What makes an emulator ready, by the name that a board's record gives it."""
+
+
+def build_firmware(record: BoardRecord, channels: int) -> Path:
+    """The firmware of a board with ``channels``, built if it is not up to date; SourceError.
+
+    For a board that is flashed through a drive it is a UF2.
+    """
+    files = _files(record)
+    _make(record, files.make, channels)
+    program = BUILD / files.program.format(channels)
+    if record.flash != "uf2":
+        return program
+    data, uf2 = uf2_of(program), program.with_suffix(".uf2")
+    if not uf2.is_file() or uf2.read_bytes() != data:
+        with written(uf2, overwrite=True) as part:
+            part.write_bytes(data)
+    return uf2
+
+
+def firmware_image(record: BoardRecord, channels: int) -> Path:
     """What is written to a board: built from the sources in a checkout, else the wheel's image.
 
     Raises
@@ -66,9 +148,10 @@ def firmware_image(channels: int) -> Path:
     SourceError
         When it cannot be built, or the wheel was made where it could not be.
     """
-    if FOLDER.is_dir():
-        return build_elf(channels)
-    image = IMAGES / f"tomoskin-{channels}.hex"
+    files, in_checkout = _files(record), FOLDER.is_dir()
+    if in_checkout:
+        _make(record, files.make_image, channels)
+    image = (BUILD if in_checkout else IMAGES) / files.image.format(channels)
     if not image.is_file():
         raise SourceError(
             "this installation holds no firmware", where="firmware", hint="use a git checkout"
@@ -76,17 +159,16 @@ def firmware_image(channels: int) -> Path:
     return image
 
 
-def build_programs() -> Programs:
-    """Firmware and emulator, built if they are not up to date.
+def _files(record: BoardRecord) -> FirmwareFiles:
+    if record.firmware is None:
+        raise SourceError(f"there is no firmware for the {record.text}", where="firmware")
+    return record.firmware
 
-    Raises
-    ------
-    SourceError
-        When this is no checkout, a tool is missing, or the build fails.
-    """
-    elf = build_elf()
-    make_firmware(_NEEDED, _PACKAGES, "emulator")
-    return Programs(elf, BUILD / "tomoskin-emulator")
+
+def _make(record: BoardRecord, target: str, channels: int) -> None:
+    files = _files(record)
+    needed, packages = ("make", *files.needs), f"make {files.packages}"
+    make_firmware(needed, packages, target, f"CHANNELS={channels}")
 
 
 @contextmanager
@@ -106,7 +188,7 @@ def make_firmware(needed: Sequence[str], packages: str, *arguments: str) -> None
     hint = f"on Debian: apt-get install {packages}"
     if not FOLDER.is_dir():
         raise SourceError(
-            "the firmware's sources are not here",
+            _NO_SOURCES,
             where="firmware",
             hint="use a git checkout; tomoskin firmware flash needs none",
         )

@@ -1,23 +1,34 @@
-"""The source ``emulator``, for the entry-point group ``tomoskin.sources``."""
+"""The source ``emulator``: a board that is simulated down to its processor, and the sheet at it."""
 
 from __future__ import annotations
 
 import math
 import tempfile
+import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tomoskin.board.source import SerialTransport, Transport, read_options
-from tomoskin.core import FloatArray
-from tomoskin.sensing.signal import FIGURES
-from tomoskin.twin import ThermalVoltages, TwinSettings, TwinSkin, read_settings
-from tomoskin.twin.emulator import pico, program
-from tomoskin.twin.emulator.pico import build_pico_programs
+from tomoskin.board.source import (
+    BOARDS,
+    DEFAULT_BOARD,
+    SerialTransport,
+    Transport,
+    read_options,
+)
+from tomoskin.core import FloatArray, SourceError
+from tomoskin.twin import (
+    Contact,
+    Pose,
+    ThermalVoltages,
+    TwinSettings,
+    TwinSkin,
+    on_converter,
+    read_settings,
+)
 from tomoskin.twin.emulator.process import (
     BoardFaults,
     BoardProcess,
@@ -26,32 +37,105 @@ from tomoskin.twin.emulator.process import (
     OwnVoltages,
     SkinMemory,
 )
-from tomoskin.twin.emulator.program import build_programs
-from tomoskin.twin.emulator.transport import EmulatorTransport
+from tomoskin.twin.emulator.program import programs_of
 
 if TYPE_CHECKING:
     from tomoskin.model.skin import Skin
 
-
-@dataclass(frozen=True, slots=True)
-class BoardKind:
-    """A board: its name for people, its converter, the channels that its firmware is built for, and
-    how the parts of its emulator are."""
-
-    text: str
-    adc_bits: int
-    channels: tuple[int, ...]
-    build: Callable[[], BoardPrograms]
+_STEP = 0.01
+"""Between two looks at the sheet, s."""
 
 
-BOARDS = {
-    "mega": BoardKind("Arduino Mega 2560", 10, program.CHANNELS, build_programs),
-    "pico": BoardKind("Raspberry Pi Pico", pico.ADC_BITS, pico.CHANNELS, build_pico_programs),
-}
-"""By the name that options and commands give."""
+class EmulatorTransport:
+    """Bytes of a board that is simulated down to its processor."""
 
-DEFAULT = "mega"
-"""The board where none is named."""
+    def __init__(
+        self,
+        programs: BoardPrograms,
+        sheet: TwinSkin,
+        front: Front,
+        own: OwnVoltages | None = None,
+        *,
+        thermal: ThermalVoltages | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """Power the board on; SourceError when it does not start.
+
+        ``own``: without it, none; ``thermal`` takes the place of its potentials.
+        """
+        self.name = "emulator"
+        self.sheet = sheet
+        self._clock = clock
+        self._stood = clock()
+        self._closed = False
+        self._written = sheet.resistance()
+        self._thermal = thermal
+        with ExitStack() as stack:
+            running = powered(programs, front, self._written, own=own)
+            self._board, self._memory = stack.enter_context(running)
+            if thermal:
+                self._memory.write_potentials(thermal.volts)
+            self._serial = stack.enter_context(closing(SerialTransport(self._board.port)))
+            self._stack = stack.pop_all()
+
+    @property
+    def presses(self) -> tuple[Contact, ...]:
+        """What presses on the sheet now."""
+        return self.sheet.presses
+
+    def set_presses(self, presses: tuple[Contact, ...]) -> None:
+        """Replace all presses; GeometryError when one is off the skin."""
+        self.sheet.set_presses(presses)
+
+    def set_pose(self, pose: Pose) -> None:
+        """Bend and stretch the sheet; GeometryError for a shape that it cannot take."""
+        self.sheet.set_pose(pose)
+
+    def read(self, timeout: float) -> bytes:
+        """What has come, waiting at most ``timeout`` s for the first byte."""
+        self._age()
+        return self._open.read(timeout)
+
+    @property
+    def waited(self) -> float:
+        """How long the first byte of the last read had waited here, s."""
+        return self._open.waited
+
+    def write(self, data: bytes) -> None:
+        """Send ``data`` to the board."""
+        self._open.write(data)
+
+    def close(self) -> None:
+        """Power the board off."""
+        if not self._closed:
+            self._closed = True
+            self._stack.close()
+
+    @property
+    def complaints(self) -> str:
+        """What the emulated switches were misused for; empty when they were not."""
+        return "" if self._closed else self._board.complaints
+
+    @property
+    def _open(self) -> SerialTransport:
+        if self._closed:
+            raise SourceError("the emulator has been switched off", where=self.name)
+        return self._serial
+
+    def _age(self) -> None:
+        """Let the sheet go on to now, and show the converter what it has become."""
+        now = self._clock()
+        if self._closed or now - self._stood < _STEP:
+            return
+        self.sheet.advance(now - self._stood)
+        if self._thermal:
+            self._thermal.wander(now - self._stood)
+            self._memory.write_potentials(self._thermal.volts)
+        self._stood = now
+        resistance = self.sheet.resistance()
+        if resistance is not self._written:
+            self._memory.write(resistance)
+            self._written = resistance
 
 
 def open_emulator(argument: str, skin: Skin) -> EmulatorTransport:
@@ -66,7 +150,7 @@ def open_emulator(argument: str, skin: Skin) -> EmulatorTransport:
         For an unknown option, or when firmware and emulator cannot be built here.
     """
     options = read_options(argument, ("seed", "preset", *BOARDS), "emulator")
-    board = next((name for name in BOARDS if name in options), DEFAULT)
+    board = next((name for name in BOARDS if name in options), DEFAULT_BOARD)
     settings = read_settings(options, skin, "emulator").with_electrodes(skin.twin.electrodes)
     own, thermal = own_of(skin, settings)
     return EmulatorTransport(
@@ -79,51 +163,54 @@ def open_emulator(argument: str, skin: Skin) -> EmulatorTransport:
 
 
 @contextmanager
-def emulate_board(skin: Skin, board: str = DEFAULT) -> Iterator[BoardProcess]:
+def powered(
+    programs: BoardPrograms,
+    front: Front,
+    resistance: FloatArray,
+    *,
+    own: OwnVoltages | None = None,
+    faults: BoardFaults | None = None,
+) -> Iterator[tuple[BoardProcess, SkinMemory]]:
+    """A board on a sheet of (n, n) Ω transfer ``resistance``, and the memory that holds that."""
+    with (
+        tempfile.TemporaryDirectory(prefix="tomoskin-") as folder,
+        closing(SkinMemory(Path(folder) / "skin", front, resistance, faults, own)) as memory,
+        closing(BoardProcess(programs, memory.path, front.current)) as process,
+    ):
+        yield process, memory
+
+
+@contextmanager
+def emulate_board(skin: Skin, board: str = DEFAULT_BOARD) -> Iterator[BoardProcess]:
     """A board on the skin at rest, for a host that opens its port itself; SourceError."""
     settings = TwinSettings.preset(skin.twin.preset).with_electrodes(skin.twin.electrodes)
     resistance, (own, _) = TwinSkin.of(skin, settings).resistance(), own_of(skin, settings)
-    with tempfile.TemporaryDirectory(prefix="tomoskin-") as folder:
-        front = front_of(skin, settings, board)
-        memory = SkinMemory(Path(folder) / "skin", front, resistance, own=own)
-        process = BoardProcess(programs_of(board), memory.path, skin.current)
-        try:
-            yield process
-        finally:
-            process.close()
-            memory.close()
+    front = front_of(skin, settings, board)
+    with powered(programs_of(board), front, resistance, own=own) as (process, _):
+        yield process
 
 
 @contextmanager
 def emulate_load(
     resistance: FloatArray,
     current: float,
-    board: str = DEFAULT,
+    board: str = DEFAULT_BOARD,
     faults: BoardFaults | None = None,
 ) -> Iterator[Transport]:
     """A board on a network of resistors, of (n, n) Ω transfer resistance; SourceError.
 
     ``current`` A; ``faults`` of a Mega's board: without it, none. The converter is as noisy as the
-    decks say, and has the Mega's scale.
+    decks say, and has the scale of the board's record.
     """
-    levels = float(1 << BOARDS[board].adc_bits)
-    noise = FIGURES.noise * levels / 1024
-    front = Front(current, FIGURES.compliance, 35.0, 0.0, 5.0, levels, noise)
-    with tempfile.TemporaryDirectory(prefix="tomoskin-") as folder:
-        memory = SkinMemory(Path(folder) / "skin", front, resistance, faults)
-        process = BoardProcess(programs_of(board), memory.path, current)
-        try:
-            transport = SerialTransport(process.port)
-            yield transport
-            transport.close()
-        finally:
-            process.close()
-            memory.close()
-
-
-def programs_of(board: str) -> BoardPrograms:
-    """Firmware and emulator of one of :data:`BOARDS`, built if need be; SourceError."""
-    return BOARDS[board].build()
+    record = BOARDS[board]
+    levels, figures = float(1 << record.adc_bits), record.electronics
+    noise = figures.noise * levels / 1024
+    front = Front(current, figures.compliance, record.gain, 0.0, record.reference, levels, noise)
+    with (
+        powered(programs_of(board), front, resistance, faults=faults) as (process, _),
+        closing(SerialTransport(process.port)) as transport,
+    ):
+        yield transport
 
 
 def own_of(skin: Skin, settings: TwinSettings) -> tuple[OwnVoltages, ThermalVoltages]:
@@ -141,21 +228,21 @@ def own_of(skin: Skin, settings: TwinSettings) -> tuple[OwnVoltages, ThermalVolt
     return own, thermal
 
 
-def front_of(skin: Skin, settings: TwinSettings, board: str = DEFAULT) -> Front:
+def front_of(skin: Skin, settings: TwinSettings, board: str = DEFAULT_BOARD) -> Front:
     """The board before a skin, as far as the emulator knows it.
 
     The skin file's read-out is that of the board it was made for. Another one's amplifier uses as
     much of its own converter's scale, and is as noisy in volts.
     """
     compliance = settings.electronics.compliance
-    readout = skin.readout
-    bits = max(BOARDS[board].adc_bits, readout.adc_bits)
+    bits = BOARDS[board].adc_bits
+    readout, noise = on_converter(skin.readout, settings.electronics.noise, bits)
     return Front(
         current=skin.current,
         compliance=1e300 if math.isinf(compliance) else compliance,
         gain=readout.gain,
         offset=readout.offset,
         reference=readout.reference_voltage,
-        levels=float(1 << bits),
-        noise=settings.electronics.noise * (1 << bits - readout.adc_bits),
+        levels=float(1 << readout.adc_bits),
+        noise=noise,
     )

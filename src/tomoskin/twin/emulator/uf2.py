@@ -1,10 +1,13 @@
-"""UF2, the form in which a Pico takes its firmware: blocks of 256 bytes for its boot drive."""
+"""UF2, the form in which a Pico takes its firmware through its boot drive: blocks of 256 bytes."""
 
 from __future__ import annotations
 
+import os
 import struct
+from collections.abc import Iterable
+from pathlib import Path
 
-from tomoskin.core import SourceError
+from tomoskin.core import SourceError, StrPath
 
 RP2040 = 0xE48BFF56
 """The family that the RP2040's boot ROM asks for."""
@@ -19,6 +22,14 @@ _HAS_FAMILY = 0x2000
 _BLOCK = 512
 PAGE = 256
 """Bytes of flash in a block."""
+
+_SETTINGS = 0x1FF000
+"""Where the flash's last sector begins: ``firmware/pico/flash.c``."""
+
+_MOUNTS = ("/media", "/run/media", "/Volumes", "/mnt")
+_ABOUT, _WRITTEN = "INFO_UF2.TXT", "tomoskin.uf2"
+_DEPTHS = (_ABOUT, f"*/{_ABOUT}", f"*/*/{_ABOUT}")
+_HINT = "hold BOOTSEL while you plug the Pico in: it shows itself as a drive, RPI-RP2"
 
 _STAGE = 252
 """Bytes of the boot's second stage; its checksum follows."""
@@ -35,44 +46,27 @@ def pack_uf2(image: bytes, address: int = FLASH) -> bytes:
     )
 
 
-def unpack_uf2(data: bytes, where: str) -> dict[int, bytes]:
-    """Pages of 256 bytes by address. Raises SourceError for what a Pico would not take."""
-    if not data or len(data) % _BLOCK:
-        raise _bad(where, f"expected blocks of {_BLOCK} bytes, found {len(data)} bytes")
-    pages: dict[int, bytes] = {}
-    numbers, total = set(), 0
-    for at in range(0, len(data), _BLOCK):
-        first, second, flags, address, size, number, total, family = _HEAD.unpack_from(data, at)
-        if (first, second) != _MAGIC or data[at + _BLOCK - 4 : at + _BLOCK] != _END:
-            raise _bad(where, f"expected the marks of UF2 at byte {at}, found others")
-        if not flags & _HAS_FAMILY or family != RP2040:
-            found = f"{family:08x}" if flags & _HAS_FAMILY else "none"
-            raise SourceError(
-                f"expected firmware of the family {RP2040:08x} (RP2040), found {found}",
-                where=where,
-                hint="this UF2 is for another board: tomoskin firmware build --board pico",
-            )
-        if size != PAGE:
-            raise _bad(where, f"expected {PAGE} bytes in a block, found {size}")
-        if number in numbers or address in pages:
-            raise _bad(where, f"expected each block once, found block {number} again")
-        numbers.add(number)
-        pages[address] = data[at + _HEAD.size : at + _HEAD.size + PAGE]
-    missing = sorted(set(range(total)) - numbers)
-    if missing or len(numbers) > total:
-        what = f"block {missing[0]} is missing" if missing else "it says fewer"
-        raise _bad(where, f"expected {total} blocks, found {len(numbers)}: {what}")
-    return pages
+def uf2_of(image: Path) -> bytes:
+    """The UF2 of a Pico's firmware; SourceError where its boot ROM would not run that."""
+    data = image.read_bytes()
+    check_boot(data, str(image))
+    return pack_uf2(data)
+
+
+def settings_uf2(current: float) -> bytes:
+    """The UF2 that says what a Pico's current limiter is set to, A; its firmware stays."""
+    page = struct.pack("<I", round(current * 1e6)).ljust(PAGE, b"\xff")
+    return pack_uf2(page, FLASH + _SETTINGS)
 
 
 def check_boot(image: bytes, where: str) -> None:
     """Raise SourceError unless the boot ROM would run ``image``: it checks the second stage."""
     expected = boot_checksum(image[:_STAGE])
-    (found,) = struct.unpack_from("<I", image, _STAGE)
-    if found != expected:
+    (held,) = struct.unpack_from("<I", image, _STAGE)
+    if held != expected:
         raise SourceError(
             f"expected the checksum 0x{expected:08X} of the boot's second stage, "
-            f"found 0x{found:08X}",
+            f"found 0x{held:08X}",
             where=where,
             hint="a Pico would not start: correct the last word of firmware/pico/boot2.S",
         )
@@ -88,5 +82,52 @@ def boot_checksum(stage: bytes) -> int:
     return crc
 
 
-def _bad(where: str, what: str) -> SourceError:
-    return SourceError(f"no UF2: {what}", where=where, hint="build it again")
+def write_uf2(uf2: bytes, drive: StrPath) -> None:
+    """Write ``uf2`` to the boot ``drive`` of a Pico; SourceError when it is another's."""
+    drive = Path(drive)
+    about = drive / _ABOUT
+    board = _board_of(about)
+    if "RP2" not in board:
+        raise SourceError(
+            f"expected the boot drive of a Pico (Board-ID RPI-RP2), found {board or 'none'}",
+            where=str(drive),
+            hint=_HINT,
+        )
+    try:
+        part = drive / _WRITTEN  # the board takes it as it comes, and nothing is there before
+        with part.open("wb") as file:
+            file.write(uf2)
+            file.flush()
+            os.fsync(file.fileno())
+    except OSError as error:
+        raise SourceError(f"could not write: {error}", where=str(drive), hint=_HINT) from None
+
+
+def find_boot_drive(roots: Iterable[StrPath] | None = None) -> Path:
+    """The boot drive of the only Pico that waits for its firmware.
+
+    Raises
+    ------
+    SourceError
+        When there is none, or more than one.
+    """
+    tops = [Path(root) for root in (_MOUNTS if roots is None else roots)]
+    folders = [about.parent for top in tops for depth in _DEPTHS for about in top.glob(depth)]
+    drives = [drive for drive in folders if "RP2" in _board_of(drive / _ABOUT)]
+    if len(drives) != 1:
+        names = ", ".join(map(str, drives)) or "none"
+        raise SourceError(
+            f"expected one boot drive of a Pico, found {names}",
+            where="firmware flash",
+            hint=f"{_HINT}; or name where it is mounted",
+        )
+    return drives[0]
+
+
+def _board_of(about: Path) -> str:
+    """What a boot drive calls its board; empty where it is none."""
+    try:
+        lines = about.read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        return ""
+    return next((line.partition(":")[2].strip() for line in lines if "Board-ID" in line), "")

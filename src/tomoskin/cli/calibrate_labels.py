@@ -1,0 +1,218 @@
+"""What says where, how hard or how bent a frame is: options such as ``LABEL=A:B`` for frames A to
+B-1, arrays of the file, and what the twin has noted in a session."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import typer
+
+from tomoskin.cli.output import remark
+from tomoskin.core import DataError, FloatArray
+
+if TYPE_CHECKING:
+    from tomoskin.core import Arrays, Detection, Touch
+    from tomoskin.learning import Codes, Examples, WeighedPresses
+    from tomoskin.pipeline import Reconstruction
+    from tomoskin.sensing.signal import Recording
+
+ALONG_Y = 90.0
+"""Direction of a bend's axis from x, degrees, unless one is given."""
+
+
+def labels_of_frames(given: Sequence[str], n: int, option: str, label: str) -> list[str]:
+    """(n,) label of each frame, "" without one.
+
+    ``option`` and ``label`` are what the command calls them: ``--class``, ``NAME``.
+    Raises BadParameter on a malformed text, DataError on frames that do not exist or that have
+    two labels.
+    """
+    labels = [""] * n
+    for text in given:
+        name, equals, span = text.rpartition("=")
+        first, colon, last = span.partition(":")
+        if not (name and equals and colon and first.isdigit() and last.isdigit()):
+            raise typer.BadParameter(f'expected {label}=A:B, got "{text}"', param_hint=option)
+        start, stop = int(first), int(last)
+        if not 0 <= start < stop <= n:
+            raise DataError(f"expected frames within 0:{n}, got {span}", where=f"{option} {name}")
+        taken = sorted({labels[k] for k in range(start, stop)} - {"", name})
+        if taken:
+            raise DataError(
+                f"frames of {span} already have the label {taken[0]}",
+                where=f"{option} {name}",
+                hint=f"give each frame one {label}",
+            )
+        labels[start:stop] = [name] * (stop - start)
+    return labels
+
+
+def _arrays(path: Path) -> Arrays:
+    """The arrays of an interchange file; none of any other file."""
+    from tomoskin.core import load_arrays
+    from tomoskin.files.imports import is_session
+
+    return {} if is_session(path) or path.suffix.lower() != ".npz" else load_arrays(path)
+
+
+def class_examples(
+    path: Path, dv: FloatArray, given: list[str] | None, codes: Codes | None
+) -> Examples:
+    """Examples of the frames ``dv`` (n, n_meas) of a file; ``codes`` where they are known before.
+
+    Raises
+    ------
+    DataError
+        When nothing says what the frames show (and ``codes`` are not known), or it is no label.
+    """
+    from tomoskin.core import real_numbers
+    from tomoskin.learning import Codes, Examples
+
+    arrays = {} if given else _arrays(path)
+    if "flags" in arrays:
+        flags = real_numbers(arrays, "flags", str(path))
+        count = flags.shape[1] if flags.ndim == 2 else 0
+        names = arrays.get("flag_names", np.arange(1, count + 1)).ravel().tolist()
+        own = Codes(tuple(map(str, names)), exclusive=False)
+        return Examples.checked(codes or own, dv, flags)
+    if given or "class" in arrays:
+        labels = (
+            labels_of_frames(given, len(dv), "--class", "NAME")
+            if given
+            else [str(s) for s in arrays["class"].tolist()]
+        )
+        codes = codes or Codes.of_labels(labels)
+        return Examples.checked(codes, dv, codes.flags_of(labels))
+    if codes is None:
+        raise DataError(
+            "holds no classes: expected class (n_frames,) or flags (n_frames, f)",
+            where=str(path),
+            hint="add one of them, or --class idle=0:40 --class touch=40:80",
+        )
+    return Examples.checked(codes, dv, np.full((len(dv), len(codes.names)), np.nan))
+
+
+def forces(path: Path, n: int, given: list[str] | None) -> FloatArray:
+    """(n,) force in each frame, in the unit that it is given in; NaN without one."""
+    from tomoskin.core import real_numbers
+
+    if given:
+        named = labels_of_frames(given, n, "--weight", "FORCE")
+        return np.array([_number(text) if text else np.nan for text in named])
+    arrays = _arrays(path)
+    if "force_n" not in arrays:
+        raise DataError(
+            "holds no forces: expected force_n (n_frames,), NaN where no weight was applied",
+            where=str(path),
+            hint="add force_n, or --weight 4.9=40:60 --weight 9.8=80:100",
+        )
+    labels = real_numbers(arrays, "force_n", str(path))
+    if labels.shape != (n,):
+        raise DataError(f"expected {n} values of force_n, got {labels.shape}", where=str(path))
+    return labels
+
+
+def _number(text: str) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        number = np.nan
+    if not np.isfinite(number):
+        raise typer.BadParameter(f'expected a number as FORCE, got "{text}"', param_hint="--weight")
+    return number
+
+
+def weighed(
+    path: Path, result: Reconstruction, newtons: FloatArray, time: FloatArray
+) -> WeighedPresses:
+    """Touches of frames with one touch; a press is what one does at one spot until it is lifted."""
+    from tomoskin.learning import WeighedPresses
+
+    rows: list[tuple[Detection, float, int, float]] = []
+    without, several, number = 0, 0, 0
+    before: Touch | None = None
+    for frame, touches in zip(result.frames.tolist(), result.touches, strict=True):
+        has_force = bool(np.isfinite(newtons[frame]))
+        without += has_force and not touches
+        several += has_force and len(touches) > 1
+        alone = touches[0] if len(touches) == 1 else None
+        if alone is not None:
+            number += before is None or not _goes_on(before, alone)
+            rows.append((alone.detection, float(newtons[frame]), number, float(time[frame])))
+        before = alone
+    if without or several:
+        remark(
+            f"{path}: of the frames with a force, {without} show no touch and {several} show "
+            "several touches; these were left out"
+        )
+    detections, *labels = zip(*rows, strict=True) if rows else ((), (), (), ())
+    return WeighedPresses.of(detections, *(np.array(column) for column in labels))
+
+
+def _goes_on(before: Touch, touch: Touch) -> bool:
+    """Whether it is the press of the frame before: the same touch within its own radius."""
+    was, now = before.detection, touch.detection
+    apart = np.hypot(now.x - was.x, now.y - was.y)
+    return before.id == touch.id and bool(apart**2 <= now.area / np.pi)
+
+
+Bends = tuple[list[int], FloatArray, FloatArray]
+"""Frames, and the angle and axis in each, rad."""
+
+
+def bends(path: Path, data: Recording, given: list[str] | None) -> Bends:
+    """Bends that options name, else those of the session's truth.
+
+    From the truth come frames that nothing presses, with one bend or none.
+    """
+    pairs = _named_bends(given, len(data)) if given else _true_bends(path, data)
+    frames = sorted(pairs)
+    angle, axis = np.array([pairs[frame] for frame in frames]).T
+    return frames, angle, axis
+
+
+def _named_bends(given: list[str], n: int) -> dict[int, tuple[float, float]]:
+    labels = labels_of_frames(given, n, "--bend", "DEG[@AXIS]")
+    return {frame: _angles(text) for frame, text in enumerate(labels) if text}
+
+
+def _angles(text: str) -> tuple[float, float]:
+    degrees, _, axis = text.partition("@")
+    try:
+        angle = math.radians(float(degrees)), math.radians(float(axis or ALONG_Y))
+    except ValueError:
+        angle = math.nan, math.nan
+    if not all(map(math.isfinite, angle)):
+        raise typer.BadParameter(
+            f'expected DEG=A:B or DEG@AXIS=A:B, got "{text}"', param_hint="--bend"
+        )
+    return angle
+
+
+def _true_bends(path: Path, data: Recording) -> dict[int, tuple[float, float]]:
+    from tomoskin.files.imports import is_session
+    from tomoskin.files.session import SessionReader
+
+    truth, pairs = [], {}
+    if is_session(path):
+        with SessionReader(path) as session:
+            truth = list(session.truth())
+    at = np.searchsorted([item.host_time for item in truth], data.time, side="right") - 1
+    for frame, number in enumerate(at.tolist()):
+        item = truth[number] if number >= 0 else None
+        if item is None or item.presses or len(item.bends) > 1:
+            continue
+        bend = item.bends[0] if item.bends else {"angle": 0.0, "axis": math.pi / 2}
+        if "angle" in bend:
+            pairs[frame] = float(bend["angle"]), float(bend["axis"])
+    if not pairs:
+        raise DataError(
+            "holds no angles of bends",
+            where=str(path),
+            hint="give them: --bend 0=0:20 --bend 30=40:60",
+        )
+    return pairs

@@ -1,0 +1,143 @@
+"""Curves: those that alpha was read from with the Picard plot, and figures of merit over distance.
+
+The figures of merit are a table too.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tomoskin.core import StrPath, written
+from tomoskin.files.exports.figure import dress, new_figure, save_figure
+from tomoskin.imaging import AlphaChoice, Curve, Merit, Picard
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_ACROSS = 3
+_LINE, _MARK = "tab:blue", "tab:red"
+_MOST = 30.0
+"""A panel ends at so many times the chosen value: what lies far above is of no interest."""
+
+
+def write_choices(
+    path: StrPath,
+    title: str,
+    choices: Sequence[AlphaChoice],
+    picard: Picard | None = None,
+    *,
+    overwrite: bool = False,
+) -> None:
+    """Draw one panel for each choice that has a curve, and one for the Picard plot.
+
+    Raises
+    ------
+    DataError
+        When matplotlib is not installed, and as :func:`written` does.
+    """
+    drawn = [(choice, choice.curve) for choice in choices if choice.curve is not None]
+    count = len(drawn) + (picard is not None)
+    columns = max(min(count, _ACROSS), 1)
+    rows = max(-(-count // columns), 1)
+    figure = new_figure(path, 4.4 * columns, 3.4 * rows + 0.4)
+    figure.suptitle(title, fontsize=11)
+    axes = np.atleast_1d(figure.subplots(rows, columns)).ravel()
+    for ax, (choice, curve) in zip(axes, drawn, strict=False):
+        _draw(ax, choice, curve)
+    if picard is not None:
+        _draw_picard(axes[len(drawn)], picard)
+    for ax in axes[count:]:
+        ax.set_visible(False)
+    save_figure(path, figure, overwrite=overwrite)
+
+
+def _draw(ax: Axes, choice: AlphaChoice, curve: Curve) -> None:
+    ax.plot(curve.x, curve.y, color=_LINE, linewidth=1.4)
+    x, y = curve.x[curve.chosen], curve.y[curve.chosen]
+    ax.plot(x, y, "o", color=_MARK, markersize=6)
+    ax.set_xscale("log")
+    if curve.y.min() > 0:
+        ax.set_yscale("log")
+        ax.set_ylim(top=min(1.2 * curve.y.max(), _MOST * y))
+    title = f"{choice.rule}: alpha = {choice.alpha:.3g}"
+    dress(ax, title, curve.x_label, curve.y_label)
+
+
+def _draw_picard(ax: Axes, picard: Picard) -> None:
+    index = np.arange(1, len(picard.singular_values) + 1)
+    ax.semilogy(index, picard.singular_values, color="0.2", label="σ")
+    ax.semilogy(index, picard.coefficients, "x", color=_LINE, markersize=4, label="|uᴴW^½dv|")
+    ax.semilogy(index, picard.solution, ".", color="tab:orange", markersize=4, label="|uᴴW^½dv|/σ")
+    if np.isfinite(picard.noise).any():
+        ax.semilogy(index, picard.noise, color=_MARK, linestyle=":", label="noise")
+    condition = picard.singular_values[0] / picard.singular_values[-1]
+    dress(ax, f"Picard plot: condition {condition:.2g}", "mode", "")
+    ax.locator_params(axis="x", integer=True)
+    ax.legend(fontsize=7)
+
+
+_FIGURES = (
+    ("amplitude", "amplitude response", 1.0),
+    ("position_error", "position error (mm, inwards above 0)", 1e3),
+    ("offset", "distance from the target (mm)", 1e3),
+    ("resolution", "resolution (fraction of the extent)", 1.0),
+    ("deformation", "shape deformation", 1.0),
+    ("ringing", "ringing", 1.0),
+)
+"""Name in :class:`Merit`, label, and factor to the label's unit."""
+
+COLUMNS = (
+    "operator",
+    "noise_figure",
+    "distance_m",
+    "amplitude",
+    "position_error_m",
+    "offset_m",
+    "resolution",
+    "deformation",
+    "ringing",
+)
+
+
+def write_merit(path: StrPath, merits: Mapping[str, Merit], *, overwrite: bool = False) -> None:
+    """Draw a panel per figure with a curve per operator, named by the keys of ``merits``.
+
+    Raises
+    ------
+    DataError
+        When matplotlib is not installed, and as :func:`written` does.
+    """
+    figure = new_figure(path, 10.5, 6.0)
+    for ax, (name, label, factor) in zip(figure.subplots(2, 3).ravel(), _FIGURES, strict=True):
+        for operator, merit in merits.items():
+            shown = f"{operator} (noise figure {merit.noise_figure:.2g})"
+            ax.plot(1e3 * merit.distance, factor * getattr(merit, name), ".-", label=shown)
+        dress(ax, "", "distance from the centre (mm)", label)
+        low = min(0.0, *(float(np.nanmin(getattr(m, name), initial=0.0)) for m in merits.values()))
+        ax.set_ylim(bottom=1.1 * factor * low)
+    ax.legend(fontsize=7)
+    save_figure(path, figure, overwrite=overwrite)
+
+
+def write_merit_table(
+    path: StrPath, merits: Mapping[str, Merit], *, overwrite: bool = False
+) -> None:
+    """Write a CSV file of :data:`COLUMNS`, a row for each operator and target.
+
+    Raises as :func:`written` does.
+    """
+    with (
+        written(path, overwrite=overwrite) as part,
+        part.open("w", newline="", encoding="utf-8") as file,
+    ):
+        writer = csv.writer(file)
+        writer.writerow(COLUMNS)
+        for operator, merit in merits.items():
+            table = (merit.distance, *(getattr(merit, name) for name, _, _ in _FIGURES))
+            for row in zip(*table, strict=True):
+                numbers = (merit.noise_figure, *row)
+                writer.writerow([operator, *(f"{number:.6g}" for number in numbers)])

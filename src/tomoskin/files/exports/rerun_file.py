@@ -1,0 +1,134 @@
+"""The sheet in space, touches and series as Rerun shows them; a session as a file of Rerun."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from uuid import uuid4
+
+import numpy as np
+
+from tomoskin.core import CHANGE, Event, Image, SinkError, StrPath, needed, written
+from tomoskin.files.exports.bag import recorded_items, recorded_stream
+from tomoskin.files.messages import Contacts, Item, Stream, touch_colour, touch_width
+from tomoskin.files.session import as_recorded
+
+if TYPE_CHECKING:
+    from tomoskin.files.exports.session_export import Export
+
+_WHERE = "rerun"
+_ARROW = 0.02
+"""Length of a touch's normal, m."""
+
+_ROBOT = uuid4()
+"""Identity of what the skins of one robot log."""
+
+
+class RerunView:
+    """Logs results and events to a recording stream of Rerun, on the timeline ``time``."""
+
+    def __init__(self, rerun: Any, recording: Any, stream: Stream) -> None:
+        self._rerun, self._recording, self._stream = rerun, recording, stream
+        self._ids: set[int] = set()
+        if stream.corners is not None:
+            corners = stream.corners.reshape(-1, 3)
+            sheet = rerun.Mesh3D(
+                vertex_positions=corners, triangle_indices=np.arange(len(corners)).reshape(-1, 3)
+            )
+            recording.log(self._path("sheet"), sheet, static=True)
+
+    def log(self, item: Item) -> None:
+        """What ``item`` says, at the time of its measurement."""
+        utc = self._stream.utc(item.host_time)
+        when = {"duration": item.host_time} if utc is None else {"timestamp": utc}
+        self._recording.set_time("time", **when)
+        for event in (item,) if isinstance(item, Event) else item.events:
+            text = self._rerun.TextLog(f"{event.kind}: {event.text}")
+            self._recording.log(self._path("events"), text)
+        if isinstance(item, Event):
+            return
+        if item.is_due:
+            self._touches(item)
+        if item.image is not None and self._stream.corners is not None:
+            self._sheet(item.image)
+
+    def _touches(self, contacts: Contacts) -> None:
+        touches = contacts.tracked
+        places = np.array([contact.position for contact in contacts.touches]).reshape(-1, 3)
+        normals = np.array([contact.normal for contact in contacts.touches]).reshape(-1, 3)
+        colours = [[*touch_colour(touch).values()] for touch in touches]
+        dots = self._rerun.Points3D(
+            places,
+            radii=[touch_width(touch) / 2 for touch in touches],
+            labels=[str(touch.id) for touch in touches],
+            colors=np.array(colours).reshape(-1, 4),
+        )
+        self._recording.log(self._path("touches"), dots)
+        arrows = self._rerun.Arrows3D(origins=places, vectors=_ARROW * normals)
+        self._recording.log(self._path("normals"), arrows)
+        self._series("valid", float(contacts.valid))
+        if contacts.latency is not None:
+            self._series("latency", contacts.latency)
+        for contact in contacts.touches:
+            touch = contact.touch
+            self._series(f"peak/{touch.id}", touch.detection.peak)
+            if contact.force is not None:
+                self._series(f"force/{touch.id}", contact.force)
+        ids = {touch.id for touch in touches}
+        for gone in self._ids - ids:  # or its line would go on for ever
+            for name in ("peak", "force"):
+                gap = self._rerun.Clear(recursive=False)
+                self._recording.log(self._path(f"{name}/{gone}"), gap)
+        self._ids = ids
+
+    def _sheet(self, image: Image) -> None:
+        share = np.clip(image.values / self._stream.limit, -1.0, 1.0)
+        last = len(CHANGE.table) - 1
+        colours = CHANGE.table[np.rint((share + 1) / 2 * last).astype(int)]
+        mesh = self._rerun.Mesh3D.from_fields(vertex_colors=np.repeat(colours, 3, axis=0))
+        self._recording.log(self._path("sheet"), mesh)
+
+    def _series(self, name: str, value: float) -> None:
+        self._recording.log(self._path(name), self._rerun.Scalars(value))
+
+    def _path(self, name: str) -> str:
+        return f"{self._stream.naming.namespace}/{name}"
+
+
+def write_rerun(job: Export, path: StrPath) -> None:
+    """Write what the sink would have sent of a session; an image every ``job.every`` s.
+
+    Raises
+    ------
+    DataError, OutputError
+        When the session cannot be replayed, or the file not be written.
+    SinkError
+        When Rerun is not installed.
+    """
+    path = Path(path)
+    rerun, prepared = needed("rerun", "rerun", _WHERE, SinkError), as_recorded(job.session)
+    stream = recorded_stream(job, prepared)
+    with written(path, overwrite=job.overwrite) as part:
+        recording = rerun_recording(rerun, stream)
+        recording.save(str(part))
+        view = RerunView(rerun, recording, stream)
+        for item in recorded_items(job, prepared, stream):
+            view.log(item)
+        recording.flush()
+        recording.disconnect()
+
+
+def rerun_recording(rerun: Any, stream: Stream) -> Any:
+    """A recording whose only times are those of the measurements.
+
+    Those of a robot's skins have one identity in a process: a viewer shows them as one.
+    """
+    if stream.corners is None and stream.points is not None:
+        raise SinkError("Rerun shows sheets, but this skin is a body", where=_WHERE)
+    if stream.place is None:
+        recording = rerun.RecordingStream(f"tomoskin {stream.skin}")
+    else:
+        recording = rerun.RecordingStream("tomoskin robot", recording_id=_ROBOT)
+    recording.set_log_time_enabled(False)
+    recording.set_log_tick_enabled(False)
+    return recording

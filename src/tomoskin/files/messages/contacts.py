@@ -1,0 +1,298 @@
+"""One frame as it leaves the program: its touches, and whether to rely on them.
+
+Every message, table and file for other programs is made from :class:`Contacts`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, Self
+
+import numpy as np
+
+from tomoskin.core import Detection, Event, FloatArray, Force, Image, Touch
+from tomoskin.files.messages.stream import Stream
+from tomoskin.model.mesh import Surface
+from tomoskin.model.robot import quaternion
+from tomoskin.pipeline import FrameResult
+from tomoskin.sensing.track import TouchEvent
+
+NO_REFERENCE = "the reference has not been taken yet: do not touch the skin for a moment"
+
+UNKNOWN = 1e6
+"""Variance of what is not measured, m² or rad²: what filters take for no knowledge."""
+
+_NO_FORCE = {"force": None, "force_interval": None, "force_calibrated": False}
+"""What a row says of a touch whose force nothing tells."""
+
+Vector = tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Contact:
+    """One touch in space.
+
+    Attributes
+    ----------
+    touch
+        Its identity, and where it is on the sheet.
+    position
+        (3,) m, on the surface, in the frame of its :class:`Contacts`.
+    axes
+        Unit vectors: along the sheet's x, across it, and away from the body.
+    slope
+        (3, 2): derivative of the position by the sheet's x and y.
+    """
+
+    touch: Touch
+    position: Vector
+    axes: tuple[Vector, Vector, Vector] = field(repr=False)
+    slope: FloatArray = field(repr=False)
+
+    @classmethod
+    def of(cls, touch: Touch, surface: Surface) -> Self:
+        """Of a touch of the sheet that lies on ``surface``; plain numbers, which is faster."""
+        uv = [[touch.detection.x, touch.detection.y]]
+        slope = surface.jacobian(uv)[0]
+        along, up = map(_unit, slope.T.tolist())
+        normal = _unit(_cross(along, up))
+        x, y, z = surface.point(uv)[0].tolist()
+        return cls(touch, (x, y, z), (along, _cross(normal, along), normal), slope)
+
+    @property
+    def normal(self) -> Vector:
+        """(3,) unit vector, away from the body."""
+        return self.axes[2]
+
+    @property
+    def orientation(self) -> Vector:
+        """X, y, z, w of the rotation to the axes."""
+        return quaternion(self.axes)
+
+    @property
+    def covariance(self) -> FloatArray | None:
+        """(3, 3) m² of the position, along the surface only; None where it is not known."""
+        d = self.touch.detection
+        known = math.isfinite(d.sd_x) and math.isfinite(d.sd_y)
+        return self._in_space(_on_sheet(d)) if known else None
+
+    @property
+    def pose_covariance(self) -> FloatArray:
+        """(6, 6) of position and rotation, m² and rad².
+
+        Along the normal, and of rotations, it is :data:`UNKNOWN`.
+        """
+        whole = UNKNOWN * np.eye(6)
+        normal = np.array(self.normal)
+        whole[:3, :3] = self._in_space(_on_sheet(self.touch.detection))
+        whole[:3, :3] += UNKNOWN * normal[:, None] * normal
+        return whole
+
+    @property
+    def force(self) -> float | None:
+        """N, against the normal; None where nothing tells it."""
+        force = self.touch.detection.force
+        return None if force is None else force.newtons
+
+    @property
+    def push(self) -> FloatArray:
+        """(3,) N, into the body; NaN where nothing tells it."""
+        return -(np.nan if self.force is None else self.force) * np.array(self.normal)
+
+    @property
+    def torque(self) -> FloatArray:
+        """(3,) N m of the push about the origin of the frame of coordinates."""
+        return np.cross(self.position, self.push)
+
+    def content(self) -> dict[str, Any]:
+        """As plain values by name: on the sheet, and in space."""
+        spread = self.covariance
+        return (
+            _NO_FORCE
+            | touch_row(self.touch)
+            | {
+                "position": self.position,
+                "normal": self.normal,
+                "covariance": None if spread is None else spread.tolist(),
+            }
+        )
+
+    def _in_space(self, sheet: FloatArray) -> FloatArray:
+        """(3, 3) of a covariance (2, 2) on the sheet."""
+        return np.asarray(self.slope @ sheet @ self.slope.T)
+
+
+@dataclass(frozen=True, eq=False)
+class Contacts:
+    """All touches of one frame: whose, when, in which coordinates, and whether to rely on them.
+
+    Attributes
+    ----------
+    stream
+        Which skin it is.
+    sequence, host_time
+        As in the frame that was measured: its number, and monotonic s when its last byte came.
+    valid
+        Whether "no touch" means that nothing touches: a reference stands, enough electrodes
+        work, and frames come.
+    problem
+        What is wrong, in a sentence, or None.
+    latency
+        s from ``host_time`` until this record was made; None for what was recorded.
+    tracked
+        The touches on the sheet, in the order of their identities.
+    happened
+        What happened to touches in this frame: onset, move, release, merge, split.
+    voltages, reference
+        (n_meas,) V; None where no frame came, or no reference stands.
+    image
+        Change of conductivity; None where a newer frame waits, or one was sent a moment ago.
+    is_due
+        Whether the touches are worth a message.
+    reports
+        Whether it is time to say how the skin is.
+    """
+
+    stream: Stream = field(repr=False)
+    sequence: int
+    host_time: float
+    valid: bool
+    problem: str | None
+    latency: float | None
+    tracked: tuple[Touch, ...] = ()
+    happened: tuple[TouchEvent, ...] = ()
+    voltages: FloatArray | None = field(default=None, repr=False)
+    reference: FloatArray | None = field(default=None, repr=False)
+    image: Image | None = field(default=None, repr=False)
+    is_due: bool = True
+    reports: bool = True
+
+    @classmethod
+    def of(cls, stream: Stream, result: FrameResult) -> Self:
+        """What ``result`` says of the skin."""
+        valid = result.ready and result.has_image
+        return cls(
+            stream=stream,
+            sequence=result.sequence,
+            host_time=result.host_time,
+            valid=valid,
+            problem=result.problem if result.ready else NO_REFERENCE,
+            latency=stream.latency(result.host_time),
+            tracked=result.touches,
+            happened=result.events,
+            voltages=result.voltages,
+            reference=result.reference if result.ready else None,
+            image=result.image if valid else None,
+        )
+
+    @property
+    def skin(self) -> str:
+        """Name of the skin that is touched."""
+        return self.stream.skin
+
+    @property
+    def frame_id(self) -> str:
+        """Name of the frame of coordinates."""
+        return self.stream.naming.frame_id
+
+    @property
+    def utc(self) -> float | None:
+        """S since 1970 of ``host_time``; None in a simulation."""
+        return self.stream.utc(self.host_time)
+
+    @cached_property
+    def touches(self) -> tuple[Contact, ...]:
+        """The touches in space, in the order of their identities."""
+        return tuple(Contact.of(touch, self.stream.surface) for touch in self.tracked)
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """What happened to touches, in words."""
+        return tuple(map(event_of, self.happened))
+
+    def strongest(self, most: int) -> list[Contact]:
+        """The strongest ``most`` touches, for forms that have room for no more."""
+        return sorted(self.touches, key=lambda c: -abs(c.touch.detection.peak))[:most]
+
+    def header(self) -> dict[str, Any]:
+        """Everything but the touches, as plain values by name."""
+        return {
+            "host_time": self.host_time,
+            "utc_s": self.utc,
+            "skin": self.skin,
+            "frame_id": self.frame_id,
+            "sequence": self.sequence,
+            "latency_s": self.latency,
+            "valid": self.valid,
+            "problem": self.problem,
+        }
+
+    def content(self) -> dict[str, Any]:
+        """Everything as plain values by name, the touches too."""
+        return self.header() | {"touches": [touch.content() for touch in self.touches]}
+
+    def happenings(self) -> list[dict[str, Any]]:
+        """Each thing that happened to a touch, with that touch, as plain values by name."""
+        return [
+            {"time_s": event.host_time, "event": event.kind}
+            | self.header()
+            | Contact.of(event.touch, self.stream.surface).content()
+            for event in self.happened
+        ]
+
+
+def touch_row(touch: Touch) -> dict[str, Any]:
+    """One touch as plain values by name; its force, N, only where a calibration tells it."""
+    r, force = touch.detection, touch.detection.force
+    return ({} if force is None else _newtons(force)) | {
+        "id": touch.id, "kind": touch.kind, "since": touch.since,
+        "x": r.x, "y": r.y, "sd_x": r.sd_x, "sd_y": r.sd_y, "area": r.area, "peak": r.peak,
+        "cov_xy": r.cov_xy, "close": r.close, "merged": touch.merged,
+        "possible": touch.possible,
+    }  # fmt: skip
+
+
+def event_of(happened: TouchEvent) -> Event:
+    """What happened to a touch as an event: "touch-onset", "touch-move", "touch-release", …"""
+    return Event(happened.host_time, f"touch-{happened.kind}", happened.text)
+
+
+def event_content(stream: Stream, event: Event, *, of_frame: bool = False) -> dict[str, Any]:
+    """An event as plain values; of a replay only those of its frames are known in UTC."""
+    unknown = stream.replayed and not of_frame
+    return {
+        "time_s": event.host_time,
+        "kind": event.kind,
+        "text": event.text,
+        "utc_s": None if unknown else stream.utc(event.host_time),
+        "skin": stream.skin,
+        "frame_id": stream.naming.frame_id,
+    }
+
+
+def _newtons(force: Force) -> dict[str, Any]:
+    return {
+        "force": force.newtons,
+        "force_interval": (force.low, force.high),
+        "force_calibrated": force.calibrated,
+    }
+
+
+def _on_sheet(detection: Detection) -> FloatArray:
+    """(2, 2) m², the covariance of a position on the sheet."""
+    variance = np.array([detection.sd_x**2, detection.sd_y**2])
+    if np.isfinite(variance).all():
+        return np.diag(variance) + detection.cov_xy * np.eye(2)[::-1]
+    return np.diag(np.where(np.isfinite(variance), variance, UNKNOWN))
+
+
+def _cross(a: Vector, b: Vector) -> Vector:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def _unit(vector: Sequence[float]) -> Vector:
+    length = math.hypot(*vector)
+    return tuple(value / length for value in vector)

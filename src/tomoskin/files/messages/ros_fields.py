@@ -1,0 +1,165 @@
+"""What a frame says, as the fields of ROS 2 messages."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from tomoskin.core import FloatArray, Image, PixelMap
+from tomoskin.files.messages.contacts import UNKNOWN, Contact, Contacts
+from tomoskin.files.messages.foxglove_records import touch_colour, touch_width
+from tomoskin.model.robot import Place
+
+Value = dict[str, Any]
+
+_SPHERE, _TEXT, _DELETE_ALL = 2, 9, 3
+_LABEL = 8e-3
+"""Height of a touch's number, m."""
+_GREY = {"r": 0.5, "g": 0.5, "b": 0.5, "a": 1.0}
+_OK, _WARN, _ERROR = 0, 1, 2
+_FLOAT32 = 7
+_NOT_MEASURED = {"covariance": (UNKNOWN * np.eye(6)).ravel()}
+
+
+def header(stamp: int, frame: str) -> Value:
+    """``std_msgs/Header`` of ``stamp`` ns since 1970."""
+    sec, nanosec = divmod(stamp, 1_000_000_000)
+    return {"stamp": {"sec": sec, "nanosec": nanosec}, "frame_id": frame}
+
+
+def pose(contact: Contact) -> Value:
+    """``geometry_msgs/PoseWithCovariance``: on the surface, z along the normal."""
+    return {"pose": _pose(contact), "covariance": contact.pose_covariance.ravel()}
+
+
+def track(head: Value, contact: Contact) -> Value:
+    """``nav_msgs/Odometry``: a pose with the touch's identity; velocities are not measured."""
+    name = _name(head, contact)
+    return {"header": head, "child_frame_id": name, "pose": pose(contact), "twist": _NOT_MEASURED}
+
+
+def contacts(head: Value, frame: Contacts) -> Value:
+    """``tactile_msgs/TactileContacts``; a wrench is about the origin of the frame of coordinates,
+    and NaN where force is not measured."""
+    return {
+        "contacts": [
+            {
+                "header": head,
+                "name": _name(head, contact),
+                "position": _named("xyz", contact.position),
+                "normal": _named("xyz", contact.normal),
+                "wrench": _wrench(contact.push, contact.torque),
+            }
+            for contact in frame.touches
+        ]
+    }
+
+
+def wrench(head: Value, frame: Contacts) -> Value:
+    """``geometry_msgs/WrenchStamped``: of all touches, about the frame's origin.
+
+    It is NaN where touches are not valid, or the force of one is not measured.
+    """
+    nothing = np.full(3, 0.0 if frame.valid else np.nan)
+    force = sum((contact.push for contact in frame.touches), start=nothing)
+    torque = sum((contact.torque for contact in frame.touches), start=nothing)
+    return {"header": head, "wrench": _wrench(force, torque)}
+
+
+def markers(head: Value, frame: Contacts) -> Value:
+    """``visualization_msgs/MarkerArray`` that shows these touches, and no others."""
+    shown = [{"header": head, "action": _DELETE_ALL, "frame_locked": True}]
+    for contact in frame.touches:
+        width, place = touch_width(contact.touch), _pose(contact)
+        about = {"header": head, "id": contact.touch.id, "pose": place, "frame_locked": True}
+        sphere = {"ns": "touch", "type": _SPHERE, "color": touch_colour(contact.touch)}
+        scale = _named("xyz", (width, width, 0.2 * width))
+        shown.append(about | sphere | {"scale": scale})
+        label = {"ns": "label", "type": _TEXT, "color": _GREY, "text": str(contact.touch.id)}
+        shown.append(about | label | {"scale": {"z": _LABEL}})
+    return {"markers": shown}
+
+
+def diagnostics(head: Value, frame: Contacts) -> Value:
+    """``diagnostic_msgs/DiagnosticArray``: error where touches are not valid."""
+    level = _ERROR if not frame.valid else _WARN if frame.problem else _OK
+    values = {
+        "sequence": frame.sequence,
+        "latency_s": frame.latency,
+        "touches": len(frame.touches),
+        "valid": frame.valid,
+    }
+    status = {
+        "level": level,
+        "name": f"{frame.stream.naming.namespace}: skin",
+        "message": frame.problem or "OK",
+        "hardware_id": frame.skin,
+        "values": [{"key": key, "value": str(value)} for key, value in values.items()],
+    }
+    return {"header": head, "status": [status]}
+
+
+def transform(stamp: int, frame: str, mount: Place) -> Value:
+    """``tf2_msgs/TFMessage``: where the skin is on the robot."""
+    place = {
+        "translation": _named("xyz", mount.pose.position.tolist()),
+        "rotation": _named("xyzw", mount.pose.quaternion()),
+    }
+    head = header(stamp, mount.link)
+    return {"transforms": [{"header": head, "child_frame_id": frame, "transform": place}]}
+
+
+def image(head: Value, change: Image, pixels: PixelMap) -> Value:
+    """``sensor_msgs/Image``: 32-bit floats, the top row first, NaN outside the sheet."""
+    values = change.on_pixels(pixels).astype("<f4")
+    height, width = values.shape
+    return {
+        "header": head,
+        "height": height,
+        "width": width,
+        "encoding": "32FC1",
+        "is_bigendian": 0,
+        "step": 4 * width,
+        "data": values.tobytes(),
+    }
+
+
+def points(head: Value, change: Image, places: FloatArray) -> Value:
+    """``sensor_msgs/PointCloud2``: the change at the middle of each cell, in space."""
+    data = np.column_stack([places, change.values]).astype("<f4")
+    names = ("x", "y", "z", "change")
+    return {
+        "header": head,
+        "height": 1,
+        "width": len(data),
+        "fields": [
+            {"name": name, "offset": 4 * number, "datatype": _FLOAT32, "count": 1}
+            for number, name in enumerate(names)
+        ],
+        "is_bigendian": False,
+        "point_step": 4 * len(names),
+        "row_step": data.nbytes,
+        "data": data.tobytes(),
+        "is_dense": True,
+    }
+
+
+def _pose(contact: Contact) -> Value:
+    return {
+        "position": _named("xyz", contact.position),
+        "orientation": _named("xyzw", contact.orientation),
+    }
+
+
+def _name(head: Value, contact: Contact) -> str:
+    return f"{head['frame_id']}/touch_{contact.touch.id}"
+
+
+def _wrench(force: FloatArray, torque: FloatArray) -> Value:
+    return {"force": _named("xyz", force.tolist()), "torque": _named("xyz", torque.tolist())}
+
+
+def _named(names: str, values: Sequence[float]) -> Value:
+    return dict(zip(names, values, strict=True))

@@ -1,0 +1,101 @@
+"""What leaves the program as messages of ROS 2, by topic."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from tomoskin.core import Event, Image, encode_json
+from tomoskin.files.messages import ros_fields
+from tomoskin.files.messages.contacts import Contacts, event_content
+from tomoskin.files.messages.reporter import Item
+from tomoskin.files.messages.ros_fields import Value
+from tomoskin.files.messages.stream import Stream
+
+POSE = "geometry_msgs/msg/PoseWithCovarianceStamped"
+ODOMETRY = "nav_msgs/msg/Odometry"
+IMAGE = "sensor_msgs/msg/Image"
+TEXT = "std_msgs/msg/String"
+
+TOPICS = {
+    "touch": POSE,
+    "track": ODOMETRY,
+    "touches": TEXT,
+    "valid": "std_msgs/msg/Bool",
+    "contacts": "tactile_msgs/msg/TactileContacts",
+    "wrench": "geometry_msgs/msg/WrenchStamped",
+    "markers": "visualization_msgs/msg/MarkerArray",
+    "image": IMAGE,
+    "points": "sensor_msgs/msg/PointCloud2",
+    "events": TEXT,
+    "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray",
+    "/tf_static": "tf2_msgs/msg/TFMessage",
+}
+"""Type of each topic, by its name in the skin's namespace; with "/": of the whole robot."""
+
+KEPT = frozenset({"/tf_static"})
+"""Topics whose last message is for those too who come later."""
+
+
+@dataclass(frozen=True, slots=True)
+class RosMessage:
+    """A message for ``topic`` (of :data:`TOPICS`), its fields by name; ``stamp`` ns since 1970."""
+
+    topic: str
+    value: Value
+    stamp: int
+
+
+def ros_messages(stream: Stream, item: Item) -> Iterator[RosMessage]:
+    """Messages of one frame, or of an event."""
+    stamp = stream.log_time(item.host_time)
+    of_frame = not isinstance(item, Event)
+    for event in (item,) if isinstance(item, Event) else item.events:
+        content = event_content(stream, event, of_frame=of_frame)
+        yield RosMessage("events", _json(content), stamp)
+    if isinstance(item, Event):
+        return
+    head = ros_fields.header(stamp, item.frame_id)
+    for topic, value in _of_frame(head, item, stamp):
+        yield RosMessage(topic, value, stamp)
+
+
+def _of_frame(head: Value, contacts: Contacts, stamp: int) -> Iterator[tuple[str, Value]]:
+    stream = contacts.stream
+    if contacts.is_due:
+        yield from _touches(head, contacts)
+    if contacts.image is not None:
+        yield from _images(head, stream, contacts.image)
+    if contacts.reports:
+        naming = stream.naming
+        yield "/diagnostics", ros_fields.diagnostics(head, contacts)
+        if naming.mount is not None:
+            yield "/tf_static", ros_fields.transform(stamp, naming.frame_id, naming.mount)
+
+
+def _images(head: Value, stream: Stream, image: Image) -> Iterator[tuple[str, Value]]:
+    if stream.pixels is not None:
+        yield "image", ros_fields.image(head, image, stream.pixels)
+    if stream.points is not None:
+        yield "points", ros_fields.points(head, image, stream.points)
+
+
+def _touches(head: Value, contacts: Contacts) -> Iterator[tuple[str, Value]]:
+    """Each touch as a pose and as a track, which has its identity; then all of them.
+
+    Where touches are not valid there are no contacts, not even none.
+    """
+    for contact in contacts.touches:
+        yield "touch", {"header": head, "pose": ros_fields.pose(contact)}
+        yield "track", ros_fields.track(head, contact)
+    yield "touches", _json(contacts.content())
+    yield "valid", {"data": contacts.valid}
+    if contacts.valid:
+        yield "contacts", ros_fields.contacts(head, contacts)
+    yield "wrench", ros_fields.wrench(head, contacts)
+    yield "markers", ros_fields.markers(head, contacts)
+
+
+def _json(content: Mapping[str, Any]) -> Value:
+    return {"data": encode_json(content).decode()}

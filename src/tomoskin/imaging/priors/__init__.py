@@ -1,1 +1,0 @@
-"""Priors: what is held to be likely of an image before there are data."""
