@@ -94,7 +94,6 @@ def test_the_picture_of_rules_without_a_recording(tomoskin: Command, tmp_path: P
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--rule", "elbow"), "expected a rule among light-touch"),
         (("--rule", "gcv"), "there is no frame of a touched skin"),
         (("--recording", "none.npz"), "none.npz"),
     ],
@@ -103,6 +102,13 @@ def test_refusals(tomoskin: Command, arguments: tuple[str, ...], message: str) -
     code, _, err = tomoskin("skin", "alpha", "textile-disc-8", *arguments)
     assert code == 1
     assert message in err
+
+
+def test_a_rule_that_was_probably_meant_is_named(tomoskin: Command) -> None:
+    for rule, says in (("elbow", "expected a rule among light-touch"), ("lcurve", '"l-curve"?')):
+        code, _, err = tomoskin("skin", "alpha", "textile-disc-8", "--rule", rule)
+        assert code == 2
+        assert says in " ".join(err.replace("│", " ").split())
 
 
 @pytest.mark.parametrize(

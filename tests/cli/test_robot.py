@@ -36,6 +36,7 @@ def test_skins_are_placed_in_one_command_each(tomoskin, arm):
     mesh = ("skin", "place", arm, "upper", "--out", out, "--on-mesh")
     assert tomoskin(*mesh)[0] == 0
     robot = Robot.load(out)
+    assert robot.skins[2].skin == "textile-disc-8", "as every other command, where none is named"
     assert [(s.name, s.place.link, s.source) for s in robot.skins] == [
         ("fore", "fore", "twin:seed=1"),
         ("palm", "fore", "twin:seed=2"),

@@ -17,7 +17,7 @@ from tomoskin.files.session import SessionReader, as_recorded, replayed, tick_ra
 from tomoskin.learning import CLASSES, Classifier, ClassReading
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Pipeline, prepare, reconstruct
-from tomoskin.server.page_messages import state as message
+from tomoskin.server.views import state as message
 
 NAMES = ("idle", "left", "right")
 EACH = 12
@@ -64,9 +64,9 @@ def test_a_run_says_which_class_it_shows(run):
     shown = status.class_reading
     assert shown == ClassReading("right", shown.probability, False)
     assert status.text.endswith(f", right {100 * shown.probability:.0f} %")
-    told = json.loads(message(status))["class"]
+    told = json.loads(message(status).json)["class"]
     assert told == {"name": "right", "probability": shown.probability, "unknown": False}
-    assert json.loads(message(replace(status, class_reading=None)))["class"] is None
+    assert json.loads(message(replace(status, class_reading=None)).json)["class"] is None
 
 
 def test_a_replay_tells_the_same_classes_to_the_bit(run):

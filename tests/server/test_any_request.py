@@ -20,13 +20,13 @@ from websockets.sync.client import ClientConnection, connect
 from damage import mutated
 from tomoskin.core import WireError
 from tomoskin.model.skin import Skin
-from tomoskin.server.requests import Request, decode_request
+from tomoskin.server.requests import REQUEST, decode_request
 
 SKIN, HANG = "textile-disc-8", 10.0
 _NAMES = ("a", "run.mcap", "textile-disc-8", "textile-disc-16", "touch.npz", "twin", "x-1", "none")
 _EXTREMES = (0.0, -0.0, 1e-300, 1e-9, 1e-3, 0.05, 1.0, -1.0, 17.3, 1e6, 1e300)
 _SEED = 1
-SCHEMA = msgspec.json.schema(Request)
+SCHEMA = msgspec.json.schema(REQUEST)
 
 
 def test_any_request_is_understood_or_refused() -> None:

@@ -95,7 +95,7 @@ def test_links_and_folders_are_no_files(tmp_path):
     (inside / "run.mcap").write_bytes(b"run")
     (inside / "notes.txt").write_bytes(b"not listed")
     folder = Folder(inside)
-    assert [file.name for file in folder.list_files().files] == ["run.mcap"]
+    assert [file.name for file in folder.list_files()[0]] == ["run.mcap"]
     for name in ("link.npz", "folder.npz", "none.npz"):
         with pytest.raises(DataError, match="no such file"):
             folder.existing(name)
@@ -104,17 +104,28 @@ def test_links_and_folders_are_no_files(tmp_path):
     assert folder.existing("run.mcap").read_bytes() == b"run"
 
 
-def test_names_that_no_page_may_ask_for_are_counted(tmp_path):
+def test_names_that_no_page_may_ask_for_are_counted(tmp_path, prepared):
     names = (b"run.mcap", b"skin.toml", b"two words.toml", b"a.b.toml", b"\xff.txt")
     try:
         for name in (*names, b"sk\xffn.toml", b"r\xff.mcap"):
-            Path(os.fsdecode(os.fsencode(tmp_path) + b"/" + name)).touch()
+            path = Path(os.fsdecode(os.fsencode(tmp_path) + b"/" + name))
+            path.write_text(prepared.skin.to_toml())
     except OSError as error:
         pytest.skip(f"names are text here: {error}")
-    found = Folder(tmp_path).list_files()
-    assert {file.name for file in found.files} == {"run.mcap", "skin.toml", "a.b.toml"}
-    assert found.others == 3
+    files, others = Folder(tmp_path).list_files()
+    assert {file.name for file in files} == {"run.mcap", "skin.toml", "a.b.toml"}
+    assert others == 3
     assert Folder(tmp_path).skins() == ["skin"]
+
+
+def test_only_settings_of_skins_and_robots_are_listed(tmp_path, prepared):
+    (tmp_path / "pyproject.toml").write_text('[project]\nname = "x"\n')
+    (tmp_path / "broken.toml").write_text("[outline")
+    (tmp_path / "mine.toml").write_text(prepared.skin.to_toml())
+    (tmp_path / "arm.toml").write_text('[[skin]]\nname = "hand"\nskin = "textile-disc-8"\n')
+    folder = Folder(tmp_path)
+    assert folder.skins() == ["mine"]
+    assert {file.name for file in folder.list_files()[0]} == {"mine.toml", "arm.toml"}
 
 
 def test_a_name_that_is_taken_gets_a_number(tmp_path):
@@ -272,7 +283,7 @@ def test_notes_lead_nowhere_else(tmp_path):
     (tmp_path / "in" / "run.mcap").write_bytes(b"")
     (tmp_path / "in" / "run.notes.txt").symlink_to(tmp_path / "secret.txt")
     folder = Folder(tmp_path / "in")
-    assert [file.notes for file in folder.list_files().files] == [""]
+    assert [file.notes for file in folder.list_files()[0]] == [""]
     with pytest.raises(DataError, match="is a link"):
         folder.annotate("run.mcap", "mine")
     assert (tmp_path / "secret.txt").read_text() == "secret"
@@ -392,6 +403,26 @@ def test_a_calibration_of_the_folder_is_switched_on_and_off(taught, prepared):
         assert "no such file" in page.told("error")["message"]
         page.ask("calibration", name="run.mcap")
         assert ".npz" in page.told("error")["message"]
+
+
+def test_a_flow_that_no_page_shows_records_nothing(flows):
+    site, page = flows
+    runner = site.runner
+    page.ask("flow_begin", kind="touch")
+    dot = press_dots(site, page, 1)["dot"]
+    page.ask("flow_show", on=False)
+    page.told("flow", lambda m: m["paused"])
+    runner.ask(commands.HoldPresses(page, (Press(*dot, FORCE, RADIUS),)))
+    before = runner.status().frames
+    Watch(runner).until(lambda: runner.status().frames > before + 60)
+    with site.connect() as socket:
+        other = type(page)(socket)
+        told = other.told("flow")
+        assert (told["kind"], told["paused"], len(told["presses"])) == ("touch", True, 1)
+        other.ask("flow_show", on=True)
+        told = page.told("flow", lambda m: not m["paused"])
+        assert (told["phase"], len(told["presses"])) == ("rest", 1)
+    page.told("flow", lambda m: m["paused"])  # the page that showed it has gone
 
 
 def test_a_press_is_taken_back_and_the_flow_left(flows):

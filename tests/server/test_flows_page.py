@@ -39,10 +39,12 @@ def looks_right(opened, name):
 def test_a_recording_is_marked_listed_exported_played_and_left(opened, folder):
     page = opened.page
     assert opened.test_id("timeline").count() == 0
+    before = opened.test_id("sheet").bounding_box()
     opened.test_id("do-record").click()
     opened.test_id("state").filter(has_text="Recording").wait_for()
     assert opened.test_id("do-record").get_attribute("aria-pressed") == "true"
     opened.test_id("timeline").wait_for()
+    assert opened.test_id("sheet").bounding_box() == before, "the sheet moves under a finger"
     opened.press(0.03, 0.02)
     page.keyboard.press("m")
     opened.test_id("mark-text").fill("a finger")

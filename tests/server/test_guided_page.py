@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from functools import partial
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import pytest
 from run.board import Board, pressed, samples_of
 from server.looks import look_in_both
 from server.serving import Site
+from server.test_play import Page
 from server.watching import Watched
 from tomoskin.board.source import open_source
 from tomoskin.learning import FORCE, TOUCH
@@ -29,7 +31,12 @@ def folder(tmp_path_factory):
 def site(prepared, folder):
     runner = Runner(prepared, lambda: open_source("twin:fast", prepared.skin))
     runner.start()
-    site = Site(runner, folder=folder, take=lambda hub: serve_requests(hub, "twin"))
+
+    def take(hub):
+        hub.opener = partial(open_source, "twin:fast")
+        serve_requests(hub, "twin")
+
+    site = Site(runner, folder=folder, take=take)
     yield site
     site.stop()
     runner.stop()
@@ -89,6 +96,24 @@ def test_the_wires_are_found_by_pressing_dots(opened, folder):
     opened.test_id("flow-keep").click()
     opened.test_id("flow-begin").wait_for()
     assert Skin.load(folder / "mapped.toml").n_electrodes == 8
+
+
+def test_a_kept_press_is_on_the_twin_after_its_pattern_has_changed(opened, site):
+    before = opened.page.evaluate("window.tomoskin.scene.pattern.name")
+    opened.page.keyboard.down("Shift")
+    opened.press(0.03, 0.03)
+    opened.page.mouse.up()
+    opened.page.keyboard.up("Shift")
+    with site.connect() as socket:
+        page = Page(socket)
+        page.ask("settings", changes={"drive": {"pattern": "opposite"}})
+        page.told("scene", lambda m: m["pattern"]["name"] != before)
+        page.told("settings", lambda m: not m["busy"])
+        opened.until("last?.truths.length === 1")
+        opened.page.keyboard.press("Escape")
+        opened.until("last?.truths.length === 0")
+        page.ask("undo")
+        page.told("scene", lambda m: m["pattern"]["name"] == before)
 
 
 def lay(opened, newtons, place, done):
@@ -199,3 +224,32 @@ def test_a_rubbed_skin_is_learnt_and_used(rubbed, folder):
     opened.test_id("calibration").filter(has_text="rubbed.npz").wait_for()
     opened.test_id("calibration-health").wait_for()
     assert len(TOUCH.read(folder / "rubbed.npz").model.presses) >= 150
+
+
+def test_a_flow_whose_drawer_is_closed_is_paused_and_named(opened):
+    opened.test_id("open-setup").click()
+    opened.test_id("step-force").click()
+    opened.test_id("flow-begin").click()
+    opened.test_id("weight-unit").select_option("N")
+    lay(opened, 2, (0.03, 0.03), 0)
+    opened.test_id("state").filter(has_text="Teaching forces").wait_for()
+    opened.test_id("open-setup").click()
+    opened.test_id("state").filter(has_text="Teaching paused").wait_for()
+    opened.test_id("remark").filter(has_text="Teaching forces is paused, 1 recorded").wait_for()
+    looks_right(opened, "flow-paused")
+    opened.press(-0.03, 0.03)
+    held = "() => window.tomoskin.last.truths[0]?.force > 5"
+    opened.page.wait_for_function(held)  # the weight that was said counts no more
+    opened.page.mouse.up()
+    opened.lifted()
+    opened.page.reload()
+    opened.until("last?.referenceReady")
+    opened.test_id("state").filter(has_text="Teaching paused").wait_for()
+    opened.test_id("open-setup").click()
+    opened.test_id("taken").filter(has_text="1 placement recorded").wait_for()
+    opened.test_id("state").filter(has_text="Teaching forces").wait_for()
+    assert opened.test_id("weight").input_value() == "2"
+    assert opened.test_id("weight-unit").input_value() == "N"
+    opened.test_id("flow-end").click()
+    opened.test_id("flow-end").filter(has_text="Forget all of it").click()
+    opened.test_id("state").filter(has_text="Live").wait_for()

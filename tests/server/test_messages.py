@@ -12,7 +12,8 @@ from tomoskin.pipeline import colour_limit, prepare
 from tomoskin.pipeline.records import ReferenceState
 from tomoskin.run.status import Status
 from tomoskin.sensing.signal import BaselineState, ElectrodeHealth
-from tomoskin.server import page_messages
+from tomoskin.server import views
+from tomoskin.server.page_messages import Refusal
 
 
 def make_status(**changes):
@@ -37,7 +38,7 @@ def make_status(**changes):
 
 
 def test_scene(prepared):
-    scene = json.loads(page_messages.scene(prepared, "twin", limit=0.1, pressable=True))
+    scene = json.loads(views.scene(prepared, "twin", limit=0.1, pressable=True).json)
     mesh = prepared.mesh
     np.testing.assert_array_equal(np.reshape(scene["points"], (-1, 2)), mesh.points)
     np.testing.assert_array_equal(np.reshape(scene["cells"], (-1, 3)), mesh.cells)
@@ -56,7 +57,7 @@ def test_a_sheet_on_a_surface_is_told_in_space(prepared):
     skin = prepared.skin.altered(
         {"surface": {"shape": "cylinder", "radius": "60 mm"}, "mesh": {"cells": 300}}
     )
-    scene = json.loads(page_messages.scene(prepare(skin), "twin", limit=0.1, pressable=True))
+    scene = json.loads(views.scene(prepare(skin), "twin", limit=0.1, pressable=True).json)
     solid = np.reshape(scene["solid"], (-1, 3))
     flat = np.reshape(scene["points"], (-1, 2))
     assert len(solid) == len(flat)
@@ -69,7 +70,7 @@ def test_a_sheet_on_a_surface_is_told_in_space(prepared):
 
 
 def test_electrode_points_run_along_the_arc(prepared):
-    scene = json.loads(page_messages.scene(prepared, "twin", limit=0.1, pressable=True))
+    scene = json.loads(views.scene(prepared, "twin", limit=0.1, pressable=True).json)
     for electrode in scene["electrodes"]:
         along = prepared.mesh.points[electrode["points"]]
         steps = np.linalg.norm(np.diff(along, axis=0), axis=1)
@@ -78,16 +79,16 @@ def test_electrode_points_run_along_the_arc(prepared):
 
 
 def test_chain():
-    assert page_messages.chain(np.array([[3, 4], [2, 3], [4, 9]])) in ([2, 3, 4, 9], [9, 4, 3, 2])
-    assert page_messages.chain(np.array([[1, 2]])) in ([1, 2], [2, 1])
+    assert views.chain(np.array([[3, 4], [2, 3], [4, 9]])) in ([2, 3, 4, 9], [9, 4, 3, 2])
+    assert views.chain(np.array([[1, 2]])) in ([1, 2], [2, 1])
     ring = np.array([[0, 1], [1, 2], [2, 0]])
-    assert page_messages.chain(ring) == [0, 1, 2]
+    assert views.chain(ring) == [0, 1, 2]
     pieces = np.array([[0, 1], [5, 6]])
-    assert page_messages.chain(pieces) == [0, 1, 5, 6]
+    assert views.chain(pieces) == [0, 1, 5, 6]
 
 
 def test_state():
-    state = json.loads(page_messages.state(make_status()))
+    state = json.loads(views.state(make_status()).json)
     assert state["p99_ms"] == 1.0
     assert state["reference"] == {"frames": 20, "needed": 20, "age_s": 2.0, "ready": True}
     assert (state["alpha"], state["rule"]) == (0.06, "light-touch")
@@ -104,7 +105,7 @@ def test_sick_electrodes_and_the_drift_of_the_reference_are_told():
     reference = ReferenceState(20, 20, 5.0, 1e-4, baseline)
     sick = ElectrodeHealth(4, "open", "no current", 3.5)
     status = make_status(reference=reference, electrodes=(sick,))
-    state = json.loads(page_messages.state(status))
+    state = json.loads(views.state(status).json)
     assert state["baseline"] == {
         "drift": pytest.approx(0.012),
         "held_s": 30.0,
@@ -119,13 +120,13 @@ def test_sick_electrodes_and_the_drift_of_the_reference_are_told():
 
 
 def test_of_a_recording_only_the_files_name_is_told():
-    state = json.loads(page_messages.state(make_status(recording=Path("folder") / "run.mcap")))
+    state = json.loads(views.state(make_status(recording=Path("folder") / "run.mcap")).json)
     assert state["recording"] == "run.mcap"
 
 
 def test_what_is_not_known_is_null():
     unknown = make_status(p50=float("nan"), p99=float("nan"), reference=ReferenceState(3, 20))
-    state = json.loads(page_messages.state(unknown))
+    state = json.loads(views.state(unknown).json)
     assert state["p50_ms"] is None
     assert state["noise_v"] is None
     assert "3 of 20" in state["text"]
@@ -138,15 +139,15 @@ def test_the_line_of_state_says_the_problem_first():
 
 def test_whatever_a_file_is_called_the_state_is_told():
     status = make_status(source="skin on replay:\udcff.mcap", recording=Path("r\udcff.mcap"))
-    told = json.loads(page_messages.state(status))
+    told = json.loads(views.state(status).json)
     assert told["recording"] == "r?.mcap"
     assert told["text"].startswith("skin on replay:?.mcap")
 
 
 def test_event_and_error():
-    event = json.loads(page_messages.event(Event(1.5, "lost", "2 frames lost")))
+    event = json.loads(views.event(Event(1.5, "lost", "2 frames lost")).json)
     assert event == {"type": "event", "time_s": 1.5, "kind": "lost", "text": "2 frames lost"}
-    assert json.loads(page_messages.error("what?")) == {"type": "error", "message": "what?"}
+    assert json.loads(Refusal(message="what?").json) == {"type": "error", "message": "what?"}
 
 
 def test_the_scale_ends_at_a_round_number_that_a_firm_press_fills(prepared):

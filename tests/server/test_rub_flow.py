@@ -33,7 +33,7 @@ class Rubber:
     def show(self, dv, *shown):
         self.time += RATE
         rest = np.full(len(dv), REST)
-        seen = self.flow.see(
+        self.flow.see(
             SimpleNamespace(
                 host_time=self.time,
                 voltages=rest + dv,
@@ -43,8 +43,6 @@ class Rubber:
                 baseline=None,
             )
         )
-        if seen is not None:
-            self.flow.take(seen)
 
     def rub(self, n, seed=0, side=-1.0, fingers=1):
         dv, xy = touches(n, seed, side)
@@ -67,17 +65,17 @@ def learn(flow):
 def test_the_map_fills_and_a_word_says_when_it_is_enough(rubber):
     flow = rubber.flow
     rubber.rub(100)
-    half = flow.fields()["rubbed"]
-    assert half["touches"] == 100
-    assert half["text"] == "50 more to learn from."
-    assert 0 < np.count_nonzero(half["covered"]) < len(half["covered"])
+    half = flow.now().rubbed
+    assert half.touches == 100
+    assert half.text == "50 more to learn from."
+    assert 0 < np.count_nonzero(half.covered) < len(half.covered)
     with pytest.raises(WireError, match="50 more touches are needed"):
         flow.answers[LearnFlow](LearnFlow())
     rubber.rub(150, seed=1)
-    full = flow.fields()["rubbed"]
-    assert full["enough"], full["text"]
-    assert "Enough to learn from" in full["text"]
-    assert np.count_nonzero(full["covered"]) > 0.9 * len(full["covered"])
+    full = flow.now().rubbed
+    assert full.enough, full.text
+    assert "Enough to learn from" in full.text
+    assert np.count_nonzero(full.covered) > 0.9 * len(full.covered)
 
 
 def test_what_was_rubbed_is_learnt_and_says_how_sure_it_is(rubber):
@@ -89,7 +87,7 @@ def test_what_was_rubbed_is_learnt_and_says_how_sure_it_is(rubber):
     dv, xy = touches(60, 7)
     missed = np.linalg.norm(estimate.answer.predict(dv)[0] - xy, axis=1)
     assert np.median(missed) < 0.015
-    assert estimate.figures["deviation_mm"] < 15
+    assert estimate.figures.deviation_mm < 15
 
 
 def test_a_finger_that_stands_still_and_two_hands_do_not_count(rubber):
@@ -99,17 +97,17 @@ def test_a_finger_that_stands_still_and_two_hands_do_not_count(rubber):
         rubber.show(dv[0], spot(1, 0.0, 0.0))
     rubber.time += 1.0
     rubber.show(dv[0])
-    assert flow.fields()["rubbed"]["touches"] == 1
+    assert flow.now().rubbed.touches == 1
     rubber.rub(60, fingers=2)
-    text = flow.fields()["rubbed"]["text"]
+    text = flow.now().rubbed.text
     assert "60 % of the frames show several touches" in text
     assert "one finger of one hand" in text
-    assert flow.fields()["rubbed"]["touches"] == 1
+    assert flow.now().rubbed.touches == 1
 
 
 def test_half_of_the_skin_is_said_by_the_map_and_by_the_electrodes(rubber):
     rubber.rub(160, seed=2, side=0.1)
-    text = rubber.flow.fields()["rubbed"]["text"]
+    text = rubber.flow.now().rubbed.text
     assert "of the skin is touched: go on where the map is empty" in text
     rubbed = replace(rubber.flow.rubbed, covered=np.ones(9))
     assert "No touch has come near E" in rubbed.text
@@ -150,19 +148,19 @@ def test_known_positions_are_taken_beside_the_rubbing(rubber):
     flow = rubber.flow
     rubber.rub(20)
     flow.answers[AskPoint](AskPoint(on=True))
-    first = flow.fields()["dot"]
+    first = flow.now().dot
     rng = np.random.default_rng(0)
     dv = 1e-3 * np.ones(40)
     for frame in range(40):
         noise = 1e-6 * rng.normal(size=40)
         rubber.show((dv if frame > 18 else 0 * dv) + noise)
-    fields = flow.fields()
-    assert fields["presses"] == [first]
-    assert fields["dot"] != first
-    assert fields["rubbed"]["touches"] == 20, "a press at the dot is no rubbing"
+    fields = flow.now()
+    assert fields.presses == [first]
+    assert fields.dot != first
+    assert fields.rubbed.touches == 20, "a press at the dot is no rubbing"
     flow.answers[UndoPress](UndoPress())
-    assert flow.fields()["presses"] == []
+    assert flow.now().presses == []
     flow.answers[AskPoint](AskPoint(on=False))
-    assert flow.fields()["dot"] is None
+    assert flow.now().dot is None
     with pytest.raises(WireError, match="no press"):
         flow.answers[UndoPress](UndoPress())

@@ -331,7 +331,7 @@ def test_five_pages_at_once(site):
 
 
 def test_too_many_pages_are_told(site, monkeypatch):
-    monkeypatch.setattr("tomoskin.server.hub.MAX_PAGES", 1)
+    monkeypatch.setattr("tomoskin.server.page_connection.MAX_PAGES", 1)
     with site.connect() as one:
         first(one, "scene")
         with site.connect() as two, pytest.raises(ConnectionClosed) as closed:

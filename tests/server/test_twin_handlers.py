@@ -16,9 +16,8 @@ from tomoskin.model.mesh import Arm, Cap, Hinge
 from tomoskin.run import Runner, commands
 from tomoskin.run.twin_control import sheet_pose, way_to_bend
 from tomoskin.run.twin_requests import BendRequest, SetPose, StretchRequest
-from tomoskin.server import Hub
+from tomoskin.server import Hub, TwinHandlers
 from tomoskin.server.requests import decode_request
-from tomoskin.server.twin_handlers import TwinHandlers
 from tomoskin.twin import FACES, Bent, Face, Press, Probe, Square, Stretched
 
 BEND = {"angle": 0.8, "axis": 0.5, "length": 0.06}

@@ -10,9 +10,8 @@ import pytest
 
 from tomoskin.core import DataError, Detection, Touch, WireError
 from tomoskin.learning import FORCE, Weight
-from tomoskin.server.placements import PlacementTaker
 from tomoskin.server.requests import DeletePress, SetWeight, UndoPress
-from tomoskin.server.weigh_flow import WeighFlow, weighed_presses
+from tomoskin.server.weigh_flow import PlacementTaker, WeighFlow, weighed_presses
 
 RATE = 0.04
 AREA = math.pi * 4e-4
@@ -91,8 +90,7 @@ def flow(prepared):
     flow = WeighFlow(prepared)
 
     def see(time, touches):
-        seen = flow.see(SimpleNamespace(host_time=time, touches=touches))
-        return None if seen is None else flow.take(seen) or None
+        return flow.see(SimpleNamespace(host_time=time, touches=touches)) or None
 
     return flow, Bench(see)
 
@@ -121,7 +119,7 @@ def test_ten_weights_are_learnt_from_saved_and_used(flow, tmp_path):
     estimate = flow.estimated(flow.examples())
     assert estimate.ready
     assert "Ten are enough" in estimate.text
-    assert np.abs(estimate.figures["errors"]).mean() < 0.2
+    assert np.abs(estimate.figures.errors).mean() < 0.2
     skin = flow.prepared.skin
     assert skin.outline.contains(estimate.place[None]).all()
     path = tmp_path / "force.npz"
@@ -131,9 +129,9 @@ def test_ten_weights_are_learnt_from_saved_and_used(flow, tmp_path):
     assert force.newtons == pytest.approx(4.0, rel=0.25)
     assert force.low < force.newtons < force.high
     flow.estimate = estimate
-    fields = flow.fields()
-    assert fields["weights"][3] == "8 N"
-    assert fields["phase"] == "release"
+    fields = flow.now()
+    assert fields.weights[3] == "8 N"
+    assert fields.phase == "release"
 
 
 def test_a_wrong_label_is_named_and_can_be_deleted(flow):
@@ -141,13 +139,13 @@ def test_a_wrong_label_is_named_and_can_be_deleted(flow):
     for k, newtons in enumerate(TOPS):
         weigh(flow, bench, newtons, *PLACES[k], said=10.0 if k == 6 else None)
     estimate = flow.estimated(flow.examples())
-    assert estimate.figures["doubtful"] == [6]
+    assert estimate.figures.doubtful == [6]
     assert "enough without the problems below" in estimate.text
     named = "Placement 7: the label 10 N contradicts"
-    assert any(remark.startswith(named) for remark in estimate.figures["remarks"])
+    assert any(remark.startswith(named) for remark in estimate.figures.remarks)
     assert flow.answers[DeletePress](DeletePress(6))
     estimate = flow.estimated(flow.examples())
-    assert estimate.figures["doubtful"] == []
+    assert estimate.figures.doubtful == []
     assert flow.answers[UndoPress](UndoPress())
     assert len(flow.examples()) == 10
     with pytest.raises(WireError, match="no press"):
@@ -158,7 +156,7 @@ def test_weights_that_contradict_and_one_spot_are_said_in_the_words_of_the_comma
     flow, bench = flow
     for newtons in TOPS[:8]:
         weigh(flow, bench, newtons, 0.01, 0.01)
-    remarks = flow.estimated(flow.examples()).figures["remarks"]
+    remarks = flow.estimated(flow.examples()).figures.remarks
     assert any("all presses lie within" in remark for remark in remarks)
     for k, newtons in enumerate(TOPS[:8]):
         weigh(flow, bench, newtons, *PLACES[k], said=10.0 / newtons)
@@ -168,13 +166,30 @@ def test_weights_that_contradict_and_one_spot_are_said_in_the_words_of_the_comma
         flow.estimated(contradicting)
 
 
+def test_a_placement_that_is_refused_says_why(flow):
+    flow, bench = flow
+    set_weight(flow, 4.0)
+    bench.lift()
+    assert not bench.lay(4.0, frames=5)
+    bench.lift()
+    assert "lifted before it had lain still" in flow.now().text
+    bench.number += 1
+    for k in range(90):
+        bench.show(touch(bench.number, 4.0, 1e-3 * k))
+    assert "it still moves" in flow.now().text
+    assert not flow.examples()
+    bench.lift()
+    assert bench.lay(4.0)
+    assert "recorded" not in flow.now().text
+
+
 def test_grams_taken_for_newtons_are_asked_about(flow):
     flow, _ = flow
     set_weight(flow, 200.0)
-    fields = flow.fields()
-    assert fields["asked"]["text"] == "200 N"
-    assert fields["meant"]["text"] == "200 g (1.96 N)"
-    assert fields["weight"] is None
+    fields = flow.now()
+    assert fields.asked.text == "200 N"
+    assert fields.meant.text == "200 g (1.96 N)"
+    assert fields.weight is None
     with pytest.raises(WireError, match="up to 100 N"):
         set_weight(flow, 200.0, sure=True)
     set_weight(flow, 200.0, "g", sure=True)
@@ -182,14 +197,14 @@ def test_grams_taken_for_newtons_are_asked_about(flow):
     set_weight(flow, 30.0, sure=True)
     assert flow.weight.newtons == 30.0
     set_weight(flow, 0.5, "g")
-    assert flow.fields()["meant"]["text"] == "0.5 kg (4.9 N)"
+    assert flow.now().meant.text == "0.5 kg (4.9 N)"
 
 
 def test_a_weight_that_is_named_after_it_lay_there_is_recorded_then(flow):
     flow, bench = flow
     bench.lift()
     assert not bench.lay(5.0)
-    assert flow.fields()["phase"] == "name"
+    assert flow.now().phase == "name"
     assert set_weight(flow, 510.0, "g")
     (one,) = flow.examples()
     assert one.weight.newtons == pytest.approx(5.0, rel=0.01)

@@ -1,13 +1,6 @@
 /** One binary frame of the server, as typed views on the bytes that arrived. */
 
-const MAGIC = 0x314b5354; // "TSK1"
-const HEADER = 40;
-const TOUCH = 52;
-const TRUTH = 16;
-const BEND = 16;
-const READY = 1;
-const NO_PICTURE = 2;
-const BENT = 8;
+import * as wire from "./wire";
 
 /** Median, and an interval that nine in ten lie in, N. */
 export interface Force {
@@ -18,27 +11,18 @@ export interface Force {
   readonly calibrated: boolean;
 }
 
-export interface Touch {
-  readonly id: number;
-  readonly kind: "decrease" | "increase";
-  readonly x: number;
-  readonly y: number;
-  /** One standard deviation, m; NaN where unknown. */
-  readonly sdX: number;
-  readonly sdY: number;
-  /** m². */
-  readonly covXy: number;
-  /** m². */
-  readonly area: number;
-  /** N; null where no calibration tells it. */
-  readonly force: Force | null;
-  /** Signed change of conductivity at the peak, in the scene's unit. */
-  readonly peak: number;
-  /** Seconds since the touch began. */
-  readonly since: number;
-  /** How many it stands for: 0 one, 1 perhaps several, n > 1 that have come too close. */
-  readonly several: number;
+const UNCALIBRATED = 2;
+const KINDS = ["decrease", "increase"] as const;
+
+function touchAt(data: DataView, at: number) {
+  const { kind, forceState, force, low, high, ...rest } = wire.readTouch(data, at);
+  const known: Force = { newtons: force, low, high, calibrated: forceState !== UNCALIBRATED };
+  return { ...rest, kind: KINDS[kind], force: forceState ? known : null };
 }
+
+/** Lengths m, deviations NaN where unknown; `force` null where no calibration gives it; `several`:
+ * how many it stands for: 0 one, 1 perhaps several, n > 1 that have come too close. */
+export type Touch = Readonly<ReturnType<typeof touchAt>>;
 
 export type ForceState = "none" | "calibrated" | "uncalibrated";
 
@@ -49,30 +33,21 @@ export function forceStateOf(touches: readonly Touch[]): ForceState {
   return forces.every(({ calibrated }) => calibrated) ? "calibrated" : "uncalibrated";
 }
 
-export interface Truth {
-  readonly x: number;
-  readonly y: number;
-  readonly force: number;
-  readonly radius: number;
-}
+export type Truth = Readonly<ReturnType<typeof wire.readTruth>>;
 
-const BEND_STATES = ["idle", "bend", "touch", "bend and touch", "unknown"] as const;
+function bendAt(data: DataView, at: number) {
+  const { state, ...angles } = wire.readBend(data, at);
+  return { ...angles, state: wire.BEND_STATES[state] ?? "unknown" };
+}
 
 /** How the sheet is bent; angles in rad. */
-export interface Bend {
-  readonly angle: number;
-  /** One standard deviation. */
-  readonly sd: number;
-  /** From x, counter-clockwise. */
-  readonly axis: number;
-  readonly state: (typeof BEND_STATES)[number];
-}
+export type Bend = Readonly<ReturnType<typeof bendAt>>;
 
 export interface Frame {
   readonly sequence: number;
   readonly hostTime: number;
   readonly referenceReady: boolean;
-  /** False: too many rows are unusable, the image is not one. */
+  /** False: too many measurements are unusable, the image is not one. */
   readonly pictured: boolean;
   /** Bytes-in to touches-out, s. */
   readonly latency: number;
@@ -87,84 +62,36 @@ export interface Frame {
   readonly labels: Uint8Array;
 }
 
-function touchAt(data: DataView, at: number): Touch {
-  return {
-    id: data.getUint32(at, true),
-    kind: data.getUint8(at + 4) === 1 ? "increase" : "decrease",
-    x: data.getFloat32(at + 8, true),
-    y: data.getFloat32(at + 12, true),
-    sdX: data.getFloat32(at + 16, true),
-    sdY: data.getFloat32(at + 20, true),
-    covXy: data.getFloat32(at + 36, true),
-    area: data.getFloat32(at + 24, true),
-    peak: data.getFloat32(at + 28, true),
-    since: data.getFloat32(at + 32, true),
-    several: data.getUint8(at + 5),
-    force: forceAt(data, at),
-  };
-}
-
-function forceAt(data: DataView, at: number): Force | null {
-  const state = data.getUint8(at + 6);
-  if (state === 0) return null;
-  return {
-    newtons: data.getFloat32(at + 40, true),
-    low: data.getFloat32(at + 44, true),
-    high: data.getFloat32(at + 48, true),
-    calibrated: state === 1,
-  };
-}
-
-function truthAt(data: DataView, at: number): Truth {
-  return {
-    x: data.getFloat32(at, true),
-    y: data.getFloat32(at + 4, true),
-    force: data.getFloat32(at + 8, true),
-    radius: data.getFloat32(at + 12, true),
-  };
-}
-
-function bendAt(data: DataView, at: number): Bend {
-  return {
-    angle: data.getFloat32(at, true),
-    sd: data.getFloat32(at + 4, true),
-    axis: data.getFloat32(at + 8, true),
-    state: BEND_STATES[data.getUint32(at + 12, true)] ?? "unknown",
-  };
-}
-
 /** Decode one frame. Throws RangeError for bytes that are not one. */
 export function decodeFrame(buffer: ArrayBuffer): Frame {
   const data = new DataView(buffer);
-  if (buffer.byteLength < HEADER || data.getUint32(0, true) !== MAGIC) {
+  if (buffer.byteLength < wire.HEADER_BYTES || data.getUint32(0, true) !== wire.MAGIC) {
     throw new RangeError("expected a frame beginning with TSK1");
   }
-  const nCells = data.getUint32(16, true);
-  const nMeas = data.getUint32(20, true);
-  const nTouches = data.getUint16(24, true);
-  const flags = data.getUint32(28, true);
-  const nTruth = data.getUint16(26, true);
-  const touchesAt = HEADER + 4 * (nCells + 2 * nMeas);
-  const truthsAt = touchesAt + TOUCH * nTouches;
-  const bendsAt = truthsAt + TRUTH * nTruth;
-  const labelsAt = bendsAt + (flags & BENT ? BEND : 0);
+  const { sequence, hostTime, nCells, nMeas, nTouches, nTruth, flags, latencyUs } = wire.readHeader(data, 0);
+  const bent = (flags & wire.FLAGS.bent) !== 0;
+  const touchesAt = wire.HEADER_BYTES + 4 * (nCells + 2 * nMeas);
+  const truthsAt = touchesAt + wire.TOUCH_BYTES * nTouches;
+  const bendsAt = truthsAt + wire.TRUTH_BYTES * nTruth;
+  const labelsAt = bendsAt + (bent ? wire.BEND_BYTES : 0);
   if (buffer.byteLength < labelsAt + nCells) {
     throw new RangeError(
       `expected ${labelsAt + nCells} bytes for ${nCells} cells, got ${buffer.byteLength}`,
     );
   }
+  const floats = (from: number, count: number) => new Float32Array(buffer, wire.HEADER_BYTES + 4 * from, count);
   return {
-    sequence: data.getUint32(4, true),
-    hostTime: data.getFloat64(8, true),
-    referenceReady: (flags & READY) !== 0,
-    pictured: (flags & NO_PICTURE) === 0,
-    latency: data.getUint32(32, true) * 1e-6,
-    image: new Float32Array(buffer, HEADER, nCells),
-    voltages: new Float32Array(buffer, HEADER + 4 * nCells, nMeas),
-    reference: new Float32Array(buffer, HEADER + 4 * (nCells + nMeas), nMeas),
-    touches: Array.from({ length: nTouches }, (_, k) => touchAt(data, touchesAt + TOUCH * k)),
-    truths: Array.from({ length: nTruth }, (_, k) => truthAt(data, truthsAt + TRUTH * k)),
-    bend: flags & BENT ? bendAt(data, bendsAt) : null,
+    sequence,
+    hostTime,
+    referenceReady: (flags & wire.FLAGS.ready) !== 0,
+    pictured: (flags & wire.FLAGS.noImage) === 0,
+    latency: latencyUs * 1e-6,
+    image: floats(0, nCells),
+    voltages: floats(nCells, nMeas),
+    reference: floats(nCells + nMeas, nMeas),
+    touches: Array.from({ length: nTouches }, (_, k) => touchAt(data, touchesAt + wire.TOUCH_BYTES * k)),
+    truths: Array.from({ length: nTruth }, (_, k) => wire.readTruth(data, truthsAt + wire.TRUTH_BYTES * k)),
+    bend: bent ? bendAt(data, bendsAt) : null,
     labels: new Uint8Array(buffer, labelsAt, nCells),
   };
 }

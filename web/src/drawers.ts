@@ -35,9 +35,14 @@ export function toggleDrawer(id: string): void {
 export const openDrawer = (id: string): void => void (wanted.value = id);
 export const closeDrawer = (): void => void (wanted.value = null);
 
-/** Call back whenever a drawer opens, as to ask the server for what it shows. */
-export function whenOpened(id: string, callback: () => void): void {
+/** Call back whenever a drawer opens, and every so many ms while it is open (null: not again), as to
+ * ask the server for what it shows. */
+export function whileOpened(id: string, every: number | null, callback: () => void): void {
+  const open = computed(() => opened.value?.id === id);
   effect(() => {
-    if (opened.value?.id === id) callback();
+    if (!open.value) return;
+    callback();
+    const timer = every === null ? 0 : window.setInterval(callback, every);
+    return () => window.clearInterval(timer);
   });
 }

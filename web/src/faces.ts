@@ -1,5 +1,7 @@
 /** Faces of probes: how they are told to the server, and how they look from above. */
 
+import type { PressRequest } from "./wire";
+
 export type Corner = readonly [number, number];
 
 export interface Face {
@@ -68,9 +70,9 @@ export function rim(face: Face, radius: number, angle: number): readonly Corner[
 }
 
 /** What the server is told of a face beside place, force and half size; nothing for a circle. */
-export function faceMessage(face: Face, radius: number, angle: number): object {
+export function faceMessage(face: Face, radius: number, angle: number): Partial<PressRequest> {
   if (face.shape === "circle") return {};
   const { shape, corners } = face;
-  const vertices = corners?.map(([x, y]) => [x * radius, y * radius]);
+  const vertices = corners?.map(([x, y]) => [x * radius, y * radius] as const);
   return { shape, angle, ...(vertices ? { vertices } : {}) };
 }

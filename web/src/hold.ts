@@ -2,7 +2,7 @@
 
 import { effect } from "@preact/signals";
 import { grow, isGrowing, toMessage } from "./presses";
-import { hand, link, requestRepaint, scene, send } from "./state";
+import { hand, link, onMessage, requestRepaint, scene, send } from "./state";
 
 let said = "[]";
 let waiting = false;
@@ -31,6 +31,12 @@ function plan(): void {
   waiting = true;
   requestAnimationFrame(step);
 }
+
+// A twin that was made anew is pressed by nobody: what the hand holds is said again.
+onMessage("scene", () => {
+  said = "[]";
+  plan();
+});
 
 /** Start telling; call once. */
 export function startHolding(): void {

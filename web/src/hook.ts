@@ -2,10 +2,10 @@
 
 import type { Frame } from "./decode";
 import { first } from "./latency";
-import type { Scene } from "./protocol";
 import { sheetElement, view } from "./sheet/Sheet";
 import { toPixels, toSheet } from "./sheet/view";
 import { cost, newest, scene } from "./state";
+import type { Scene } from "./wire";
 
 export interface Hook {
   /** Frames received. */

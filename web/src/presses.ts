@@ -1,7 +1,7 @@
 /** The presses that this page holds on the twin, as a pure state machine in metres and newtons. */
 
 import { CIRCLE, type Face, faceMessage } from "./faces";
-import type { Press } from "./protocol";
+import type { PressRequest } from "./wire";
 
 export const MAX_PRESSES = 8;
 
@@ -21,7 +21,12 @@ export interface Probe extends Sizes {
   readonly grows: boolean;
 }
 
-export interface Held extends Press {
+export interface Held {
+  readonly x: number;
+  readonly y: number;
+  /** N. */
+  readonly force: number;
+  readonly radius: number;
   readonly face: Face;
   readonly angle: number;
   /** The pointer that holds it, or null: it stays by itself. */
@@ -134,7 +139,7 @@ export function reforced(hand: Hand, which: Held, steps: number): Hand {
 }
 
 /** What the server is told. */
-export function toMessage(hand: Hand): Press[] {
+export function toMessage(hand: Hand): PressRequest[] {
   return hand.held.map(({ x, y, force, radius, face, angle }) => ({
     ...{ x, y, force, radius },
     ...faceMessage(face, radius, angle),

@@ -1,6 +1,6 @@
 /** The connection to the server: opens, says what happens to it, and comes back with back-off. */
 
-import type { PageMessage, ServerMessage } from "./protocol";
+import type { PageRequest } from "./wire";
 
 const FIRST_WAIT = 500;
 const LONGEST_WAIT = 8000;
@@ -14,8 +14,8 @@ export type LinkState =
   | { readonly phase: "open" }
   | { readonly phase: "lost"; readonly since: number; readonly retryAt: number; readonly refused: boolean };
 
-export interface Listener {
-  message(message: ServerMessage): void;
+export interface Listener<M> {
+  message(message: M): void;
   frame(bytes: ArrayBuffer): void;
   link(state: LinkState): void;
 }
@@ -41,7 +41,8 @@ async function isRefused(): Promise<boolean> {
   }
 }
 
-export class Connection {
+/** `M`: what the server sends as text. */
+export class Connection<M> {
   private socket: WebSocket | null = null;
   private tries = 0;
   private timer = 0;
@@ -49,7 +50,7 @@ export class Connection {
 
   constructor(
     private readonly address: string,
-    private readonly listener: Listener,
+    private readonly listener: Listener<M>,
   ) {}
 
   open(): void {
@@ -73,7 +74,7 @@ export class Connection {
   }
 
   /** Send if connected; what is lost with the connection is not sent later. */
-  send(message: PageMessage): void {
+  send(message: PageRequest): void {
     if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(message));
   }
 
@@ -81,7 +82,7 @@ export class Connection {
     if (typeof data !== "string") return this.listener.frame(data);
     const message: unknown = JSON.parse(data);
     if (message !== null && typeof message === "object" && "type" in message) {
-      this.listener.message(message as ServerMessage);
+      this.listener.message(message as M);
     }
   }
 

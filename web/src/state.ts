@@ -4,12 +4,12 @@ import { batch, computed, signal } from "@preact/signals";
 import { decodeFrame, type Frame } from "./decode";
 import { History } from "./history";
 import { emptyHand, type Hand } from "./presses";
-import type { EventNote, PageMessage, Refusal, Scale, Scene, ServerMessage, Status } from "./protocol";
 import { prepareTopology } from "./sheet/topology";
 import { Connection, type LinkState, socketAddress } from "./socket";
+import type { PageRequest, Scene, ServerMessage, RunState } from "./wire";
 
 export const scene = signal<Scene | null>(null);
-export const status = signal<Status | null>(null);
+export const status = signal<RunState | null>(null);
 export const link = signal<LinkState>({ phase: "connecting" });
 /** A sentence that the server just said, cleared after some seconds. */
 export const notice = signal<string | null>(null);
@@ -77,7 +77,10 @@ function setScene(next: Scene): void {
 const receivers = new Map<string, ((message: ServerMessage) => void)[]>();
 
 /** Call back with every message of that type, in the order in which callers asked. */
-export function onMessage<M extends ServerMessage>(type: M["type"], receive: (message: M) => void): void {
+export function onMessage<T extends ServerMessage["type"]>(
+  type: T,
+  receive: (message: Extract<ServerMessage, { readonly type: T }>) => void,
+): void {
   receivers.set(type, [...(receivers.get(type) ?? []), receive as (message: ServerMessage) => void]);
 }
 
@@ -85,13 +88,13 @@ function receive(message: ServerMessage): void {
   for (const receiver of receivers.get(message.type) ?? []) receiver(message);
 }
 
-onMessage<Scene>("scene", setScene);
-onMessage<Scale>("scale", ({ limit, unit }) => {
+onMessage("scene", setScene);
+onMessage("scale", ({ limit, unit }) => {
   if (scene.value) scene.value = { ...scene.value, limit, unit };
 });
-onMessage<Status>("state", (message) => (status.value = message));
-onMessage<EventNote>("event", ({ text }) => say(text));
-onMessage<Refusal>("error", ({ message }) => say(message));
+onMessage("state", (message) => (status.value = message));
+onMessage("event", ({ text }) => say(text));
+onMessage("error", ({ message }) => say(message));
 
 const frameReceivers: ((frame: Frame) => void)[] = [];
 
@@ -129,7 +132,7 @@ export function timed<A extends unknown[]>(work: (...args: A) => void): (...args
   };
 }
 
-export const connection = new Connection(socketAddress(window.location), {
+export const connection = new Connection<ServerMessage>(socketAddress(window.location), {
   message: receive,
   frame: timed(receiveFrame),
   link(state) {
@@ -140,7 +143,7 @@ export const connection = new Connection(socketAddress(window.location), {
 });
 
 /** Send a request to the server. */
-export const send = <M extends PageMessage>(message: M): void => connection.send(message);
+export const send = (message: PageRequest): void => connection.send(message);
 
 const TICK_MS = 100;
 

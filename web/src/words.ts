@@ -1,8 +1,9 @@
 /** The state as a word, what someone must act on, and the figures of the top line. */
 
 import { duration, fixed } from "./format";
-import type { ClassReading, Scene, Status } from "./protocol";
+
 import type { LinkState } from "./socket";
+import type { ClassReading, FlowNow, Scene, RunState } from "./wire";
 
 export interface Warning {
   readonly text: string;
@@ -38,7 +39,7 @@ function disconnected(link: LinkState & { phase: "lost" }, now: number, age: num
 }
 
 /** The state of a source that is connected. */
-function stateOf(status: Status, old: boolean): readonly [word: string, remark: string] {
+function stateOf(status: RunState, old: boolean): readonly [word: string, remark: string] {
   const { paused, reference, replay, running, recording } = status;
   if (replay?.ended) return ["At the end", ""];
   if (paused) return ["Paused", ""];
@@ -52,7 +53,7 @@ function stateOf(status: Status, old: boolean): readonly [word: string, remark: 
 }
 
 /** What someone must act on; the server's own sentence first. */
-function warningsOf(status: Status, age: number | null): Warning[] {
+function warningsOf(status: RunState, age: number | null): Warning[] {
   const { baseline, calibration, paused, problem, replay, running, sick } = status;
   const found = problem ? [warning(problem)] : [];
   if (!running && !replay?.ended && !problem) found.push(warning("No frames come from the source"));
@@ -70,17 +71,32 @@ function warningsOf(status: Status, age: number | null): Warning[] {
   return found;
 }
 
+const TEACHING = { touch: "touch", rub: "touch", force: "forces", mapping: "channels" } as const;
+
+/** A guided flow, in place of the calm word of a live skin; any other word stays. */
+function withFlow(word: string, remark: string, flow: FlowNow | null): readonly [word: string, remark: string] {
+  if (!flow?.kind) return [word, remark];
+  const name = TEACHING[flow.kind];
+  const count = flow.rubbed ? `${flow.rubbed.touches} touches` : `${flow.presses.length} recorded`;
+  const said = flow.paused
+    ? `Teaching ${name} is paused, ${count}: open Set up to go on or to leave it`
+    : `Teaching ${name}: ${count}`;
+  if (word !== "Live") return [word, remark || said];
+  return [flow.paused ? "Teaching paused" : `Teaching ${name}`, said];
+}
+
 /** What the top line says. `age`: seconds since the last frame, null before the first. */
 export function headline(
   link: LinkState,
   scene: Scene | null,
-  status: Status | null,
+  status: RunState | null,
   now: number,
   age: number | null,
+  flow: FlowNow | null = null,
 ): Headline {
   if (link.phase === "lost") return disconnected(link, now, age);
   if (link.phase === "connecting" || !scene || !status) return calm("Connecting");
-  const [word, remark] = stateOf(status, age !== null && age > OLD);
+  const [word, remark] = withFlow(...stateOf(status, age !== null && age > OLD), flow);
   return { word, remark, warnings: warningsOf(status, age) };
 }
 
@@ -93,7 +109,7 @@ export interface Fact {
 }
 
 /** The figures of the top line. */
-export function facts(status: Status | null): Fact[] {
+export function facts(status: RunState | null): Fact[] {
   if (!status) return [];
   const lost = status.dropped + status.corrupt + status.gaps;
   const { age_s: age } = status.reference;
@@ -128,13 +144,13 @@ export function facts(status: Status | null): Fact[] {
 }
 
 /** Alpha of the images and what chose it. */
-export function alpha(status: Status): string {
+export function alpha(status: RunState): string {
   const by = status.rule === "hand" ? "by hand" : status.rule;
   return `${Number(status.alpha.toPrecision(2))} (${by})`;
 }
 
 /** The same in full, for a tooltip. */
-export function alphaInFull(status: Status): string {
+export function alphaInFull(status: RunState): string {
   const by = status.rule === "hand" ? "set by hand" : `chosen by the rule ${status.rule}`;
   return `Weight of the prior, ${status.alpha.toPrecision(4)}, ${by}`;
 }

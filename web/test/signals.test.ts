@@ -1,9 +1,9 @@
 import { describe, expect, it } from "vitest";
-import type { PatternTable } from "../src/protocol";
+import type { PatternRows } from "../src/wire";
 import { Log, NoiseMeter, reciprocalPairs, reciprocity } from "../src/signals/measures";
 
 /** The adjacent pattern of n electrodes, as the server orders it. */
-function adjacent(n: number): PatternTable {
+function adjacent(n: number): PatternRows {
   const drive: number[] = [];
   const measure: number[] = [];
   for (let k = 0; k < n; k++) {

@@ -26,10 +26,10 @@ class Silent {
   }
 }
 
-function connected(): { connection: Connection; states: LinkState[] } {
+function connected(): { connection: Connection<object>; states: LinkState[] } {
   const states: LinkState[] = [];
   const listener = { message: vi.fn(), frame: vi.fn(), link: (state: LinkState) => states.push(state) };
-  const connection = new Connection("ws://127.0.0.1/ws", listener);
+  const connection = new Connection<object>("ws://127.0.0.1/ws", listener);
   connection.open();
   return { connection, states };
 }

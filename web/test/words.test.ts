@@ -1,14 +1,17 @@
 import { describe, expect, it } from "vitest";
-import type { Scene, Status } from "../src/protocol";
+import type { FlowNow, Scene, RunState } from "../src/wire";
 import { backOff, socketAddress } from "../src/socket";
 import { alpha, alphaInFull, classInWords, facts, headline } from "../src/words";
 
 const scene = { source: "twin of textile-disc-8" } as Scene;
-const status: Status = {
+const status: RunState = {
   type: "state",
   running: true,
   paused: false,
   fps: 124.6,
+  frames: 900,
+  sinks: [],
+  bend: null,
   dropped: 1,
   corrupt: 2,
   gaps: 3,
@@ -32,9 +35,9 @@ const status: Status = {
 };
 const open = { phase: "open" } as const;
 
-const words = (...[next, age]: readonly [Partial<Status>, (number | null)?]) =>
+const words = (...[next, age]: readonly [Partial<RunState>, (number | null)?]) =>
   headline(open, scene, { ...status, ...next }, 10, age ?? 0.1);
-const texts = (next: Partial<Status>, age?: number) => words(next, age).warnings.map(({ text }) => text);
+const texts = (next: Partial<RunState>, age?: number) => words(next, age).warnings.map(({ text }) => text);
 
 describe("the headline", () => {
   it("is one calm word while all is well", () => {
@@ -42,6 +45,17 @@ describe("the headline", () => {
     expect(words({ paused: true }, 60)).toMatchObject({ word: "Paused", warnings: [] });
     expect(words({ recording: "run.mcap" }).word).toBe("Recording");
     expect(headline({ phase: "connecting" }, null, null, 0, null).word).toBe("Connecting");
+  });
+
+  it("names a guided flow, and says when it is paused", () => {
+    const flow = { kind: "force", paused: false, presses: [[0, 0]], rubbed: null } as unknown as FlowNow;
+    const line = (next: Partial<RunState>, given: FlowNow) =>
+      headline(open, scene, { ...status, ...next }, 10, 0.1, given);
+    expect(line({}, flow)).toMatchObject({ word: "Teaching forces", remark: "Teaching forces: 1 recorded" });
+    expect(line({}, { ...flow, paused: true })).toMatchObject({ word: "Teaching paused" });
+    expect(line({}, { ...flow, paused: true }).remark).toContain("open Set up");
+    expect(line({ recording: "run.mcap" }, flow)).toMatchObject({ word: "Recording", remark: "Teaching forces: 1 recorded" });
+    expect(line({}, { ...flow, kind: null })).toMatchObject({ word: "Live", remark: "" });
   });
 
   it("says what a calibration says that does not fit any more", () => {

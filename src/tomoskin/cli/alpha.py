@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from tomoskin.cli.choices import meant
 from tomoskin.cli.named_files import FIGURE, ForceFlag, Reads, Writes
 from tomoskin.cli.options import FramesOption, ReferenceOption, SkinArgument
 from tomoskin.cli.output import JsonFlag, tell
@@ -48,6 +49,11 @@ def alpha(
     from tomoskin.model.skin import Skin
     from tomoskin.pipeline import prepare
 
+    if rule is not None and rule not in RULES:
+        raise typer.BadParameter(
+            f'expected a rule among {", ".join(RULES)}; got "{rule}"{meant(rule, RULES)}',
+            param_hint="--rule",
+        )
     prepared = prepare(Skin.load(skin))
     prepared, evidence = _evidence(prepared, recording, reference, frames)
     spectrum = Spectrum.of(prepared.problem)

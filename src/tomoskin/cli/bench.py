@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
+from tomoskin.cli.choices import meant
 from tomoskin.cli.named_files import Otherwise, Reads
 from tomoskin.cli.output import JsonFlag, tables, tell
 from tomoskin.core import DataError
@@ -69,7 +70,8 @@ def bench(
         return
     if name not in benchmarks:
         raise typer.BadParameter(
-            f'expected {", ".join(benchmarks)}, got "{name}"', param_hint="NAME"
+            f'expected {", ".join(benchmarks)}; got "{name}"{meant(name, benchmarks)}',
+            param_hint="NAME",
         )
     module = _load(benchmarks[name].module)
     usual: int = getattr(module, "CORES", 1)

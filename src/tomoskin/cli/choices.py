@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -85,10 +86,17 @@ def with_alpha(skin: Skin, given: str | None) -> tuple[Skin, str | None]:
         if not 1e-9 <= alpha <= 1e9:
             rules = ", ".join(RULES)
             raise typer.BadParameter(
-                f'expected a number above 0, auto, or a rule among {rules}; got "{given}"',
+                f'expected a number above 0, auto, or a rule among {rules}; got "{given}"'
+                f"{meant(given, (*RULES, 'auto'))}",
                 param_hint="--alpha",
             )
     return skin.altered({"inverse": {"alpha": alpha}}), None
+
+
+def meant(given: str, known: Iterable[str]) -> str:
+    """A question after the one of the ``known`` words that was probably meant; "" for none."""
+    close = get_close_matches(given, list(known), n=1)
+    return f'; did you mean "{close[0]}"?' if close else ""
 
 
 def alpha_line(choice: AlphaChoice) -> str:

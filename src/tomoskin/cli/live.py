@@ -20,8 +20,7 @@ from tomoskin.cli.named_files import RECORDING, Otherwise, Reads, Writes
 from tomoskin.cli.options import CalibrationsOption, SinkOption, SkinsOption, SourcesOption
 from tomoskin.cli.output import Bar, JsonFlag, emit, remark
 from tomoskin.cli.record import ended_by_signals, recording_to
-from tomoskin.cli.robot import Served, chosen_robot, run_robot
-from tomoskin.cli.serving import announce, hub_of
+from tomoskin.cli.robot import Served, announce, chosen_robot, hub_of, run_robot
 
 if TYPE_CHECKING:
     from tomoskin.pipeline import Prepared
@@ -140,18 +139,11 @@ def _warn(host: str) -> None:
 
 
 def _farewell(runner: Runner, stopped: Sequence[str], *, json: bool) -> None:
-    from tomoskin.server import readings, stages
+    from tomoskin.core import plain_values
+    from tomoskin.server import state
 
-    status = runner.status()
     if json:
-        emit(
-            {
-                "type": "stopped",
-                "frames": status.frames,
-                "p50_ms": 1e3 * status.p50,
-                "p99_ms": 1e3 * status.p99,
-                "stages": stages(status),
-                **readings(status),
-                "recordings_ended": list(stopped),
-            }
-        )
+        now = plain_values(state(runner.status()))
+        kept = ("frames", "p50_ms", "p99_ms", "stages", "bend", "class", "calibration")
+        said = {name: now[name] for name in kept}
+        emit({"type": "stopped", **said, "recordings_ended": list(stopped)})

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import re
+import sys
 import webbrowser
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -17,14 +18,15 @@ import typer
 
 from tomoskin.cli.choices import board_memory, chosen_sinks, skin_for_source, with_calibrations
 from tomoskin.cli.named_files import Otherwise, Reads
+from tomoskin.cli.options import DEFAULT_SKIN, NamedSkinOption
 from tomoskin.cli.output import Bar, emit, remark
 from tomoskin.cli.record import ended_by_signals, troubles_told
-from tomoskin.cli.serving import announce, hub_of
 
 if TYPE_CHECKING:
     from tomoskin.model.robot import PlacedSkin, Robot
     from tomoskin.pipeline import Prepared
-    from tomoskin.run import Member, RobotRun
+    from tomoskin.run import Member, RobotRun, Runner
+    from tomoskin.server import AccessPolicy, Hub
 
 _NAMED = re.compile(r"[^=./\\]+=.+")
 """A skin with its name on the robot; not a path that has "=" in it, such as ./a=b.toml."""
@@ -158,6 +160,27 @@ def _farewell(run: RobotRun, stopped: Sequence[str], *, json: bool) -> None:
         emit({"type": "stopped", "skins": skins, "recordings_ended": list(stopped)})
 
 
+def hub_of(runner: Runner, source: str, folder: Path) -> Hub:
+    """What serves the page of one skin, whose frames come from ``source``."""
+    from tomoskin.board.source import open_source
+    from tomoskin.pipeline import colour_limit
+    from tomoskin.server import Hub, serve_requests
+
+    hub = Hub(runner, limit=colour_limit(runner.prepared), folder=folder)
+    hub.opener = partial(open_source, source)
+    serve_requests(hub, source)
+    return hub
+
+
+def announce(policy: AccessPolicy, text: str, *, json: bool) -> None:
+    """Say where the page is: ``text``, such as "two skins are live", and the address."""
+    if json:
+        emit({"type": "listening", "address": policy.address, "port": policy.port})
+    else:
+        typer.echo(f"{text} at {policy.address}")
+    sys.stdout.flush()
+
+
 def place(
     urdf: Annotated[Path, typer.Argument(metavar="ROBOT.urdf", help="The robot."), Reads()],
     link: Annotated[str, typer.Argument(help="Link that the skin lies on.")],
@@ -169,7 +192,7 @@ def place(
         ),
         Otherwise("the skin is added to the file"),
     ] = Path("robot.toml"),
-    skin: Annotated[str, typer.Option(help="Built-in name or path.")] = "textile-disc-16",
+    skin: NamedSkinOption = DEFAULT_SKIN,
     name: Annotated[
         str | None,
         typer.Option(help="Name of the skin on the robot. Default: the name of the link."),

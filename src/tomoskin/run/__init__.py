@@ -16,7 +16,7 @@ from tomoskin.run.labelled_frames import (
 from tomoskin.run.robot_run import Member, RobotRun
 from tomoskin.run.runner import Runner
 from tomoskin.run.simulate import Simulated, simulate
-from tomoskin.run.status import Status
+from tomoskin.run.status import ReplayStatus, Status
 from tomoskin.run.twin_control import way_to_bend
 from tomoskin.run.twin_requests import MAX_FORCE, SetPose, SetPresses, SetTwin, StrictRequest
 
@@ -25,6 +25,7 @@ __all__ = [
     "BoardMemory",
     "CheckFinding",
     "Member",
+    "ReplayStatus",
     "RobotRun",
     "Runner",
     "SetMade",

@@ -1,10 +1,9 @@
 """The page's server: what a page may ask, and what it is sent."""
 
 from tomoskin.server.access import AccessPolicy, is_loopback, load_token
-from tomoskin.server.handlers import serve_requests
+from tomoskin.server.handlers import TwinHandlers, serve_requests
 from tomoskin.server.hub import Hub
 from tomoskin.server.overview import Overview
-from tomoskin.server.page_messages import readings, stages
 from tomoskin.server.server import (
     DEFAULT_PORT,
     STATIC,
@@ -16,7 +15,7 @@ from tomoskin.server.server import (
     robot_application,
 )
 from tomoskin.server.settings_handlers import SettingsHandlers
-from tomoskin.server.twin_handlers import TwinHandlers
+from tomoskin.server.views import state
 
 __all__ = [
     "DEFAULT_PORT",
@@ -33,8 +32,7 @@ __all__ = [
     "is_loopback",
     "listen",
     "load_token",
-    "readings",
     "robot_application",
     "serve_requests",
-    "stages",
+    "state",
 ]

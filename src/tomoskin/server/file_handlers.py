@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict
 from pathlib import Path
 from typing import TypeVar
 
@@ -11,9 +10,9 @@ from tomoskin.core import DataError, WireError
 from tomoskin.files.exports import WRITERS, Export
 from tomoskin.files.session import SessionReader
 from tomoskin.run import Runner
-from tomoskin.server.folder import SESSION, Folder, Listing
+from tomoskin.server.folder import SESSION, Folder
 from tomoskin.server.hub import Hub
-from tomoskin.server.page_messages import text_of
+from tomoskin.server.page_messages import Exported, FileEntry, Files
 from tomoskin.server.requests import (
     Annotate,
     DeleteSession,
@@ -38,6 +37,7 @@ class SessionUse:
     def __init__(self, runner: Runner) -> None:
         self._runner = runner
         self.exporting: str | None = None
+        self.share = 0.0
 
     @property
     def playing(self) -> str | None:
@@ -72,7 +72,6 @@ class FileHandlers:
         self._hub, self._switch = hub, switch
         self._folder = Folder(hub.folder)
         self._use = SessionUse(hub.runner)
-        self._share = 0.0
         hub.serve(
             {
                 ListFiles: lambda page, _: self._list(page),
@@ -86,17 +85,9 @@ class FileHandlers:
         )
 
     def _list(self, page: Listener) -> None:
-        def answer(file: Listing) -> None:
-            page.post(
-                text_of(
-                    type="files",
-                    **asdict(file),
-                    recording=self._use.recording,
-                    playing=self._use.playing,
-                    exporting=self._use.exporting,
-                    share=self._share,
-                )
-            )
+        def answer(listed: tuple[tuple[FileEntry, ...], int]) -> None:
+            files, others = listed
+            page.post(Files.of(self._use, files=files, others=others).json)
 
         self._hub.tasks.run(page, self._folder.list_files, answer)
 
@@ -141,7 +132,7 @@ class FileHandlers:
     def _export(self, page: Listener, request: ExportSession) -> None:
         if self._use.exporting is not None:
             raise WireError(f"{self._use.exporting} is being exported: wait until it has ended")
-        self._use.exporting, self._share = request.name, 0.0
+        self._use.exporting, self._use.share = request.name, 0.0
 
         def work() -> Path:
             try:
@@ -150,7 +141,7 @@ class FileHandlers:
                 self._use.exporting = None
 
         def done(path: Path) -> None:
-            self._hub.tell([text_of(type="exported", name=path.name)])
+            self._hub.tell(Exported(name=path.name))
             self._list(page)
 
         self._hub.tasks.run(page, work, done)
@@ -165,7 +156,7 @@ class FileHandlers:
         return out
 
     def _advance(self, done: float, total: float) -> None:
-        self._share = done / total if total else 0.0
+        self._use.share = done / total if total else 0.0
 
     def _complete(self, name: str) -> Path:
         self._use.check_ended(name)

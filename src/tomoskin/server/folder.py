@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, replace
+import tomllib
+from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 
+from msgspec.structs import replace
+
 from tomoskin.core import DataError, write_text
+from tomoskin.server.page_messages import FileEntry
+from tomoskin.server.requests import MOST_NOTES, NAME, STEM
 
 KINDS = {
     ".mcap": "session",
@@ -22,41 +27,18 @@ KINDS = {
 }
 """What is listed and handed out, by the ending of its name."""
 
-SESSION = ".mcap"
+SESSION, SKIN = ".mcap", ".toml"
+
+_OF_SKINS = {"outline", "electrodes"}
+"""Sections that every skin file has."""
+
+_MOST_SETTINGS = 1 << 20
+"""Bytes of a file of settings that is looked into."""
 
 MOST_FILES = 200
 
-NAME = r"[A-Za-z0-9][A-Za-z0-9._-]{0,119}"
-"""Of a file that a page may ask for: no folder, nothing hidden."""
-
-STEM = r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}"
-"""The same without its ending."""
-
-
 NOTES = ".notes.txt"
 """What a person wrote about a session stands beside it, under its stem and this ending."""
-
-MOST_NOTES = 4000
-"""Letters of it."""
-
-
-@dataclass(frozen=True, slots=True)
-class FileEntry:
-    """A file: name, kind, size in bytes, when it was last written (s since 1970), notes on it."""
-
-    name: str
-    kind: str
-    size: int
-    written: float
-    notes: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class Listing:
-    """Files that are handed out, the newest first, and how many others of their kinds there are."""
-
-    files: tuple[FileEntry, ...]
-    others: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,8 +47,9 @@ class Folder:
 
     path: Path
 
-    def list_files(self) -> Listing:
-        """At most :data:`MOST_FILES`; those with names that no page may ask for are counted.
+    def list_files(self) -> tuple[tuple[FileEntry, ...], int]:
+        """At most :data:`MOST_FILES`, the newest first, and how many others of their kinds are not
+        handed out: too many, or with names that no page may ask for.
 
         Raises DataError where the folder cannot be read.
         """
@@ -75,19 +58,27 @@ class Folder:
             for path in self.path.iterdir():
                 if path.suffix not in KINDS or not path.is_file() or path.is_symlink():
                     continue
+                if path.suffix == SKIN and not _is_skin(path, or_robot=True):
+                    continue
                 if not _is_offered(path.name):
                     others += 1
                     continue
                 about = path.stat()
-                kind = KINDS[path.suffix]
-                entries.append(FileEntry(path.name, kind, about.st_size, about.st_mtime))
+                entries.append(
+                    FileEntry(
+                        name=path.name,
+                        kind=KINDS[path.suffix],
+                        size=about.st_size,
+                        written=about.st_mtime,
+                    )
+                )
         except OSError as error:
             raise DataError(
                 f"cannot be read: {error.strerror}", where="the session folder"
             ) from error
         newest = sorted(entries, key=lambda file: -file.written)
         listed = tuple(replace(file, notes=self._notes(file)) for file in newest[:MOST_FILES])
-        return Listing(listed, others + len(newest[MOST_FILES:]))
+        return listed, others + len(newest[MOST_FILES:])
 
     def _notes(self, file: FileEntry) -> str:
         path = self._notes_path(file.name)
@@ -144,8 +135,8 @@ class Folder:
 
     def skins(self) -> list[str]:
         """Stems of the skin files that a page may ask for, in the order of the alphabet."""
-        stems = (path.stem for path in self.path.glob("*.toml"))
-        return sorted(stem for stem in stems if re.fullmatch(STEM, stem))[:MOST_FILES]
+        named = (path for path in self.path.glob(f"*{SKIN}") if re.fullmatch(STEM, path.stem))
+        return sorted(path.stem for path in named if _is_skin(path))[:MOST_FILES]
 
     def existing(self, name: str, *endings: str) -> Path:
         """A file of this folder by its name; DataError where there is none that may be had."""
@@ -169,6 +160,18 @@ class Folder:
         if not _is_offered(name):
             raise DataError(f"expected the name of a file, without a folder, got {repr(name)[:80]}")
         return name
+
+
+def _is_skin(path: Path, *, or_robot: bool = False) -> bool:
+    """Whether a TOML file has the sections of a skin, or those of a robot."""
+    try:
+        if path.stat().st_size > _MOST_SETTINGS:
+            return False
+        document = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return False
+    is_robot = isinstance(document.get("skin"), list)
+    return document.keys() >= _OF_SKINS or (or_robot and is_robot)
 
 
 def _is_offered(name: str) -> bool:

@@ -5,7 +5,7 @@ header, 40 bytes      ``TSK1``, sequence u32, host_time f64, n_cells u32, n_meas
                       n_touches u16, n_truth u16, flags u32, latency_us u32, reserved u32
 image                 f32 [n_cells], change of conductivity in the scene's unit
 voltages, reference   f32 [n_meas] each, V
-touches, 52 bytes     id u32, kind u8 (0 decrease, 1 increase), apart u8 (0 yes, 1 may be
+touches, 52 bytes     id u32, kind u8 (0 decrease, 1 increase), several u8 (0 no, 1 may be
 each                  several, n > 1: n that have merged), force u8 (0 none, 1 calibrated,
                       2 uncalibrated), 1 pad, x, y, sd_x, sd_y (NaN unknown), area, peak,
                       since (s ago), cov_xy (m²), force and its interval (N, NaN none) f32
@@ -15,14 +15,15 @@ bend, 16 bytes        with flag bit 3 only: angle, its deviation, axis (rad) f32
 labels                u8 [n_cells], 0 none, k = cells of the k-th touch; padded to 4 bytes
 ====================  ======================================================================
 
-Flags: bit 0 the reference stands; bit 1 too many rows are unusable, there is no picture;
-bit 2 some rows are left out of the picture; bit 3 bends of this skin were learnt.
+Flags: bit 0 the reference stands; bit 1 too many rows are unusable, there is no image;
+bit 2 some rows are left out of the image; bit 3 bends of this skin were learnt.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from enum import IntFlag
 
 import numpy as np
 
@@ -33,38 +34,52 @@ from tomoskin.run import Runner, Snapshot
 from tomoskin.sensing.track import force_values
 from tomoskin.twin import Contact
 
-READY, NO_PICTURE, ROWS_LEFT_OUT, BEND = 1, 2, 4, 8
-"""Bits of the header's flags."""
+MAGIC = b"TSK1"
+
+
+class Flag(IntFlag):
+    """Bits of the header's flags."""
+
+    READY = 1
+    NO_IMAGE = 2
+    ROWS_LEFT_OUT = 4
+    BENT = 8
+
 
 BEND_STATES = ("idle", "bend", "touch", "bend and touch", "unknown")
 """States of a :class:`~tomoskin.learning.BendReading`, as they are numbered here."""
 
-_HEADER = np.dtype(
-    [
-        ("magic", "S4"),
-        ("sequence", "<u4"),
-        ("host_time", "<f8"),
-        ("n_cells", "<u4"),
-        ("n_meas", "<u4"),
-        ("n_touches", "<u2"),
-        ("n_truth", "<u2"),
-        ("flags", "<u4"),
-        ("latency_us", "<u4"),
-        ("reserved", "<u4"),
-    ]
-)
-_BEND = np.dtype([("angle", "<f4"), ("sd", "<f4"), ("axis", "<f4"), ("state", "<u4")])
 _MEASURES = ("x", "y", "sd_x", "sd_y", "area", "peak", "since", "cov_xy", "force", "low", "high")
-_TOUCH = np.dtype(
-    [
-        ("id", "<u4"),
-        ("kind", "u1"),
-        ("apart", "u1"),
-        ("force_state", "u1"),
-        ("pad", "u1"),
-        *((name, "<f4") for name in _MEASURES),
-    ]
-)
+RECORDS = {
+    "Header": np.dtype(
+        [
+            ("magic", "S4"),
+            ("sequence", "<u4"),
+            ("host_time", "<f8"),
+            ("n_cells", "<u4"),
+            ("n_meas", "<u4"),
+            ("n_touches", "<u2"),
+            ("n_truth", "<u2"),
+            ("flags", "<u4"),
+            ("latency_us", "<u4"),
+            ("reserved", "<u4"),
+        ]
+    ),
+    "Touch": np.dtype(
+        [
+            ("id", "<u4"),
+            ("kind", "u1"),
+            ("several", "u1"),
+            ("force_state", "u1"),
+            ("pad", "u1"),
+            *((name, "<f4") for name in _MEASURES),
+        ]
+    ),
+    "Truth": np.dtype([(name, "<f4") for name in ("x", "y", "force", "radius")]),
+    "Bend": np.dtype([("angle", "<f4"), ("sd", "<f4"), ("axis", "<f4"), ("state", "<u4")]),
+}
+"""The records of the message; ``scripts/page_types.py`` makes the page's readers of them."""
+
 _MOST = 255
 """Labels are bytes: more touches than that are not sent."""
 
@@ -112,7 +127,7 @@ def encode_result(result: FrameResult, truth: Sequence[Contact], latency: float)
             result.voltages.astype("<f4").tobytes(),
             result.reference.astype("<f4").tobytes(),
             _touches(touches, result.host_time),
-            np.array([(p.x, p.y, p.force, p.radius) for p in truth], "<f4").tobytes(),
+            _record("Truth", [(p.x, p.y, p.force, p.radius) for p in truth]),
             _bend(result.bend),
             _labels(touches, len(result.image.values)),
         ]
@@ -120,10 +135,10 @@ def encode_result(result: FrameResult, truth: Sequence[Contact], latency: float)
 
 
 def _header(result: FrameResult, n_touches: int, n_truth: int, latency: float) -> bytes:
-    flags = READY * result.ready | NO_PICTURE * (not result.has_image)
-    flags |= ROWS_LEFT_OUT * (result.left_out > 0) | BEND * (result.bend is not None)
+    flags = Flag.READY * result.ready | Flag.NO_IMAGE * (not result.has_image)
+    flags |= Flag.ROWS_LEFT_OUT * (result.left_out > 0) | Flag.BENT * (result.bend is not None)
     values = (
-        b"TSK1",
+        MAGIC,
         result.sequence % 2**32,
         result.host_time,
         len(result.image.values),
@@ -134,7 +149,11 @@ def _header(result: FrameResult, n_touches: int, n_truth: int, latency: float) -
         min(max(round(latency * 1e6), 0), 2**32 - 1),
         0,
     )
-    return np.array(values, _HEADER).tobytes()
+    return _record("Header", values)
+
+
+def _record(name: str, values: object) -> bytes:
+    return np.array(values, RECORDS[name]).tobytes()
 
 
 def _touches(touches: Sequence[Touch], now: float) -> bytes:
@@ -157,7 +176,7 @@ def _touches(touches: Sequence[Touch], now: float) -> bytes:
         )
         for t in touches
     ]
-    return np.array(rows, _TOUCH).tobytes()
+    return _record("Touch", rows)
 
 
 def _force_state(force: Force | None) -> int:
@@ -167,8 +186,7 @@ def _force_state(force: Force | None) -> int:
 def _bend(bend: BendReading | None) -> bytes:
     if bend is None:
         return b""
-    row = (bend.angle, bend.sd, bend.axis, BEND_STATES.index(bend.state))
-    return np.array(row, _BEND).tobytes()
+    return _record("Bend", (bend.angle, bend.sd, bend.axis, BEND_STATES.index(bend.state)))
 
 
 def _labels(touches: Sequence[Touch], n_cells: int) -> bytes:

@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
 from tomoskin.core import TomoskinError, WireError
-from tomoskin.learning import FORCE, TOUCH, Kind
+from tomoskin.learning import Kind
 from tomoskin.pipeline import FrameResult, Prepared
 from tomoskin.run import Runner
-from tomoskin.server.calibration_handlers import CalibrationHandlers
 from tomoskin.server.folder import Folder
 from tomoskin.server.guided_flow import GuidedFlow, StoppedError
 from tomoskin.server.hub import Hub
-from tomoskin.server.page_messages import text_of
-from tomoskin.server.press_flow import PressFlow
+from tomoskin.server.page_messages import FlowNow
+from tomoskin.server.press_flow import MappingFlow, TouchFlow
 from tomoskin.server.requests import (
     AskPoint,
     BeginFlow,
@@ -27,6 +26,7 @@ from tomoskin.server.requests import (
     KeepFlow,
     LearnFlow,
     SetWeight,
+    ShowFlow,
     StopLearning,
     UndoPress,
 )
@@ -37,59 +37,74 @@ from tomoskin.server.weigh_flow import WeighFlow
 _OF_FLOWS = (UndoPress, DeletePress, SetWeight, AskPoint, LearnFlow, StopLearning)
 """Requests that the flow of the moment answers."""
 
-_TEACHES: dict[FlowKind, Kind[Any]] = {"touch": TOUCH, "rub": TOUCH, "force": FORCE}
+_FLOWS: dict[FlowKind, Callable[[Prepared], GuidedFlow]] = {
+    "touch": TouchFlow,
+    "mapping": MappingFlow,
+    "force": WeighFlow,
+    "rub": RubFlow,
+}
 _LOOKS = 0.3
 """Seconds after which pages are told how far an estimate is."""
-
-
-def begun(kind: FlowKind, prepared: Prepared) -> GuidedFlow:
-    """A flow at its start. Raises WireError where the skin is not set up for it."""
-    match kind:
-        case "force":
-            return WeighFlow(prepared)
-        case "rub":
-            return RubFlow(prepared)
-        case _:
-            return PressFlow(kind, prepared)
 
 
 class GuideHandlers:
     """Hands frames and requests to the flow of the moment, and has it estimate.
 
-    One flow for all pages: whoever stands at the skin presses.
+    One flow for all pages: whoever stands at the skin presses. While no page shows it, it is
+    paused.
+
+    Parameters
+    ----------
+    hub
+        Whose pages.
+    note
+        Called with the kind of a calibration that has been kept, and the name of its file.
     """
 
-    def __init__(self, hub: Hub, calibrations: CalibrationHandlers) -> None:
-        self._hub, self._calibrations = hub, calibrations
+    def __init__(self, hub: Hub, note: Callable[[Kind[Any], str], None]) -> None:
+        self._hub, self._note = hub, note
         self._folder = Folder(hub.folder)
         self._flow: GuidedFlow | None = None
+        self._shown_by: set[Listener] = set()
         self._watching = contextlib.ExitStack()
         hub.serve(
             {
-                BeginFlow: lambda _, request: self._begin(request.kind),
+                BeginFlow: lambda page, request: self._begin(page, request.kind),
+                ShowFlow: lambda page, request: self._show(page, on=request.on),
                 EndFlow: lambda _, __: self._end(),
                 KeepFlow: self._keep,
                 **dict.fromkeys(_OF_FLOWS, lambda _, request: self._answer(request)),
             },
             self.greeting,
+            lambda page: self._show(page, on=False),
         )
 
-    def greeting(self) -> Sequence[str]:
+    def greeting(self) -> Sequence[FlowNow]:
         """The state of the guided flow."""
         mesh = self._hub.runner.prepared.mesh
         if self._flow is not None and self._flow.prepared.mesh.identity != mesh.identity:
             self._leave()
-        return (self._message(),)
+        return (self._flow.now() if self._flow else FlowNow(),)
 
-    def _begin(self, kind: FlowKind) -> None:
+    def _begin(self, page: Listener, kind: FlowKind) -> None:
         if self._hub.runner.replay is not None:
             raise WireError("presses need a live source: go back to live first")
-        flow = begun(kind, self._hub.runner.prepared)
+        flow = _FLOWS[kind](self._hub.runner.prepared)
         self._leave()
-        self._flow = flow
+        self._flow, self._shown_by = flow, {page}
         look = partial(self._look, flow, asyncio.get_running_loop())
         self._watching.enter_context(self._hub.runner.audience.subscribe("guide", look))
         self._tell()
+
+    def _show(self, page: Listener, *, on: bool) -> None:
+        """A page shows the flow, or does not any more."""
+        if on:
+            self._shown_by.add(page)
+        else:
+            self._shown_by.discard(page)
+        if self._flow is not None and self._flow.paused == bool(self._shown_by):
+            self._flow.show(on=bool(self._shown_by))
+            self._tell()
 
     def _leave(self) -> None:
         self._watching.close()
@@ -102,16 +117,18 @@ class GuideHandlers:
         self._tell()
 
     def _look(self, flow: GuidedFlow, loop: asyncio.AbstractEventLoop, result: FrameResult) -> None:
-        """A frame has come; in a thread of its own."""
-        seen = flow.see(result)
-        if seen is not None:
+        """Hand over a frame; in a thread of its own."""
+        with flow.lock:
+            news = None if flow.paused else flow.see(result)
+        if news is not None:
             with contextlib.suppress(RuntimeError):  # the loop has ended
-                loop.call_soon_threadsafe(self._advance, flow, seen)
+                loop.call_soon_threadsafe(self._advance, flow, news)
 
-    def _advance(self, flow: GuidedFlow, seen: object) -> None:
+    def _advance(self, flow: GuidedFlow, more: bool) -> None:
+        """Estimate where there is ``more`` to estimate from, and tell the pages."""
         if flow is not self._flow:
             return
-        if flow.take(seen):
+        if more:
             self._estimate(flow)
         self._tell()
 
@@ -120,9 +137,9 @@ class GuideHandlers:
         answer = flow.answers.get(type(request)) if flow else None
         if flow is None or answer is None:
             raise WireError("no press has been recorded that this could be about: begin first")
-        if answer(request):
-            self._estimate(flow)
-        self._tell()
+        with flow.lock:
+            more = answer(request)
+        self._advance(flow, more)
 
     def _estimate(self, flow: GuidedFlow) -> None:
         if not flow.estimating:
@@ -157,19 +174,16 @@ class GuideHandlers:
             raise WireError("more presses are needed before this can be saved")
         runner = self._hub.runner
         work = partial(flow.keep, estimate.answer, self._folder, request.name, runner)
-        self._hub.tasks.run(page, work, partial(self._kept, flow.kind, runner))
+        self._hub.tasks.run(page, work, partial(self._kept, flow.teaches, runner))
 
-    def _kept(self, kind: FlowKind, runner: Runner, name: str) -> None:
+    def _kept(self, kind: Kind[Any] | None, runner: Runner, name: str) -> None:
         self._leave()
         runner.say("kept", f"saved as {name} and in use from now on")
-        if kind in _TEACHES:
-            self._calibrations.note(_TEACHES[kind], name)
-        else:
+        if kind is None:
             self._hub.show()
+        else:
+            self._note(kind, name)
         self._tell()
 
     def _tell(self) -> None:
-        self._hub.tell([self._message()])
-
-    def _message(self) -> str:
-        return text_of(type="flow", **(self._flow.fields() if self._flow else {"kind": None}))
+        self._hub.tell(*self.greeting())

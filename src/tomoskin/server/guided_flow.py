@@ -4,16 +4,42 @@ from __future__ import annotations
 
 import threading
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar, Literal
+
+import numpy as np
 
 from tomoskin.core import FloatArray, TomoskinError, watch_stages
-from tomoskin.learning import Calibration
+from tomoskin.learning import Kind
 from tomoskin.pipeline import FrameResult, Prepared
 from tomoskin.run import Runner, commands
+from tomoskin.sensing.segment import Region
 from tomoskin.server.folder import Folder
+from tomoskin.server.page_messages import Figures, FlowNow, Point
 from tomoskin.server.requests import FlowKind
+
+_FILLED, _INSIDE = 0.6, 0.85
+"""Parts of the way to the rim that dots stay within: those that fill the sheet, since presses all
+round the rim teach little at first (the twin's textile disc, ten presses: missed by 12 mm instead
+of 51), and all others, since a finger does not press half a sheet."""
+
+_APART = 0.12
+"""A dot is no nearer to a press than this, in radii of the sheet: it would tell nothing new."""
+
+
+Effort = Literal["softly", "hard"]
+EFFORTS: tuple[Effort, ...] = ("softly", "hard")
+"""How a press is asked for, in turn: presses of one force teach that force alone."""
+
+
+@dataclass(frozen=True, eq=False)
+class GuidedPress:
+    """One press: the place m, the change (n_meas,) V that it made, and how it was asked for."""
+
+    place: Point
+    dv: FloatArray
+    effort: Effort | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +53,7 @@ class Estimate:
     text: str
     place: FloatArray | None = None
     ready: bool = False
-    figures: dict[str, Any] = field(default_factory=dict)
+    figures: Figures = field(default_factory=Figures)
     answer: Any = None
 
 
@@ -36,36 +62,44 @@ class StoppedError(TomoskinError):
 
 
 class GuidedFlow(ABC):
-    """One flow; lives in the event loop, but for :meth:`see` and :meth:`estimate_from`.
+    """One flow. Frames come in a thread of their own, requests in another: :attr:`lock` is held
+    for both.
 
     Attributes
     ----------
+    teaches
+        The kind of calibration that is kept; None: something else is.
     kind, prepared
         What it is for, and the skin.
     estimate, trouble
         What the presses tell, or why that is not known.
     estimating, stage
         Whether something newer is being estimated, and how far that is, in words.
+    paused
+        Whether frames are left out, because no page shows the flow.
     answers
         What a page may ask of it, by the type of the request: called with the request, it says
         whether there is something to estimate. WireError refuses.
     """
 
+    teaches: ClassVar[Kind[Any] | None] = None
+
     def __init__(self, kind: FlowKind, prepared: Prepared) -> None:
         self.kind, self.prepared = kind, prepared
         self.estimate: Estimate | None = None
         self.trouble = self.stage = ""
-        self.estimating = False
+        self.estimating = self.paused = False
         self.answers: Mapping[type, Callable[[Any], bool]] = {}
+        self.lock = threading.RLock()
         self._stopped = threading.Event()
 
     @abstractmethod
-    def see(self, result: FrameResult) -> object | None:
-        """Look at a frame, in a thread of its own; what :meth:`take` is to be given, if any."""
+    def see(self, result: FrameResult) -> bool | None:
+        """Take a frame; whether there is something to estimate, None where nothing is new."""
 
     @abstractmethod
-    def take(self, seen: Any) -> bool:
-        """Take what was seen; whether there is something to estimate."""
+    def restart(self) -> None:
+        """Forget what has begun and is not recorded yet."""
 
     @abstractmethod
     def examples(self) -> tuple[Any, ...]:
@@ -79,9 +113,21 @@ class GuidedFlow(ABC):
     def details(self) -> dict[str, Any]:
         """What a page shows of it, beside what all flows show."""
 
-    @abstractmethod
     def keep(self, answer: Any, folder: Folder, name: str, runner: Runner) -> str:
         """Save ``answer`` and have the run go on with it; in a thread. The file's name."""
+        assert self.teaches is not None
+        calibration = self.teaches.of(answer, self.prepared.pattern, self.prepared.skin)
+        path = folder.free(name, ".npz")
+        calibration.write(path)
+        runner.ask(commands.Adopt(runner.prepared.calibrated(calibration)))
+        return path.name
+
+    def show(self, *, on: bool) -> None:
+        """Go on where a page shows the flow, else pause: nobody would see what is recorded."""
+        with self.lock:
+            if on and self.paused:
+                self.restart()
+            self.paused = not on
 
     def stop(self) -> None:
         """End what is being estimated, soon."""
@@ -98,24 +144,59 @@ class GuidedFlow(ABC):
         with watch_stages(reached):
             return self.estimate_from(examples)
 
-    def fields(self) -> dict[str, Any]:
+    def now(self) -> FlowNow:
         """What a page shows of the flow."""
         estimate = self.estimate or Estimate("")
-        return {
+        shown = {
             "kind": self.kind,
+            "paused": self.paused,
             "thinking": self.estimating,
             "text": self.trouble or estimate.text,
             "ready": estimate.ready and not self.estimating,
             "figures": estimate.figures,
-            **self.details(),
         }
+        with self.lock:
+            return FlowNow(**shown | self.details())
 
 
-def keep_calibration(
-    calibration: Calibration[Any], folder: Folder, name: str, runner: Runner
-) -> str:
-    """Save ``calibration`` and have the run use it, as :meth:`GuidedFlow.keep`; the file's name."""
-    path = folder.free(name, ".npz")
-    calibration.write(path)
-    runner.ask(commands.Adopt(runner.prepared.calibrated(calibration)))
-    return path.name
+class Dots:
+    """Where to press next: where an estimate says, else where nobody has pressed yet."""
+
+    def __init__(self, prepared: Prepared) -> None:
+        region = Region.of(prepared.skin)
+        self._unit = region.unit
+        self._places = region.metres(_INSIDE * region.grid)
+        self._filled = region.metres(_FILLED * region.grid)
+
+    @property
+    def places(self) -> FloatArray:
+        """(n, 2) m where a dot may be."""
+        return self._places
+
+    def next(self, places: Sequence[Point], estimate: Estimate | None) -> Point:
+        """(x, y) m of the next dot, after presses at ``places``."""
+        pressed = np.array(places).reshape(-1, 2)
+        if estimate is not None and estimate.place is not None:
+            near = np.argmin(np.linalg.norm(self._places - estimate.place, axis=1))
+            place = self._places[near]
+            if _gap(pressed, place[None])[0] > _APART * self._unit:
+                return float(place[0]), float(place[1])
+        if not len(pressed):
+            return self._first()
+        x, y = self._filled[int(np.argmax(_gap(pressed, self._filled)))].tolist()
+        return x, y
+
+    def _first(self) -> Point:
+        """Off every axis of the sheet: a press in the middle allows every rotation."""
+        middle, extent = self._filled.mean(axis=0), np.ptp(self._filled, axis=0)
+        wanted = middle + extent * (0.32, 0.16)
+        x, y = self._filled[int(np.argmin(np.linalg.norm(self._filled - wanted, axis=1)))].tolist()
+        return x, y
+
+
+def _gap(pressed: FloatArray, places: FloatArray) -> FloatArray:
+    """(n,) m from each of ``places`` (n, 2) to the nearest of ``pressed`` (k, 2)."""
+    if not len(pressed):
+        return np.full(len(places), np.inf)
+    apart = np.linalg.norm(places[:, None] - pressed, axis=-1)
+    return np.asarray(apart.min(axis=1))

@@ -2,13 +2,27 @@
 
 from __future__ import annotations
 
-from tomoskin.server.calibration_handlers import CalibrationHandlers
+import asyncio
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from tomoskin.core import TomoskinError, WireError
+from tomoskin.learning import FORCE, TOUCH, Kind, load_calibration
+from tomoskin.run import SetPose, SetTwin, commands, way_to_bend
 from tomoskin.server.file_handlers import FileHandlers
+from tomoskin.server.folder import Folder
 from tomoskin.server.guide_handlers import GuideHandlers
 from tomoskin.server.hub import Hub
+from tomoskin.server.page_messages import Calibrations
+from tomoskin.server.requests import UseCalibration
 from tomoskin.server.settings_handlers import SettingsHandlers
+from tomoskin.server.settings_messages import TwinBend, TwinRefused, TwinState, TwinStretch
 from tomoskin.server.source_handlers import SourceHandlers, SourceSwitch
-from tomoskin.server.twin_handlers import TwinHandlers
+from tomoskin.server.task import Listener
+
+_OFFERED: dict[str, Kind[Any]] = {"touch": TOUCH, "force": FORCE}
 
 
 def serve_requests(hub: Hub, source: str) -> None:
@@ -18,4 +32,96 @@ def serve_requests(hub: Hub, source: str) -> None:
     switch = SourceSwitch(hub, source)
     FileHandlers(hub, switch)
     SourceHandlers(hub, switch)
-    GuideHandlers(hub, CalibrationHandlers(hub))
+    GuideHandlers(hub, CalibrationHandlers(hub).note)
+
+
+class CalibrationHandlers:
+    """Switches calibrations on and off, and knows which file each came from."""
+
+    def __init__(self, hub: Hub) -> None:
+        self._hub = hub
+        self._folder = Folder(hub.folder)
+        self._files: dict[str, str] = {}  # by kind; "": the name is not known
+        self._used_on = ""
+        hub.serve({UseCalibration: self._use}, self.greeting)
+
+    def greeting(self) -> Sequence[Calibrations]:
+        """The calibrations in use."""
+        prepared = self._hub.runner.prepared
+        if self._used_on != prepared.mesh.identity:
+            self._used_on = prepared.mesh.identity
+            self._files = dict.fromkeys(prepared.calibrations, "")
+        files = {of: self._files.get(kind.name) for of, kind in _OFFERED.items()}
+        forces = prepared.calibrations.get(FORCE.name)
+        most = None if forces is None else forces.model.most
+        return (Calibrations(**files, force_most_n=most),)
+
+    def note(self, kind: Kind[Any], name: str | None) -> None:
+        """The run goes on with the calibration in file ``name``, or None with none of ``kind``."""
+        if name is None:
+            self._files.pop(kind.name, None)
+        else:
+            self._files[kind.name] = name
+        self._hub.tell(*self.greeting())
+
+    def _use(self, page: Listener, request: UseCalibration) -> None:
+        def work() -> Kind[Any]:
+            runner = self._hub.runner
+            if request.name is None:
+                kind = _OFFERED[request.of]
+                runner.ask(commands.Adopt(runner.prepared.uncalibrated(kind)))
+                return kind
+            calibration = load_calibration(self._folder.existing(request.name, ".npz"))
+            runner.ask(commands.Adopt(runner.prepared.calibrated(calibration)))
+            return calibration.kind
+
+        self._hub.tasks.run(page, work, lambda kind: self.note(kind, request.name))
+
+
+class TwinHandlers:
+    """Bends, breaks and mends the twin, the same for all pages."""
+
+    def __init__(self, hub: Hub) -> None:
+        self._hub = hub
+        self._newest: SetPose | None = None
+        self._posing = asyncio.Lock()
+        hub.serve({SetTwin: self._set, SetPose: self._pose}, self.greeting)
+
+    def greeting(self) -> Sequence[TwinState]:
+        """What is wrong now, and how the sheet is bent."""
+        twin, skin = self._hub.runner.twin, self._hub.runner.prepared.skin
+        asked, bends = twin.pose.asked, way_to_bend(skin.surface)
+        extent = np.ptp(skin.outline.polyline(skin.outline.length / 60), axis=0)
+        now = TwinState.of(
+            twin,
+            cut=sorted(set(twin.harm.cut)),
+            noise=twin.harm.noise,
+            bends=bends,
+            bend=asked.bend and TwinBend.of(asked.bend),
+            stretch=asked.stretch and TwinStretch.of(asked.stretch),
+            size_m=float(extent.max()),
+        )
+        return (now,)
+
+    def _set(self, _: Listener, request: SetTwin) -> None:
+        """Raise WireError where the source is no twin, or has no such electrode."""
+        self._hub.runner.ask(request)
+        self._hub.tell(*self.greeting())
+
+    def _pose(self, page: Listener, request: SetPose) -> None:
+        """Raise WireError where the source has no sheet to bend."""
+        if not self._hub.runner.twin.bendable:
+            raise WireError(f"{self._hub.runner.status().source} cannot be bent on the page")
+        self._newest = request
+        self._hub.tasks.keep(self._bring(page, request))
+
+    async def _bring(self, page: Listener, request: SetPose) -> None:
+        """Bend the sheet unless something newer is asked for already, and say how it lies."""
+        async with self._posing:
+            if request is self._newest:
+                try:
+                    await asyncio.to_thread(self._hub.runner.ask, request)
+                except TomoskinError as error:
+                    hint = f" ({error.hint})" if error.hint else ""
+                    page.post(TwinRefused(message=error.message + hint).json)
+            self._hub.tell(*self.greeting())

@@ -15,19 +15,27 @@ from tomoskin import __version__
 from tomoskin.core import FloatArray, WireError, encode_json
 from tomoskin.files.messages import Contacts, Stream
 from tomoskin.model.robot import PlacedSkin, Pose, Robot
-from tomoskin.run import RobotRun, Runner, Status, commands
-from tomoskin.server.page_messages import finite, flat, text_of
-from tomoskin.server.requests import Request, SetRecording
+from tomoskin.run import RobotRun, Runner, StrictRequest, commands
+from tomoskin.server.page_connection import Host
+from tomoskin.server.page_messages import (
+    PlacedShape,
+    RobotScene,
+    RobotState,
+    RobotTouches,
+    SkinState,
+    SpaceTouch,
+    TouchesOfSkin,
+)
+from tomoskin.server.requests import SetRecording
 from tomoskin.server.run_handlers import FILE_NAME
-from tomoskin.server.task import Listener, Tasks, beside
+from tomoskin.server.task import Listener, Tasks, during
+from tomoskin.server.views import flat
 
 PERIOD = 1 / 20
 """Seconds between two looks at the touches."""
 
 _STATES = 5
 """So many looks, and all states are sent."""
-
-MAX_PAGES = 16
 
 
 class NewestTouches:
@@ -47,28 +55,28 @@ class NewestTouches:
     def renew(self) -> None:
         """Make it of the newest results; the same object where nothing has changed."""
         skins = {n: self._touches(n, r) for n, r in self._run.runners.items() if r.newest}
-        made = encode_json({"skins": skins})
+        made = encode_json(RobotTouches(skins=skins))
         if made != self._made:
             self._made = made
 
-    def _touches(self, name: str, runner: Runner) -> dict[str, Any]:
+    def _touches(self, name: str, runner: Runner) -> TouchesOfSkin:
         assert runner.newest is not None
         contacts = Contacts.of(self._streams[name], runner.newest.result)
         pose = self._poses[name]
         touches = [
-            {
-                "id": contact.touch.id,
-                "position": _rounded(pose(np.array([contact.position]))[0]),
-                "normal": _rounded(pose.rotation @ contact.normal),
-                "peak": contact.touch.detection.peak,
-                "force": contact.force,
-            }
+            SpaceTouch(
+                id=contact.touch.id,
+                position=_rounded(pose(np.array([contact.position]))[0]),
+                normal=_rounded(pose.rotation @ contact.normal),
+                peak=contact.touch.detection.peak,
+                force=contact.force,
+            )
             for contact in contacts.touches
         ]
-        return {"valid": contacts.valid, "touches": touches}
+        return TouchesOfSkin(valid=contacts.valid, touches=touches)
 
 
-class Overview:
+class Overview(Host):
     """What the pages of the whole robot are told, and may ask; lives in the event loop.
 
     Parameters
@@ -80,41 +88,36 @@ class Overview:
     """
 
     def __init__(self, robot: Robot, run: RobotRun, folder: Path) -> None:
+        super().__init__()
         self.run, self.folder = run, folder
         self._tasks = Tasks()
-        self._pages: set[Listener] = set()
         placed = {skin.name: skin for skin in robot.skins}
         streams = {
             n: Stream.of(r.prepared, n, 0.0, placed[n].place) for n, r in run.runners.items()
         }
         poses = {n: robot.link_pose(placed[n].place) for n in run.runners}
-        self.frame = NewestTouches(run, streams, poses)
+        self.frame = self._touches = NewestTouches(run, streams, poses)
         self._scene = scene(robot, streams, poses)
 
     @contextlib.asynccontextmanager
     async def running(self) -> AsyncIterator[None]:
         """Look at the runs while the block lasts."""
-        async with beside(self._tick()):
+        async with during(self._tick()):
             yield
 
-    def join(self, page: Listener) -> bool:
-        """Serve ``page`` from now on; False where there are too many."""
-        if len(self._pages) >= MAX_PAGES:
-            return False
-        self._pages.add(page)
-        self.frame.renew()  # while nobody looked it was not
-        page.post(self._scene)
-        page.post(states(self.run))
-        return True
+    def first(self) -> tuple[RobotScene, RobotState]:
+        """The robot, and how its skins are doing."""
+        self._touches.renew()  # while nobody looked it was not
+        return self._scene, states(self.run)
 
     def leave(self, page: Listener, why: str = "") -> None:
         """Stop serving ``page``."""
-        self._pages.discard(page)
+        super().leave(page)
         if why:
             for runner in self.run.runners.values():
                 runner.say("page-dropped", why)
 
-    def obey(self, page: Listener, request: Request) -> None:
+    def obey(self, page: Listener, request: StrictRequest) -> None:
         """Do what a page asks of all skins. Raises WireError where that cannot be."""
         match request:
             case commands.TakeReference():
@@ -135,23 +138,21 @@ class Overview:
         return record
 
     def _tell(self) -> None:
-        for page in self._pages:
-            page.post(states(self.run))
+        self.tell(states(self.run))
 
     async def _tick(self) -> None:
         count = 0
         while True:
-            if self._pages:
-                self.frame.renew()
+            if self.pages:
+                self._touches.renew()
                 if count % _STATES == 0:
                     self._tell()
-                for page in self._pages:
-                    page.wake()
+                self.wake()
             count += 1
             await asyncio.sleep(PERIOD)
 
 
-def scene(robot: Robot, streams: Mapping[str, Stream], poses: Mapping[str, Pose]) -> str:
+def scene(robot: Robot, streams: Mapping[str, Stream], poses: Mapping[str, Pose]) -> RobotScene:
     """Skins and links in the frame of the robot's root, m; coordinates lie flat as x0, y0, z0, …
 
     Where a link is shown by its shape no bone is, and what cannot be shown is said.
@@ -162,8 +163,7 @@ def scene(robot: Robot, streams: Mapping[str, Stream], poses: Mapping[str, Pose]
     links = (solids[n].triangles.reshape(-1, 3) for n in shown)
     corners = [urdf.pose(n)(points) for n, points in zip(shown, links, strict=True)] if urdf else []
     undrawn = [f"{link}: {why}" for link, solid in solids.items() for why in solid.problems]
-    return text_of(
-        type="robot",
+    return RobotScene(
         name=robot.name,
         bones=flat(urdf.bones(without=shown)) if urdf else [],
         links=_rounded(np.concatenate([np.zeros((0, 3)), *corners]).ravel()),
@@ -173,37 +173,27 @@ def scene(robot: Robot, streams: Mapping[str, Stream], poses: Mapping[str, Pose]
     )
 
 
-def _skin(skin: PlacedSkin, stream: Stream, pose: Pose) -> dict[str, Any]:
+def _skin(skin: PlacedSkin, stream: Stream, pose: Pose) -> PlacedShape:
     corners = np.zeros((0, 3)) if stream.corners is None else stream.corners.reshape(-1, 3)
-    return {
-        "name": skin.name,
-        "frame": stream.naming.frame_id,
-        "source": skin.source,
-        "corners": _rounded(pose(corners).ravel()),
-    }
+    frame = stream.naming.frame_id
+    return PlacedShape.of(skin, frame=frame, corners=_rounded(pose(corners).ravel()))
 
 
-def states(run: RobotRun) -> str:
+def states(run: RobotRun) -> RobotState:
     """The state of each skin, in words."""
-    skins = {name: _state(status) for name, status in run.statuses().items()}
-    recording = None if run.recording is None else run.recording.name
-    return text_of(type="robot-state", skins=skins, recording=recording)
-
-
-def _state(status: Status) -> dict[str, Any]:
-    return {
-        "running": status.running,
-        "ready": status.reference.ready,
-        "fps": status.fps,
-        "frames": status.frames,
-        "lost": status.dropped + status.gaps,
-        "p99_ms": finite(1e3 * status.p99),
-        "problem": status.problem,
-        "text": status.text,
+    skins = {
+        name: SkinState.of(
+            status,
+            ready=status.reference.ready,
+            lost=status.dropped + status.gaps,
+            p99_ms=1e3 * status.p99,
+        )
+        for name, status in run.statuses().items()
     }
+    recording = None if run.recording is None else run.recording.name
+    return RobotState(skins=skins, recording=recording)
 
 
-def _rounded(values: FloatArray) -> list[float]:
+def _rounded(values: FloatArray) -> Any:
     """To 0.01 mm, which nobody sees."""
-    rounded: list[float] = np.round(values, 5).tolist()
-    return rounded
+    return np.round(values, 5).tolist()

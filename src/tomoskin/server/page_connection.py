@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+from abc import ABC, abstractmethod
 from collections import deque
+from collections.abc import Iterable
 from typing import Protocol
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from tomoskin.core import TomoskinError, WireError
-from tomoskin.server import page_messages
-from tomoskin.server.requests import Request, decode_request
+from tomoskin.run import StrictRequest
+from tomoskin.server.page_messages import Message, Refusal
+from tomoskin.server.requests import decode_request
 from tomoskin.server.task import Listener
 
 FRAME_PERIOD = 1 / 60
@@ -19,6 +22,9 @@ FRAME_PERIOD = 1 / 60
 
 PATIENCE = 5.0
 """A page that takes nothing for this long is let go, s."""
+
+MAX_PAGES = 16
+"""Pages that are served at once."""
 
 _OUTBOX = 64
 _TRY_AGAIN_LATER = 1013
@@ -34,21 +40,52 @@ class NewestMessage(Protocol):
         """Note that a page has the message."""
 
 
-class Host(Protocol):
-    """Whom a page's connection is one of."""
+class Host(ABC):
+    """Whom pages' connections are of; each message is encoded once for all pages.
 
-    @property
-    def frame(self) -> NewestMessage:
-        """The newest message for the page."""
+    Attributes
+    ----------
+    pages
+        The pages that are served.
+    """
+
+    frame: NewestMessage
+    """The newest message for a page."""
+
+    def __init__(self) -> None:
+        self.pages: set[Listener] = set()
+
+    @abstractmethod
+    def first(self) -> Iterable[Message]:
+        """What a new page is sent."""
+
+    @abstractmethod
+    def obey(self, page: Listener, request: StrictRequest) -> None:
+        """Do what a page asks. Raises WireError where that cannot be."""
 
     def join(self, page: Listener) -> bool:
         """Serve ``page`` from now on; False where there are too many."""
+        if len(self.pages) >= MAX_PAGES:
+            return False
+        self.pages.add(page)
+        for message in self.first():
+            page.post(message.json)
+        return True
 
-    def leave(self, page: Listener, why: str = "") -> None:
+    def leave(self, page: Listener, why: str = "") -> None:  # noqa: ARG002
         """Stop serving ``page``."""
+        self.pages.discard(page)
 
-    def obey(self, page: Listener, request: Request) -> None:
-        """Do what a page asks. Raises WireError where that cannot be."""
+    def tell(self, *messages: Message) -> None:
+        """Send ``messages`` to every page."""
+        for text in [message.json for message in messages]:
+            for page in self.pages:
+                page.post(text)
+
+    def wake(self) -> None:
+        """Say to every page that there is a newer message."""
+        for page in self.pages:
+            page.wake()
 
 
 class Page:
@@ -103,7 +140,7 @@ class Page:
                 raise WireError("expected text, got a binary message")
             self._host.obey(self, decode_request(text))
         except TomoskinError as error:
-            self.post(page_messages.error(str(error)))
+            self.post(Refusal(message=str(error)).json)
 
     async def _write(self) -> None:
         loop = asyncio.get_running_loop()

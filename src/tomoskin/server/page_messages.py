@@ -1,265 +1,481 @@
-"""The text messages to a page: scene, state, event and error. Requests: ``server/requests.py``,
-frames: ``server/frames.py``."""
+"""The text messages to a page, declared once: ``scripts/page_types.py`` makes the page's types of
+them, of those about settings (``server/settings_messages.py``), of the requests
+(``server/requests.py``) and of the frame (``server/frames.py``).
+
+Lengths are m, times s. Coordinates lie flat as x0, y0, x1, y1, …; electrodes, points and presses
+are counted from 0, labels from E1. What is not finite goes out as null.
+"""
 
 from __future__ import annotations
 
-import math
-from dataclasses import asdict
-from typing import Any
+from typing import Any, Literal, Self
 
-import numpy as np
+import msgspec
 
-from tomoskin import __version__
-from tomoskin.core import Event, FloatArray, IntArray, encode_json
-from tomoskin.files.session import Timeline
-from tomoskin.learning import BendReading, CalibrationHealth, ClassReading
-from tomoskin.model.mesh import Plane
-from tomoskin.pipeline import Prepared, Unresolved
-from tomoskin.run import MAX_FORCE, Status
-from tomoskin.sensing.signal import BaselineState, ElectrodeHealth
+from tomoskin.core import encode_json
+from tomoskin.learning import ClassReading
+from tomoskin.run import ReplayStatus
+from tomoskin.run.sinks import SinkReport
+from tomoskin.server.requests import FlowKind, Unit
 
-PROBE_RADIUS = 0.015
-"""Radius of a press from the page unless it says otherwise, m: the source's usual probe."""
-
-PROBE_FORCE = 3.0
-"""Its force, N."""
+Point = tuple[float, float]
+Flat = list[float]
 
 
-_OUTLINE_POINTS = 240
+class MessagePart(msgspec.Struct, frozen=True, kw_only=True):
+    """A part of a message."""
 
-_SLOWEST = 10
-"""Of the slowest frames, those that a page is told."""
+    @classmethod
+    def of(cls, item: object, **more: Any) -> Self:
+        """The part that says of ``item`` what its own attributes say, and ``more``."""
+        own = {n: getattr(item, n) for n in cls.__struct_fields__ if n not in more}
+        return cls(**own, **more)
 
 
-def scene(prepared: Prepared, source: str, *, limit: float, pressable: bool) -> str:
+class Message(MessagePart, frozen=True, kw_only=True):
+    """A message to a page."""
+
+    @property
+    def json(self) -> str:
+        """The message as it is sent."""
+        return encode_json(self).decode()
+
+
+# The skin, and how the run is doing.
+
+
+class SkinName(MessagePart, frozen=True):
+    """The skin, by what its file says."""
+
+    name: str
+    description: str
+    source: str
+
+
+class Electrode(MessagePart, frozen=True):
+    """An electrode: its centre, its name, and the mesh points along its arc."""
+
+    x: float
+    y: float
+    label: str
+    points: list[int]
+
+
+class PatternRows(MessagePart, frozen=True):
+    """Source, sink and plus, minus of each measurement, flat."""
+
+    name: str
+    n_meas: int
+    n_drive: int
+    drive: list[int]
+    measure: list[int]
+
+
+class ProbeSizes(MessagePart, frozen=True):
+    """What a press from the page is at first, and at most."""
+
+    radius_m: float
+    force_n: float
+    max_force_n: float
+
+
+class Scene(Message, frozen=True, tag="scene"):
     """Everything about the skin that does not change from frame to frame.
 
-    ``limit`` is the end of the fixed symmetric colour scale, in the image's unit; lengths are m,
-    coordinates lie flat as x0, y0, x1, y1, …; electrodes and points are counted from 0, labels
-    from E1. ``solid``: where the points lie in space, x0, y0, z0, …, of a sheet on a surface.
+    ``limit`` is the end of the fixed symmetric colour scale, in ``unit``; ``solid`` holds the
+    points in space, x0, y0, z0, …, of a sheet on a surface; null: the sheet lies flat.
     """
-    skin, mesh, pattern = prepared.skin, prepared.mesh, prepared.pattern
-    return text_of(
-        type="scene",
-        skin={"name": skin.name, "description": skin.description, "source": str(skin.source)},
-        unit=prepared.operator.unit,
-        limit=limit,
-        points=flat(mesh.points),
-        solid=None if isinstance(skin.surface, Plane) else flat(skin.surface.point(mesh.points)),
-        cells=flat(mesh.cells),
-        outline=flat(skin.outline.polyline(skin.outline.length / _OUTLINE_POINTS)),
-        electrodes=_electrodes(prepared),
-        pattern={
-            "name": pattern.identity,
-            "n_meas": pattern.n_meas,
-            "n_drive": pattern.n_drive,
-            "drive": flat(pattern.drive),
-            "measure": flat(pattern.measure),
-        },
-        source=source,
-        pressable=pressable,
-        probe={"radius_m": PROBE_RADIUS, "force_n": PROBE_FORCE, "max_force_n": MAX_FORCE},
-        version=__version__,
-    )
+
+    skin: SkinName
+    unit: str
+    limit: float
+    points: Flat
+    solid: Flat | None
+    cells: list[int]
+    outline: Flat
+    electrodes: list[Electrode]
+    pattern: PatternRows
+    source: str
+    pressable: bool
+    probe: ProbeSizes
+    version: str
 
 
-def scale(prepared: Prepared, limit: float) -> str:
-    """The end of the colour scale, and its unit, where nothing else of the scene is new."""
-    return text_of(type="scale", limit=limit, unit=prepared.operator.unit)
+class Scale(Message, frozen=True, tag="scale"):
+    """Another scale of the same scene."""
+
+    limit: float
+    unit: str
 
 
-def state(status: Status) -> str:
-    """One look at the runner; numbers that are not known yet are null."""
-    reference = status.reference
-    return text_of(
-        type="state",
-        running=status.running,
-        paused=status.paused,
-        fps=status.fps,
-        frames=status.frames,
-        dropped=status.dropped,
-        corrupt=status.corrupt,
-        gaps=status.gaps,
-        p50_ms=finite(1e3 * status.p50),
-        p99_ms=finite(1e3 * status.p99),
-        stages=stages(status),
-        slowest=slowest(status),
-        reference={
-            "frames": reference.frames,
-            "needed": reference.needed,
-            "age_s": status.reference_age,
-            "ready": reference.ready,
-        },
-        baseline=_baseline(reference.baseline),
-        sick=[_sick(electrode) for electrode in status.electrodes],
-        noise_v=finite(reference.noise),
-        alpha=status.choice.alpha,
-        rule=status.choice.rule,
-        left_out=status.left_out,
-        recording=status.recording and status.recording.name,
-        sinks=status.sinks,
-        replay=status.replay,
-        **readings(status),
-        problem=status.problem,
-        text=status.text,
-    )
+class ReferenceNow(MessagePart, frozen=True):
+    """How far the reference is, and how old it has become."""
+
+    frames: int
+    needed: int
+    age_s: float | None
+    ready: bool
 
 
-def stages(status: Status) -> list[dict[str, Any]]:
-    """Where the age of a picture comes from, stage by stage."""
-    return [
-        {
-            "name": stage.name,
-            "p50_ms": finite(1e3 * stage.p50),
-            "p99_ms": finite(1e3 * stage.p99),
-        }
-        for stage in status.stages
-    ]
+class BaselineNow(MessagePart, frozen=True):
+    """Drift since the reference as a part of it, how long it is held, and why it is stale."""
+
+    drift: float | None
+    held_s: float
+    noise_v: float | None
+    stale: str | None
 
 
-def slowest(status: Status) -> list[dict[str, Any]]:
-    """What the slowest frames took their time for."""
-    return [
-        {"sequence": cost.sequence, "host_time_s": cost.host_time, "text": cost.text}
-        for cost in status.slowest[:_SLOWEST]
-    ]
+class StageNow(MessagePart, frozen=True):
+    """How long one stage takes."""
+
+    name: str
+    p50_ms: float | None
+    p99_ms: float | None
 
 
-def readings(status: Status) -> dict[str, Any]:
-    """What calibrations say of the newest frame, or of themselves; null where there are none."""
-    return {
-        "bend": _bend(status.bend),
-        "class": _class(status.class_reading),
-        "calibration": _calibration(status.calibration),
-    }
+class SlowFrame(MessagePart, frozen=True):
+    """A slow frame: what it took its time for, in words."""
+
+    sequence: int
+    host_time_s: float
+    text: str
 
 
-def _baseline(now: BaselineState | None) -> dict[str, Any] | None:
-    """Drift since the reference as a part of it, how long it is held, and whether it is stale."""
-    if now is None:
-        return None
-    return {
-        "drift": finite(now.drift),
-        "held_s": now.held,
-        "noise_v": finite(now.noise),
-        "stale": now.stale,
-    }
+class BendNow(MessagePart, frozen=True):
+    """How the sheet is bent, as ``tomoskin image --json`` says it."""
+
+    angle_rad: float
+    sd_rad: float
+    axis_rad: float
+    state: str
 
 
-def _bend(now: BendReading | None) -> dict[str, Any] | None:
-    """Angles in rad, as ``tomoskin image --json`` tells them."""
-    if now is None:
-        return None
-    return {"angle_rad": now.angle, "sd_rad": now.sd, "axis_rad": now.axis, "state": now.state}
+class CalibrationNow(MessagePart, frozen=True):
+    """How touches fit the calibration that locates them; ``broken``: someone must act."""
+
+    well: bool
+    broken: bool
+    findings: tuple[str, ...]
 
 
-def _class(now: ClassReading | None) -> dict[str, Any] | None:
-    """Which state the newest frame shows, as ``tomoskin image --json`` tells it."""
-    return None if now is None else asdict(now)
+class Sick(MessagePart, frozen=True):
+    """An electrode that is not good, and why, in words."""
+
+    electrode: int
+    state: str
+    reason: str
+    since_s: float | None
 
 
-def _calibration(now: CalibrationHealth | None) -> dict[str, Any] | None:
-    """How touches fit the calibration that locates them, in words for people."""
-    if now is None:
-        return None
-    return {
-        "well": now.well,
-        "broken": now.broken,
-        "findings": list(now.findings),
-    }
+class RunState(Message, frozen=True, tag="state"):
+    """One look at the runner.
+
+    ``stages``: from the sample to the page; ``slowest``: the slowest frame first; ``rule``: what
+    chose alpha ("hand": the skin file); ``left_out``: measurements that the image does without;
+    ``recording``: the file's name; ``problem``: what someone must act on.
+    """
+
+    running: bool
+    paused: bool
+    fps: float
+    frames: int
+    dropped: int
+    corrupt: int
+    gaps: int
+    p50_ms: float | None
+    p99_ms: float | None
+    stages: list[StageNow]
+    slowest: list[SlowFrame]
+    reference: ReferenceNow
+    baseline: BaselineNow | None
+    sick: list[Sick]
+    noise_v: float | None
+    alpha: float
+    rule: str
+    left_out: int
+    recording: str | None
+    sinks: tuple[SinkReport, ...]
+    replay: ReplayStatus | None
+    bend: BendNow | None
+    class_: ClassReading | None = msgspec.field(name="class")
+    calibration: CalibrationNow | None
+    problem: str | None
+    text: str
 
 
-def _sentence(text: str) -> str:
-    return f"{text[:1].upper()}{text[1:]}."
-
-
-def _sick(electrode: ElectrodeHealth) -> dict[str, Any]:
-    return {
-        "electrode": electrode.electrode,
-        "state": electrode.state,
-        "reason": electrode.reason,
-        "since_s": electrode.since,
-    }
-
-
-def event(happened: Event) -> str:
+class EventNote(Message, frozen=True, tag="event"):
     """Something that a person should know."""
-    return text_of(type="event", time_s=happened.host_time, kind=happened.kind, text=happened.text)
+
+    time_s: float
+    kind: str
+    text: str
 
 
-def unresolved(found: Unresolved | None, problem: str = "") -> str:
-    """What the data cannot tell: part of a change that they leave open, per cell; or why not."""
-    values, radius = (None, 0.0) if found is None else (found.values.round(3), found.radius)
-    return text_of(
-        type="unresolved",
-        values=None if values is None else flat(values),
-        radius_m=radius,
-        problem=problem,
-    )
+class Refusal(Message, frozen=True, tag="error"):
+    """Answer to a request that was not understood, or cannot be done."""
+
+    message: str
 
 
-def timeline(line: Timeline) -> str:
-    """What happened in the recording that is played; times in s from its first frame."""
-    return text_of(
-        type="timeline",
-        end_s=line.end,
-        notes=[{"time_s": time, "text": event.text} for time, event in line.notes],
-        events=[
-            {"time_s": time, "kind": event.kind, "text": event.text} for time, event in line.events
-        ],
-        touches=[
-            {"id": span.id, "kind": span.kind, "begin_s": span.begin, "end_s": span.end}
-            for span in line.touches
-        ],
-    )
+class UnresolvedMap(Message, frozen=True, tag="unresolved"):
+    """Of each cell the part of a change that the data leave open, 0 to 1; or the problem."""
+
+    values: Flat | None
+    radius_m: float
+    problem: str
 
 
-def error(message: str) -> str:
-    """Answer to a request that was not understood."""
-    return text_of(type="error", message=message)
+class Tick(MessagePart, frozen=True):
+    """A moment of a recording, from its first frame, and what happened."""
+
+    time_s: float
+    text: str
 
 
-def _electrodes(prepared: Prepared) -> list[dict[str, Any]]:
-    centres = prepared.skin.electrode_centres.tolist()
-    return [
-        {"x": x, "y": y, "label": f"E{number}", "points": chain(facets)}
-        for number, ((x, y), facets) in enumerate(
-            zip(centres, prepared.mesh.electrodes, strict=True), 1
-        )
-    ]
+class TimedEvent(MessagePart, frozen=True):
+    """An event of a recording."""
+
+    time_s: float
+    kind: str
+    text: str
 
 
-def chain(facets: IntArray) -> list[int]:
-    """Points along an open chain of edges, from one end to the other.
+class TouchSpan(MessagePart, frozen=True):
+    """A touch of a recording, and when it was there."""
 
-    ``facets`` is (n, 2); where the edges do not form a single open chain, their points in
-    ascending order.
+    id: int
+    kind: str
+    begin_s: float
+    end_s: float
+
+
+class PlayedTimeline(Message, frozen=True, tag="timeline"):
+    """What happened in the recording that is played."""
+
+    end_s: float
+    notes: list[Tick]
+    events: list[TimedEvent]
+    touches: list[TouchSpan]
+
+
+# Files, sources, calibrations.
+
+
+class FileEntry(MessagePart, frozen=True):
+    """A file: size in bytes, when it was last written (s since 1970), notes on it."""
+
+    name: str
+    kind: str
+    size: int
+    written: float
+    notes: str = ""
+
+
+class Files(Message, frozen=True, tag="files"):
+    """The session folder; ``others`` are not listed; ``share`` of the export is done, 0 to 1."""
+
+    files: tuple[FileEntry, ...]
+    others: int
+    recording: str | None
+    playing: str | None
+    exporting: str | None
+    share: float
+
+
+class Exported(Message, frozen=True, tag="exported"):
+    """An export has ended."""
+
+    name: str
+
+
+class Offer(MessagePart, frozen=True):
+    """A source that a page may choose: what opens it, and in words what it is."""
+
+    id: str
+    text: str
+
+
+class BoardNow(MessagePart, frozen=True):
+    """What the board says that it is; ``name`` is empty before protocol 1.2."""
+
+    name: str
+    firmware: str
+    protocol: str
+    channels: int
+    adc_bits: int
+    current_ma: float
+    unique_id: str
+
+
+class Sources(Message, frozen=True, tag="sources"):
+    """What can be connected, and what is."""
+
+    sources: list[Offer]
+    current: str
+    host_protocol: str
+    board: BoardNow | None
+    problem: str | None
+
+
+class Calibrations(Message, frozen=True, tag="calibrations"):
+    """Files of the calibrations in use; "" where the name is not known; null: none.
+
+    ``force_most_n``: the largest force that was learnt from, N.
     """
-    beside: dict[int, list[int]] = {}
-    for a, b in facets.tolist():
-        beside.setdefault(a, []).append(b)
-        beside.setdefault(b, []).append(a)
-    ends = [point for point, others in beside.items() if len(others) == 1]
-    if len(ends) != 2 or max(map(len, beside.values())) > 2:
-        return sorted(beside)
-    walk, before = [ends[0]], -1
-    while len(onward := [p for p in beside[walk[-1]] if p != before]) == 1:
-        before = walk[-1]
-        walk.append(onward[0])
-    return walk
+
+    touch: str | None
+    force: str | None
+    force_most_n: float | None
 
 
-def finite(value: float | None) -> float | None:
-    """The value; None for what JSON has no number for."""
-    return None if value is None or not math.isfinite(value) else value
+# Guided flows.
+
+Phase = Literal["rest", "press", "hold", "release", "several", "name", "rub"]
 
 
-def flat(table: FloatArray | IntArray) -> list[float]:
-    """All numbers of a table, row by row."""
-    flat: list[float] = np.asarray(table).reshape(-1).tolist()
-    return flat
+class WeightNow(MessagePart, frozen=True):
+    """A weight, in the unit in which it was given, in newtons, and in words."""
+
+    value: float
+    unit: Unit
+    newtons: float
+    text: str
 
 
-def text_of(**fields: Any) -> str:
-    """A message to a page."""
-    return encode_json(fields).decode()
+class RubbedNow(MessagePart, frozen=True):
+    """What was rubbed so far.
+
+    ``places`` are the positions of the map, ``covered`` how many touches lay near each, and
+    ``near_m`` how near; ``text`` says what is missing.
+    """
+
+    touches: int
+    needed: int
+    text: str
+    enough: bool
+    places: Flat
+    covered: Flat
+    near_m: float
+
+
+class Figures(MessagePart, frozen=True, omit_defaults=True):
+    """Numbers of an estimate, as far as its flow has them."""
+
+    errors_mm: Flat | None = None
+    median_mm: float | None = None
+    doubtful: list[int] | None = None
+    probability: float | None = None
+    odds: float | None = None
+    mapping: str | None = None
+    runner_up: str | None = None
+    polarity_known: bool | None = None
+    errors: Flat | None = None
+    deviation_mm: float | None = None
+    remarks: list[str] | None = None
+
+
+class FlowNow(Message, frozen=True, tag="flow"):
+    """The guided flow; ``kind`` null: none goes on.
+
+    ``paused``: no page shows it, and nothing is recorded; ``effort``: how to press the dot;
+    ``weights``: what each press was; ``weight``: what lies there or comes next; ``asked``: what was
+    said and is probably meant as ``meant``; ``stage``: how far learning is.
+    """
+
+    kind: FlowKind | None = None
+    paused: bool = False
+    phase: Phase = "rest"
+    dot: Point | None = None
+    presses: list[Point] = []
+    thinking: bool = False
+    text: str = ""
+    ready: bool = False
+    figures: Figures = Figures()
+    effort: Literal["softly", "hard"] | None = None
+    weights: list[str] = []
+    weight: WeightNow | None = None
+    asked: WeightNow | None = None
+    meant: WeightNow | None = None
+    rubbed: RubbedNow | None = None
+    stage: str = ""
+
+
+# A robot.
+
+
+class PlacedShape(MessagePart, frozen=True):
+    """A skin on a robot: the frame of its touches, and the corners of its triangles."""
+
+    name: str
+    frame: str
+    source: str
+    corners: Flat
+
+
+class RobotScene(Message, frozen=True, tag="robot"):
+    """A robot's skins and links in the frame of its root.
+
+    ``bones``: both ends of the line from each link to the next; ``links``: corners of the triangles
+    of the links that have a shape; ``undrawn``: which have none, and why.
+    """
+
+    name: str
+    bones: Flat
+    links: Flat
+    undrawn: list[str]
+    skins: list[PlacedShape]
+    version: str
+
+
+class SkinState(MessagePart, frozen=True):
+    """How one skin of a robot is doing."""
+
+    running: bool
+    ready: bool
+    fps: float
+    frames: int
+    lost: int
+    p99_ms: float | None
+    problem: str | None
+    text: str
+
+
+class RobotState(Message, frozen=True, tag="robot-state"):
+    """How each skin of a robot is doing, and the name of the recording."""
+
+    skins: dict[str, SkinState]
+    recording: str | None
+
+
+class SpaceTouch(MessagePart, frozen=True):
+    """A touch in the frame of the robot's root; ``force`` N, null where nothing gives it."""
+
+    id: int
+    position: tuple[float, float, float]
+    normal: tuple[float, float, float]
+    peak: float
+    force: float | None
+
+
+class TouchesOfSkin(MessagePart, frozen=True):
+    """The touches on one skin, and whether its data can be relied on."""
+
+    valid: bool
+    touches: list[SpaceTouch]
+
+
+class RobotTouches(MessagePart, frozen=True):
+    """The newest touches on each skin of a robot; sent as JSON in bytes, the newest only."""
+
+    skins: dict[str, TouchesOfSkin]
+
+
+PAGE_MESSAGES = (
+    *(Scene, Scale, RunState, EventNote, Refusal, UnresolvedMap, PlayedTimeline),
+    *(Files, Exported, Sources, Calibrations, FlowNow),
+)
+"""What the page of one skin is sent, beside :data:`~.settings_messages.SETTINGS_MESSAGES`."""
+
+ROBOT_MESSAGES = (RobotScene, RobotState, Refusal)
+"""What the page of a robot is sent as text."""

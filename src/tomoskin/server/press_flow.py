@@ -2,78 +2,142 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, Literal
+
+import numpy as np
 
 from tomoskin.core import FloatArray, WireError, write_text
-from tomoskin.learning import TOUCH, Locator, MappingAnswer
+from tomoskin.learning import (
+    TOUCH,
+    LeftOut,
+    Locator,
+    MappingAnswer,
+    ring_of,
+    solve_channel_mapping,
+)
 from tomoskin.pipeline import FrameResult, Prepared, prepare
 from tomoskin.run import Runner, commands
 from tomoskin.server.folder import Folder
-from tomoskin.server.guided_flow import Estimate, GuidedFlow, keep_calibration
-from tomoskin.server.guided_presses import (
-    EFFORTS,
-    Dots,
-    Effort,
-    GuidedPress,
-    estimate_touch,
-    estimate_wiring,
-)
-from tomoskin.server.press_taker import Phase, PressTaker
-from tomoskin.server.requests import FlowKind, UndoPress
+from tomoskin.server.guided_flow import EFFORTS, Dots, Effort, Estimate, GuidedFlow, GuidedPress
+from tomoskin.server.page_messages import Figures
+from tomoskin.server.press_taker import PressTaker
+from tomoskin.server.requests import UndoPress
+
+_FEWEST_TOUCH, _FEWEST_MAPPING = 6, 3
+_FIRST = 10
+"""So many presses fill the sheet; from then on a locator says where the next tells most."""
 
 
-@dataclass(frozen=True, eq=False)
-class _Seen:
-    """The phase, what is wrong, and the change (n_meas,) V of a press that was taken, or None."""
+def estimate_touch(prepared: Prepared, presses: Sequence[GuidedPress]) -> Estimate:
+    """A locator of the presses, and by how much it misses them. Raises DataError."""
+    if len(presses) < _FEWEST_TOUCH:
+        left = _FEWEST_TOUCH - len(presses)
+        return Estimate(f"{_counted(left)} more for a first estimate")
+    dv, xy = _arrays(presses)
+    locator = Locator.fit(dv, xy, pattern=prepared.pattern, skin=prepared.skin)
+    errors = 1e3 * locator.errors
+    doubted = sorted({remark.row for remark in locator.remarks})
+    text = f"Median error {_by_effort(presses, errors)} (each press left out in turn)"
+    left_out = LeftOut.of(locator)
+    if left_out.one_force:
+        text += (
+            ", but all presses were about equally hard: expect larger errors for softer and "
+            "harder ones"
+        )
+    if left_out.is_guess:
+        text += "; the mean of all positions is as good an estimate: press harder"
+    elif len(presses) < _FIRST:
+        text += ". Ten presses are a start, fifty are good"
+    figures = Figures(
+        errors_mm=errors.tolist(), median_mm=float(np.median(errors)), doubtful=doubted
+    )
+    place = locator.next_place() if len(presses) >= _FIRST else None
+    return Estimate(text, place, True, figures, locator)
 
-    phase: Phase
-    hint: str
-    dv: FloatArray | None
+
+def _by_effort(presses: Sequence[GuidedPress], errors: FloatArray) -> str:
+    missed = {
+        effort: [
+            error for press, error in zip(presses, errors, strict=True) if press.effort == effort
+        ]
+        for effort in EFFORTS
+    }
+    if not all(missed.values()):
+        return f"{np.median(errors):.0f} mm"
+    return ", ".join(f"{np.median(mm):.0f} mm pressed {effort}" for effort, mm in missed.items())
 
 
-class PressFlow(GuidedFlow):
-    """What was pressed so far; see :class:`GuidedFlow`.
+def estimate_mapping(
+    prepared: Prepared,
+    presses: Sequence[GuidedPress],
+    untouched: tuple[FloatArray, FloatArray] | None,
+) -> Estimate:
+    """The likeliest channel mapping and how sure it is; ``untouched`` mean, noise V. DataError."""
+    if len(presses) < _FEWEST_MAPPING:
+        left = _FEWEST_MAPPING - len(presses)
+        return Estimate(f"{_counted(left)} more for a first answer")
+    dv, xy = _arrays(presses)
+    rest, noise = untouched or (None, None)
+    solution = solve_channel_mapping(dv, xy, prepared.skin, reference=rest, noise=noise)
+    ring = ring_of(prepared.skin)
+    figures = Figures(
+        mapping=solution.mapping.text(ring),
+        probability=solution.probability,
+        odds=min(solution.odds, 1e9),
+        runner_up=solution.runner_up.text(ring),
+        polarity_known=solution.polarity_known,
+        doubtful=[row for row, _, _ in solution.contradicted],
+    )
+    text = _in_words(solution, figures)
+    return Estimate(text, solution.next_place, solution.sure, figures, solution)
 
-    Attributes
-    ----------
-    presses
-        Presses so far.
-    """
 
-    def __init__(self, kind: FlowKind, prepared: Prepared) -> None:
+def _in_words(solution: MappingAnswer, figures: Figures) -> str:
+    if solution.sure:
+        return f"Sure: {figures.mapping}"
+    if solution.doubtful:
+        return "Many presses fit other positions better. Was each press on its dot?"
+    if solution.unexplained > 1 - solution.probability - solution.unexplained:
+        return "No channel mapping explains these presses well. Press on the dot, and harder"
+    return f"Not sure yet: {figures.mapping}, or {figures.runner_up}. The next dot decides"
+
+
+class _DotFlow(GuidedFlow):
+    """Presses where the dot is; see :class:`GuidedFlow`."""
+
+    efforts: tuple[Effort | None, ...] = (None,)
+
+    def __init__(self, kind: Literal["touch", "mapping"], prepared: Prepared) -> None:
         super().__init__(kind, prepared)
         self.presses: list[GuidedPress] = []
         self.answers = {UndoPress: lambda _: self._undo()}
         self._taker = PressTaker.of(prepared)
-        self._now = _Seen(self._taker.phase, "", None)
         self._undone = False
         self._dots = Dots(prepared)
         self._dot = self._dots.next((), None)
 
-    def see(self, result: FrameResult) -> _Seen | None:
-        """See :class:`GuidedFlow`."""
+    def see(self, result: FrameResult) -> bool | None:
+        """Take a press on the dot, and move the dot on; or say what else is to be done."""
         taker, before = self._taker, (self._taker.phase, self._taker.hint)
         if self._undone and taker.phase == "release":  # it may have been no press
             taker.restart()
         self._undone = False
         dv = taker.push(result.host_time, result.voltages)
-        changed = dv is not None or before != (taker.phase, taker.hint)
-        return _Seen(taker.phase, taker.hint, dv) if changed else None
-
-    def take(self, seen: _Seen) -> bool:
-        """A press on the dot was taken, and the dot moves on; or something else is to be done."""
-        self._now = seen
-        if seen.dv is None:
-            return False
-        self.presses.append(GuidedPress(self._dot, seen.dv, self.effort))
+        if dv is None:
+            return None if before == (taker.phase, taker.hint) else False
+        self.presses.append(GuidedPress(self._dot, dv, self.effort))
         self._dot = self._dots.next([p.place for p in self.presses], self.estimate)
         return True
+
+    def restart(self) -> None:
+        """See :class:`GuidedFlow`."""
+        self._taker.restart()
 
     @property
     def effort(self) -> Effort | None:
         """How to press the dot; None where that does not matter."""
-        return EFFORTS[len(self.presses) % len(EFFORTS)] if self.kind == "touch" else None
+        return self.efforts[len(self.presses) % len(self.efforts)]
 
     def _undo(self) -> bool:
         """Remove the last press."""
@@ -87,33 +151,54 @@ class PressFlow(GuidedFlow):
         """See :class:`GuidedFlow`."""
         return tuple(self.presses)
 
-    def estimate_from(self, examples: tuple[GuidedPress, ...]) -> Estimate:
-        """See :class:`GuidedFlow`."""
-        if self.kind == "touch":
-            return estimate_touch(self.prepared, examples)
-        return estimate_wiring(self.prepared, examples, self._taker.untouched)
-
     def details(self) -> dict[str, Any]:
         """See :class:`GuidedFlow`."""
-        hint = {"text": self._now.hint} if self._now.hint else {}
-        return {
-            **hint,
-            "phase": self._now.phase,
+        hint = {"text": self._taker.hint} if self._taker.hint else {}
+        return hint | {
+            "phase": self._taker.phase,
             "dot": self._dot,
             "effort": self.effort,
             "presses": [press.place for press in self.presses],
         }
 
-    def keep(
-        self, answer: Locator | MappingAnswer, folder: Folder, name: str, runner: Runner
-    ) -> str:
+
+class TouchFlow(_DotFlow):
+    """Touch is learnt from presses on dots, soft and hard in turn."""
+
+    teaches = TOUCH
+    efforts = EFFORTS
+
+    def __init__(self, prepared: Prepared) -> None:
+        super().__init__("touch", prepared)
+
+    def estimate_from(self, examples: tuple[GuidedPress, ...]) -> Estimate:
         """See :class:`GuidedFlow`."""
-        skin = self.prepared.skin
-        if isinstance(answer, Locator):
-            calibration = TOUCH.of(answer, self.prepared.pattern, skin)
-            return keep_calibration(calibration, folder, name, runner)
+        return estimate_touch(self.prepared, examples)
+
+
+class MappingFlow(_DotFlow):
+    """The channel mapping is found from presses on dots."""
+
+    def __init__(self, prepared: Prepared) -> None:
+        super().__init__("mapping", prepared)
+
+    def estimate_from(self, examples: tuple[GuidedPress, ...]) -> Estimate:
+        """See :class:`GuidedFlow`."""
+        return estimate_mapping(self.prepared, examples, self._taker.untouched)
+
+    def keep(self, answer: MappingAnswer, folder: Folder, name: str, runner: Runner) -> str:
+        """See :class:`GuidedFlow`."""
         path = folder.free(name, ".toml")
-        mapped = answer.mapping.applied(skin)
+        mapped = answer.mapping.applied(self.prepared.skin)
         write_text(path, mapped.to_toml())
         runner.ask(commands.Change(prepare(mapped)))
         return path.name
+
+
+def _arrays(presses: Sequence[GuidedPress]) -> tuple[FloatArray, FloatArray]:
+    dv = np.array([press.dv for press in presses])
+    return dv, np.array([press.place for press in presses])
+
+
+def _counted(left: int) -> str:
+    return f"{left} press{'es' if left != 1 else ''}"

@@ -5,17 +5,27 @@ Requests that are commands to the run stand in ``run/commands.py`` and ``run/twi
 
 from __future__ import annotations
 
+from functools import reduce
+from operator import or_
 from typing import Annotated, Literal
 
 import msgspec
 from msgspec import Meta
 
 from tomoskin.core import WireError
-from tomoskin.run import SetPose, SetPresses, SetTwin, StrictRequest, commands
-from tomoskin.server.folder import MOST_NOTES, NAME, STEM
+from tomoskin.run import StrictRequest
 
 MAX_REQUEST = 32_768
 """Longest request, bytes: a pattern of some thousand rows, written out."""
+
+NAME = r"[A-Za-z0-9][A-Za-z0-9._-]{0,119}"
+"""Of a file that a page may ask for: no folder, nothing hidden."""
+
+STEM = r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}"
+"""The same without its ending."""
+
+MOST_NOTES = 4000
+"""Letters of the notes on a session."""
 
 FileName = Annotated[str, Meta(pattern=rf"^{NAME}\Z")]
 """Of a file in the session folder: no folder, nothing hidden; ``server/folder.py`` looks again."""
@@ -26,6 +36,8 @@ Stem = Annotated[str, Meta(pattern=rf"^{STEM}\Z")]
 Format = Literal["touches", "csv", "npz", "mat", "h5", "parquet", "png", "gif"]
 
 FlowKind = Literal["touch", "mapping", "force", "rub"]
+
+Unit = Literal["N", "g", "kg"]
 
 Calibrated = Literal["touch", "force"]
 """What a calibration that a page can choose is of."""
@@ -152,6 +164,12 @@ class BeginFlow(StrictRequest, frozen=True, tag="flow_begin"):
     kind: FlowKind
 
 
+class ShowFlow(StrictRequest, frozen=True, tag="flow_show"):
+    """This page shows the flow, or hides it: while no page shows it, it is paused."""
+
+    on: bool
+
+
 class UndoPress(StrictRequest, frozen=True, tag="flow_undo"):
     """Remove the last press."""
 
@@ -166,7 +184,7 @@ class SetWeight(StrictRequest, frozen=True, tag="flow_weight"):
     """What lies on the skin, or comes next; ``sure``: an unusual weight is meant as it is said."""
 
     value: Annotated[float, Meta(gt=0, le=1e6)]
-    unit: Literal["N", "g", "kg"]
+    unit: Unit
     sure: bool = False
 
 
@@ -201,49 +219,16 @@ class UseCalibration(StrictRequest, frozen=True, tag="calibration"):
     of: Calibrated = "touch"
 
 
-RunRequest = (
-    commands.TakeReference
-    | commands.SetPause
-    | SetRecording
-    | AskUnresolved
-    | commands.Note
-    | Painted
-    | SetPresses
-    | SetTwin
-    | SetPose
-    | commands.ReplayCommand
-)
+REQUESTS = tuple(kind for kind in StrictRequest.__subclasses__() if kind.__struct_config__.tag)
+"""All that a page may ask: every request of these modules that has a type of its own."""
 
-SettingsRequest = SetSettings | UndoSettings | RedoSettings | SaveSkin | LoadSkin | AskPattern
+REQUEST = reduce(or_, REQUESTS)
+"""Any of them, as a type."""
 
-FlowRequest = (
-    ListFiles
-    | OpenSession
-    | GoLive
-    | ExportSession
-    | RenameSession
-    | DeleteSession
-    | Annotate
-    | ListSources
-    | Connect
-    | BeginFlow
-    | UndoPress
-    | DeletePress
-    | SetWeight
-    | AskPoint
-    | LearnFlow
-    | StopLearning
-    | EndFlow
-    | KeepFlow
-    | UseCalibration
-)
-
-Request = RunRequest | SettingsRequest | FlowRequest
-
-_DECODER: msgspec.json.Decoder[Request] = msgspec.json.Decoder(Request)
+_DECODER: msgspec.json.Decoder[StrictRequest] = msgspec.json.Decoder(REQUEST)
 
 
-def decode_request(data: str | bytes) -> Request:
+def decode_request(data: str | bytes) -> StrictRequest:
     """One request from a page's message.
 
     Raises

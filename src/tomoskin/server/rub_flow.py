@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from tomoskin.core import DataError, FloatArray, WireError, reach
-from tomoskin.learning import TOUCH, Locator, Rubbing, quiet_electrodes
+from tomoskin.learning import TOUCH, Rubbing, quiet_electrodes
 from tomoskin.pipeline import FrameResult, Prepared
-from tomoskin.run import Runner
 from tomoskin.sensing.segment import Region
-from tomoskin.server.folder import Folder
-from tomoskin.server.guided_flow import Estimate, GuidedFlow, keep_calibration
-from tomoskin.server.guided_presses import Dots
+from tomoskin.server.guided_flow import Dots, Estimate, GuidedFlow, GuidedPress
+from tomoskin.server.page_messages import Figures, Point, RubbedNow
 from tomoskin.server.press_taker import OFTEN, PressTaker
 from tomoskin.server.requests import AskPoint, LearnFlow, StopLearning, UndoPress
 
@@ -88,26 +86,26 @@ class Rubbed:
     @property
     def text(self) -> str:
         """What is still missing, in words."""
-        said = []
+        words = []
         if self.frames > _FEWEST / 3 and self.several > _SEVERAL * self.frames:
-            said.append(
+            words.append(
                 f"{100 * self.several / self.frames:.0f} % of the frames show several touches and "
                 "are left out: rub with one finger of one hand, and more slowly."
             )
         if len(self.dv) < _FEWEST:
-            said.append(f"{_FEWEST - len(self.dv)} more to learn from.")
+            words.append(f"{_FEWEST - len(self.dv)} more to learn from.")
         elif self.part < _COVERED:
-            said.append(
+            words.append(
                 f"{100 * self.part:.0f} % of the skin is touched: go on where the map is empty."
             )
         elif self.quiet:
             names = ", ".join(f"E{electrode + 1}" for electrode in self.quiet)
-            said.append(f"No touch has come near {names} yet: rub out to the rim.")
+            words.append(f"No touch has come near {names} yet: rub out to the rim.")
         elif len(self.dv) < _GOOD:
-            said.append(f"Enough to learn from. {_GOOD} are better: a minute of rubbing.")
+            words.append(f"Enough to learn from. {_GOOD} are better: a minute of rubbing.")
         else:
-            said.append("Enough.")
-        return " ".join(said)
+            words.append("Enough.")
+        return " ".join(words)
 
 
 class RubbedTouches:
@@ -154,23 +152,6 @@ class RubbedTouches:
         return Rubbed(dv, self._covered, self._several, self._frames, quiet)
 
 
-@dataclass(frozen=True, eq=False)
-class _Seen:
-    """What was rubbed, the phase of a press at a known position, and its change (n_meas,) V."""
-
-    rubbed: Rubbed
-    phase: str
-    dv: FloatArray | None
-
-
-@dataclass(frozen=True, eq=False)
-class _Point:
-    """A press at a known position m, and its change (n_meas,) V."""
-
-    xy: tuple[float, float]
-    dv: FloatArray = field(repr=False)
-
-
 class RubFlow(GuidedFlow):
     """What was rubbed so far; see :class:`GuidedFlow`. It learns when it is asked to.
 
@@ -180,11 +161,13 @@ class RubFlow(GuidedFlow):
         Touches everywhere, and presses at known positions.
     """
 
+    teaches = TOUCH
+
     def __init__(self, prepared: Prepared) -> None:
         super().__init__("rub", prepared)
         self._touches = RubbedTouches(prepared)
         self.rubbed = self._touches.now()
-        self.points: list[_Point] = []
+        self.points: list[GuidedPress] = []
         self.answers = {
             AskPoint: lambda request: self._ask(on=request.on),
             UndoPress: lambda _: self._undo(),
@@ -192,35 +175,36 @@ class RubFlow(GuidedFlow):
             StopLearning: lambda _: self._stop(),
         }
         self._taker: PressTaker | None = None
-        self._phase = "rub"
         self._dots = Dots(prepared)
-        self._dot: tuple[float, float] | None = None
+        self._dot: Point | None = None
         self._examples: tuple[Any, ...] = ()
-        self._told = -np.inf
+        self._shown = -np.inf
 
-    def see(self, result: FrameResult) -> _Seen | None:
-        """See :class:`GuidedFlow`."""
-        taker, dv, phase = self._taker, None, "rub"
+    def see(self, result: FrameResult) -> bool | None:
+        """Take a touch, or a press at the dot."""
+        taker, dv, moved = self._taker, None, False
         if taker is None:
             self._touches.push(result)
         else:
-            dv, phase = taker.push(result.host_time, result.voltages), taker.phase
-        due = not 0 <= result.host_time - self._told < _PERIOD
-        if dv is None and phase == self._phase and not due:
-            return None
-        self._told = result.host_time
-        return _Seen(self._touches.now(), phase, dv)
-
-    def take(self, seen: _Seen) -> bool:
-        """Touches have come, or a press at the dot."""
-        self.rubbed, self._phase = seen.rubbed, seen.phase
-        if seen.dv is not None and self._dot is not None:
-            self.points.append(_Point(self._dot, seen.dv))
+            phase = taker.phase
+            dv = taker.push(result.host_time, result.voltages)
+            moved = taker.phase != phase
+        if dv is not None and self._dot is not None:
+            self.points.append(GuidedPress(self._dot, dv))
             self._dot = self._next_dot()
+        elif not moved and 0 <= result.host_time - self._shown < _PERIOD:
+            return None
+        self._shown = result.host_time
+        self.rubbed = self._touches.now()
         return False
 
-    def _next_dot(self) -> tuple[float, float]:
-        return self._dots.next([point.xy for point in self.points], None)
+    def restart(self) -> None:
+        """See :class:`GuidedFlow`."""
+        if self._taker is not None:
+            self._taker.restart()
+
+    def _next_dot(self) -> Point:
+        return self._dots.next([point.place for point in self.points], None)
 
     def _ask(self, *, on: bool) -> bool:
         self._taker = PressTaker.of(self.prepared) if on else None
@@ -256,48 +240,41 @@ class RubFlow(GuidedFlow):
         dv = np.concatenate([[point.dv for point in points], rubbed.dv]) if points else rubbed.dv
         xy = np.full((len(dv), 2), np.nan)
         for number, point in enumerate(points):
-            xy[number] = point.xy
-        found = Rubbing.of(dv, self.prepared.skin, xy)
-        if not found.holds:
-            raise DataError("; ".join(found.findings))
+            xy[number] = point.place
+        answer = Rubbing.of(dv, self.prepared.skin, xy)
+        if not answer.holds:
+            raise DataError("; ".join(answer.findings))
 
         def learnt(done: float, total: float) -> None:
             self.stage = f"learning, {100 * done / total:.0f} %"
             reach()
 
         return Estimate(
-            f"{found.text}.",
+            f"{answer.text}.",
             ready=True,
-            figures={
-                "deviation_mm": 1e3 * found.deviation,
-                "remarks": [*rubbed.gap, *found.findings],
-            },
-            answer=found.locator(learnt),
+            figures=Figures(
+                deviation_mm=1e3 * answer.deviation, remarks=[*rubbed.gap, *answer.findings]
+            ),
+            answer=answer.locator(learnt),
         )
 
     def details(self) -> dict[str, Any]:
         """See :class:`GuidedFlow`."""
         rubbed = self.rubbed
         return {
-            "phase": self._phase,
+            "phase": "rub" if self._taker is None else self._taker.phase,
             "dot": self._dot,
-            "presses": [point.xy for point in self.points],
+            "presses": [point.place for point in self.points],
             "stage": self.stage,
-            "rubbed": {
-                "touches": len(rubbed.dv),
-                "needed": _FEWEST,
-                "text": rubbed.text,
-                "enough": rubbed.enough,
-                "places": self._touches.places.ravel().tolist(),
-                "covered": rubbed.covered.tolist(),
-                "near_m": self._touches.near,
-            },
+            "rubbed": RubbedNow.of(
+                rubbed,
+                touches=len(rubbed.dv),
+                needed=_FEWEST,
+                places=self._touches.places.ravel().tolist(),
+                covered=rubbed.covered.tolist(),
+                near_m=self._touches.near,
+            ),
         }
-
-    def keep(self, answer: Locator, folder: Folder, name: str, runner: Runner) -> str:
-        """See :class:`GuidedFlow`."""
-        calibration = TOUCH.of(answer, self.prepared.pattern, self.prepared.skin)
-        return keep_calibration(calibration, folder, name, runner)
 
 
 def _rms(values: FloatArray) -> float:

@@ -14,7 +14,7 @@ from tomoskin.core import DataError, GeometryError, TomoskinError, WireError
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Unresolved
 from tomoskin.run import Runner, SetPresses, commands
-from tomoskin.server import page_messages
+from tomoskin.server.page_messages import UnresolvedMap
 from tomoskin.server.requests import AskUnresolved, Painted, SetRecording
 from tomoskin.server.task import Handlers, Listener, Tasks
 from tomoskin.twin import Contact
@@ -39,7 +39,7 @@ def run_handlers(runner: Runner, folder: Path, tasks: Tasks) -> Handlers:
         tasks.keep(_record(runner, folder, on=request.on))
 
     def map_out(page: Listener, _: AskUnresolved) -> None:
-        tasks.run(page, partial(_unresolved, runner), page.post)
+        tasks.run(page, partial(_unresolved, runner), lambda found: page.post(found.json))
 
     def play(page: Listener, request: commands.ReplayCommand) -> None:
         tasks.run(page, partial(runner.ask, request), lambda _: None)  # a seek may read a file
@@ -56,16 +56,16 @@ def run_handlers(runner: Runner, folder: Path, tasks: Tasks) -> Handlers:
     }
 
 
-def _unresolved(runner: Runner) -> str:
-    """What the data of this moment cannot tell, as a message."""
+def _unresolved(runner: Runner) -> UnresolvedMap:
+    """What the data of this moment cannot tell."""
     newest, prepared = runner.newest, runner.prepared
     health = newest.result.health if newest else None
     lost = np.zeros(prepared.pattern.n_meas, bool) if health is None else health.lost
     try:
         found = Unresolved.of(prepared, runner.status().choice.alpha, np.flatnonzero(lost))
     except TomoskinError as error:
-        return page_messages.unresolved(None, error.message)
-    return page_messages.unresolved(found)
+        return UnresolvedMap(values=None, radius_m=0.0, problem=error.message)
+    return UnresolvedMap(values=found.values.round(3).tolist(), radius_m=found.radius, problem="")
 
 
 async def _record(runner: Runner, folder: Path, *, on: bool) -> None:

@@ -23,7 +23,7 @@ from starlette.websockets import WebSocket
 from websockets.exceptions import InvalidState
 
 from tomoskin.core import DataError, StrPath, TomoskinError
-from tomoskin.server import page_messages
+from tomoskin.server import views
 from tomoskin.server.access import AccessControl, AccessPolicy
 from tomoskin.server.door import Door
 from tomoskin.server.folder import Folder
@@ -96,7 +96,7 @@ def robot_application(
     ``/skin/NAME/`` what :func:`application` has of one skin."""
     skins = (Mount(f"/skin/{n}", routes=[*_routes(h), _page(static)]) for n, h in hubs.items())
     routes = [
-        *_ends(overview, lambda: states(overview.run)),
+        *_ends(overview, lambda: states(overview.run).json),
         Route("/", partial(_file, static / "robot.html")),
         *skins,
         _page(static),
@@ -115,7 +115,7 @@ def _routes(hub: Hub) -> list[BaseRoute]:
             return PlainTextResponse(f"{error}\n", 404)
         return FileResponse(path, media_type="application/octet-stream", filename=name)
 
-    ends = _ends(hub, lambda: page_messages.state(hub.runner.status()))
+    ends = _ends(hub, lambda: views.state(hub.runner.status()).json)
     return [*ends, Route("/files/{name}", download)]
 
 

@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
+from msgspec.structs import replace
+
 from tomoskin.core import PatternError, SkinError, TomoskinError
 from tomoskin.model.pattern import named
 from tomoskin.model.section import (
@@ -20,7 +22,15 @@ from tomoskin.model.section import (
     Whole,
 )
 from tomoskin.model.skin import SECTIONS, Skin
-from tomoskin.server.page_messages import text_of
+from tomoskin.server.settings_messages import (
+    Condition,
+    KeyForm,
+    KindForm,
+    PatternTable,
+    SchemaForm,
+    SectionForm,
+    SettingRefused,
+)
 
 Changes = Mapping[str, Mapping[str, Any]]
 """Values by section and key, as a skin file writes them; None takes a key out."""
@@ -36,47 +46,46 @@ _PLACE = re.compile(r"\[(\w+)\](?: (\w+))?(?:, (.+))?$")
 
 
 @cache
-def schema() -> str:
-    """Message with every section and key: kinds, bounds, units, meanings and conditions."""
-    sections = [
-        {
-            "name": section.section,
-            "meaning": section.meaning,
-            "keys": [
-                {
-                    "name": key.name,
-                    "kind": _form(key.kind),
-                    "expected": key.kind.expected,
-                    "meaning": key.meaning,
-                    "required": key.required,
-                    "when": _condition(key.when),
-                    "effective": _condition(key.effective),
-                    "unless": key.unless or None,
-                    "locked": (section.section, key.name) in LOCKED,
-                }
-                for key in section.keys
-            ],
-        }
-        for section in SECTIONS.values()
-    ]
-    return text_of(type="schema", sections=sections)
+def schema() -> SchemaForm:
+    """Every section and key: kinds, bounds, units, meanings and conditions."""
+    return SchemaForm(
+        sections=[
+            SectionForm(
+                name=section.section,
+                meaning=section.meaning,
+                keys=[
+                    KeyForm.of(
+                        key,
+                        kind=_form(key.kind),
+                        expected=key.kind.expected,
+                        when=_condition(key.when),
+                        effective=_condition(key.effective),
+                        unless=key.unless or None,
+                        locked=(section.section, key.name) in LOCKED,
+                    )
+                    for key in section.keys
+                ],
+            )
+            for section in SECTIONS.values()
+        ]
+    )
 
 
-def _condition(of: tuple[str, tuple[str, ...]] | None) -> dict[str, Any] | None:
-    return None if of is None else {"key": of[0], "words": of[1]}
+def _condition(of: tuple[str, tuple[str, ...]] | None) -> Condition | None:
+    return None if of is None else Condition(key=of[0], words=of[1])
 
 
-def refusal(error: TomoskinError) -> str:
-    """Message that a setting was refused, with its section and key where the error names them."""
+def refusal(error: TomoskinError) -> SettingRefused:
+    """That a setting was refused, with its section and key where the error names them."""
     place = _PLACE.search(error.where)
     section, key, part = place.groups() if place else (None, None, None)
     advice = f" ({error.hint})" if error.hint else ""
     text = f"{f'{part}: ' if part else ''}{error.message}{advice}" if place else str(error)
-    return text_of(type="settings_error", section=section, key=key, message=text)
+    return SettingRefused(section=section, key=key, message=text)
 
 
-def table_of(name: str, n_electrodes: int) -> str:
-    """Message with the rows of a named pattern.
+def table_of(name: str, n_electrodes: int) -> PatternTable:
+    """The rows of a named pattern.
 
     Raises
     ------
@@ -89,8 +98,7 @@ def table_of(name: str, n_electrodes: int) -> str:
             f"expected a pattern of at most {MOST_ROWS} rows to edit, got {pattern.n_meas}",
             hint="choose it by its name, or begin with a smaller pattern",
         )
-    rows = {"drive": pattern.drive.tolist(), "measure": pattern.measure.tolist()}
-    return text_of(type="pattern", name=name, **rows)
+    return PatternTable(name=name, drive=pattern.drive.tolist(), measure=pattern.measure.tolist())
 
 
 def altered(skin: Skin, changes: Changes) -> Skin:
@@ -126,21 +134,20 @@ def _tidy(skin: Skin, name: str, changes: Mapping[str, Any]) -> dict[str, Any]:
     return {**barred, **changes}
 
 
-def _form(kind: ValueKind[Any]) -> dict[str, Any]:
+def _form(kind: ValueKind[Any]) -> KindForm:
+    form = KindForm(form="text")
     match kind:
         case Choice():
-            form: dict[str, Any] = {"form": "choice", "words": kind.words}
+            form = KindForm(form="choice", words=kind.words)
         case Whole() | Number():
-            form = {"form": "number", "low": kind.low, "high": kind.high}
+            form = KindForm(form="number", low=kind.low, high=kind.high)
         case Quantity():
-            form = {"form": "quantity", "unit": kind.unit, "low": kind.low, "high": kind.high}
+            form = KindForm(form="quantity", unit=kind.unit, low=kind.low, high=kind.high)
         case NumberOrWord():
-            form = {**_form(kind.number), "words": kind.words.words}
+            form = replace(_form(kind.number), words=kind.words.words)
         case OneOrEach():
             form = _form(kind.inner)
         case Table():
             names, kinds = zip(*kind.row.entries.items(), strict=True)
-            form = {"form": "rows", "names": names, "inner": _form(kinds[0])}
-        case _:
-            form = {"form": "text"}
+            form = KindForm(form="rows", names=names, inner=_form(kinds[0]))
     return form

@@ -5,9 +5,10 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import Any, get_args
 
 from tomoskin.core import (
     Output,
@@ -25,7 +26,7 @@ from tomoskin.pipeline import Prepared, colour_limit, prepare, tuned_image
 from tomoskin.run import Runner, commands
 from tomoskin.server.folder import Folder
 from tomoskin.server.hub import Hub
-from tomoskin.server.page_messages import text_of
+from tomoskin.server.page_messages import Message
 from tomoskin.server.requests import (
     AskPattern,
     LoadSkin,
@@ -35,9 +36,10 @@ from tomoskin.server.requests import (
     UndoSettings,
 )
 from tomoskin.server.settings_form import altered, refusal, schema, table_of
+from tomoskin.server.settings_messages import Progress, Settings, StageName
 from tomoskin.server.task import Listener
 
-STAGES = ("mesh", "model", "image", "touches", "source")
+STAGES = get_args(StageName)
 """What a change of settings comes to, one after the other; many begin later, or end earlier."""
 
 MOST_KEPT = 100
@@ -146,7 +148,7 @@ class SettingsHandlers:
             self.greeting,
         )
 
-    def greeting(self) -> Sequence[str]:
+    def greeting(self) -> tuple[Message, ...]:
         """The schema, the settings as they are, and how far a change is."""
         return (schema(), self._message(), _progress(self._stage))
 
@@ -156,7 +158,7 @@ class SettingsHandlers:
             skin = altered(self._present(), request.changes)
             self._check(skin)
         except TomoskinError as error:
-            page.post(refusal(error))
+            page.post(refusal(error).json)
             return
         self._history.add(self._present(), keys, time.monotonic())
         self._go(page, skin)
@@ -172,7 +174,7 @@ class SettingsHandlers:
             skin = Skin.load(path if path.is_file() else request.name)
             self._check(skin)
         except TomoskinError as error:
-            page.post(refusal(error))
+            page.post(refusal(error).json)
             return
         self._history.add(self._present())
         self._go(page, skin)
@@ -182,16 +184,16 @@ class SettingsHandlers:
         try:
             _save(self._hub.folder / name, self._present(), replace=request.replace)
         except TomoskinError as error:  # the page is told names, never paths
-            page.post(refusal(type(error)(error.message, where=name, hint=error.hint)))
+            page.post(refusal(type(error)(error.message, where=name, hint=error.hint)).json)
             return
         self._hub.runner.say("saved", f"settings saved as {name}")
-        self._hub.tell([self._message()])
+        self._hub.tell(self._message())
 
     def _pattern(self, page: Listener, request: AskPattern) -> None:
         try:
-            page.post(table_of(request.name, self._present().n_electrodes))
+            page.post(table_of(request.name, self._present().n_electrodes).json)
         except TomoskinError as error:
-            page.post(refusal(error))
+            page.post(refusal(error).json)
 
     def _present(self) -> Skin:
         """The settings as they are, or will be when what is being prepared is ready."""
@@ -213,7 +215,7 @@ class SettingsHandlers:
         if not self._working:
             self._working = True
             self._hub.tasks.keep(self._work(page))
-        self._hub.tell([self._message()])
+        self._hub.tell(self._message())
 
     async def _work(self, page: Listener) -> None:
         """Prepare what is wanted until nothing newer is; what fails is taken back."""
@@ -226,12 +228,13 @@ class SettingsHandlers:
             except _SupersededError:
                 continue
             except TomoskinError as error:
-                page.post(refusal(error))
+                page.post(refusal(error).json)
             except Exception as error:  # the next change is none the worse for it
                 _log.exception("settings could not be prepared")
-                page.post(refusal(SkinError(f"internal error, {type(error).__name__}: {error}")))
+                internal = SkinError(f"internal error, {type(error).__name__}: {error}")
+                page.post(refusal(internal).json)
         self._working, self._stage = False, None
-        self._hub.tell([self._message()])
+        self._hub.tell(self._message())
 
     async def _follow(self, skin: Skin) -> None:
         """Go on with ``skin``, and tell every page."""
@@ -251,7 +254,7 @@ class SettingsHandlers:
                 raise _SupersededError
             if stage:
                 self._stage = stage
-                loop.call_soon_threadsafe(self._hub.tell, [_progress(stage)])
+                loop.call_soon_threadsafe(self._hub.tell, _progress(stage))
 
         return watch
 
@@ -277,11 +280,9 @@ class SettingsHandlers:
         self._took = time.monotonic() - start
         return None
 
-    def _message(self) -> str:
-        """The message with the settings."""
+    def _message(self) -> Settings:
         skin = self._present()
-        return text_of(
-            type="settings",
+        return Settings(
             document=skin.document,
             n_electrodes=skin.n_electrodes,
             automatic_alpha=self._automatic.of(self._hub.runner),
@@ -295,10 +296,10 @@ class SettingsHandlers:
         )
 
 
-def _progress(stage: str | None) -> str:
-    """The progress message; None: nothing is being changed."""
+def _progress(stage: Any) -> Progress:
+    """How far a change is; None: nothing is being changed."""
     done = 0 if stage is None else STAGES.index(stage)
-    return text_of(type="progress", stage=stage, done=done, stages=len(STAGES))
+    return Progress(stage=stage, done=done, stages=len(STAGES))
 
 
 def _change(runner: Runner, prepared: Prepared, open_source: commands.Opener) -> None:

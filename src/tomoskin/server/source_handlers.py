@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from tomoskin.board.source import (
     BOARDS,
@@ -14,14 +13,14 @@ from tomoskin.board.source import (
     list_ports,
     open_source,
 )
-from tomoskin.board.wire import SCHEMA
+from tomoskin.board.wire import SCHEMA, Info
 from tomoskin.core import SourceError
 from tomoskin.files.session import ReplayTransport, SessionReader, as_recorded, parse_replay
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared
 from tomoskin.run import commands
 from tomoskin.server.hub import Hub
-from tomoskin.server.page_messages import text_of
+from tomoskin.server.page_messages import BoardNow, Offer, Sources
 from tomoskin.server.requests import Connect, ListSources
 from tomoskin.server.task import Listener
 
@@ -32,14 +31,6 @@ EMULATED = {
     for name, board in BOARDS.items()
     if board.emulator
 }
-
-
-@dataclass(frozen=True, slots=True)
-class Offer:
-    """A source that a page may choose: what opens it, and in words what it is."""
-
-    id: str
-    text: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +64,7 @@ class SourceSwitch:
         offers |= {f"serial:{port.device}": str(port) for port in list_ports()}
         if not self._home.startswith("replay:"):
             offers = {self._home: offers.get(self._home, self._home)} | offers
-        return [Offer(id, text) for id, text in offers.items()]
+        return [Offer(id=id, text=text) for id, text in offers.items()]
 
     def connect(self, spec: str) -> None:
         """Go on with one of :meth:`offers`. Raises SourceError."""
@@ -119,7 +110,7 @@ class SourceHandlers:
 
     def _list(self, page: Listener, _: ListSources) -> None:
         def answer(offers: list[Offer]) -> None:
-            page.post(self._message(offers))
+            page.post(self._message(offers).json)
 
         self._hub.tasks.run(page, self._switch.offers, answer)
 
@@ -127,27 +118,23 @@ class SourceHandlers:
         work = partial(self._switch.connect, request.source)
         self._hub.tasks.run(page, work, lambda _: self._hub.show())
 
-    def _message(self, offers: list[Offer]) -> str:
+    def _message(self, offers: list[Offer]) -> Sources:
         status = self._hub.runner.status()
-        return text_of(
-            type="sources",
-            sources=[asdict(offer) for offer in offers],
+        return Sources(
+            sources=offers,
             current=self._switch.spec,
             host_protocol=f"{SCHEMA.major}.{SCHEMA.minor}",
-            board=_board(status.board, status.board_name),
+            board=None if status.board is None else _identity(status.board, status.board_name),
             problem=status.problem,
         )
 
 
-def _board(info: Any, name: str) -> dict[str, Any] | None:
-    if info is None:
-        return None
-    return {
-        "name": name,
-        "firmware": ".".join(map(str, info.firmware)),
-        "protocol": f"{info.major}.{info.minor}",
-        "channels": info.channels,
-        "adc_bits": info.adc_bits,
-        "current_ma": info.current / 1e3,
-        "unique_id": info.unique_id.hex(),
-    }
+def _identity(info: Info, name: str) -> BoardNow:
+    return BoardNow.of(
+        info,
+        name=name,
+        firmware=".".join(map(str, info.firmware)),
+        protocol=f"{info.major}.{info.minor}",
+        current_ma=info.current / 1e3,
+        unique_id=info.unique_id.hex(),
+    )

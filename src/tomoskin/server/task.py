@@ -1,4 +1,4 @@
-"""What a page asks for that takes its time: done beside the event loop, its refusal sent back."""
+"""What a page asks for that takes its time: done outside the event loop, its refusal sent back."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import AsyncIterator, Callable, Coroutine, Mapping
 from typing import Any, Protocol, TypeVar
 
 from tomoskin.core import TomoskinError
-from tomoskin.server import page_messages
+from tomoskin.server.page_messages import Refusal
 
 _T = TypeVar("_T")
 
@@ -31,7 +31,7 @@ Handlers = Mapping[type, Handler]
 
 
 @contextlib.asynccontextmanager
-async def beside(work: Coroutine[None, None, None]) -> AsyncIterator[None]:
+async def during(work: Coroutine[None, None, None]) -> AsyncIterator[None]:
     """Do ``work`` while the block lasts, and no longer."""
     task = asyncio.create_task(work)
     try:
@@ -62,7 +62,7 @@ class Tasks:
             try:
                 outcome = await asyncio.to_thread(work)
             except TomoskinError as error:
-                page.post(page_messages.error(str(error)))
+                page.post(Refusal(message=str(error)).json)
             else:
                 then(outcome)
 

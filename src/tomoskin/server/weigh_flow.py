@@ -2,23 +2,128 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from tomoskin.core import DataError, WireError
+from tomoskin.core import DataError, Detection, FloatArray, Touch, WireError
 from tomoskin.learning import FORCE, ForceModel, ForceReport, WeighedPresses, Weight, least_known
 from tomoskin.pipeline import FrameResult, Prepared
-from tomoskin.run import Runner
-from tomoskin.server.folder import Folder
-from tomoskin.server.guided_flow import Estimate, GuidedFlow, keep_calibration
-from tomoskin.server.guided_presses import Dots
-from tomoskin.server.placements import Placement, PlacementTaker, PlacingPhase
+from tomoskin.server.guided_flow import Dots, Estimate, GuidedFlow
+from tomoskin.server.page_messages import Figures, Phase, Point, WeightNow
+from tomoskin.server.press_taker import OFTEN
 from tomoskin.server.requests import DeletePress, SetWeight, UndoPress
 
 _FEWEST, _ENOUGH, _GOOD = 5, 10, 20
 """Placements from which forces are learnt, that are enough to begin with, and that are good."""
+
+
+_STILL_FOR, _FEWEST_FRAMES = 0.6, 8
+"""Seconds, and frames, for which something must lie still: a hand that lowers it does not."""
+
+_CREEPS, _WAVERS = 0.04, 2.0
+"""How far it may move meanwhile, from the first half to the second: its change of the sheet as a
+part of itself, or in deviations of such a mean where that is more."""
+
+_SLIDES = 3e-3
+"""The same of its position, m."""
+
+_GONE = 3
+"""Frames without a touch after which nothing lies there."""
+
+_PATIENCE = 3.0
+"""Seconds of lying there after which it is said why nothing is recorded."""
+
+_EARLY = "Not recorded: it was lifted before it had lain still for 0.6 s. Let it lie."
+_MOVES = "Not recorded yet: it still moves or sinks in. Let it lie, or lift it and lay it on again."
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """What one thing did from the moment it was laid on until it lay still: detections in the order
+    of ``time`` (n,) s, and the one of them, ``still``, that stands for it lying still."""
+
+    detections: tuple[Detection, ...]
+    time: FloatArray
+    still: int
+
+    @property
+    def xy(self) -> Point:
+        """Position of the weight, m."""
+        detection = self.detections[self.still]
+        return detection.x, detection.y
+
+
+class PlacementTaker:
+    """Takes placements, one at a time; each lies alone, and is lifted before the next.
+
+    What leads up to it is kept: a sheet remembers.
+    """
+
+    def __init__(self) -> None:
+        self.phase: Phase = "rest"
+        self.hint = ""
+        self._rows: list[tuple[float, Detection]] = []
+        self._id = 0
+        self._empty = 0
+
+    def push(self, time: float, touches: Sequence[Touch]) -> Placement | None:
+        """Take the touches of a frame at ``time`` s; the placement when it has lain still."""
+        if not touches:
+            self._empty += 1
+            if self._empty >= _GONE:
+                if self.phase != "press":
+                    self.hint = _EARLY if self.phase == "hold" else ""
+                self.phase = "press"
+                self._rows.clear()
+            return None
+        self._empty = 0
+        if self.phase in {"rest", "release"}:
+            return None
+        if len(touches) > 1 or touches[0].merged:
+            self.phase = "several"
+            self._rows.clear()
+            return None
+        return self._alone(time, touches[0])
+
+    def _alone(self, time: float, touch: Touch) -> Placement | None:
+        if self.phase != "hold":
+            self.phase, self.hint = "hold", ""
+        if touch.id != self._id:
+            self._id = touch.id
+            self._rows.clear()
+        if self._rows and 0 <= time - self._rows[-1][0] < OFTEN:
+            return None
+        self._rows.append((time, touch.detection))
+        still = self._still()
+        if still is None:
+            if time - self._rows[0][0] > _PATIENCE:
+                self.hint = _MOVES
+            return None
+        self.phase, self.hint = "release", ""
+        times, detections = zip(*self._rows, strict=True)
+        self._rows.clear()
+        return Placement(detections, np.array(times), still)
+
+    def _still(self) -> int | None:
+        """Number of the row that stands for it, once it lies still."""
+        times = np.array([time for time, _ in self._rows])
+        first = int(np.searchsorted(times, times[-1] - _STILL_FOR))
+        if times[-1] - times[0] < _STILL_FOR or len(times) - first < _FEWEST_FRAMES:
+            return None
+        late = [detection for _, detection in self._rows[first:]]
+        content = np.array([abs(d.peak) * d.area for d in late])
+        xy = np.array([(d.x, d.y) for d in late])
+        half = len(late) // 2
+        moved = abs(content[half:].mean() - content[:half].mean())
+        usual = content.std() * np.sqrt(2 / half)
+        slid = np.linalg.norm(xy[half:].mean(axis=0) - xy[:half].mean(axis=0))
+        if moved > max(_CREEPS * content.mean(), _WAVERS * usual) or slid > _SLIDES:
+            return None
+        middle = np.argsort(content)[len(content) // 2]
+        return first + int(middle)
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,14 +132,6 @@ class Weighed:
 
     placement: Placement
     weight: Weight
-
-
-@dataclass(frozen=True, eq=False)
-class _Seen:
-    """A phase that has begun, and the placement that was taken, or None."""
-
-    phase: PlacingPhase
-    placement: Placement | None
 
 
 class WeighFlow(GuidedFlow):
@@ -50,6 +147,8 @@ class WeighFlow(GuidedFlow):
         What was said, where it is probably meant otherwise.
     """
 
+    teaches = FORCE
+
     def __init__(self, prepared: Prepared) -> None:
         super().__init__("force", prepared)
         self.weighed: list[Weighed] = []
@@ -61,24 +160,22 @@ class WeighFlow(GuidedFlow):
             UndoPress: lambda _: self._delete(len(self.weighed) - 1),
         }
         self._taker = PlacementTaker()
-        self._phase: PlacingPhase = self._taker.phase
         self._waiting: Placement | None = None
         self._dots = Dots(prepared)
 
-    def see(self, result: FrameResult) -> _Seen | None:
-        """See :class:`GuidedFlow`."""
-        before = self._taker.phase
-        placement = self._taker.push(result.host_time, result.touches)
-        changed = placement is not None or self._taker.phase != before
-        return _Seen(self._taker.phase, placement) if changed else None
-
-    def take(self, seen: _Seen) -> bool:
-        """A placement was taken, or a phase has begun."""
-        self._phase = seen.phase
-        if seen.placement is None:
-            return False
-        self._waiting = seen.placement
+    def see(self, result: FrameResult) -> bool | None:
+        """Take a placement, or say that a phase has begun."""
+        taker = self._taker
+        before = taker.phase, taker.hint
+        placement = taker.push(result.host_time, result.touches)
+        if placement is None:
+            return None if before == (taker.phase, taker.hint) else False
+        self._waiting = placement
         return self._record()
+
+    def restart(self) -> None:
+        """See :class:`GuidedFlow`."""
+        self._taker = PlacementTaker()
 
     def _record(self) -> bool:
         """Put the placement that waits on the list, once its weight has been said."""
@@ -118,31 +215,27 @@ class WeighFlow(GuidedFlow):
             f"{report.text}. {_advice(report)}",
             least_known(model, self._dots.places),
             ready=True,
-            figures={
-                "errors": model.errors.tolist(),
-                "doubtful": [r.press for r in report.remarks if r.press is not None],
-                "remarks": [_of_press(r.press) + r.reason for r in report.remarks],
-            },
+            figures=Figures(
+                errors=model.errors.tolist(),
+                doubtful=[r.press for r in report.remarks if r.press is not None],
+                remarks=[_of_press(r.press) + r.reason for r in report.remarks],
+            ),
             answer=model,
         )
 
     def details(self) -> dict[str, Any]:
         """See :class:`GuidedFlow`."""
         places = [one.placement.xy for one in self.weighed]
-        return {
-            "phase": "name" if self._waiting else self._phase,
+        hint = {"text": self._taker.hint} if self._taker.hint else {}
+        return hint | {
+            "phase": "name" if self._waiting else self._taker.phase,
             "dot": self._dots.next(places, self.estimate),
             "presses": places,
             "weights": [one.weight.text for one in self.weighed],
-            "weight": _fields(self.weight),
-            "asked": _fields(self.asked),
-            "meant": _fields(self.asked and self.asked.meant),
+            "weight": _shown(self.weight),
+            "asked": _shown(self.asked),
+            "meant": _shown(self.asked and self.asked.meant),
         }
-
-    def keep(self, answer: ForceModel, folder: Folder, name: str, runner: Runner) -> str:
-        """See :class:`GuidedFlow`."""
-        calibration = FORCE.of(answer, self.prepared.pattern, self.prepared.skin)
-        return keep_calibration(calibration, folder, name, runner)
 
 
 def weighed_presses(examples: tuple[Weighed, ...]) -> WeighedPresses:
@@ -175,12 +268,8 @@ def _of_press(number: int | None) -> str:
     return "" if number is None else f"Placement {number + 1}: "
 
 
-def _fields(weight: Weight | None) -> dict[str, Any] | None:
-    if weight is None:
-        return None
-    return {
-        "value": weight.value, "unit": weight.unit, "newtons": weight.newtons, "text": weight.text,
-    }  # fmt: skip
+def _shown(weight: Weight | None) -> WeightNow | None:
+    return None if weight is None else WeightNow.of(weight)
 
 
 def _counted(left: int) -> str:

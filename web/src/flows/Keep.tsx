@@ -1,20 +1,31 @@
 /** What ends every flow: leaving it, or a name for what was learnt. */
 
-import { signal } from "@preact/signals";
+import { type Signal, signal } from "@preact/signals";
 import { send } from "../state";
 import { flow, type FlowKind } from "./model";
 
-const names: Readonly<Record<FlowKind, ReturnType<typeof signal<string>>>> = {
+const names: Readonly<Record<FlowKind, Signal<string>>> = {
   mapping: signal("mapped"),
   touch: signal("touch"),
   rub: signal("rubbed"),
   force: signal("force"),
 };
 
+/** How much was recorded when leaving was asked for; null: it was not. */
+const asked = signal<number | null>(null);
+
+/** Leave the flow; asked for twice where something was recorded, since that is forgotten. */
 export function Leave() {
+  const { presses, rubbed } = flow.value;
+  const count = presses.length + (rubbed?.touches ?? 0);
+  const sure = count > 0 && asked.value === count;
+  const leave = () => {
+    asked.value = sure ? null : count;
+    if (sure || count === 0) send({ type: "flow_end" });
+  };
   return (
-    <button type="button" data-testid="flow-end" onClick={() => send({ type: "flow_end" })}>
-      Leave
+    <button type="button" data-testid="flow-end" onClick={leave}>
+      {sure ? "Forget all of it" : "Leave"}
     </button>
   );
 }
@@ -49,7 +60,7 @@ export function Keep({ kind }: { kind: FlowKind }) {
 
 /** What is wrong with what was pressed, in words. */
 export function Remarks() {
-  const remarks = flow.value.figures?.remarks ?? [];
+  const remarks = flow.value.figures.remarks ?? [];
   return (
     <>
       {remarks.map((remark) => (

@@ -62,7 +62,7 @@ function Learn({ needed, thinking }: { needed: number; thinking: boolean }) {
 }
 
 export function Rub() {
-  const { phase = "rub", presses = [], rubbed, text, thinking = false, dot, ready } = flow.value;
+  const { phase, presses, rubbed, text, thinking, dot, ready } = flow.value;
   if (!rubbed) return null;
   const { touches, needed } = rubbed;
   return (
@@ -78,7 +78,7 @@ export function Rub() {
       <p data-testid="taken">
         {touches} touches{presses.length > 0 && `, ${presses.length} known positions`}. {rubbed.text}
       </p>
-      <Points on={dot != null} count={presses.length} />
+      <Points on={dot !== null} count={presses.length} />
       <Learn needed={needed - touches} thinking={thinking} />
       <p data-testid="flow-text" class={!ready && text ? "wrong" : ""}>
         {text}

@@ -1,12 +1,15 @@
 /** The drawer of the session folder: what was recorded, played again, taken along. */
 
 import { signal, useSignal } from "@preact/signals";
-import { addDrawer, whenOpened } from "../drawers";
-import { send, status } from "../state";
+import { addDrawer, whileOpened } from "../drawers";
+import { say, send, status } from "../state";
 import { bytes, day } from "./format";
-import { askFiles, calibrations, exported, files, type FoundFile } from "./model";
+import type { ExportSession, FileEntry } from "../wire";
+import { askFiles, calibrations, exported, files } from "./model";
 
-const FORMATS: readonly (readonly [string, string])[] = [
+type Format = ExportSession["format"];
+
+const FORMATS: readonly (readonly [Format, string])[] = [
   ["touches", "Touches (CSV)"],
   ["csv", "Voltages (CSV)"],
   ["npz", "Numbers (NPZ)"],
@@ -17,7 +20,7 @@ const FORMATS: readonly (readonly [string, string])[] = [
   ["gif", "Film (GIF)"],
 ];
 
-const chosen = signal<string>("touches");
+const chosen = signal<Format>("touches");
 
 function Download({ name }: { name: string }) {
   return (
@@ -41,7 +44,7 @@ function change(name: string | null): void {
 }
 
 /** Another name, notes, deletion; what is in use keeps its name. */
-function Change({ file, busy }: { file: FoundFile; busy: boolean }) {
+function Change({ file, busy }: { file: FileEntry; busy: boolean }) {
   const { name } = file;
   const to = useSignal(stemOf(name));
   const notes = useSignal(file.notes);
@@ -112,13 +115,13 @@ function Change({ file, busy }: { file: FoundFile; busy: boolean }) {
   );
 }
 
-function aboutOf(file: FoundFile): string {
+function aboutOf(file: FileEntry): string {
   if (files.value?.recording === file.name) return "being recorded";
   if (files.value?.playing === file.name) return "being played";
   return `${day(file.written)}, ${bytes(file.size)}`;
 }
 
-function Session({ file }: { file: FoundFile }) {
+function Session({ file }: { file: FileEntry }) {
   const { name } = file;
   const playing = files.value?.playing === name;
   const recorded = files.value?.recording === name;
@@ -131,7 +134,14 @@ function Session({ file }: { file: FoundFile }) {
         {file.notes && <p class="noted">{file.notes}</p>}
       </div>
       <div class="does">
-        <button type="button" disabled={recorded} onClick={() => send({ type: "open", name })}>
+        <button
+          type="button"
+          disabled={recorded}
+          onClick={() => {
+            say(`Opening ${name}`);
+            send({ type: "open", name });
+          }}
+        >
           Play
         </button>
         <button
@@ -156,7 +166,7 @@ function Session({ file }: { file: FoundFile }) {
   );
 }
 
-function Other({ file }: { file: FoundFile }) {
+function Other({ file }: { file: FileEntry }) {
   const { touch, force } = calibrations.value;
   const gives = file.name === touch ? "positions" : file.name === force ? "forces" : null;
   return (
@@ -191,7 +201,7 @@ function View() {
         <select
           data-testid="format"
           value={chosen.value}
-          onChange={({ currentTarget }) => (chosen.value = currentTarget.value)}
+          onChange={({ currentTarget }) => (chosen.value = currentTarget.value as Format)}
         >
           {FORMATS.map(([id, name]) => (
             <option key={id} value={id}>
@@ -231,13 +241,4 @@ function View() {
 
 addDrawer({ id: "sessions", label: "Sessions", key: "S", title: "Recordings: play, export, download, rename, delete, write notes", View });
 
-const OFTEN = 1000;
-let timer = 0;
-whenOpened("sessions", () => {
-  askFiles();
-  window.clearInterval(timer);
-  timer = window.setInterval(() => {
-    if (document.querySelector("[data-testid=drawer-sessions]")) askFiles();
-    else window.clearInterval(timer);
-  }, OFTEN);
-});
+whileOpened("sessions", 1000, askFiles);

@@ -1,24 +1,23 @@
 /** The drawer that sets a skin up: the board, the reference, the wires, the touch, the force. */
 
-import { signal } from "@preact/signals";
 import { takeReference } from "../commands";
-import { addDrawer, whenOpened } from "../drawers";
+import { addDrawer, whileOpened } from "../drawers";
 import { duration, millimetres } from "../format";
 import { send, status } from "../state";
+import type { FlowNow } from "../wire";
 import { InUse } from "./Calibrations";
 import { Keep, Leave } from "./Keep";
-import { askFiles, askSources, flow, type FlowKind, type Phase, sources } from "./model";
+import { askFiles, askSources, flow, type FlowKind, type Phase, sources, type Step, step, stepOf } from "./model";
 import { Rub } from "./Rub";
 import { Weigh } from "./Weigh";
 
-type Step = "board" | "mapping" | "touch" | "force";
 const STEPS: readonly (readonly [Step, string])[] = [
   ["board", "1 Board"],
   ["mapping", "2 Channels"],
   ["touch", "3 Touch"],
   ["force", "4 Force"],
 ];
-const step = signal<Step>("board");
+
 function Identity() {
   const found = sources.value;
   const board = found?.board;
@@ -153,21 +152,28 @@ const PHASES: Partial<Record<Phase, string>> = {
   release: "Recorded. Let go",
 };
 
+/** What is to be done now. */
+function lead({ phase, effort, ready }: FlowNow): string | undefined {
+  if (phase !== "press") return PHASES[phase];
+  if (effort) return `Press ${effort} where the dot is`;
+  return ready ? "Save it, or press where the dot is" : PHASES.press;
+}
+
 function Going({ kind }: { kind: FlowKind }) {
-  const { phase = "rest", effort, presses = [], text, thinking, figures } = flow.value;
+  const { presses, text, thinking, figures } = flow.value;
   const taken = `${presses.length} press${presses.length === 1 ? "" : "es"} recorded`;
-  const doubtful = figures?.doubtful ?? [];
+  const doubtful = figures.doubtful ?? [];
   return (
     <>
       <p class="lead" role="status" data-testid="phase">
-        {phase === "press" && effort ? `Press ${effort} where the dot is` : PHASES[phase]}
+        {lead(flow.value)}
       </p>
       <p data-testid="taken">
         {taken}
         {thinking ? ", computing…" : ""}
       </p>
       <p data-testid="flow-text">{text}</p>
-      {kind === "mapping" && figures?.probability !== undefined && (
+      {kind === "mapping" && figures.probability !== undefined && (
         <progress value={figures.probability} max={1} aria-label="How sure the answer is" />
       )}
       {doubtful.length > 0 && (
@@ -176,16 +182,6 @@ function Going({ kind }: { kind: FlowKind }) {
           {doubtful.map((row) => row + 1).join(", ")} do not fit the others: the position may be wrong.
         </p>
       )}
-      <ol class="presses" aria-label="Presses recorded">
-        {presses.map(([x, y], k) => (
-          <li key={k} class={doubtful.includes(k) ? "doubtful" : ""}>
-            x {millimetres(x, 0)}, y {millimetres(y, 0)} mm
-            {figures?.errors_mm?.[k] !== undefined && (
-              <span class="small"> missed by {figures.errors_mm[k].toFixed(0)} mm</span>
-            )}
-          </li>
-        ))}
-      </ol>
       <div class="does">
         <button
           type="button"
@@ -198,6 +194,16 @@ function Going({ kind }: { kind: FlowKind }) {
         <Leave />
       </div>
       <Keep kind={kind} />
+      <ol class="presses" aria-label="Presses recorded">
+        {presses.map(([x, y], k) => (
+          <li key={k} class={doubtful.includes(k) ? "doubtful" : ""}>
+            x {millimetres(x, 0)}, y {millimetres(y, 0)} mm
+            {figures.errors_mm?.[k] !== undefined && (
+              <span class="small"> missed by {figures.errors_mm[k].toFixed(0)} mm</span>
+            )}
+          </li>
+        ))}
+      </ol>
     </>
   );
 }
@@ -231,7 +237,7 @@ function Guided({ kinds }: { kinds: readonly Teaching[] }) {
 
 function View() {
   const shown = step.value;
-  const going = flow.value.kind === "rub" ? "touch" : flow.value.kind;
+  const going = flow.value.kind && stepOf(flow.value.kind);
   return (
     <div class="flow">
       <div class="steps" role="group" aria-label="Steps">
@@ -255,17 +261,11 @@ function View() {
 
 addDrawer({ id: "setup", label: "Set up", key: "U", title: "Board, reference, channel mapping, touch, force", View });
 
-const OFTEN = 2000;
-let timer = 0;
-whenOpened("setup", () => {
-  const ask = () => {
-    askSources();
-    askFiles();
-  };
-  ask();
-  window.clearInterval(timer);
-  timer = window.setInterval(() => {
-    if (document.querySelector("[data-testid=drawer-setup]")) ask();
-    else window.clearInterval(timer);
-  }, OFTEN);
+whileOpened("setup", 2000, () => {
+  askSources();
+  askFiles();
+});
+whileOpened("setup", null, () => {
+  const { kind } = flow.peek();
+  if (kind) step.value = stepOf(kind);
 });

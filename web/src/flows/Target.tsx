@@ -1,7 +1,8 @@
 /** On the sheet: the dot where to press next, the presses that were taken, the map of a rubbed skin. */
 
 import { toPixels, type View } from "../sheet/view";
-import { dot, flow, type Phase, type Rubbed } from "./model";
+import type { RubbedNow } from "../wire";
+import { dot, flow, type Phase } from "./model";
 
 const WORDS: Readonly<Record<Phase, string>> = {
   rest: "Hands off",
@@ -14,14 +15,14 @@ const WORDS: Readonly<Record<Phase, string>> = {
 };
 
 function word(): string {
-  const { kind, phase = "rest", effort } = flow.value;
+  const { kind, phase, effort } = flow.value;
   if (phase === "press" && kind === "force") return "Here next";
   if (phase === "hold" && kind === "force") return "";
   return phase === "press" && effort ? `Press ${effort}` : WORDS[phase];
 }
 
 /** Where the skin has been rubbed: full where it has, rings where it has not. */
-function Covered({ view, rubbed }: { view: View; rubbed: Rubbed }) {
+function Covered({ view, rubbed }: { view: View; rubbed: RubbedNow }) {
   const { places, covered } = rubbed;
   return (
     <g data-testid="covered" class="covered">
@@ -34,9 +35,9 @@ function Covered({ view, rubbed }: { view: View; rubbed: Rubbed }) {
 }
 
 export function Target({ view }: { view: View }) {
-  const { phase = "rest", presses = [], rubbed } = flow.value;
+  const { phase, presses, rubbed, paused } = flow.value;
   const place = dot.value;
-  if (!place && !rubbed) return null;
+  if (paused || (!place && !rubbed)) return null;
   const [x, y] = place ? toPixels(view, ...place) : [0, 0];
   return (
     <svg class={`target ${phase}`} width={view.width} height={view.height} aria-hidden="true" data-testid="dot">

@@ -4,8 +4,9 @@ import { signal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { addCommand } from "../commands";
 import { link, send, status } from "../state";
+import type { Tick } from "../wire";
 import { clock } from "./format";
-import { allGaps, allMarks, allSpans, duration, lineOf, position, type Tick } from "./model";
+import { allGaps, allMarks, allSpans, duration, lineOf, position } from "./model";
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5, 10];
 const SEEK_MS = 120;
@@ -189,7 +190,8 @@ function PlayButtons() {
 
 export function TimeLine() {
   const of = lineOf.value;
-  if (of === null && !marking.value) return null;
+  // Its room is there from the start: the sheet must not move under a finger.
+  if (of === null && !marking.value) return <div class="timeline" aria-hidden="true" />;
   const end = of === "replay" ? ` of ${clock(duration.value)}` : "";
   return (
     <section class="timeline" data-testid="timeline" aria-label="Time line">

@@ -4,7 +4,10 @@ import { effect, signal } from "@preact/signals";
 import { fixed, millimetres } from "../format";
 import { hand, scene, send } from "../state";
 import { Keep, Leave, Remarks } from "./Keep";
-import { flow, type Phase, type Unit, type Weight } from "./model";
+import type { WeightNow } from "../wire";
+import { flow, type Phase } from "./model";
+
+type Unit = WeightNow["unit"];
 
 const PHASES: Partial<Record<Phase, string>> = {
   rest: "Lift everything off the skin",
@@ -19,13 +22,21 @@ const UNITS: readonly Unit[] = ["g", "kg", "N"];
 const value = signal("");
 const unit = signal<Unit>("g");
 
-const setWeight = (weight: Pick<Weight, "value" | "unit">, sure = false): void =>
+const setWeight = (weight: Pick<WeightNow, "value" | "unit">, sure = false): void =>
   send({ type: "flow_weight", value: weight.value, unit: weight.unit, sure });
+
+/** A page that comes later has the weight in its field too. */
+effect(() => {
+  const { weight } = flow.value;
+  if (!weight || value.peek()) return;
+  value.value = String(weight.value);
+  unit.value = weight.unit;
+});
 
 /** On a simulated skin a press of this page is the weight that lies there. */
 effect(() => {
-  const { kind, weight } = flow.value;
-  const weighed = kind === "force" && scene.value?.pressable && weight ? weight : null;
+  const { kind, weight, paused } = flow.value;
+  const weighed = kind === "force" && !paused && scene.value?.pressable && weight ? weight : null;
   const { probe } = hand.peek();
   if (!weighed && probe.grows) return;
   const force = weighed ? Math.min(weighed.newtons, probe.maxForce) : probe.force;
@@ -33,7 +44,7 @@ effect(() => {
 });
 
 /** What is wrong with this weight on a simulated skin, in words. */
-function tooHeavy(weight: Weight): string | null {
+function tooHeavy(weight: WeightNow): string | null {
   const most = scene.value?.probe.max_force_n ?? Infinity;
   if (!scene.value?.pressable || weight.newtons <= most) return null;
   return `The simulated skin is pressed with at most ${fixed(most, 0)} N: choose a smaller weight.`;
@@ -107,16 +118,16 @@ function missed(error: number | undefined): string {
 }
 
 function Recorded() {
-  const { presses = [], weights = [], figures } = flow.value;
+  const { presses, weights, figures } = flow.value;
   return (
     <ol class="placements" aria-label="Placements recorded">
       {presses.map(([x, y], k) => (
-        <li key={k} class={figures?.doubtful?.includes(k) ? "doubtful" : ""} data-testid="placement">
+        <li key={k} class={figures.doubtful?.includes(k) ? "doubtful" : ""} data-testid="placement">
           <span>
             {k + 1}. {weights[k]}
             <span class="small">
               {" "}
-              at {millimetres(x, 0)}, {millimetres(y, 0)} mm{missed(figures?.errors?.[k])}
+              at {millimetres(x, 0)}, {millimetres(y, 0)} mm{missed(figures.errors?.[k])}
             </span>
           </span>
           <button
@@ -134,7 +145,7 @@ function Recorded() {
 }
 
 export function Weigh() {
-  const { phase = "rest", presses = [], weight, text, thinking } = flow.value;
+  const { phase, presses, weight, text, thinking } = flow.value;
   const heavy = weight && tooHeavy(weight);
   return (
     <>

@@ -41,7 +41,7 @@ function Force() {
   );
   return (
     <div class="force" role="group" aria-label="Force">
-      <span>Force</span>
+      <span>Press with</span>
       {step(commands.softer, "Less force")}
       <output>{fixed(force, 1)} N</output>
       {step(commands.harder, "More force")}

@@ -1,6 +1,6 @@
 /** A uPlot that fills its panel: made once per plan, fed by a function, redrawn when that says so. */
 
-import { effect } from "@preact/signals";
+import { computed, effect } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
@@ -28,6 +28,31 @@ export function axis(theme: Theme, more: uPlot.Axis): uPlot.Axis {
   };
 }
 
+/** Keep a plot of what `plan` and `data` say, made by `make`; returns the undoing.
+ *
+ * One effect does both: data never meet the plot of an older plan. */
+export function keepPlotted<P extends object, D>(
+  plan: () => P | null,
+  data: () => D,
+  make: (plan: P) => { setData(data: D): void; destroy(): void },
+): () => void {
+  const planned = computed(plan);
+  let made: P | null = null;
+  let plot: ReturnType<typeof make> | null = null;
+  const undo = effect(() => {
+    if (made !== planned.value) {
+      plot?.destroy();
+      made = planned.value;
+      plot = made && make(made);
+    }
+    plot?.setData(data());
+  });
+  return () => {
+    undo();
+    plot?.destroy();
+  };
+}
+
 export function Plot({ label, plan, data }: PlotProps) {
   const box = useRef<HTMLDivElement>(null);
   useEffect(() => {
@@ -35,23 +60,12 @@ export function Plot({ label, plan, data }: PlotProps) {
     if (!element) return;
     const room = () => ({ width: element.clientWidth, height: element.clientHeight });
     let plot: uPlot | null = null;
-    const undo = effect(() => {
-      const wanted = plan();
-      plot?.destroy();
-      plot = wanted ? new uPlot({ ...wanted, ...room() }, undefined, element) : null;
-    });
-    // After the plan's effect, so that new data always finds the new plot.
-    const undoData = effect(() => {
-      void plan();
-      plot?.setData(data());
-    });
+    const undo = keepPlotted(plan, data, (made) => (plot = new uPlot({ ...made, ...room() }, undefined, element)));
     const observer = new ResizeObserver(() => plot?.setSize(room()));
     observer.observe(element);
     return () => {
       observer.disconnect();
-      undoData();
       undo();
-      plot?.destroy();
     };
   }, [plan, data]);
   return <div ref={box} class="plot" role="img" aria-label={label} />;

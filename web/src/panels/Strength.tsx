@@ -25,7 +25,7 @@ const scale = computed<Scale>(() =>
 );
 const lines = computed(() => (inNewtons.value ? history.forces : history.columns));
 
-/** The touch's number where its line ends. */
+/** The touch's number where its line ends, with an arrow where it goes on above. */
 function nameLines(plot: uPlot): void {
   const { ctx } = plot;
   const colours = theme.peek();
@@ -40,7 +40,8 @@ function nameLines(plot: uPlot): void {
   const ends = lines.peek().flatMap((column, slot) => {
     const value = column[last] ?? null;
     if (value === null) return [];
-    return { text: String(history.idOf(slot)), y: plot.valToPos(Math.min(value, top.peek()), "y", true) };
+    const beyond = value > top.peek() ? "↑" : "";
+    return { text: `${history.idOf(slot)}${beyond}`, y: plot.valToPos(Math.min(value, top.peek()), "y", true) };
   });
   let above = -Infinity;
   for (const { text, y } of ends.sort((a, b) => a.y - b.y)) {

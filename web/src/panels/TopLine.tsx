@@ -1,6 +1,7 @@
 /** The top line: the state as a word, the skin, what happens or what to act on, the figures. */
 
 import { signal } from "@preact/signals";
+import { flow } from "../flows/model";
 import { doing, progress, settings } from "../settings/model";
 import { connection, link, newest, notice, now, scene, send, status } from "../state";
 import { facts, headline, type Warning } from "../words";
@@ -40,6 +41,9 @@ function Skin() {
   );
 }
 
+/** The name of the skin on its robot, whose page is two folders up; null where it stands alone. */
+const part = /\/skin\/([^/]+)\/$/.exec(window.location.pathname)?.[1] ?? null;
+
 /** The first warning on one line; it opens the list of all. */
 function Warnings({ warnings }: { readonly warnings: readonly Warning[] }) {
   const more = warnings.length - 1;
@@ -71,7 +75,7 @@ function Remark({ text }: { readonly text: string }) {
 }
 
 export function TopLine() {
-  const { word, remark, warnings } = headline(link.value, scene.value, status.value, now.value, age());
+  const { word, remark, warnings } = headline(link.value, scene.value, status.value, now.value, age(), flow.value);
   const lost = link.value.phase === "lost";
   const act = warnings.length > 0;
   return (
@@ -84,6 +88,11 @@ export function TopLine() {
         <span class="lamp" aria-hidden="true" />
         <strong>{word}</strong>
       </p>
+      {part !== null && (
+        <a class="button" href="../../" title="All skins of the robot" data-testid="robot">
+          ‹ {decodeURIComponent(part)}
+        </a>
+      )}
       <Skin />
       {act ? <Warnings warnings={warnings} /> : <Remark text={remark} />}
       {lost && (

@@ -35,6 +35,9 @@ function Strength({ touch, scale }: { touch: Touch; scale: Scale }) {
       <td class="large" title={`${forceInWords(force)} (nine in ten)`} data-testid="force">
         {!force.calibrated && "~"}
         {fixed(force.newtons, 1)}
+        <span class="small interval">
+          {fixed(force.low, 0)}–{fixed(force.high, 0)}
+        </span>
       </td>
     );
   }
@@ -49,17 +52,17 @@ function Strength({ touch, scale }: { touch: Touch; scale: Scale }) {
 }
 
 function StrengthTitle({ forces, scale }: { forces: boolean; scale: Scale }) {
-  const change = `change, ${scale.unit}`;
+  const change = `strength, ${scale.unit}`;
   if (!forces) return <>{change}</>;
   return (
     <button
       type="button"
       class="quiet"
       aria-pressed={asChange.value}
-      title={asChange.value ? "Show newtons" : "Show the change of conductivity"}
+      title={asChange.value ? "Show newtons" : "Estimated from the touch, with the interval that nine in ten lie in; again for the change of conductivity"}
       onClick={() => (asChange.value = !asChange.value)}
     >
-      {asChange.value ? change : forceState.value === "uncalibrated" ? "~force, N" : "force, N"}
+      {asChange.value ? change : forceState.value === "uncalibrated" ? "~felt, N" : "felt, N"}
     </button>
   );
 }

@@ -1,6 +1,6 @@
 /** Measurement rows grouped by drive, with a gap between drives, ready to plot. */
 
-import type { PatternTable } from "../protocol";
+import type { PatternRows } from "../wire";
 
 export interface Grouping {
   /** Place of each plotted point; a gap's place lies between two drives. */
@@ -12,7 +12,7 @@ export interface Grouping {
 }
 
 /** Group a pattern's rows: consecutive rows of one source and sink belong together. */
-export function groupByDrive(pattern: PatternTable): Grouping {
+export function groupByDrive(pattern: PatternRows): Grouping {
   const places: number[] = [];
   const rows: number[] = [];
   const drives: { label: string; from: number; to: number }[] = [];

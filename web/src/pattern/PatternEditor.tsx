@@ -4,7 +4,7 @@ import { computed, effect, signal, useSignal } from "@preact/signals";
 import { change, valuesOf } from "../settings/model";
 import { onMessage, scene, send } from "../state";
 import { PatternTable } from "./PatternTable";
-import { countDrives, fresh, fromPattern, fromTables, problems, type Row, type Tables, toTables } from "./rows";
+import { countDrives, fresh, fromPattern, fromTables, problems, type Row, toTables } from "./rows";
 
 const NAMED = ["adjacent", "opposite", "skip:2", "all_pairs", "adjacent+opposite"];
 const OWN = "table";
@@ -14,10 +14,7 @@ const edited = signal<readonly Row[] | null>(null);
 const pattern = signal(scene.peek()?.pattern);
 const present = computed(() => (pattern.value ? fromPattern(pattern.value) : []));
 
-onMessage<Tables & { readonly type: "pattern" }>(
-  "pattern",
-  (tables) => (edited.value = fromTables(tables)),
-);
+onMessage("pattern", (tables) => (edited.value = fromTables(tables)));
 // Another pattern of the skin: what was edited has been used, or no longer fits.
 effect(() => {
   const now = scene.value?.pattern;

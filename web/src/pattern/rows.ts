@@ -1,6 +1,6 @@
 /** The rows of a pattern as a person edits them: typed words, checked one by one. Pure. */
 
-import type { PatternTable } from "../protocol";
+import type { PatternRows } from "../wire";
 
 /** Source, sink, plus, minus as they were typed, E1 first. */
 export type Cells = readonly [string, string, string, string];
@@ -39,7 +39,7 @@ export function fromTables({ drive, measure }: Tables): Row[] {
 }
 
 /** The skin's present rows. */
-export function fromPattern({ n_meas, drive, measure }: PatternTable): Row[] {
+export function fromPattern({ n_meas, drive, measure }: PatternRows): Row[] {
   const pairs = (flat: readonly number[]) =>
     Array.from({ length: n_meas }, (_, k) => [flat[2 * k], flat[2 * k + 1]]);
   return fromTables({ drive: pairs(drive), measure: pairs(measure) });

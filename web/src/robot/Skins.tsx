@@ -17,7 +17,7 @@ function Row({ name, frame }: { name: string; frame: string }) {
       <span class="frame">{frame}</span>
       <span class="rate">{rate}</span>
       <span class="found" data-testid={`touches-${name}`}>
-        {found.length === 0 ? "no touch" : found.map((t) => `${t.id}${strength(t.force)}`).join(", ")}
+        {found.length === 0 ? "no touch" : `touch ${found.map((t) => `${t.id}${strength(t.force)}`).join(", ")}`}
       </span>
       {trouble && <p role="status">{trouble}</p>}
     </li>

@@ -8,23 +8,22 @@ import { effect, signal } from "@preact/signals";
 import { render } from "preact";
 import { Connection, type LinkState, socketAddress } from "../socket";
 import { typeface } from "../theme";
-import { type RobotScene, type RobotState, robot, states, touches } from "./model";
+import type { RobotMessage, RobotTouches } from "../wire";
+import { robot, states, touches } from "./model";
 import { Skins } from "./Skins";
 import { Space } from "./Space";
 
 const link = signal<LinkState>({ phase: "connecting" });
 const error = signal<string | null>(null);
 
-const connection = new Connection(socketAddress(window.location), {
-  message(said) {
-    const message: unknown = said; // the server of a robot has messages of its own
-    const { type } = message as { type: string };
-    if (type === "robot") robot.value = message as RobotScene;
-    if (type === "robot-state") states.value = message as RobotState;
-    if (type === "error") error.value = (message as { message: string }).message;
+const connection = new Connection<RobotMessage>(socketAddress(window.location), {
+  message(message) {
+    if (message.type === "robot") robot.value = message;
+    else if (message.type === "robot-state") states.value = message;
+    else error.value = message.message;
   },
   frame(bytes) {
-    touches.value = (JSON.parse(new TextDecoder().decode(bytes)) as { skins: typeof touches.value }).skins;
+    touches.value = (JSON.parse(new TextDecoder().decode(bytes)) as RobotTouches).skins;
   },
   link(state) {
     link.value = state;
@@ -53,8 +52,7 @@ function Bar() {
   const recording = states.value?.recording ?? null;
   const off = link.value.phase !== "open";
   const record = () => {
-    const request = { type: "record", on: recording === null };
-    connection.send(request);
+    connection.send({ type: "record", on: recording === null });
   };
   return (
     <footer class="doings">

@@ -1,7 +1,8 @@
 /** What is drawn over the robot's skins: links, names, and touches with their numbers. */
 
 import type { Theme } from "../theme";
-import { type Camera, isFacing, type RobotScene, type SkinTouches, toPicture } from "./model";
+import type { RobotScene } from "../wire";
+import { type Camera, isFacing, type SkinTouches, toPicture } from "./model";
 
 const DOT = 7;
 const ARROW = 0.03;

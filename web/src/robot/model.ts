@@ -1,56 +1,10 @@
 /** What the page of a robot is told: skins in space, how each is doing, and the touches on them. */
 
 import { signal } from "@preact/signals";
+import type { RobotScene, RobotState, RobotTouches } from "../wire";
 import { FIRST_ORBIT, type Orbit, rotation } from "../sheet/solid";
 
-export interface PlacedSkin {
-  readonly name: string;
-  /** Frame of coordinates of its touches for other programs: its link's. */
-  readonly frame: string;
-  readonly source: string;
-  /** Corners of its triangles in the robot's root frame, m: x0, y0, z0, … */
-  readonly corners: readonly number[];
-}
-
-export interface RobotScene {
-  readonly type: "robot";
-  readonly name: string;
-  /** Both ends of the line from each link to the next, m. */
-  readonly bones: readonly number[];
-  /** Corners of the triangles of all links that have a shape, as those of skins. */
-  readonly links: readonly number[];
-  /** Which shapes cannot be drawn, and why. */
-  readonly undrawn: readonly string[];
-  readonly skins: readonly PlacedSkin[];
-}
-
-export interface SkinState {
-  readonly running: boolean;
-  readonly ready: boolean;
-  readonly fps: number;
-  readonly frames: number;
-  readonly lost: number;
-  readonly p99_ms: number | null;
-  readonly problem: string | null;
-  readonly text: string;
-}
-
-export interface RobotState {
-  readonly type: "robot-state";
-  readonly skins: Readonly<Record<string, SkinState>>;
-  readonly recording: string | null;
-}
-
-export interface SpaceTouch {
-  readonly id: number;
-  readonly position: readonly [number, number, number];
-  readonly normal: readonly [number, number, number];
-  readonly peak: number;
-  /** N, or null where nothing tells it. */
-  readonly force: number | null;
-}
-
-export type SkinTouches = Readonly<Record<string, { valid: boolean; touches: readonly SpaceTouch[] }>>;
+export type SkinTouches = RobotTouches["skins"];
 
 export const robot = signal<RobotScene | null>(null);
 export const states = signal<RobotState | null>(null);

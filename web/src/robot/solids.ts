@@ -1,5 +1,6 @@
 /** The robot's links and skins in WebGL2: one buffer of corners, shaded by the way their triangles look. */
 
+import { compiled } from "../sheet/program";
 import type { Theme } from "../theme";
 import type { Camera } from "./model";
 
@@ -27,25 +28,6 @@ void main() {
   colour = vec4(mix(line, base, 0.2 + 0.4 * abs(normal.z) + 0.4 * near), 1.0);
 }`;
 
-function built(gl: WebGL2RenderingContext): WebGLProgram {
-  const program = gl.createProgram();
-  for (const [kind, text] of [
-    [gl.VERTEX_SHADER, VERTEX],
-    [gl.FRAGMENT_SHADER, FRAGMENT],
-  ] as const) {
-    const shader = gl.createShader(kind);
-    if (!shader) throw new Error("no shader");
-    gl.shaderSource(shader, text);
-    gl.compileShader(shader);
-    gl.attachShader(program, shader);
-  }
-  gl.linkProgram(program);
-  if (!gl.getProgramParameter(program, gl.LINK_STATUS)) {
-    throw new Error(gl.getProgramInfoLog(program) ?? "the robot's program does not link");
-  }
-  return program;
-}
-
 /** #rrggbb as parts of one; the build shortens some to #rgb. */
 export function parts(colour: string): [number, number, number] {
   const full = colour.length === 4 ? colour.replace(/[^#]/g, "$&$&") : colour;
@@ -59,7 +41,7 @@ export class Solids {
   private ofSkins = 0;
 
   constructor(private readonly gl: WebGL2RenderingContext) {
-    this.program = built(gl);
+    this.program = compiled(gl, VERTEX, FRAGMENT);
     gl.useProgram(this.program);
     gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
     gl.enableVertexAttribArray(0);

@@ -1,7 +1,8 @@
 /** One setting as the schema describes it: a choice, a number, a quantity, a word; with its unit, its
  * meaning, and what is wrong with it. */
 
-import { change, discard, type KeyForm, parted, refused, type Value, typed } from "./model";
+import type { KeyForm, Value } from "../wire";
+import { change, discard, parted, refused, typed } from "./model";
 
 const NAMES: Readonly<Record<string, string>> = {
   alpha: "α",

@@ -8,17 +8,16 @@ import { Field, isRefused, Refusal } from "./Field";
 import {
   applies,
   doing,
-  type KeyForm,
   progress,
   redo,
   refused,
   schema,
-  type SectionForm,
   settings,
   undo,
   valuesOf,
 } from "./model";
 import { Alpha, Threshold } from "./Slider";
+import type { KeyForm, SectionForm } from "../wire";
 
 /** What is changed most stands first; in words. */
 const ORDER: Readonly<Record<string, string>> = {

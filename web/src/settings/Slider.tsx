@@ -1,7 +1,8 @@
 /** Settings that are drawn rather than typed: alpha on a logarithmic scale, the thresholds. */
 
-import { change, type KeyForm, settings, soon, type Value } from "./model";
+import { change, settings, soon } from "./model";
 import { status } from "../state";
+import type { KeyForm, Value } from "../wire";
 import { alpha, alphaInFull } from "../words";
 import { nameOf } from "./Field";
 

@@ -2,101 +2,34 @@
 
 import { signal } from "@preact/signals";
 import { onMessage, say, send } from "../state";
-
-export type Value = string | number | readonly (readonly (string | number)[])[];
-
-export interface KindForm {
-  readonly form: "choice" | "number" | "quantity" | "rows" | "text";
-  readonly words?: readonly string[];
-  readonly low?: number;
-  readonly high?: number;
-  readonly unit?: string;
-}
-
-interface Condition {
-  readonly key: string;
-  readonly words: readonly string[];
-}
-
-export interface KeyForm {
-  readonly name: string;
-  readonly kind: KindForm;
-  /** What a value must be, in words. */
-  readonly expected: string;
-  readonly meaning: string;
-  readonly required: boolean;
-  /** Beside which values of another key it may stand. */
-  readonly when: Condition | null;
-  /** With which it does anything. */
-  readonly effective: Condition | null;
-  readonly unless: string | null;
-  readonly locked: boolean;
-}
-
-export interface SectionForm {
-  readonly name: string;
-  readonly meaning: string;
-  readonly keys: readonly KeyForm[];
-}
+import type { Condition, KeyForm, KindForm, Progress, SectionForm, SettingRefused, Settings, Value } from "../wire";
 
 type Values = Readonly<Record<string, Value | null>>;
 
-export interface Settings {
-  readonly type: "settings";
-  readonly document: Readonly<Record<string, Values>>;
-  readonly n_electrodes: number;
-  readonly automatic_alpha: number | null;
-  readonly alpha: number;
-  readonly undo: number;
-  readonly redo: number;
-  readonly busy: boolean;
-  readonly took_ms: number | null;
-  readonly files: readonly string[];
-  readonly builtin: readonly string[];
-}
-
-/** How far a change has come: `done` of `stages`, and the stage that goes on; null before the first. */
-export interface Progress {
-  readonly type: "progress";
-  readonly stage: "mesh" | "model" | "image" | "touches" | "source" | null;
-  readonly done: number;
-  readonly stages: number;
-}
-
-export interface Refused {
-  readonly type: "settings_error";
-  readonly section: string | null;
-  readonly key: string | null;
-  readonly message: string;
-}
-
 export const schema = signal<readonly SectionForm[]>([]);
 export const settings = signal<Settings | null>(null);
-export const refused = signal<Refused | null>(null);
+export const refused = signal<SettingRefused | null>(null);
 export const progress = signal<Progress | null>(null);
 /** What has been typed and is not the skin's yet, by section. */
 const drafts = signal<Readonly<Record<string, Values>>>({});
 /** The key that was changed last, until the change has been made. */
 let asked: { readonly section: string; readonly key: string } | null = null;
 
-onMessage<{ readonly type: "schema"; readonly sections: readonly SectionForm[] }>(
-  "schema",
-  ({ sections }) => (schema.value = sections),
-);
-onMessage<Settings>("settings", (message) => {
+onMessage("schema", ({ sections }) => (schema.value = sections));
+onMessage("settings", (message) => {
   settings.value = message;
   if (!message.busy) asked = null;
   const open = refused.value?.section;
   drafts.value = open && drafts.value[open] ? { [open]: drafts.value[open] } : {};
 });
-onMessage<Progress>("progress", (message) => (progress.value = message));
+onMessage("progress", (message) => (progress.value = message));
 /** What only shows once the whole sheet is made names no key: it is that of the last change. */
-function placed(message: Refused): Refused {
+function placed(message: SettingRefused): SettingRefused {
   if (!asked || message.key !== null || (message.section ?? asked.section) !== asked.section) return message;
   return { ...message, ...asked };
 }
 
-onMessage<Refused>("settings_error", (message) => {
+onMessage("settings_error", (message) => {
   refused.value = placed(message);
   if (refused.value.section === null) {
     drafts.value = {};

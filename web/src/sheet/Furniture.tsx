@@ -1,6 +1,6 @@
 /** What stands still around the image: the outline, the electrodes, the scale bar. */
 
-import type { Electrode, Scene, Sick } from "../protocol";
+import type { Electrode, Scene, Sick } from "../wire";
 import { narrow } from "../screen";
 import { barLength, boxOf, outward, toPixels, type View } from "./view";
 

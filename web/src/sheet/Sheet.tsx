@@ -55,6 +55,7 @@ function Reading() {
   return (
     <p class="reading" data-testid="reading">
       {millimetres(place[0], 0)}, {millimetres(place[1], 0)} mm{" "}
+      {!open && <span class="of">change </span>}
       <strong>{open ? percent(open[found.cell]) : inScale(frame.image[found.cell], scale)}</strong>{" "}
       {open ? "% left open" : scale.unit}
     </p>

@@ -3,6 +3,7 @@
 import { MAP_SIZE } from "../colours";
 import type { Look, Picture } from "./picture";
 import type { Seen } from "./solid";
+import { compiled } from "./program";
 import { toNodes, type Topology } from "./topology";
 
 const VERTEX = `#version 300 es
@@ -41,25 +42,6 @@ void main() {
 }`;
 
 const ROW = 1024;
-
-function compile(gl: WebGL2RenderingContext): WebGLProgram {
-  const program = gl.createProgram();
-  for (const [kind, text] of [
-    [gl.VERTEX_SHADER, VERTEX],
-    [gl.FRAGMENT_SHADER, FRAGMENT],
-  ] as const) {
-    const shader = gl.createShader(kind);
-    if (!shader) throw new Error("no shader");
-    gl.shaderSource(shader, text);
-    gl.compileShader(shader);
-    gl.attachShader(program, shader);
-  }
-  gl.linkProgram(program);
-  if (!gl.getProgramParameter(program, gl.LINK_STATUS)) {
-    throw new Error(gl.getProgramInfoLog(program) ?? "the sheet's program does not link");
-  }
-  return program;
-}
 
 function makeTexture(gl: WebGL2RenderingContext, unit: number, filter: number): WebGLTexture {
   const texture = gl.createTexture();
@@ -101,7 +83,7 @@ export class GlPicture implements Picture {
   private seen: Seen | undefined;
 
   constructor(private readonly gl: WebGL2RenderingContext) {
-    const program = compile(gl);
+    const program = compiled(gl, VERTEX, FRAGMENT);
     const at = (name: string) => gl.getUniformLocation(program, name);
     gl.useProgram(program);
     makeTexture(gl, 0, gl.NEAREST);

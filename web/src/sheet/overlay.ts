@@ -229,7 +229,8 @@ function drawHeld(pen: Pen, theme: Theme, view: View, held: Held, maxForce: numb
   pen.strokeStyle = theme.halo;
   pen.lineWidth = 4;
   pen.lineJoin = "round";
-  const text = `${held.force.toFixed(1)} N`;
+  const grows = held.growing && held.force < maxForce ? ", grows while held" : "";
+  const text = `pressed with ${held.force.toFixed(1)} N${grows}`;
   pen.strokeText(text, x, lowest + FORCE_GAP);
   pen.fillStyle = theme.ink;
   pen.fillText(text, x, lowest + FORCE_GAP);

@@ -9,7 +9,6 @@ import { SLOTS, SPAN } from "../history";
 import { axis, Plot, type Plan } from "../panels/Plot";
 import { groupByDrive, spread } from "../panels/rows";
 import { history, newest, onFrame, onMessage, scene, shown } from "../state";
-import type { Status } from "../protocol";
 import { shownDrive } from "../sheet/space";
 import { theme } from "../theme";
 import { Budget } from "./Budget";
@@ -22,7 +21,7 @@ const HOUR = 3600;
 const noise = new NoiseMeter();
 const drift = new Log(DRIFT_PERIOD, HOUR / DRIFT_PERIOD);
 onFrame((frame) => noise.add(frame.voltages));
-onMessage<Status>("state", ({ baseline }) =>
+onMessage("state", ({ baseline }) =>
   drift.add(performance.now() / 1e3, baseline?.drift == null ? null : 100 * baseline.drift),
 );
 

@@ -1,6 +1,6 @@
 /** What the voltages say of themselves: noise of each row, reciprocity, drift over time. */
 
-import type { PatternTable } from "../protocol";
+import type { PatternRows } from "../wire";
 
 /** Frames over which noise is averaged. */
 const MEMORY = 64;
@@ -34,7 +34,7 @@ export class NoiseMeter {
 }
 
 /** Pairs of rows that must read alike: drive and measurement exchanged. Sign −1: with the other sign. */
-export function reciprocalPairs(pattern: PatternTable): readonly (readonly [number, number, number])[] {
+export function reciprocalPairs(pattern: PatternRows): readonly (readonly [number, number, number])[] {
   const known = new Map<string, readonly [number, number]>();
   const pairs: (readonly [number, number, number])[] = [];
   const ordered = (a: number, b: number) => (a < b ? ([a, b, 1] as const) : ([b, a, -1] as const));

@@ -3,23 +3,14 @@
 import { computed, effect, signal } from "@preact/signals";
 import { AMOUNT, mapTable } from "../colours";
 import { fixed, millimetres } from "../format";
-import type { ServerMessage } from "../protocol";
 import { link, onMessage, scene, send, status } from "../state";
+import type { UnresolvedMap } from "../wire";
 
-interface Answer extends ServerMessage {
-  readonly type: "unresolved";
-  /** Of each cell, the part of a change that the data leave open, 0 to 1; null: not known. */
-  readonly values: readonly number[] | null;
-  readonly radius_m: number;
-  /** Why it is not known. */
-  readonly problem: string;
-}
-
-const answer = signal<Answer | null>(null);
+const answer = signal<UnresolvedMap | null>(null);
 /** Whether its tab is open. */
 export const wanted = signal(false);
 
-onMessage<Answer>("unresolved", (message) => (answer.value = message));
+onMessage("unresolved", (message) => (answer.value = message));
 
 /** What the map follows from: it changes with these, and with no frame. */
 const cause = computed(() => {

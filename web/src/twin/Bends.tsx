@@ -2,7 +2,8 @@
 
 import { fixed } from "../format";
 import { BendFigure } from "./BendFigure";
-import { layFlat, refusal, twin, type TwinBend, type TwinStretch, want, wanted } from "./model";
+import type { TwinBend, TwinStretch } from "../wire";
+import { layFlat, refusal, twin, want, wanted } from "./model";
 import { Slider } from "./Slider";
 
 const DEGREE = Math.PI / 180;

@@ -3,38 +3,7 @@
 import { signal } from "@preact/signals";
 import { soon } from "../settings/model";
 import { onMessage, send } from "../state";
-
-export interface TwinBend {
-  /** Rad; positive where the front is convex. */
-  readonly angle: number;
-  /** Rad from x. */
-  readonly axis: number;
-  /** Width of the strip that bends, m. */
-  readonly length: number;
-}
-
-export interface TwinStretch {
-  /** Relative elongations. */
-  readonly along: number;
-  readonly across: number;
-  /** Rad from x. */
-  readonly axis: number;
-}
-
-interface TwinState {
-  readonly type: "twin";
-  readonly breakable: boolean;
-  readonly cut: readonly number[];
-  /** LSB of one conversion; null: the twin's own. */
-  readonly noise: number | null;
-  readonly bendable: boolean;
-  /** How it can be bent: along a strip, or at the joint that it lies on; null: not at all. */
-  readonly bends: "hinge" | "joint" | null;
-  readonly bend: TwinBend | null;
-  readonly stretch: TwinStretch | null;
-  /** Largest extent of the sheet, m. */
-  readonly size_m: number;
-}
+import type { TwinBend, TwinState, TwinStretch } from "../wire";
 
 const UNKNOWN: TwinState = {
   type: "twin",
@@ -58,7 +27,7 @@ export interface Wanted {
 const LEVEL: TwinStretch = { along: 0, across: 0, axis: 0 };
 
 const flat = (size: number): Wanted => ({
-  bend: { angle: 0, axis: Math.PI / 2, length: Math.min(0.06, size) },
+  bend: { angle: 0, axis: Math.PI / 2, length: Math.min(0.06, size), offset: 0 },
   stretch: LEVEL,
 });
 
@@ -76,7 +45,7 @@ onMessage("scene", () => {
   unanswered = 0;
   due = false;
 });
-onMessage<TwinState>("twin", (message) => {
+onMessage("twin", (message) => {
   twin.value = message;
   unanswered = Math.max(0, unanswered - 1);
   if (unanswered > 0 || due) return;
@@ -86,10 +55,7 @@ onMessage<TwinState>("twin", (message) => {
     stretch: message.stretch ?? { ...stretch, axis: wanted.value.stretch.axis },
   };
 });
-onMessage<{ readonly type: "twin_refused"; readonly message: string }>(
-  "twin_refused",
-  ({ message }) => (refusal.value = message),
-);
+onMessage("twin_refused", ({ message }) => (refusal.value = message));
 
 /** Break and mend. */
 export function harm(change: Partial<Pick<TwinState, "cut" | "noise">>): void {
