@@ -58,7 +58,7 @@ def noise(signal: float = 1 / GAIN, converter: float = CONVERTER_NOISE) -> Figur
 
 def mega_noise() -> Figures:
     """The same of the Mega's board, by its decks."""
-    board = tomllib.loads(MEGA.read_text(encoding="utf-8"))["board"]
+    board = tomllib.loads(MEGA.read_text(encoding="utf-8"))["mega"]["electronics"]
     return {"total": board["input_noise"], "ohms": board["input_noise"] / 0.1}
 
 

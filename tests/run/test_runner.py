@@ -285,8 +285,9 @@ class NoRoom:
         return self._file.write(data)
 
 
-def test_a_full_disk_ends_the_recording_but_not_the_run(runner, until, tmp_path):
-    path = FullPath(tmp_path / "x.mcap")
+def test_a_full_disk_ends_the_recording_but_not_the_run(runner, until, tmp_path, monkeypatch):
+    monkeypatch.setattr("tomoskin.files.session.message_log.Path", FullPath)
+    path = tmp_path / "x.mcap"
     runner.ask(commands.Record(path))
     assert runner.status().recording == path
     runner.start()

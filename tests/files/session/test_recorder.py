@@ -176,8 +176,9 @@ def test_a_curved_sheet_has_no_images(tmp_path, start):
         assert message_counts(session)["/image"] == 0
 
 
-def test_a_full_disk_ends_the_recording_and_leaves_it_readable(tmp_path, said, start):
-    path = FailingPath(tmp_path / "x.mcap")
+def test_a_full_disk_ends_the_recording_and_leaves_it_readable(tmp_path, monkeypatch, said, start):
+    monkeypatch.setattr("tomoskin.files.session.message_log.Path", FailingPath)
+    path = tmp_path / "x.mcap"
     worker = start(path)
     record(worker, 500)
     text = said.wait_for("recording-stopped")
