@@ -316,7 +316,7 @@ def rub(labelled: Labelled) -> LearningOutcome:
 
 
 class Unit(StrEnum):
-    """The unit of the labels."""
+    """The unit in which labels of force are given."""
 
     N = "N"
     G = "g"

@@ -24,7 +24,7 @@ def _eight_bytes(name: str | None) -> str | None:
 
 
 def _numbers(channels: tuple[int, ...]) -> str:
-    """``8, 16 or 32``."""
+    """The numbers as people list them, such as "8, 16 or 32"."""
     *others, most = map(str, channels)
     return f"{', '.join(others)} or {most}" if others else most
 

@@ -27,7 +27,7 @@ app.command("place")(place)
 
 @app.command("list")
 def list_skins(json: JsonFlag = False) -> None:
-    """List the built-in skins."""
+    """List the built-in skins with their descriptions."""
     from tomoskin.model.skin import Skin
 
     skins = [Skin.load(name) for name in Skin.names()]

@@ -63,7 +63,7 @@ class Archive(Arrays):
             check_fits(sum(_size(archive, name) for name in self._names.values()), where)
 
     def __getitem__(self, key: str) -> NDArray[Any]:
-        """Read one array."""
+        """Read the array of this name from the file."""
         name = self._names[key]
         with self._opened() as archive, archive.open(name) as member:
             if not name.endswith(".npy"):
@@ -72,11 +72,11 @@ class Archive(Arrays):
             return array
 
     def __iter__(self) -> Iterator[str]:
-        """Names of the arrays."""
+        """Yield the names of the arrays."""
         return iter(self._names)
 
     def __len__(self) -> int:
-        """Number of arrays."""
+        """The number of arrays in the file."""
         return len(self._names)
 
     @contextmanager

@@ -14,17 +14,17 @@ class Clock(Protocol):
     """Where a source takes its time from."""
 
     def now(self) -> float:
-        """Monotonic seconds."""
+        """The seconds of a clock that never goes back."""
 
     def wait(self, condition: threading.Condition, seconds: float) -> None:
         """Wait for ``condition`` (held) at most that long."""
 
 
 class WallClock:
-    """The clock of the computer."""
+    """The clock of the computer, in real time."""
 
     def now(self) -> float:
-        """Monotonic seconds."""
+        """The monotonic seconds of the computer."""
         return time.monotonic()
 
     def wait(self, condition: threading.Condition, seconds: float) -> None:
@@ -39,7 +39,7 @@ class VirtualClock:
         self.time = 0.0
 
     def now(self) -> float:
-        """Seconds since the start."""
+        """The virtual seconds since the start."""
         return self.time
 
     def wait(self, condition: threading.Condition, seconds: float) -> None:

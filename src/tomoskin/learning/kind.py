@@ -197,7 +197,7 @@ _GIVEN = {"pattern", "progress"}
 
 
 def silent(_done: float, _total: float) -> None:
-    """Report no progress."""
+    """Take the progress of a fit and report nothing."""
 
 
 @dataclass(frozen=True, eq=False)

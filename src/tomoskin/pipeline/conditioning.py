@@ -150,7 +150,7 @@ class BaselineDifferences:
 
     @property
     def reference(self) -> Reference:
-        """The baseline as it is now."""
+        """The baseline of this moment as a reference."""
         return self._baseline.reference
 
     @property
@@ -160,7 +160,7 @@ class BaselineDifferences:
 
     @property
     def state(self) -> BaselineState:
-        """How the baseline is."""
+        """What the baseline is doing: learning, held, or why not."""
         return self._baseline.state
 
     def subspace(self) -> NuisanceSubspace:
@@ -168,7 +168,7 @@ class BaselineDifferences:
         return self._nuisance(self._health).nuisance
 
     def condition(self, measured: Voltages) -> Conditioned:
-        """Difference data of a frame."""
+        """Make difference data of one frame of voltages."""
         values, baseline = measured.values, self._baseline
         mean = baseline.mean
         unknown = measured.excluded & ~np.isfinite(values)
@@ -271,11 +271,11 @@ class GivenDifferences:
 
     @property
     def mean(self) -> FloatArray:
-        """(n_meas,) V of the model."""
+        """The voltages (n_meas,) of the model, in V."""
         return self.prepared.operator.reference
 
     def subspace(self) -> None:
-        """There is none."""
+        """The nuisance subspace: given differences have none."""
 
     def condition(self, measured: Voltages) -> Conditioned:
         """Of a frame whose values are difference data already."""
@@ -292,7 +292,7 @@ class GivenDifferences:
     def learn(
         self, time: float, moved: FloatArray | float, *, touched: bool, noise: bool = True
     ) -> Learnt:
-        """Nothing can be learnt."""
+        """Learn nothing, since no baseline stands behind given differences."""
         del time, moved, touched, noise
         return Learnt(image=False, touches=False)
 

@@ -146,7 +146,7 @@ class Following:
         )
 
     def push(self, measured: Voltages) -> FrameResult:
-        """Take one frame."""
+        """Take the voltages of one frame all the way to touches."""
         self._tune()
         self._refind()
         reach("voltages")

@@ -93,7 +93,7 @@ class Pipeline:
 
     @property
     def reference_state(self) -> ReferenceState:
-        """How far the reference is."""
+        """How far the reference is, and how its baseline does."""
         state, needed = self._state, self._needed
         if isinstance(state, Collecting):
             return ReferenceState(state.taken, needed)

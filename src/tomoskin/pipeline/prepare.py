@@ -111,7 +111,7 @@ class Prepared:
 
     @cached_property
     def no_image(self) -> Image:
-        """The image of no change."""
+        """The image of data that have not changed."""
         return self.operator(np.zeros(self.pattern.n_meas))
 
     @cached_property

@@ -41,7 +41,7 @@ class ModelAgreement:
 
     @classmethod
     def of(cls, reference: FloatArray, model: FloatArray) -> Self:
-        """Of two vectors (n_meas,)."""
+        """The agreement of two vectors (n_meas,) of voltages."""
         length, expected = float(np.linalg.norm(reference)), float(np.linalg.norm(model))
         if not length or not expected:
             return cls(0.0, length / expected if expected else 0.0)
@@ -49,7 +49,7 @@ class ModelAgreement:
 
     @property
     def text(self) -> str:
-        """How well they agree."""
+        """The agreement as one sentence for people."""
         return (
             f"the reference agrees with the skin's model by {self.cosine:.3f} (1 = "
             f"proportional), at {self.size:.3g} times its size"
@@ -195,5 +195,5 @@ class ReferenceState:
 
     @property
     def ready(self) -> bool:
-        """Whether it stands."""
+        """Whether there is a reference to follow frames with."""
         return self.since is not None

@@ -42,7 +42,7 @@ class FrameCost:
 
     @property
     def seconds(self) -> float:
-        """All stages together."""
+        """The seconds that all stages took together."""
         return 1e-6 * sum(spent for _, spent, _ in self.stages)
 
     @property
@@ -63,7 +63,7 @@ class CostMeter:
     """
 
     def __init__(self, clock: Callable[[], float]) -> None:
-        """``clock`` in s."""
+        """Begin to measure with ``clock``, which gives seconds."""
         self._clock, self._count = clock, 0
         self._stage, self._since = _BEGIN, 0.0
         self._spent: dict[str, list[float]] = {}

@@ -47,7 +47,7 @@ class Losses:
         return cls(device_drops + frames.foreign, link.counters.corrupt, frames.lost)
 
     def __add__(self, other: Losses) -> Losses:
-        """The sum of both losses."""
+        """The losses of both, added count by count."""
         return Losses(
             self.dropped + other.dropped,
             self.corrupt + other.corrupt,

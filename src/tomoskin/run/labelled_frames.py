@@ -96,7 +96,7 @@ def shard_identity(plan: SetPlan, shard: int) -> str:
 
 
 def in_this_process(plan: SetPlan, shards: Sequence[int]) -> Made:
-    """One shard after the other."""
+    """Make the shards here, one after the other."""
     for shard in shards:
         yield shard, make_shard(plan, shard)
 

@@ -26,7 +26,7 @@ _log = logging.getLogger(__name__)
 
 
 class _StoppedError(Exception):
-    """The run has to end."""
+    """The run has to end, and its loop is left by this."""
 
 
 class Loop:

@@ -53,7 +53,7 @@ class Subscriber(Consumer):
         self.name, self._call = name, call
 
     def admit(self, message: Any) -> FrameResult | None:
-        """Results only."""
+        """Let results of frames pass, and nothing else."""
         return message if isinstance(message, FrameResult) else None
 
     def take(self, item: FrameResult) -> None:
@@ -227,7 +227,7 @@ class Publisher:
         self._audience.wake()
 
     def sink_reports(self) -> tuple[SinkReport, ...]:
-        """The state of each sink."""
+        """The reports of all sinks, in their order."""
         return tuple(map(sink_report, self._sinks))
 
     def stop(self) -> None:

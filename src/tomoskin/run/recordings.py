@@ -40,7 +40,7 @@ class PreRoll:
     """
 
     def __init__(self) -> None:
-        """Make an empty pre-roll."""
+        """Make a pre-roll that holds no frames yet."""
         self._since: list[Marked] = []
         self._complete = True
         self._number = 0

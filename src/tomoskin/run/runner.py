@@ -132,7 +132,7 @@ class Runner:
         self._loop.flow.out.say(kind, text)
 
     def status(self) -> Status:
-        """The status of this moment."""
+        """The status of the run at this moment."""
         return self._loop.flow.status(self._loop.trouble)
 
     @property

@@ -99,11 +99,11 @@ class _Recorded:
         return data
 
     def write(self, data: bytes) -> None:
-        """Send ``data`` to the twin."""
+        """Send ``data`` to the twin behind the recording."""
         self._twin.write(data)
 
     def close(self) -> None:
-        """Switch the twin off."""
+        """Switch the twin behind the recording off."""
         self._twin.close()
 
 

@@ -41,7 +41,7 @@ class Door(H11Protocol):
             min(waiting, key=lambda door: door._limit.when() if door._limit else 0.0)._refuse()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Wait no longer."""
+        """Stop the clock of a connection that has ended."""
         self._stop_waiting()
         super().connection_lost(exc)
 
@@ -51,7 +51,7 @@ class Door(H11Protocol):
         self._mind()
 
     def on_response_complete(self) -> None:
-        """Wait for the next request."""
+        """Start the clock for the next request."""
         super().on_response_complete()
         self._mind()
 

@@ -38,7 +38,7 @@ MAGIC = b"TSK1"
 
 
 class Flag(IntFlag):
-    """Bits of the header's flags."""
+    """The bits of the flags in a frame's header."""
 
     READY = 1
     NO_IMAGE = 2

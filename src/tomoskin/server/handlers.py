@@ -46,7 +46,7 @@ class CalibrationHandlers:
         hub.serve({UseCalibration: self._use}, self.greeting)
 
     def greeting(self) -> Sequence[Calibrations]:
-        """The calibrations in use."""
+        """The calibrations in use, as a new page learns of them."""
         prepared = self._hub.runner.prepared
         if self._used_on != prepared.mesh.identity:
             self._used_on = prepared.mesh.identity

@@ -111,7 +111,7 @@ class Overview(Host):
         return self._scene, states(self.run)
 
     def leave(self, page: Listener, why: str = "") -> None:
-        """Stop serving ``page``."""
+        """Stop serving ``page``, and say why in every run."""
         super().leave(page)
         if why:
             for runner in self.run.runners.values():

@@ -57,7 +57,7 @@ class Host(ABC):
 
     @abstractmethod
     def first(self) -> Iterable[Message]:
-        """What a new page is sent."""
+        """The messages that a new page is sent first."""
 
     @abstractmethod
     def obey(self, page: Listener, request: StrictRequest) -> None:
@@ -73,7 +73,7 @@ class Host(ABC):
         return True
 
     def leave(self, page: Listener, why: str = "") -> None:  # noqa: ARG002
-        """Stop serving ``page``."""
+        """Stop serving ``page``, whatever the reason."""
         self.pages.discard(page)
 
     def tell(self, *messages: Message) -> None:

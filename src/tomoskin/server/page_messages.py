@@ -23,7 +23,7 @@ Flat = list[float]
 
 
 class MessagePart(msgspec.Struct, frozen=True, kw_only=True):
-    """A part of a message."""
+    """A part of one of the messages to a page."""
 
     @classmethod
     def of(cls, item: object, **more: Any) -> Self:
@@ -33,11 +33,11 @@ class MessagePart(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Message(MessagePart, frozen=True, kw_only=True):
-    """A message to a page."""
+    """A message that the server sends to a page."""
 
     @property
     def json(self) -> str:
-        """The message as it is sent."""
+        """The message as the text that is sent."""
         return encode_json(self).decode()
 
 
@@ -127,7 +127,7 @@ class BaselineNow(MessagePart, frozen=True):
 
 
 class StageNow(MessagePart, frozen=True):
-    """How long one stage takes."""
+    """How long one stage of the frame flow takes."""
 
     name: str
     p50_ms: float | None
@@ -234,7 +234,7 @@ class Tick(MessagePart, frozen=True):
 
 
 class TimedEvent(MessagePart, frozen=True):
-    """An event of a recording."""
+    """An event of a recording, at its time."""
 
     time_s: float
     kind: str
@@ -284,7 +284,7 @@ class Files(Message, frozen=True, tag="files"):
 
 
 class Exported(Message, frozen=True, tag="exported"):
-    """An export has ended."""
+    """An export has ended, and its file is there."""
 
     name: str
 

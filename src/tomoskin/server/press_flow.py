@@ -131,7 +131,7 @@ class _DotFlow(GuidedFlow):
         return True
 
     def restart(self) -> None:
-        """See :class:`GuidedFlow`."""
+        """Forget the press that is being made."""
         self._taker.restart()
 
     @property
@@ -140,7 +140,7 @@ class _DotFlow(GuidedFlow):
         return self.efforts[len(self.presses) % len(self.efforts)]
 
     def _undo(self) -> bool:
-        """Remove the last press."""
+        """Remove the last press, and ask for it again."""
         if not self.presses:
             raise WireError("there is no press to undo")
         self._dot = self.presses.pop().place
@@ -148,11 +148,11 @@ class _DotFlow(GuidedFlow):
         return True
 
     def examples(self) -> tuple[GuidedPress, ...]:
-        """See :class:`GuidedFlow`."""
+        """The presses that have been made so far."""
         return tuple(self.presses)
 
     def details(self) -> dict[str, Any]:
-        """See :class:`GuidedFlow`."""
+        """What the page shows: the dot to press, the presses, and a hint."""
         hint = {"text": self._taker.hint} if self._taker.hint else {}
         return hint | {
             "phase": self._taker.phase,
@@ -172,7 +172,7 @@ class TouchFlow(_DotFlow):
         super().__init__("touch", prepared)
 
     def estimate_from(self, examples: tuple[GuidedPress, ...]) -> Estimate:
-        """See :class:`GuidedFlow`."""
+        """Estimate the map of touches from these presses."""
         return estimate_touch(self.prepared, examples)
 
 
@@ -183,11 +183,11 @@ class MappingFlow(_DotFlow):
         super().__init__("mapping", prepared)
 
     def estimate_from(self, examples: tuple[GuidedPress, ...]) -> Estimate:
-        """See :class:`GuidedFlow`."""
+        """Estimate the channel mapping from these presses."""
         return estimate_mapping(self.prepared, examples, self._taker.untouched)
 
     def keep(self, answer: MappingAnswer, folder: Folder, name: str, runner: Runner) -> str:
-        """See :class:`GuidedFlow`."""
+        """Write a skin file with the mapping, and change over to it."""
         path = folder.free(name, ".toml")
         mapped = answer.mapping.applied(self.prepared.skin)
         write_text(path, mapped.to_toml())

@@ -148,7 +148,7 @@ class Annotate(StrictRequest, frozen=True, tag="annotate"):
 
 
 class ListSources(StrictRequest, frozen=True, tag="sources"):
-    """Ask what can be connected."""
+    """The page asks what can be connected."""
 
 
 class Connect(StrictRequest, frozen=True, tag="connect"):
@@ -171,7 +171,7 @@ class ShowFlow(StrictRequest, frozen=True, tag="flow_show"):
 
 
 class UndoPress(StrictRequest, frozen=True, tag="flow_undo"):
-    """Remove the last press."""
+    """The page takes the last press back."""
 
 
 class DeletePress(StrictRequest, frozen=True, tag="flow_delete"):
@@ -199,7 +199,7 @@ class LearnFlow(StrictRequest, frozen=True, tag="flow_learn"):
 
 
 class StopLearning(StrictRequest, frozen=True, tag="flow_stop"):
-    """End what is being learnt."""
+    """The page ends what is being learnt."""
 
 
 class EndFlow(StrictRequest, frozen=True, tag="flow_end"):

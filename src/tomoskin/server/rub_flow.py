@@ -145,7 +145,7 @@ class RubbedTouches:
         self._covered = self._covered + (apart < self.near)
 
     def now(self) -> Rubbed:
-        """The touches so far."""
+        """The touches that were rubbed so far."""
         dv = np.array(self._dv).reshape(-1, self._pattern.n_meas)
         some = dv[:: max(1, len(dv) // _GOOD)]
         quiet = quiet_electrodes(some, self._pattern) if len(dv) >= _FEWEST else ()
@@ -199,7 +199,7 @@ class RubFlow(GuidedFlow):
         return False
 
     def restart(self) -> None:
-        """See :class:`GuidedFlow`."""
+        """Forget the point that is being pressed."""
         if self._taker is not None:
             self._taker.restart()
 
@@ -234,7 +234,7 @@ class RubFlow(GuidedFlow):
         return self._examples
 
     def estimate_from(self, examples: tuple[Any, ...]) -> Estimate:
-        """See :class:`GuidedFlow`."""
+        """Estimate where the rubbed touches were, and a map from them."""
         rubbed, points = examples
         self.stage = "finding where the touches were"
         dv = np.concatenate([[point.dv for point in points], rubbed.dv]) if points else rubbed.dv
@@ -259,7 +259,7 @@ class RubFlow(GuidedFlow):
         )
 
     def details(self) -> dict[str, Any]:
-        """See :class:`GuidedFlow`."""
+        """What the page shows: the dot, the points, and what was rubbed."""
         rubbed = self.rubbed
         return {
             "phase": "rub" if self._taker is None else self._taker.phase,

@@ -47,7 +47,7 @@ class KeyForm(MessagePart, frozen=True):
 
 
 class SectionForm(MessagePart, frozen=True):
-    """One section of a skin file."""
+    """The form of one section of a skin file."""
 
     name: str
     meaning: str
@@ -139,7 +139,7 @@ class TwinState(Message, frozen=True, tag="twin"):
 
 
 class TwinRefused(Message, frozen=True, tag="twin_refused"):
-    """The twin cannot be bent so."""
+    """The twin cannot be bent in this way."""
 
     message: str
 

@@ -20,7 +20,7 @@ class Listener(Protocol):
         """Say that there is a new frame."""
 
     def post(self, text: str) -> None:
-        """Send ``text`` soon."""
+        """Send ``text`` soon, without waiting for it."""
 
 
 Handler = Callable[[Listener, Any], None]
@@ -46,7 +46,7 @@ class Tasks:
     """Work that is under way, kept until it is done: the loop itself would forget it."""
 
     def __init__(self) -> None:
-        """Make an empty set of tasks."""
+        """Make a set that holds no tasks yet."""
         self._tasks: set[asyncio.Task[None]] = set()
 
     def keep(self, work: Coroutine[None, None, None]) -> None:

@@ -54,7 +54,7 @@ def scene(prepared: Prepared, source: str, *, limit: float, pressable: bool) -> 
 
 
 def state(status: Status) -> to_page.RunState:
-    """One look at the runner."""
+    """The state of the run as the page gets it."""
     reference, baseline, bend = status.reference, status.reference.baseline, status.bend
     return to_page.RunState.of(
         status,
@@ -84,7 +84,7 @@ def state(status: Status) -> to_page.RunState:
 
 
 def event(happened: Event) -> to_page.EventNote:
-    """An event of the run."""
+    """An event of the run as the page gets it."""
     return to_page.EventNote.of(happened, time_s=happened.host_time)
 
 

@@ -51,7 +51,7 @@ class Placement:
 
     @property
     def xy(self) -> Point:
-        """Position of the weight, m."""
+        """The position of the weight, in m."""
         detection = self.detections[self.still]
         return detection.x, detection.y
 
@@ -174,7 +174,7 @@ class WeighFlow(GuidedFlow):
         return self._record()
 
     def restart(self) -> None:
-        """See :class:`GuidedFlow`."""
+        """Forget the weight that is being placed."""
         self._taker = PlacementTaker()
 
     def _record(self) -> bool:
@@ -202,11 +202,11 @@ class WeighFlow(GuidedFlow):
         return True
 
     def examples(self) -> tuple[Weighed, ...]:
-        """See :class:`GuidedFlow`."""
+        """The weights that have been placed so far."""
         return tuple(self.weighed)
 
     def estimate_from(self, examples: tuple[Weighed, ...]) -> Estimate:
-        """See :class:`GuidedFlow`."""
+        """Estimate the forces of touches from these weights."""
         if len(examples) < _FEWEST:
             return Estimate(f"{_counted(_FEWEST - len(examples))} more for a first answer")
         model = ForceModel.fit(weighed_presses(examples), self.prepared.skin)
@@ -224,7 +224,7 @@ class WeighFlow(GuidedFlow):
         )
 
     def details(self) -> dict[str, Any]:
-        """See :class:`GuidedFlow`."""
+        """What the page shows: the dot, the weights so far, and a hint."""
         places = [one.placement.xy for one in self.weighed]
         hint = {"text": self._taker.hint} if self._taker.hint else {}
         return hint | {

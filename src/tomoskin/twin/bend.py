@@ -39,7 +39,7 @@ class BendSettings:
     )
 
     def __post_init__(self) -> None:
-        """Check the numbers."""
+        """Check that the height is not negative."""
         check_numbers(self, least="height")
 
 
@@ -66,7 +66,7 @@ class Bent(Deformation):
     surface: Surface
 
     def strain(self, uv: FloatArray, rest: Surface, height: float) -> FloatArray:
-        """See :class:`Deformation`."""
+        """The strain of the layer at ``height`` against the sheet at rest."""
         self.surface.check(uv)
         now, before = (layer_metric(one, uv, height) for one in (self.surface, rest))
         return hencky(now, before)

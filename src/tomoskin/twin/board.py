@@ -86,7 +86,7 @@ class Board:
         return min(_MOST_CONVERSIONS, _MOST_SAMPLE // ((1 << self.adc_bits) - 1))
 
     def info(self, request: int) -> Info:
-        """The answer to GET_INFO."""
+        """The board's answer to GET_INFO."""
         return Info(
             request=request,
             major=SCHEMA.major,

@@ -73,7 +73,7 @@ class ElectronicsSettings:
     thermal_time: float = parameter(60.0, "s", "Correlation time of that.", "assumed")
 
     def __post_init__(self) -> None:
-        """Check the numbers."""
+        """Check that every number is in its range."""
         check_numbers(
             self,
             above="contact_time hum_frequency leak thermal_time",

@@ -46,7 +46,7 @@ class ContactSettings:
     rolling_friction: float = parameter(0.02, "", "Rolling friction of a probe.", "assumed")
 
     def __post_init__(self) -> None:
-        """Check the numbers."""
+        """Check the foundation and the range of every number."""
         if self.foundation not in FOUNDATIONS:
             raise ModelError(f"expected a foundation of {FOUNDATIONS}, got {self.foundation!r}")
         check_numbers(

@@ -72,7 +72,7 @@ class ScriptedPress:
 
     @property
     def end(self) -> float:
-        """When the force is gone, s."""
+        """The time when the force is gone, in s."""
         return self.start + self.force[-1][0]
 
     def at(self, time: float, friction: Friction) -> Probe | None:

@@ -46,7 +46,7 @@ class Load:
 
     @classmethod
     def none(cls, n: int) -> Self:
-        """A load without a press."""
+        """The load of a sheet that nothing presses."""
         return cls(np.zeros((4, n)))
 
     @property
@@ -56,7 +56,7 @@ class Load:
 
     @property
     def depth(self) -> FloatArray:
-        """Depths (n,) m of the sheet."""
+        """The depths (n,) of the sheet, in m."""
         return np.asarray(self.felt[3])
 
 

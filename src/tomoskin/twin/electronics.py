@@ -110,7 +110,7 @@ class TwinElectronics:
         electronics: ElectronicsSettings,
         seed: int,
     ) -> None:
-        """``current`` A."""
+        """Make electronics that drive the sheet with ``current``, in A."""
         self.sheet, self._readout, self._current = sheet, readout, current
         self.settings = electronics
         *parts, chance = np.random.SeedSequence(seed).spawn(4)
@@ -134,7 +134,7 @@ class TwinElectronics:
 
     @property
     def faults(self) -> Faults:
-        """The faults of this moment."""
+        """The faults that hold at this moment."""
         return self._faults
 
     def set_faults(self, faults: Faults) -> None:

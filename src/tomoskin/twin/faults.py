@@ -46,7 +46,7 @@ class LineSettings:
     )
 
     def __post_init__(self) -> None:
-        """Check the numbers."""
+        """Check that every probability is in its range."""
         for name in ("loss", "corruption", "hold"):
             value = getattr(self, name)
             if not 0 <= value < 1:

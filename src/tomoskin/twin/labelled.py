@@ -150,17 +150,17 @@ class SetPlan:
     n_frames: int
 
     def __post_init__(self) -> None:
-        """Check the number of frames."""
+        """Check that there is a frame to make."""
         if self.n_frames < 1:
             raise ScriptError(f"expected at least 1 frame, got {self.n_frames}", where="--presses")
 
     @property
     def n_shards(self) -> int:
-        """Number of shards."""
+        """The number of shards that hold all frames."""
         return -(-self.n_frames // SHARD_FRAMES)
 
     def size(self, shard: int) -> int:
-        """Frames of a shard."""
+        """The number of frames in this shard."""
         return min(SHARD_FRAMES, self.n_frames - shard * SHARD_FRAMES)
 
     @cached_property

@@ -87,7 +87,7 @@ class MaterialSettings:
     )
 
     def __post_init__(self) -> None:
-        """Check the numbers."""
+        """Check that every number is in its range."""
         check_numbers(
             self,
             above="thickness temperature_time spread_length",

@@ -44,7 +44,7 @@ class TwinSettings:
     bend: BendSettings = field(default_factory=BendSettings)
 
     def __post_init__(self) -> None:
-        """Check the numbers."""
+        """Check the refinement of the mesh and the seed."""
         check_numbers(self, above="mesh_ratio", least="seed")
 
     @classmethod

@@ -48,7 +48,7 @@ class Probe:
     drag: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        """Check the numbers."""
+        """Check the place, force, angle and drag."""
         _check_place(self.x, self.y)
         _check_force(self.force)
         if not math.isfinite(self.angle):
@@ -92,14 +92,14 @@ class Press:
     radius: float
 
     def __post_init__(self) -> None:
-        """Check the numbers."""
+        """Check the place, radius and force."""
         _check_place(self.x, self.y)
         _circle(self.radius)
         _check_force(self.force)
 
     @property
     def shape(self) -> Circle:
-        """The face of the tip."""
+        """The face of the tip, which is a circle."""
         return _circle(self.radius)
 
     @property

@@ -127,7 +127,7 @@ class SampleTable:
 
     @cached_property
     def seconds(self) -> float:
-        """How long one scan takes."""
+        """The seconds that one scan takes."""
         return float(self.length.sum()) + self._dead
 
     @cached_property

@@ -222,7 +222,7 @@ class FaultSection(Section, section="fault", many=True):
 
 
 class MarkSection(Section, section="mark", many=True):
-    """A note in the recording."""
+    """A note that is written into the recording."""
 
     at: float = key(_TIME, "Time of the note.")
     text: str = key(Text(), "The note itself.")

@@ -77,18 +77,18 @@ class Circle(_Crowned):
     crown: float = math.inf
 
     def __post_init__(self) -> None:
-        """Check the numbers."""
+        """Check the radius and the crown."""
         _check("radius", self.radius)
         _check("crown", self.crown, curved=True)
 
     @property
     def extent(self) -> float:
-        """Radius of the face, m."""
+        """The radius of the face, in m."""
         return self.radius
 
     @property
     def area(self) -> float:
-        """Area of the face, m²."""
+        """The area of the round face, in m²."""
         return math.pi * self.radius**2
 
     def inside(self, points: FloatArray) -> NDArray[np.bool_]:
@@ -104,18 +104,18 @@ class Square(_Crowned):
     crown: float = math.inf
 
     def __post_init__(self) -> None:
-        """Check the numbers."""
+        """Check the side and the crown."""
         _check("side", self.side)
         _check("crown", self.crown, curved=True)
 
     @property
     def extent(self) -> float:
-        """Half of a diagonal, m."""
+        """The half of a diagonal, in m."""
         return self.side / math.sqrt(2)
 
     @property
     def area(self) -> float:
-        """Area of the face, m²."""
+        """The area of the square face, in m²."""
         return self.side**2
 
     def inside(self, points: FloatArray) -> NDArray[np.bool_]:
@@ -142,18 +142,18 @@ class Finger(Shape):
     across: float = 8e-3
 
     def __post_init__(self) -> None:
-        """Check the numbers."""
+        """Check that every length is a size."""
         for name in ("length", "width", "along", "across"):
             _check(name, getattr(self, name))
 
     @property
     def extent(self) -> float:
-        """Half the longer axis, m."""
+        """The half of the longer axis, in m."""
         return max(self.length, self.width) / 2
 
     @property
     def area(self) -> float:
-        """Area of the pad, m²."""
+        """The area of the finger's pad, in m²."""
         return math.pi * self.length * self.width / 4
 
     def inside(self, points: FloatArray) -> NDArray[np.bool_]:
@@ -179,7 +179,7 @@ class Face(_Crowned):
     crown: float = math.inf
 
     def __post_init__(self) -> None:
-        """Check the vertices."""
+        """Check the crown and the vertices."""
         _check("crown", self.crown, curved=True)
         _ = self._polygon
 
@@ -194,7 +194,7 @@ class Face(_Crowned):
 
     @property
     def area(self) -> float:
-        """Area of the face, m²."""
+        """The area of the face's polygon, in m²."""
         return self._polygon.area
 
     def inside(self, points: FloatArray) -> NDArray[np.bool_]:
@@ -203,7 +203,7 @@ class Face(_Crowned):
 
 
 def _finger(half_length: float) -> Finger:
-    """A fingertip in proportion."""
+    """The finger of this length, in usual proportions."""
     usual = Finger()
     scale = 2 * half_length / usual.length
     return Finger(*(scale * v for v in (usual.length, usual.width, usual.along, usual.across)))

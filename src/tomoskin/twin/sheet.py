@@ -69,7 +69,7 @@ class _Loading:
 
     @property
     def load(self) -> Load:
-        """What the cells feel now."""
+        """The load that the cells feel now."""
         under = presses, pose = self.now
         if not _same(under, self._felt[0]):
             if presses is not self._dented[0]:
@@ -163,7 +163,7 @@ class TwinSkin:
 
     @property
     def n_electrodes(self) -> int:
-        """Number of electrodes."""
+        """The number of electrodes on the sheet."""
         return self.model.pattern.n_electrodes
 
     @property

@@ -56,7 +56,7 @@ class TwinTransport:
 
     @property
     def sheet(self) -> TwinSkin:
-        """The twin's sheet."""
+        """The twin's sheet, which answers the scans."""
         return self.electronics.sheet
 
     @property
@@ -127,14 +127,14 @@ class TwinTransport:
                     self._clock.wait(self._condition, max(min(self.device.due, end) - now, 0.0))
 
     def write(self, data: bytes) -> None:
-        """Send ``data`` to the twin."""
+        """Send ``data`` to the twin's board."""
         with self._condition:
             self._check_open()
             self._inbox += data
             self._condition.notify()
 
     def close(self) -> None:
-        """Switch the twin off."""
+        """Switch the twin off and wake who waits for it."""
         with self._condition:
             self._closed = True
             self._condition.notify()

@@ -24,7 +24,7 @@ class Converter(_Record, frozen=True, kw_only=True):
     dropped: int = 0
 
     def conversion(self, prescaler: int) -> float:
-        """Seconds of one conversion."""
+        """The seconds that one conversion takes."""
         return self.clocks * (prescaler if self.divided else 1) / self.clock
 
 

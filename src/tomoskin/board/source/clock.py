@@ -86,7 +86,7 @@ class ClockFitter:
         self._run: _Run | None = None
 
     def add(self, ticks: int, host_time: float) -> None:
-        """Take one frame."""
+        """Take the counter and the arrival of one frame into the fit."""
         run = self._run
         if run is None or ticks < run.last:
             run = self._run = _Run(ticks, host_time, ticks)

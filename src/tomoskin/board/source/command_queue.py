@@ -55,7 +55,7 @@ class SequenceFilter:
 
     @property
     def counters(self) -> FrameCounters:
-        """The counts since the start."""
+        """The counts of frames since the start."""
         return FrameCounters(self._passed, self._lost, self._foreign, self._stale)
 
     def take(self, frame: Frame) -> list[Frame | Event]:

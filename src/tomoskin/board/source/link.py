@@ -151,7 +151,7 @@ class Link(AbstractContextManager["Link"]):
                         return
 
     def __exit__(self, *_: object) -> None:
-        """Close the link."""
+        """Close the link, whatever ended the block."""
         self.close()
 
     def _listen(self, timeout: float) -> list[Frame | Event]:

@@ -143,7 +143,7 @@ class SerialTransport:
             raise self._gone(error) from None
 
     def write(self, data: bytes) -> None:
-        """Send ``data`` to the board."""
+        """Send ``data`` to the board at this port."""
         try:
             self._serial.write(data)
         except (OSError, TypeError) as error:
@@ -186,7 +186,7 @@ class SerialTransport:
         return answer
 
     def close(self) -> None:
-        """Close the port."""
+        """Close the port, if it is still open."""
         if not self._closed:
             self._closed = True
             self._ahead.close()

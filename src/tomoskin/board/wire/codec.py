@@ -68,7 +68,7 @@ _BY_RECORD = {RECORDS[name]: layout for name, layout in _LAYOUTS.items() if name
 
 
 def type_byte(record: type[Command]) -> int:
-    """The type byte of a command."""
+    """The byte that names this type of command on the wire."""
     return _BY_RECORD[record].spec.type
 
 

@@ -38,7 +38,7 @@ class Named:
 
     @property
     def text(self) -> str:
-        """The name, for people."""
+        """The name as text, without its filling zeros."""
         return self.name.rstrip(b"\0").decode(errors="replace")
 
 

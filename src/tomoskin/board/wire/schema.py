@@ -57,7 +57,7 @@ class EnumValue(msgspec.Struct, frozen=True):
 
 
 class EnumSpec(msgspec.Struct, frozen=True):
-    """An enumeration."""
+    """An enumeration of the schema with its values."""
 
     text: str
     values: tuple[EnumValue, ...]
@@ -85,7 +85,7 @@ class MessageSpec(msgspec.Struct, frozen=True):
 
     @property
     def to_device(self) -> bool:
-        """Whether it is a command."""
+        """Whether the host sends it to the board."""
         return self.direction == "to_device"
 
 
@@ -137,7 +137,7 @@ class Schema(msgspec.Struct, frozen=True, dict=True):
 
     @cached_property
     def by_name(self) -> dict[str, MessageSpec]:
-        """Messages by their name."""
+        """The messages of the schema by their names."""
         return {message.name: message for message in self.messages}
 
 

@@ -102,7 +102,7 @@ class RandomField:
 
     @property
     def size(self) -> int:
-        """Number of modes."""
+        """The number of modes that the field is made of."""
         return int(self.basis.shape[1])
 
     def at(self, points: FloatArray) -> FloatArray:

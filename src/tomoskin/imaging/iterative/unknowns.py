@@ -27,7 +27,7 @@ class ImageMap(Protocol):
 
     @property
     def size(self) -> int:
-        """Number of latent values."""
+        """The number of latent values of an image."""
         ...
 
     def contrast(self, latent: FloatArray) -> FloatArray:
@@ -93,12 +93,12 @@ class Unknowns:
 
     @property
     def n_contacts(self) -> int:
-        """Number of contact factors."""
+        """The number of contact factors that are unknown."""
         return {"fixed": 0, "one": 1, "each": self.model.pattern.n_electrodes}[self.contacts]
 
     @property
     def size(self) -> int:
-        """Number of unknowns."""
+        """The number of all unknowns: image, background and contacts."""
         return self.image.size + 1 + self.n_contacts
 
     def at(self, unknowns: FloatArray) -> ModelPoint:
@@ -115,7 +115,7 @@ class ModelPoint:
 
     @property
     def latent(self) -> FloatArray:
-        """Latent values of the image."""
+        """The part of the unknowns that makes the image."""
         return self.unknowns[: self.of.image.size]
 
     @property
@@ -133,7 +133,7 @@ class ModelPoint:
 
     @cached_property
     def conductivity(self) -> FloatArray:
-        """(n_cells,) S or S/m."""
+        """The conductivity (n_cells,) in S or S/m."""
         with np.errstate(over="ignore"):  # the model refuses what is not finite
             return self.background * np.exp(self.of.image.contrast(self.latent))
 
@@ -197,7 +197,7 @@ class Joint:
 
     @property
     def matrix(self) -> FloatArray:
-        """The matrix Q, dense."""
+        """The matrix Q of all unknowns, dense."""
         image = self.image.matrix * self.strength
         n = len(image)
         both = np.zeros((n + len(self.others.matrix),) * 2)

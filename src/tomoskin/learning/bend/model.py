@@ -183,12 +183,12 @@ class BendModel:
 
     @property
     def n_modes(self) -> int:
-        """Number of directions."""
+        """The number of directions in which a bend moves the data."""
         return int(self.directions.shape[1])
 
     @cached_property
     def whiten(self) -> Whitener:
-        """Makes the noise white."""
+        """The transform that makes the noise white."""
         return Whitener.of(self.covariance)
 
     @cached_property

@@ -41,7 +41,7 @@ class Codes:
     exclusive: bool
 
     def __post_init__(self) -> None:
-        """Check the names."""
+        """Check that names differ and that there are classes enough."""
         twice = sorted({name for name in self.names if self.names.count(name) > 1})
         if twice:
             raise DataError(f"expected each name once, got {', '.join(twice)} twice")
@@ -133,7 +133,7 @@ class Examples:
         return cls(codes, data, given, number)
 
     def __len__(self) -> int:
-        """Number of frames."""
+        """The number of labelled frames."""
         return len(self.dv)
 
     @property

@@ -63,7 +63,7 @@ class ClassReading:
 
     @property
     def text(self) -> str:
-        """For people."""
+        """The class as the page and the terminal show it."""
         if self.unknown:
             return f"unknown class (nearest: {self.name})"
         return f"{self.name} {100 * self.probability:.0f} %"
@@ -321,7 +321,7 @@ class ClassesApplied(Applied):
         self._classifier = classifier
 
     def read(self, view: FrameView, detections: list[Detection], *, touched: bool) -> ClassReading:
-        """The class of this frame."""
+        """Read the class of this frame from its change since the reference."""
         del detections, touched
         return self._classifier.read(view.differences.since_reference)
 

@@ -46,7 +46,7 @@ class ForceReport:
 
     @classmethod
     def of(cls, model: ForceModel) -> ForceReport:
-        """Of a model that has learnt."""
+        """The report of a model that has learnt."""
         rows = model.presses.labelled
         errors, force = np.abs(model.errors), model.presses.force[rows]
         return cls(
@@ -63,7 +63,7 @@ class ForceReport:
 
     @property
     def text(self) -> str:
-        """In a sentence."""
+        """The report as one sentence for people."""
         return (
             f"{self.touches} touches of {self.presses} presses, {self.from_n:.2g} to "
             f"{self.to_n:.2g} N; left out of the learning their forces are missed by "

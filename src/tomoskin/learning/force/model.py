@@ -50,7 +50,7 @@ class PressedSpots:
     memory: MemoryState
 
     def __len__(self) -> int:
-        """Number of spots."""
+        """The number of spots that are pressed."""
         return len(self.xy)
 
 

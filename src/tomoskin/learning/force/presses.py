@@ -41,7 +41,7 @@ class Weight:
 
     @property
     def newtons(self) -> float:
-        """Force, N."""
+        """The force of the weight, in newtons."""
         return self.value * NEWTONS[self.unit]
 
     @property
@@ -153,7 +153,7 @@ class WeighedPresses:
         return cls(xy, area, peak, snr, force, press.astype(int), time)
 
     def __len__(self) -> int:
-        """Number of touches."""
+        """The number of touches with a label."""
         return len(self.force)
 
     @property

@@ -33,7 +33,7 @@ class ChannelMapping:
 
     @classmethod
     def as_drawn(cls, n: int) -> Self:
-        """What the skin file says."""
+        """The mapping that the skin file draws: channel i at electrode i."""
         return cls(tuple(range(n)))
 
     def turned(self, ring: tuple[int, ...], steps: int, *, mirrored: bool) -> Self:

@@ -69,7 +69,7 @@ class CalibrationHealth:
 
     @property
     def broken(self) -> bool:
-        """Whether someone must act."""
+        """Whether the calibration is so strange that someone must act."""
         return len(self.excluded) > _FEW or (self.known and self.strangeness > BROKEN)
 
     @property

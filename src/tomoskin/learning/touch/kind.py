@@ -47,7 +47,7 @@ class Standing:
         self._noises: deque[float] = deque(maxlen=_NOISES)
 
     def clear(self) -> None:
-        """The touch has ended."""
+        """Forget the touch, since it has ended."""
         self._frames.clear()
         self._newest.clear()
 

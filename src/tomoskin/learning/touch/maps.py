@@ -35,7 +35,7 @@ class Projected:
 
     @property
     def n(self) -> int:
-        """Number of presses."""
+        """The number of presses, those at rest included."""
         return len(self.weights) + self.n_rest
 
 

@@ -50,7 +50,7 @@ class Rotations:
         return cls(np.zeros(n_rows, dtype=np.int64), np.zeros(n_rows))
 
     def of_rows(self, rows: IntArray) -> Self:
-        """Those of some rows only."""
+        """The rotations of these measurements only."""
         return type(self)(self.orbit[rows], self.angle[rows])
 
     def reversed(self) -> Self:

@@ -83,7 +83,7 @@ class Presses:
         return cls(data, labels, force)
 
     def __len__(self) -> int:
-        """Number of presses."""
+        """The number of labelled presses."""
         return len(self.dv)
 
     def within(self, region: Region) -> Self:

@@ -58,7 +58,7 @@ class Likeness:
 
     @property
     def variance(self) -> float:
-        """Of a response at one place."""
+        """The variance of a response at one place."""
         return 1.0 + _CONSTANT
 
 

@@ -67,7 +67,7 @@ class CalibratedCovariance:
         return cls(*(float(x) for x in factor * spent * optimum))
 
     def __call__(self, posterior: FloatArray, disagreement: FloatArray) -> FloatArray:
-        """(n, 2, 2) covariance."""
+        """The covariance (n, 2, 2) of each position, in m²."""
         common = (self.everywhere + _SPREAD**2) * np.eye(2)
         return np.asarray(self.posterior * posterior + self.disagreement * disagreement + common)
 

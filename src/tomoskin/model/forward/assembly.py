@@ -66,17 +66,17 @@ class SystemAssembly:
 
     @property
     def n_points(self) -> int:
-        """Number of nodal unknowns."""
+        """The number of nodes with an unknown potential."""
         return self.element.n_nodes
 
     @property
     def n_electrodes(self) -> int:
-        """Number of electrodes."""
+        """The number of electrodes on the mesh."""
         return len(self.element.facets)
 
     @property
     def n_unknowns(self) -> int:
-        """Size of the system."""
+        """The number of equations of the system."""
         return self.n_points + self.n_electrodes - 1
 
     @cached_property

@@ -25,7 +25,7 @@ class Compressed:
 
     @cached_property
     def matrix(self) -> csc_array:
-        """The matrix in scipy's form."""
+        """The matrix as scipy's sparse columns."""
         n = len(self.indptr) - 1
         return csc_array((self.values, self.indices, self.indptr), shape=(n, n))
 
@@ -88,7 +88,7 @@ class Patches(Protocol):
         ...
 
     def forget(self) -> None:
-        """Drop all that were stored."""
+        """Drop all columns that were stored."""
         ...
 
     def change(

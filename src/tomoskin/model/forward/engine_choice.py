@@ -59,7 +59,7 @@ class Native:
         return factorise_natively
 
     def fields(self, operator: csr_array, vectors: NDArray[Any], out: NDArray[Any]) -> None:
-        """See :class:`Engine`."""
+        """Write the product of operator and vectors, transposed, into ``out``."""
         indptr, indices = (
             part.astype(np.int32, copy=False) for part in (operator.indptr, operator.indices)
         )
@@ -68,14 +68,14 @@ class Native:
     def jacobian(
         self, gradient: NDArray[Any], pattern: Pattern, current: FloatArray
     ) -> NDArray[Any]:
-        """See :class:`Engine`."""
+        """The Jacobian of the pattern, computed by the native engine."""
         rows: NDArray[Any] = self.core.jacobian(
             gradient, pattern.drives, current, pattern.drive_index, pattern.measure
         )
         return rows
 
     def patches(self, base: BaseState) -> Patches:
-        """See :class:`Engine`."""
+        """The native engine's changes about one state of the sheet."""
         made: Patches = self.core.Patches(
             base.cells, base.local, base.held, base.conductivity, base.fields, base.grounded
         )

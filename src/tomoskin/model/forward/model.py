@@ -107,7 +107,7 @@ class State:
 
     @property
     def voltages(self) -> NDArray[Any]:
-        """(n_meas,) V of the pattern."""
+        """The voltages (n_meas,) of the pattern, in V."""
         return self.solution.voltages
 
     @property

@@ -41,13 +41,13 @@ class Scipy:
         return lambda values: _factorise(Compressed(values, indices, indptr))
 
     def fields(self, operator: csr_array, vectors: NDArray[Any], out: NDArray[Any]) -> None:
-        """See :class:`Engine`."""
+        """Write the product of operator and vectors, transposed, into ``out``."""
         out[...] = (operator @ vectors).T
 
     def jacobian(
         self, gradient: NDArray[Any], pattern: Pattern, current: FloatArray
     ) -> NDArray[Any]:
-        """See :class:`Engine`."""
+        """The Jacobian of the pattern, one drive after the other."""
         out = np.empty((pattern.n_meas, gradient.shape[-1]), dtype=gradient.dtype)
         for drive, (source, sink) in enumerate(pattern.drives):
             rows = np.flatnonzero(pattern.drive_index == drive)
@@ -58,7 +58,7 @@ class Scipy:
         return out
 
     def patches(self, base: BaseState) -> Patches:
-        """See :class:`Engine`."""
+        """The plain changes about one state of the sheet."""
         return PlainPatches(base)
 
 
@@ -70,13 +70,13 @@ class PlainFactor:
     factor: SuperLU
 
     def columns(self, rows: IntArray) -> NDArray[Any]:
-        """See the protocol."""
+        """The columns of the inverse that belong to these rows."""
         return np.asarray(self.factor.solve(self._units(rows)))
 
     def checked_columns(
         self, values: NDArray[Any], rows: IntArray
     ) -> tuple[NDArray[Any], NDArray[Any], float]:
-        """See the protocol."""
+        """The columns, their correction to first order, and the largest residual."""
         columns = self.columns(rows)
         matrix = Compressed(values, self.matrix.indices, self.matrix.indptr).matrix
         residual = self._units(rows) - matrix @ columns
@@ -123,19 +123,19 @@ class PlainPatches:
         self._columns: NDArray[Any] = np.empty((0, n), base.fields.dtype)
 
     def keep(self, nodes: IntArray, columns: NDArray[Any]) -> None:
-        """See the protocol."""
+        """Store the columns of the inverse that belong to these nodes."""
         self._slot[nodes] = len(self._columns) + np.arange(len(nodes))
         self._columns = np.vstack([self._columns, columns.T])
 
     def forget(self) -> None:
-        """See the protocol."""
+        """Drop all columns that were stored."""
         self._slot[:] = -1
         self._columns = self._columns[:0]
 
     def change(
         self, starts: IntArray, cells: IntArray, conductivity: NDArray[Any]
     ) -> tuple[NDArray[Any], NDArray[Any], IntArray]:
-        """See the protocol."""
+        """The changes that touches make, and the nodes whose columns are missing."""
         touches, base = Touches(starts, cells, conductivity), self._base
         if touches.fault(len(base.cells)) is not None:
             raise ValueError("a cell or conductivity is out of range")

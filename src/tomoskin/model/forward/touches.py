@@ -51,7 +51,7 @@ class Touches:
         return cls(starts, np.ascontiguousarray(cells, np.int64), np.ascontiguousarray(sigma, kind))
 
     def __len__(self) -> int:
-        """Return their number."""
+        """The number of touches in the stack."""
         return len(self.starts) - 1
 
     def __getitem__(self, number: int) -> tuple[IntArray, NDArray[Any]]:
@@ -144,7 +144,7 @@ def stacks(cells: IntArray, touches: Touches) -> Iterator[Stack]:
 
 
 def _stack(cells: IntArray, touches: Touches, numbers: IntArray) -> Stack:
-    """These touches as a stack."""
+    """The touches of these numbers as one stack."""
     begin, end = touches.starts[numbers], touches.starts[numbers + 1]
     owner = np.repeat(np.arange(len(numbers)), end - begin)
     entries = np.arange(len(owner)) + np.repeat(

@@ -35,7 +35,7 @@ class ElectrodeArc:
         return cls(centre - width / 2, centre + width / 2)
 
     def width(self, outline: Outline) -> float:
-        """Length of the arc, m."""
+        """The length of the arc on this outline, in m."""
         span = self.end - self.start
         return span if span >= 0 else span + outline.length
 

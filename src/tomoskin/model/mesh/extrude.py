@@ -199,7 +199,7 @@ class Body:
 
 
 def _facets(body: Body, outline: Outline, patches: Sequence[Patch]) -> list[IntArray]:
-    """Facets of each patch."""
+    """The facets of the body that each patch covers."""
     edges = boundary_facets(body.triangles)
     s = outline.nearest(body.flat[edges].mean(axis=1))
     centroids = body.flat[body.triangles].mean(axis=1)

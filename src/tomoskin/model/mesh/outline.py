@@ -24,12 +24,12 @@ class Outline(Protocol):
     @property
     @abstractmethod
     def length(self) -> float:
-        """Length of the curve, m."""
+        """The length of the closed curve, in m."""
 
     @property
     @abstractmethod
     def area(self) -> float:
-        """Area inside, m²."""
+        """The area inside the curve, in m²."""
 
     @property
     @abstractmethod
@@ -81,7 +81,7 @@ class Ellipse(Outline):
     semi_y: float
 
     def __post_init__(self) -> None:
-        """Check the half axes."""
+        """Check that both half axes are sizes."""
         check_size("half axis along x", self.semi_x)
         check_size("half axis along y", self.semi_y)
 
@@ -92,7 +92,7 @@ class Ellipse(Outline):
 
     @property
     def area(self) -> float:
-        """Area inside, m²."""
+        """The area inside the ellipse, in m²."""
         return math.pi * self.semi_x * self.semi_y
 
     @property
@@ -102,7 +102,7 @@ class Ellipse(Outline):
 
     @property
     def corners(self) -> FloatArray:
-        """An ellipse has no corners."""
+        """The corners of the curve: an ellipse has none."""
         return np.zeros(0)
 
     def point(self, s: ArrayLike) -> FloatArray:
@@ -167,17 +167,17 @@ class Disc(Outline):
     radius: float
 
     def __post_init__(self) -> None:
-        """Check the radius."""
+        """Check that the radius is a size."""
         check_size("radius", self.radius)
 
     @property
     def length(self) -> float:
-        """Length of the curve, m."""
+        """The circumference of the disc, in m."""
         return 2 * math.pi * self.radius
 
     @property
     def area(self) -> float:
-        """Area inside, m²."""
+        """The area inside the circle, in m²."""
         return math.pi * self.radius**2
 
     @property
@@ -187,7 +187,7 @@ class Disc(Outline):
 
     @property
     def corners(self) -> FloatArray:
-        """A disc has no corners."""
+        """The corners of the curve: a disc has none."""
         return np.zeros(0)
 
     def point(self, s: ArrayLike) -> FloatArray:

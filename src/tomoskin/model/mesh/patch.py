@@ -31,7 +31,7 @@ class WallPatch:
     arc: ElectrodeArc | None = None
 
     def width(self, outline: Outline) -> float:
-        """Length along the wall, m."""
+        """The length of the patch along the wall, in m."""
         return outline.length if self.arc is None else self.arc.width(outline)
 
     def holds(self, outline: Outline, s: FloatArray) -> NDArray[np.bool_]:

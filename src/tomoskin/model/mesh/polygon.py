@@ -41,12 +41,12 @@ class Polygon(Outline):
 
     @cached_property
     def length(self) -> float:
-        """Length of the curve, m."""
+        """The length of all sides together, in m."""
         return float(self._sides.sum())
 
     @cached_property
     def area(self) -> float:
-        """Area inside, m²."""
+        """The area inside the polygon, in m²."""
         return _signed_area(self.vertices)
 
     @cached_property
@@ -125,12 +125,12 @@ class Rectangle(Polygon):
 
     @property
     def width(self) -> float:
-        """Extent along x, m."""
+        """The extent of the rectangle along x, in m."""
         return float(self.vertices[1, 0] - self.vertices[0, 0])
 
     @property
     def height(self) -> float:
-        """Extent along y, m."""
+        """The extent of the rectangle along y, in m."""
         return float(self.vertices[2, 1] - self.vertices[1, 1])
 
 

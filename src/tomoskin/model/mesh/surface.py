@@ -116,10 +116,10 @@ def _of_lengths(mesh: Mesh, surface: Surface) -> FloatArray:
 
 @dataclass(frozen=True)
 class Plane(Surface):
-    """A sheet that lies flat."""
+    """The surface of a sheet that lies flat."""
 
     def point(self, uv: ArrayLike) -> FloatArray:
-        """Points (n, 3) m with z = 0."""
+        """The points (n, 3) in m, with z = 0."""
         uv = rows_of(uv)
         return np.column_stack([uv, np.zeros(len(uv))])
 

@@ -173,12 +173,12 @@ class Pattern:
 
     @property
     def n_meas(self) -> int:
-        """Number of measurements."""
+        """The number of measurements in a frame."""
         return len(self.measure)
 
     @property
     def n_drive(self) -> int:
-        """Number of drives."""
+        """The number of drives in a frame."""
         return len(self.drives)
 
     @property

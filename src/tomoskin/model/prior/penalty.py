@@ -96,7 +96,7 @@ class Factored:
 
     @property
     def matrix(self) -> FloatArray:
-        """The matrix Q, dense."""
+        """The matrix Q of the penalty, dense."""
         return self.dense()
 
     def carry(self, jacobian: NDArray[Any]) -> Carried:

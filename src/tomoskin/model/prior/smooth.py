@@ -224,7 +224,7 @@ class _Covariance:
 
     @property
     def matrix(self) -> FloatArray:
-        """The matrix Q = C⁻¹, dense."""
+        """The matrix Q = C⁻¹ of the penalty, dense."""
         return np.asarray(inv(self.correlation(cdist(self.positions, self.positions))))
 
     def carry(self, jacobian: NDArray[Any]) -> Carried:

@@ -48,7 +48,7 @@ class Pose:
         return float(roll), float(pitch), float(yaw)
 
     def quaternion(self) -> tuple[float, ...]:
-        """The rotation as x, y, z, w."""
+        """The rotation as a quaternion x, y, z, w."""
         return quaternion(self.rotation.T)
 
     def __call__(self, points: FloatArray) -> FloatArray:

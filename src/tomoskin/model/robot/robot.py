@@ -42,7 +42,7 @@ _FILE = Text(1000)
 
 
 class RobotSection(Section, section="robot"):
-    """The robot itself."""
+    """What the robot is called, and its model."""
 
     name: str = key(Text(64), "A title of one line, for people.", default="robot")
     urdf: str | None = key(

@@ -29,7 +29,7 @@ Pairs = tuple[tuple[Any, ...], ...]
 
 
 class NameSection(Section, section="skin"):
-    """What this skin is."""
+    """What this skin is called and what it is for."""
 
     name: str = key(Text(most=255), "Short name, shown on the page.")
     description: str = key(Text(), "One sentence for people.", default="")
@@ -128,7 +128,7 @@ class ElectrodesSection(Section, section="electrodes"):
 
 
 class MaterialSection(Section, section="material"):
-    """The sheet."""
+    """What the sheet of the skin is made of."""
 
     sheet_resistance: float = key(
         Quantity("sheet resistance", "ohm/sq", 1e-4, 1e8),

@@ -55,7 +55,7 @@ class MaterialMemory:
     breakdown_times: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        """Check the numbers."""
+        """Check the strengths, widths and times of each series."""
         for parts, sizes, most in (
             ("play", "play_widths", 1.0),
             ("creep", "creep_times", 1.0),

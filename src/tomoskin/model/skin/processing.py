@@ -77,7 +77,7 @@ class SignalSettings(Section, section="signal"):
 
 
 class TouchSettings(Section, section="touch"):
-    """How data become touches."""
+    """How difference data become touches."""
 
     method: str = key(
         Choice(("fit", "image")),

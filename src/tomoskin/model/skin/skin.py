@@ -143,7 +143,7 @@ class Skin:
 
     @property
     def n_electrodes(self) -> int:
-        """Number of electrodes."""
+        """The number of electrodes of the skin."""
         return len(self.arcs)
 
     @property

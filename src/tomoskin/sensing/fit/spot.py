@@ -205,7 +205,7 @@ class Spots:
         return isinstance(other, Spots) and self.mesh.identity == other.mesh.identity
 
     def __hash__(self) -> int:
-        """The hash of the sheet."""
+        """The hash of the sheet that the spots lie on."""
         return hash(self.mesh.identity)
 
     def change(self, spots: FloatArray) -> tuple[IntArray, FloatArray]:

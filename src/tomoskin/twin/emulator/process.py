@@ -140,7 +140,7 @@ class SkinMemory:
         _SEQUENCE.pack_into(self._map, _SEQUENCE_AT, self._sequence)
 
     def close(self) -> None:
-        """Free the shared memory."""
+        """Free the memory that is shared with the process."""
         self._map.close()
 
 
@@ -213,7 +213,7 @@ class BoardProcess:
 
     @property
     def alive(self) -> bool:
-        """Whether the process runs."""
+        """Whether the process is still running."""
         return self._process.poll() is None
 
     @property
@@ -223,7 +223,7 @@ class BoardProcess:
         return self._stderr.read().decode(errors="replace")
 
     def close(self) -> None:
-        """Switch the board off."""
+        """Switch the board off, and keep its last words."""
         if self._stderr.closed:
             return
         self._process.kill()

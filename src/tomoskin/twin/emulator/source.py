@@ -102,11 +102,11 @@ class EmulatorTransport:
         return self._open.waited
 
     def write(self, data: bytes) -> None:
-        """Send ``data`` to the board."""
+        """Send ``data`` to the simulated board."""
         self._open.write(data)
 
     def close(self) -> None:
-        """Power the board off."""
+        """Power the board off, if it is still on."""
         if not self._closed:
             self._closed = True
             self._stack.close()
