@@ -16,7 +16,7 @@ from tomoskin.learning import BENDS, BendExamples, BendModel, Differences, Frame
 from tomoskin.model.mesh import Cylinder, Hinge
 from tomoskin.pipeline import Pipeline
 from tomoskin.pipeline.finding import finder_of, voltage_covariance
-from tomoskin.pipeline.nuisance import JUMP
+from tomoskin.pipeline.frame_subspace import JUMP
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
 from tomoskin.sensing.signal import Reference
 from tomoskin.twin import Bent, Pose, Press

@@ -15,7 +15,7 @@ from bench_rig import INSIDE_90
 from report import Floats, Report, percent, recordings, table
 from tomoskin import Locator, Pattern, Skin
 from tomoskin.learning import SessionAlignment, Several, Watch
-from tomoskin.learning.touch.process import Process, squared_distances
+from tomoskin.learning.touch.gaussian_process import Process, squared_distances
 
 SKINS = {"noPattern": 2.28, "fullCB": 6.74, "parallel": 3.13, "concentric": 4.99, "radial": 3.84}
 """Five skins with what their authors' network reaches after 2,000 presses, mm."""

@@ -20,7 +20,7 @@ from tomoskin.model.pattern import Scan
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, prepare
 from tomoskin.pipeline.finding import Finder, finder_of
-from tomoskin.pipeline.nuisance import JUMP
+from tomoskin.pipeline.frame_subspace import JUMP
 from tomoskin.pipeline.tune import tuned, tuned_sheet
 from tomoskin.sensing.fit import Whitener, row_covariance
 from tomoskin.sensing.signal import FIGURES, NuisanceSubspace, Readout, Reference

@@ -28,7 +28,7 @@ from tomoskin.learning import Differences, FrameView
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, prepare
 from tomoskin.pipeline.finding import finder_of
-from tomoskin.pipeline.nuisance import JUMP
+from tomoskin.pipeline.frame_subspace import JUMP
 from tomoskin.pipeline.tune import tuned_sheet
 from tomoskin.sensing.fit import Whitener, row_covariance
 from tomoskin.sensing.signal import Reference

@@ -185,7 +185,7 @@ OWN_WAYS = {
     "core/written.py": "the way",
     "files/session/message_log.py": "a session, while it happens, into a file that must be new",
     "twin/emulator/program.py": "a lock beside what make builds",
-    "twin/emulator/process.py": "in a temporary folder of its own",
+    "twin/emulator/board_process.py": "in a temporary folder of its own",
     "twin/emulator/flash.py": "in a temporary folder of its own",
 }
 OPENERS = {"write_text", "write_bytes", "savefig", "savemat", "ParquetWriter", "mkstemp", "File"}

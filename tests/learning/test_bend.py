@@ -7,7 +7,7 @@ import pytest
 
 from tomoskin.core import DataError
 from tomoskin.learning import BendExamples, BendModel, BendReader, JointReference
-from tomoskin.learning.bend.model import Memory
+from tomoskin.learning.bend.bend_model import Memory
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import prepare
 from tomoskin.sensing.fit import SpotModel

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tomoskin.core import Detection, FloatArray
-from tomoskin.learning.touch.health import FitCorrection
+from tomoskin.learning.touch.calibration_health import FitCorrection
 
 SAID = 0.002
 PLACES = np.random.default_rng(1).uniform(-0.08, 0.08, (40, 2))

@@ -11,9 +11,9 @@ from learning.labelled import RADIUS, ROWS, Floats, held, places, presses
 from tomoskin import Locator, Pattern, Skin
 from tomoskin.core import DataError
 from tomoskin.learning import LeftOut, Presses
+from tomoskin.learning.touch.gaussian_process import Basis, Likeness, moments
 from tomoskin.learning.touch.maps import ResponseMaps
 from tomoskin.learning.touch.posterior import GridLikelihood, pooled
-from tomoskin.learning.touch.process import Basis, Likeness, moments
 from tomoskin.sensing.segment import Region
 
 

@@ -9,7 +9,7 @@ from learning.labelled import RADIUS, ROWS, Floats, held, presses
 from tomoskin import Locator
 from tomoskin.core import DataError
 from tomoskin.learning import Watch
-from tomoskin.learning.touch.health import STRANGE
+from tomoskin.learning.touch.calibration_health import STRANGE
 from tomoskin.learning.touch.watch import LIVE, LostRows, without
 
 JUMPED = [3, 8, 21, 30, 35, 38]

@@ -11,8 +11,8 @@ from tomoskin.core import FloatArray, Voltages
 from tomoskin.learning import FORCE, TOUCH, ForceModel, Locator, WeighedPresses
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Pipeline, Prepared, prepare
+from tomoskin.pipeline.frame_result import FrameResult
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
-from tomoskin.pipeline.records import FrameResult
 from tomoskin.sensing.segment import Region
 
 FITTED = prepare(Skin.load("textile-disc-8"))

@@ -9,7 +9,7 @@ import pytest
 from tomoskin.core import Event
 from tomoskin.imaging import AlphaChoice
 from tomoskin.pipeline import colour_limit, prepare
-from tomoskin.pipeline.records import ReferenceState
+from tomoskin.pipeline.frame_result import ReferenceState
 from tomoskin.run.status import Status
 from tomoskin.sensing.signal import BaselineState, ElectrodeHealth
 from tomoskin.server import views

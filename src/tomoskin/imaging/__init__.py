@@ -7,8 +7,8 @@ from tomoskin.imaging.iterative.absolute import Absolute, AbsoluteImaging, homog
 from tomoskin.imaging.iterative.observation import Observation
 from tomoskin.imaging.iterative.shapes import RandomField, Segmented, ShapeImaging
 from tomoskin.imaging.iterative.sharp_difference import SharpDifference, SharpImage
+from tomoskin.imaging.linear.linear_problem import LinearProblem, OneStep
 from tomoskin.imaging.linear.operator import MOST_EXCLUDED, Operator
-from tomoskin.imaging.linear.problem import LinearProblem, OneStep
 from tomoskin.imaging.linear.spectrum import Assembly, Spectrum
 from tomoskin.imaging.linear.temporal import Modes, Steady, Temporal
 from tomoskin.imaging.resolution import (

@@ -11,8 +11,8 @@ from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
 from tomoskin.core import FloatArray, ModelError
+from tomoskin.imaging.linear.linear_problem import LinearProblem
 from tomoskin.imaging.linear.operator import Operator
-from tomoskin.imaging.linear.problem import LinearProblem
 from tomoskin.imaging.linear.spectrum import Spectrum
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.prior import Diagonal

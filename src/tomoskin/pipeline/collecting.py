@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, Voltages
-from tomoskin.pipeline.records import NO_AGREEMENT, ModelAgreement
+from tomoskin.pipeline.frame_result import NO_AGREEMENT, ModelAgreement
 from tomoskin.sensing.signal import Reference
 
 _MOST_EXCLUDED, _MOST_LOST = 0.5, 0.25

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tomoskin.core import FloatArray, IntArray, Voltages
 from tomoskin.learning import Differences
 from tomoskin.model.pattern import Scan
-from tomoskin.pipeline.nuisance import JUMP, Drift, Nuisance
+from tomoskin.pipeline.frame_subspace import JUMP, Drift, Nuisance
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.sensing.signal import (
     Baseline,
@@ -160,7 +160,7 @@ class BaselineDifferences:
 
     @property
     def state(self) -> BaselineState:
-        """What the baseline is doing: learning, held, or why not."""
+        """The values of the baseline, and how long it has been held."""
         return self._baseline.state
 
     def subspace(self) -> NuisanceSubspace:

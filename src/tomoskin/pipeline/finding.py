@@ -11,9 +11,9 @@ import numpy as np
 from tomoskin.board.source import Configuration, ScanSettings
 from tomoskin.core import Detection, FloatArray, finished
 from tomoskin.learning import FrameView, TouchFit
-from tomoskin.pipeline.nuisance import JUMP
+from tomoskin.pipeline.frame_result import ModelAgreement
+from tomoskin.pipeline.frame_subspace import JUMP
 from tomoskin.pipeline.prepare import Prepared
-from tomoskin.pipeline.records import ModelAgreement
 from tomoskin.sensing.fit import (
     EXHAUSTIVE,
     Pace,

@@ -25,9 +25,9 @@ from tomoskin.pipeline.finding import (
     finder_of,
     located_alone,
 )
+from tomoskin.pipeline.frame_result import FrameResult
 from tomoskin.pipeline.imaging import Filtered, SingleFrame
 from tomoskin.pipeline.prepare import Prepared
-from tomoskin.pipeline.records import FrameResult
 from tomoskin.pipeline.tune import tune, tuned_sheet
 from tomoskin.sensing.fit import LIVE, Pace
 from tomoskin.sensing.signal import Reference

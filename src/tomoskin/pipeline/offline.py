@@ -13,10 +13,10 @@ from tomoskin.core import DataError, FloatArray, Image, IntArray, Touch, Voltage
 from tomoskin.imaging import AlphaChoice
 from tomoskin.learning import BENDS, CLASSES, BendReading, ClassReading
 from tomoskin.pipeline.following import Setting
+from tomoskin.pipeline.frame_result import FrameResult, ModelAgreement
 from tomoskin.pipeline.pipeline import Pipeline
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.pipeline.recorded import Idle, RecordedFrames, recorded_frames
-from tomoskin.pipeline.records import FrameResult, ModelAgreement
 from tomoskin.pipeline.tune import tuned_by_rule
 from tomoskin.sensing.fit import EXHAUSTIVE
 from tomoskin.sensing.signal import Recording

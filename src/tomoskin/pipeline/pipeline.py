@@ -8,8 +8,8 @@ from tomoskin.core import Frame, Mark, Voltages, reach
 from tomoskin.imaging import AlphaChoice
 from tomoskin.pipeline.collecting import Collecting
 from tomoskin.pipeline.following import Following, Setting
+from tomoskin.pipeline.frame_result import FrameResult, ReferenceState
 from tomoskin.pipeline.prepare import Prepared
-from tomoskin.pipeline.records import FrameResult, ReferenceState
 from tomoskin.sensing.signal import Reference
 from tomoskin.sensing.track import Tracker, TrackSettings
 

@@ -12,8 +12,8 @@ from tomoskin.core import DataError, FloatArray, Image, IntArray
 from tomoskin.imaging import MOST_EXCLUDED, Evidence
 from tomoskin.model.pattern import Pattern
 from tomoskin.pipeline.conditioning import MOST_NUISANCE
+from tomoskin.pipeline.frame_result import NO_AGREEMENT, REFUSED, ModelAgreement
 from tomoskin.pipeline.prepare import Prepared
-from tomoskin.pipeline.records import NO_AGREEMENT, REFUSED, ModelAgreement
 from tomoskin.sensing.signal import Consecutive, Recording, Reference, difference, in_phase
 
 _LISTED = 5

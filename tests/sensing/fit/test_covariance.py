@@ -8,7 +8,7 @@ import pytest
 from tomoskin.core import finished
 from tomoskin.model.pattern import Pattern, Scan
 from tomoskin.sensing.fit import Whitener, idle_covariance, row_covariance
-from tomoskin.sensing.fit.targets import drawn_together
+from tomoskin.sensing.fit.noise_structure import drawn_together
 from tomoskin.sensing.signal import Scatter
 
 SCAN = Scan.of(Pattern.adjacent(8))

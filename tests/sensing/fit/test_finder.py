@@ -13,7 +13,7 @@ from tomoskin.core import Detection, FloatArray
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.skin import Skin
 from tomoskin.sensing.fit import SpotFinder, SpotModel, position_bound, spots_of
-from tomoskin.sensing.fit.watch import FrameWatch
+from tomoskin.sensing.fit.unexplained import FrameWatch
 
 NOTHING = np.zeros((208, 0))
 

@@ -33,7 +33,7 @@ from tomoskin.board.wire import (
 )
 from tomoskin.core import Frame, SourceError
 from tomoskin.twin.emulator import BoardProcess, Front, OwnVoltages, SkinMemory
-from tomoskin.twin.emulator.process import BoardPrograms
+from tomoskin.twin.emulator.board_process import BoardPrograms
 from twin.emulator.test_mutants import mutated as mutated_elf
 from twin.emulator.test_pico import mutated as mutated_image
 from twin.emulator.watch import CLOCK, Watch

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh, qr, solve_triangular
 
 from tomoskin.core import FloatArray, ModelError
+from tomoskin.imaging.linear.linear_problem import LinearProblem
 from tomoskin.imaging.linear.operator import Operator
-from tomoskin.imaging.linear.problem import LinearProblem
 
 _ROUNDING = 1e-14
 """An eigenvalue below this part of the largest is rounding (a reciprocal row, for one)."""

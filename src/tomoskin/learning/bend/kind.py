@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tomoskin.core import Detection, FloatArray
-from tomoskin.learning.bend.model import BendModel
+from tomoskin.learning.bend.bend_model import BendModel
 from tomoskin.learning.kind import Applied, Conditions, FrameView, Kind, TouchFit
 from tomoskin.sensing.fit import Response, spots_of
 

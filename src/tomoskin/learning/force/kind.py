@@ -9,7 +9,7 @@ import numpy as np
 
 from tomoskin.core import DataError, Detection, FloatArray, IntArray
 from tomoskin.learning.force.curve import basis
-from tomoskin.learning.force.model import ForceModel, LabelRemark, PressedSpots
+from tomoskin.learning.force.force_model import ForceModel, LabelRemark, PressedSpots
 from tomoskin.learning.kind import Applied, Calibration, Conditions, FrameView, Kind
 from tomoskin.model.skin import Skin
 

@@ -12,8 +12,8 @@ from scipy.linalg import eigh
 from scipy.special import ndtri
 
 from tomoskin.core import DataError, FloatArray
+from tomoskin.learning.touch.gaussian_process import Process, nine_in_ten, squared_distances
 from tomoskin.learning.touch.presses import Features, frames
-from tomoskin.learning.touch.process import Process, nine_in_ten, squared_distances
 
 _TERMS = (("change", "rest"), ("pressed",), ("rest",))
 _COMPONENTS = {"change": 60, "pressed": 60, "rest": 10}

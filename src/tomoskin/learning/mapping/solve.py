@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tomoskin.core import DataError, FloatArray
-from tomoskin.learning.mapping.evidence import (
+from tomoskin.learning.mapping.mapping import ChannelMapping, ring_of, swaps, turns
+from tomoskin.learning.mapping.mapping_likelihood import (
     IndentationResponses,
     MappingLikelihood,
     agreement,
     likelihood,
     quiet_noise,
 )
-from tomoskin.learning.mapping.mapping import ChannelMapping, ring_of, swaps, turns
 from tomoskin.learning.touch.presses import Presses
 from tomoskin.model.skin import Skin
 from tomoskin.sensing.segment import Region

@@ -17,7 +17,7 @@ from tomoskin.learning.kind import (
     Kind,
     Progress,
 )
-from tomoskin.learning.touch.health import CalibrationHealth, FitCorrection
+from tomoskin.learning.touch.calibration_health import CalibrationHealth, FitCorrection
 from tomoskin.learning.touch.locator import Locator
 from tomoskin.learning.touch.presses import Presses
 from tomoskin.learning.touch.watch import LIVE, Watch

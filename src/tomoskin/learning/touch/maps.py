@@ -10,7 +10,7 @@ import numpy as np
 from scipy.linalg import eigh
 
 from tomoskin.core import FloatArray
-from tomoskin.learning.touch.process import Basis, Likeness
+from tomoskin.learning.touch.gaussian_process import Basis, Likeness
 
 _PSEUDO_ROWS = 60.0
 """Weight of the prior of both covariances, which is their own diagonal."""

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from tomoskin.core import FloatArray, IntArray
-from tomoskin.learning.touch.process import nearness
+from tomoskin.learning.touch.gaussian_process import nearness
 
 _NEAR = 0.2
 """Radius of what is called the same place, in radii of the region."""

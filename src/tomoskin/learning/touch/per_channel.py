@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, IntArray
-from tomoskin.learning.touch.process import LENGTHS, Basis, Likeness
+from tomoskin.learning.touch.gaussian_process import LENGTHS, Basis, Likeness
 from tomoskin.model.pattern import Pattern
 
 _DECIMALS = 9

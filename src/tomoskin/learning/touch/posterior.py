@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, IntArray
+from tomoskin.learning.touch.gaussian_process import LENGTHS, Likeness, moments, squared_distances
 from tomoskin.learning.touch.maps import ResponseMaps, principal
 from tomoskin.learning.touch.per_channel import ChannelLikelihood, ChannelMaps, Rotations
-from tomoskin.learning.touch.process import LENGTHS, Likeness, moments, squared_distances
 
 BoolArray = NDArray[np.bool_]
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from tomoskin.core import DataError, FloatArray, IntArray
-from tomoskin.learning.touch.process import nearness
+from tomoskin.learning.touch.gaussian_process import nearness
 from tomoskin.sensing.segment import Region
 
 _FEWEST = 6

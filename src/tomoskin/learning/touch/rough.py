@@ -14,7 +14,7 @@ from scipy.sparse.csgraph import shortest_path
 from scipy.special import ndtri
 
 from tomoskin.core import FloatArray
-from tomoskin.learning.touch.process import Basis, Likeness, squared_distances
+from tomoskin.learning.touch.gaussian_process import Basis, Likeness, squared_distances
 from tomoskin.learning.touch.topographic import TopographicMap, balanced, coefficients_of
 from tomoskin.model.forward import ForwardModel
 

@@ -12,10 +12,16 @@ from numpy.typing import ArrayLike
 from threadpoolctl import threadpool_limits
 
 from tomoskin.core import DataError, FloatArray, IntArray
+from tomoskin.learning.touch.gaussian_process import (
+    Basis,
+    Likeness,
+    moments,
+    nearness,
+    squared_distances,
+)
 from tomoskin.learning.touch.matching import CHANCE, distance, matched, prevalence
 from tomoskin.learning.touch.posterior import BoolArray
 from tomoskin.learning.touch.presses import Presses, labelled_touches
-from tomoskin.learning.touch.process import Basis, Likeness, moments, nearness, squared_distances
 from tomoskin.learning.touch.topographic import TopographicMap, coefficients_of, whitening
 
 if TYPE_CHECKING:

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tomoskin.core import Detection, FloatArray, IntArray
+from tomoskin.learning.touch.gaussian_process import moments, squared_distances
 from tomoskin.learning.touch.locator import Locator, detection_at
 from tomoskin.learning.touch.maps import ResponseMaps
 from tomoskin.learning.touch.presses import Features, frames
-from tomoskin.learning.touch.process import moments, squared_distances
 
 _PLACES = 160
 """Places that a touch is looked for at; what is between them is their mean."""

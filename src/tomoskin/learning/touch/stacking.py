@@ -11,7 +11,12 @@ from scipy.optimize import minimize, nnls
 from scipy.special import chdtri
 
 from tomoskin.core import FloatArray
-from tomoskin.learning.touch.process import Process, nine_in_ten, squared_distances, squared_norms
+from tomoskin.learning.touch.gaussian_process import (
+    Process,
+    nine_in_ten,
+    squared_distances,
+    squared_norms,
+)
 
 _SPREAD = 1e-3
 """Deviation, in radii of the region, below which no place is known."""

@@ -8,9 +8,9 @@ from typing import Self
 import numpy as np
 
 from tomoskin.core import FloatArray
+from tomoskin.learning.touch.gaussian_process import moments
 from tomoskin.learning.touch.locator import Locator
 from tomoskin.learning.touch.presses import Features, Presses
-from tomoskin.learning.touch.process import moments
 from tomoskin.learning.touch.rough import (
     ModelFit,
     Ranked,

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tomoskin.core import DataError, FloatArray, IntArray
-from tomoskin.learning.touch.health import CalibrationHealth
+from tomoskin.learning.touch.calibration_health import CalibrationHealth
 from tomoskin.learning.touch.locator import Locator
 from tomoskin.learning.touch.presses import frames
 

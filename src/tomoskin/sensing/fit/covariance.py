@@ -13,7 +13,7 @@ from scipy.special import ndtr, stdtrit
 from tomoskin.core import FloatArray
 from tomoskin.model.pattern import Scan
 from tomoskin.sensing.fit.noise import rounding_left, row_covariance
-from tomoskin.sensing.fit.targets import Blocks, target
+from tomoskin.sensing.fit.noise_structure import Blocks, target
 from tomoskin.sensing.signal import Reference, Scatter
 
 _EDGE = 1.15
@@ -156,11 +156,11 @@ def learnt_covariance(
 ) -> Generator[None, None, FloatArray]:
     """(n_meas, n_meas) V² for a ``scatter`` (n_meas, n_meas) V² of so many independent frames.
 
-    The structure of the read-out (:mod:`tomoskin.sensing.fit.targets`), and in it: factors that
-    many rows have in common, as hum, which stand out of the spectrum of noise (Marchenko & Pastur
-    1967), with the variance that was seen; and all else drawn towards the structure as far as the
-    frames bear it out (oracle-approximating shrinkage: Chen, Wiesel, Eldar & Hero 2010, which
-    betters Ledoit & Wolf 2004 for normal noise). A factor like one of the ``signatures``,
+    The structure of the read-out (:mod:`tomoskin.sensing.fit.noise_structure`), and in it: factors
+    that many measurements have in common, as hum, which stand out of the spectrum of noise
+    (Marchenko & Pastur 1967), with their own variance; and all else drawn towards the structure as
+    far as the frames bear it out (oracle-approximating shrinkage: Chen, Wiesel, Eldar & Hero 2010,
+    which betters Ledoit & Wolf 2004 for normal noise). A factor like one of the ``signatures``,
     (n, n_meas), is a touch that stood for a part of the frames, and no noise.
     """
     found = yield from _factors(blocks, scatter, frames)

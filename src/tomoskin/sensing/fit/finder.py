@@ -23,7 +23,7 @@ from tomoskin.sensing.fit.sight import Sight
 from tomoskin.sensing.fit.spot import FILLING, N_PARAMETERS
 from tomoskin.sensing.fit.spot_fit import Deficit
 from tomoskin.sensing.fit.spot_model import SpotModel
-from tomoskin.sensing.fit.watch import FrameWatch
+from tomoskin.sensing.fit.unexplained import FrameWatch
 
 _GROWS = 0.5
 """Standard deviation of what a touch that has just begun grows by within a scan, in parts of it."""

@@ -18,11 +18,11 @@ from tomoskin.sensing.fit.certificate import Reduced
 from tomoskin.sensing.fit.native import NativeSolver
 from tomoskin.sensing.fit.prior import SpotPrior
 from tomoskin.sensing.fit.problem import Solver
-from tomoskin.sensing.fit.sheet import fields_of, fitting_sheet
 from tomoskin.sensing.fit.solver import NumpySolver, SheetDomain
 from tomoskin.sensing.fit.spot import Footprints, Response
 from tomoskin.sensing.fit.table import ResponseTable
 from tomoskin.sensing.fit.tabulate import Tabulation, kept_tabulation
+from tomoskin.sensing.fit.uneven_sheet import fields_of, fitting_sheet
 
 _CELLS = 1500
 """Of the mesh that spots are fitted on: their profile is smooth, and a frame is quick."""
@@ -108,7 +108,7 @@ class SpotModel:
         """The model of the sheet that a ``reference`` (n_meas,) V shows, a piece between yields.
 
         Itself where that sheet is even. ``deviation`` (n_meas,) V is the reference's own; see
-        :mod:`tomoskin.sensing.fit.sheet`.
+        :mod:`tomoskin.sensing.fit.uneven_sheet`.
         """
         state = yield from fitting_sheet(self.response.state, reference, deviation)
         if state is self.response.state:

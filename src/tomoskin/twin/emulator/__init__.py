@@ -1,5 +1,13 @@
 """The board's real firmware on a simulated processor, before the twin's sheet."""
 
+from tomoskin.twin.emulator.board_process import (
+    BoardFaults,
+    BoardProcess,
+    BoardPrograms,
+    Front,
+    OwnVoltages,
+    SkinMemory,
+)
 from tomoskin.twin.emulator.flash import (
     check_current,
     read_identity,
@@ -8,14 +16,6 @@ from tomoskin.twin.emulator.flash import (
     sense_resistor,
     write_firmware,
     write_identity,
-)
-from tomoskin.twin.emulator.process import (
-    BoardFaults,
-    BoardProcess,
-    BoardPrograms,
-    Front,
-    OwnVoltages,
-    SkinMemory,
 )
 from tomoskin.twin.emulator.program import PicoPrograms, Programs, build_firmware, programs_of
 from tomoskin.twin.emulator.source import EmulatorTransport, emulate_board, emulate_load

@@ -16,7 +16,7 @@ from tomoskin.board.source import (
 )
 from tomoskin.board.wire import BoardLimits, GetBoard, GetInfo, Info
 from tomoskin.core import SourceError
-from tomoskin.twin.emulator.process import BoardIdentity
+from tomoskin.twin.emulator.board_process import BoardIdentity
 from tomoskin.twin.emulator.program import firmware_image
 from tomoskin.twin.emulator.uf2 import find_boot_drive, uf2_of, write_uf2
 

@@ -16,7 +16,7 @@ from typing import IO
 
 from tomoskin.board.source import BOARDS, BoardRecord, FirmwareFiles
 from tomoskin.core import SourceError, written
-from tomoskin.twin.emulator.process import BoardPrograms
+from tomoskin.twin.emulator.board_process import BoardPrograms
 from tomoskin.twin.emulator.uf2 import uf2_of
 
 FOLDER = Path(__file__).resolve().parents[4] / "firmware"

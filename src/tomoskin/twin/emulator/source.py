@@ -29,7 +29,7 @@ from tomoskin.twin import (
     on_converter,
     read_settings,
 )
-from tomoskin.twin.emulator.process import (
+from tomoskin.twin.emulator.board_process import (
     BoardFaults,
     BoardProcess,
     BoardPrograms,

@@ -9,7 +9,7 @@ from scipy.special import softmax
 
 from tomoskin.core import FloatArray, IntArray
 from tomoskin.learning.force.curve import ForceCurve
-from tomoskin.learning.force.presses import WeighedPresses
+from tomoskin.learning.force.weighed_presses import WeighedPresses
 from tomoskin.model.skin import MaterialMemory, MemoryState, load_of
 
 _PARTS, _WIDTHS = (0.2, 0.4), (0.1, 0.2, 0.4)

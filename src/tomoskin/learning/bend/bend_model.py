@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 
 from tomoskin.core import DataError, FloatArray, IntArray
-from tomoskin.learning.bend.examples import BendExamples
+from tomoskin.learning.bend.recorded_bends import BendExamples
 from tomoskin.sensing.fit import Whitener
 
 _WIDTHS = (0.03, 0.08, 0.16, 0.3)
