@@ -91,7 +91,7 @@ export interface RunState {
   readonly text: string;
 }
 
-/** How long one stage takes. */
+/** How long one stage of the frame flow takes. */
 export interface StageNow {
   readonly name: string;
   readonly p50_ms: number | null;
@@ -206,7 +206,7 @@ export interface Tick {
   readonly text: string;
 }
 
-/** An event of a recording. */
+/** An event of a recording, at its time. */
 export interface TimedEvent {
   readonly time_s: number;
   readonly kind: string;
@@ -241,7 +241,7 @@ export interface FileEntry {
   readonly notes: string;
 }
 
-/** An export has ended. */
+/** An export has ended, and its file is there. */
 export interface Exported {
   readonly type: "exported";
   readonly name: string;
@@ -343,7 +343,7 @@ export interface SchemaForm {
   readonly sections: readonly SectionForm[];
 }
 
-/** One section of a skin file. */
+/** The form of one section of a skin file. */
 export interface SectionForm {
   readonly name: string;
   readonly meaning: string;
@@ -447,7 +447,7 @@ export interface TwinStretch {
   readonly axis: number;
 }
 
-/** The twin cannot be bent so. */
+/** The twin cannot be bent in this way. */
 export interface TwinRefused {
   readonly type: "twin_refused";
   readonly message: string;
@@ -673,7 +673,7 @@ export interface Annotate {
   readonly text: string;
 }
 
-/** Ask what can be connected. */
+/** The page asks what can be connected. */
 export interface ListSources {
   readonly type: "sources";
 }
@@ -696,7 +696,7 @@ export interface ShowFlow {
   readonly on: boolean;
 }
 
-/** Remove the last press. */
+/** The page takes the last press back. */
 export interface UndoPress {
   readonly type: "flow_undo";
 }
@@ -726,7 +726,7 @@ export interface LearnFlow {
   readonly type: "flow_learn";
 }
 
-/** End what is being learnt. */
+/** The page ends what is being learnt. */
 export interface StopLearning {
   readonly type: "flow_stop";
 }
