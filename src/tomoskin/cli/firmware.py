@@ -93,7 +93,7 @@ def flash(
     with Bar("writing"):
         port = write_firmware(record, channels, port)
     after = (
-        "the Pico starts it by itself"
+        f"the {record.text} starts it by itself"
         if record.flash == "uf2"
         else "next: tomoskin firmware configure"
     )
@@ -152,7 +152,7 @@ def configure(
     identity = held.change(asked, name)
     check_current(identity.current, BOARDS[board], of_skin)
     with Bar("writing"):
-        write_identity(port, identity)
+        write_identity(BOARDS[board], port, identity)
     typer.echo(f"{port}: {say_identity(identity)}, read back from the firmware")
     _say_resistor(identity.current)
 

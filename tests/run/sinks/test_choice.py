@@ -11,7 +11,7 @@ from tomoskin.run.sinks import make_sink, sink_names
 
 
 def test_the_installed_sinks():
-    assert sink_names() == ("foxglove", "lsl", "mqtt", "rerun", "ros2")
+    assert {"foxglove", "lsl", "mqtt", "rerun", "ros2"} <= set(sink_names())
 
 
 @pytest.mark.parametrize(
@@ -37,7 +37,7 @@ def test_names_say_where_results_go_but_no_password(spec, name):
     ("spec", "said"),
     [
         ("", "there is no sink"),
-        ("kafka", "sinks: foxglove, lsl, mqtt, rerun, ros2"),
+        ("kafka", f"sinks: {', '.join(sink_names())}"),
         ("foxglove:port", "expected a port"),
         ("foxglove:70000", "expected a port"),
         ("foxglove:0", "expected a port"),

@@ -115,7 +115,7 @@ def test_the_command_line_builds_and_flashes(pico: PicoPrograms, tmp_path: Path)
     assert Path(said.output.strip()) == pico.image
     boot = drive(tmp_path / "RPI-RP2")
     words = ["firmware", "flash", str(boot), "--board", "pico", "--channels", "32"]
-    assert "the Pico starts it" in CliRunner().invoke(app, words).output
+    assert "the Raspberry Pi Pico starts it" in CliRunner().invoke(app, words).output
     assert (boot / "tomoskin.uf2").read_bytes() == pico.image.read_bytes()
     assert CliRunner().invoke(app, ["firmware", "build", "--board", "uno"]).exit_code == 2
     assert CliRunner().invoke(app, ["firmware", "flash"]).exit_code == 2

@@ -105,6 +105,7 @@ class BoardRecord(_Record, frozen=True, kw_only=True):
     chop: Chop = Chop()
     usb: tuple[tuple[int, int], ...] = ()
     flash: Literal["avrdude", "uf2", ""] = ""
+    avrdude: str = ""
     emulator: Literal["simavr", "rp2040js", ""] = ""
     firmware: FirmwareFiles | None = None
 

@@ -169,6 +169,11 @@ def may_begin(detection: Detection, threshold: float) -> bool:
     return not (detection.weak or detection.snr < threshold)
 
 
+def is_forgotten(detection: Detection, threshold: float) -> bool:
+    """Whether a newcomer that is not reported yet is no touch, since it no longer stands out."""
+    return detection.snr < threshold
+
+
 def is_reported(odds: float, detection: Detection, seconds: float) -> bool:
     """Whether a touch is sure to be there, and it is known where it is; or it has been detected
     for so many ``seconds`` that it is reported all the same: its first frames may have seen it

@@ -143,7 +143,7 @@ class Tracker:
         if self.settings.still and trace.missing is None:
             self._report_onset(trace)
             return
-        if trace.missing is not None or trace.detection.snr < self.settings.snr:
+        if trace.missing is not None or policy.is_forgotten(trace.detection, self.settings.snr):
             self._traces.remove(trace)
             return
         seconds = self._clock.now - trace.since

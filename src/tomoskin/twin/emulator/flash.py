@@ -23,7 +23,6 @@ from tomoskin.twin.emulator.uf2 import find_boot_drive, uf2_of, write_uf2
 _REFERENCE = 1.225
 """V across the board's sense resistor."""
 
-_AVRDUDE = ("avrdude", "-q", "-q", "-p", "atmega2560", "-c", "wiring", "-b", "115200", "-D", "-P")
 _LONGEST = 60.0
 _HINT = "is it the board's port, and does nothing else use it?"
 _AGAIN, _TRIES = 0.5, 10
@@ -68,11 +67,11 @@ def write_firmware(record: BoardRecord, channels: int, place: str | None) -> str
             where="firmware flash",
         )
     _need_avrdude()
-    _avrdude(place, "-U", f"flash:w:{firmware_image(record, channels)}:i")
+    _avrdude(record, place, "-U", f"flash:w:{firmware_image(record, channels)}:i")
     return place
 
 
-def write_identity(port: str, identity: BoardIdentity) -> None:
+def write_identity(record: BoardRecord, port: str, identity: BoardIdentity) -> None:
     """Write the EEPROM of the board at ``port``, and hear from its firmware that it holds it.
 
     avrdude's own check is off: the bootloader of most boards reads EEPROMs from a wrong place, and
@@ -86,7 +85,7 @@ def write_identity(port: str, identity: BoardIdentity) -> None:
     with tempfile.TemporaryDirectory(prefix="tomoskin-") as folder:
         file = Path(folder) / "eeprom"
         file.write_bytes(identity.pack())
-        _avrdude(port, "-V", "-U", f"eeprom:w:{file}:r")
+        _avrdude(record, port, "-V", "-U", f"eeprom:w:{file}:r")
     held = read_identity(port)
     if held.pack() != identity.pack():
         raise SourceError(
@@ -144,13 +143,13 @@ def _need_avrdude() -> None:
         raise SourceError("avrdude is missing", where="firmware", hint=hint)
 
 
-def _avrdude(port: str, *words: str) -> None:
+def _avrdude(record: BoardRecord, port: str, *words: str) -> None:
     _need_avrdude()
     SerialTransport(port).close()  # before one that is absent, avrdude waits for ever
     where = f"avrdude, {port}"
     try:
         done = subprocess.run(
-            [*_AVRDUDE, port, *words],
+            ["avrdude", "-q", "-q", *record.avrdude.split(), "-D", "-P", port, *words],
             capture_output=True,
             text=True,
             check=False,
