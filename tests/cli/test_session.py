@@ -210,6 +210,16 @@ def test_recording_a_replay_ends_with_it(tomoskin, recorded, tmp_path):
     assert "Ctrl-C" not in err
 
 
+def test_a_session_without_its_end_is_recorded_again(tomoskin, recorded, tmp_path):
+    whole, cut, again = (tmp_path / f"{name}.mcap" for name in ("whole", "cut", "again"))
+    assert tomoskin("record", whole, "--source", f"replay:{recorded}@max", "--json")[0] == 0
+    cut.write_bytes(whole.read_bytes()[:-5000])  # it is not known how long it is
+    code, out, err = tomoskin("record", again, "--source", f"replay:{cut}@max", "--json")
+    assert code == 0, err
+    with SessionReader(cut) as session:
+        assert json.loads(out)["frames"] == sum(1 for _ in session.frames())
+
+
 def test_what_is_written_is_said(tomoskin, recorded, tmp_path):
     table = tmp_path / "x.csv"
     code, out, _ = tomoskin("session", "export", recorded, table)

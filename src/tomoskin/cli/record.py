@@ -168,9 +168,11 @@ def _wait(runner: Runner, seconds: float | None, frames: int | None) -> None:
 
 
 def _played(status: Status) -> list[tuple[float, float | None]]:
-    """How far a replay is; one that begins again at its end has none."""
+    """How far a replay is, if that is known: not of one that begins again at its end."""
     replay = status.replay
     if replay is None or replay.loop:
         return []
+    if replay.end_s <= 0 and not replay.ended:
+        return []  # a file without its end says how long it is only as it is played
     reached = replay.end_s if replay.ended else min(replay.now_s, 0.99 * replay.end_s)
     return [(reached, replay.end_s)]
