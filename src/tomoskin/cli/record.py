@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 _OFTEN = 0.1
 _TROUBLES = frozenset({"no-answer", "source-lost", "silent", "fault", "internal"})
 """Events after which no frames come."""
-_STOPPED = "recording-stopped"
+_STOPPED = frozenset({"recording-stopped", "replay-damaged"})
 
 
 def record(
@@ -134,7 +134,7 @@ def troubles_told(runner: Runner, name: str = "") -> Iterator[list[str]]:
             last = ended.wait(_OFTEN)
             number, happened = runner.events.since(number)
             for event in happened:
-                if event.kind == _STOPPED:
+                if event.kind in _STOPPED:
                     stopped.append(event.text)
                     remark(name + event.text)
                 elif event.kind in _TROUBLES or (troubled and event.kind == "connected"):

@@ -143,6 +143,8 @@ class Flow:
         replay = self.marker.replay
         if replay is not None and replay.ended != self._ended:
             self._ended = replay.ended  # when its last frames have been processed, not when read
+            if replay.ended and replay.damage is not None:
+                out.say("replay-damaged", f"the replay ends here: {replay.damage}")
             out.wake()
 
     def status(self, trouble: str | None) -> Status:

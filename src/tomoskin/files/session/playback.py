@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from itertools import chain, islice
 
 from tomoskin.board.wire import SCHEMA, Deframer, decode_payload, encode
-from tomoskin.core import Event, Frame, Mark, MarkedFrame, StrPath
+from tomoskin.core import DataError, Event, Frame, Mark, MarkedFrame, StrPath
 from tomoskin.files.session.session_reader import SessionReader, end_time, start_time
 from tomoskin.sensing.track import Span, touch_spans
 
@@ -95,7 +95,11 @@ class Playhead:
     now
         The time in the recording, host monotonic s: exactly that of the last piece when it has
         just been played.
+    damage
+        What is wrong with the file where it could be read no further, or None.
     """
+
+    damage: DataError | None = None
 
     def __init__(self, items: Callable[[float], Iterable[Item]]) -> None:
         self._items = items
@@ -107,7 +111,7 @@ class Playhead:
 
     def seek(self, host_time: float, earlier: Iterable[MarkedFrame] = ()) -> None:
         """Go on from the first frame at ``host_time``, if there is one, after those ``earlier``."""
-        there = pieces(self._items(host_time - _BEFORE), host_time)
+        there = self._until_damage(pieces(self._items(host_time - _BEFORE), host_time))
         first = tuple(islice(there, 1))
         before = pieces(earlier if first else ())
         self._pieces = chain(before, first, there)
@@ -132,6 +136,13 @@ class Playhead:
         if piece.is_earlier:
             self._reach_next()
         return piece
+
+    def _until_damage(self, there: Iterator[Piece]) -> Iterator[Piece]:
+        """A damaged file ends where it can be read no further."""
+        try:
+            yield from there
+        except DataError as error:
+            self.damage = error
 
     def _reach_next(self) -> None:
         """Recorded time goes on from the next piece, however far it is."""

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from tomoskin.board.source import Configuration, ScanSettings
 from tomoskin.board.wire import OLDER, SCHEMA
-from tomoskin.core import Clock, Mark, MarkedFrame, SourceError, WallClock
+from tomoskin.core import Clock, DataError, Mark, MarkedFrame, SourceError, WallClock
 from tomoskin.files.session.info import References
 from tomoskin.files.session.playback import Item, Playhead
 from tomoskin.files.session.replay_board import ReplayBoard
@@ -98,6 +98,11 @@ class ReplayTransport:
     def ended(self) -> bool:
         """Whether nothing is left to play."""
         return self._head.next is None and not self.loop
+
+    @property
+    def damage(self) -> DataError | None:
+        """What is wrong with the file where it could be played no further, or None."""
+        return self._head.damage
 
     @property
     def end(self) -> float:
