@@ -26,6 +26,7 @@ _OFTEN = 0.1
 _TROUBLES = frozenset({"no-answer", "source-lost", "silent", "fault", "internal"})
 """Events after which no frames come."""
 _STOPPED = frozenset({"recording-stopped", "replay-damaged"})
+"""Events with which a recording ends before it is whole."""
 
 
 def record(

@@ -18,5 +18,8 @@ def test_it_plays_what_is_before_the_damage_and_says_what_is_wrong(tmp_path):
         head, played = Playhead(session.reads), 0
         while head.next is not None:
             played += len(head.play().frames)
-    assert played == whole
-    assert "the CRC of a chunk is wrong" in str(head.damage)
+        assert played == whole
+        assert "the CRC of a chunk is wrong" in str(head.damage)
+        head.seek(float("-inf"))
+        assert head.next is not None
+        assert head.damage is None

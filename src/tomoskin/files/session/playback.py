@@ -96,10 +96,8 @@ class Playhead:
         The time in the recording, host monotonic s: exactly that of the last piece when it has
         just been played.
     damage
-        What is wrong with the file where it could be read no further, or None.
+        What is wrong with the file where it could be read no further since the last seek, or None.
     """
-
-    damage: DataError | None = None
 
     def __init__(self, items: Callable[[float], Iterable[Item]]) -> None:
         self._items = items
@@ -111,6 +109,7 @@ class Playhead:
 
     def seek(self, host_time: float, earlier: Iterable[MarkedFrame] = ()) -> None:
         """Go on from the first frame at ``host_time``, if there is one, after those ``earlier``."""
+        self.damage: DataError | None = None
         there = self._until_damage(pieces(self._items(host_time - _BEFORE), host_time))
         first = tuple(islice(there, 1))
         before = pieces(earlier if first else ())
