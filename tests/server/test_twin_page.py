@@ -16,7 +16,7 @@ from tomoskin.learning import BENDS, CLASSES, BendExamples, BendModel, Classifie
 from tomoskin.model.mesh import Hinge
 from tomoskin.pipeline import voltage_covariance
 from tomoskin.run import Runner
-from tomoskin.run.twin_requests import BendRequest, SetPose
+from tomoskin.run.commands import BendRequest, SetPose
 from tomoskin.server import TwinHandlers
 from tomoskin.twin import Bent, Face, TwinSettings, TwinSkin
 

@@ -3,6 +3,7 @@
 from tomoskin.run import commands
 from tomoskin.run.board_check import CheckFinding, check_board
 from tomoskin.run.board_memory import BoardMemory
+from tomoskin.run.commands import MAX_FORCE, SetPose, SetPresses, SetTwin, StrictRequest
 from tomoskin.run.flow import Snapshot
 from tomoskin.run.labelled_frames import (
     SetMade,
@@ -18,7 +19,6 @@ from tomoskin.run.runner import Runner
 from tomoskin.run.simulate import Simulated, simulate
 from tomoskin.run.status import ReplayStatus, Status
 from tomoskin.run.twin_control import way_to_bend
-from tomoskin.run.twin_requests import MAX_FORCE, SetPose, SetPresses, SetTwin, StrictRequest
 
 __all__ = [
     "MAX_FORCE",

@@ -16,10 +16,9 @@ from tomoskin.pipeline import Prepared, colour_limit
 from tomoskin.run import Runner, StrictRequest, commands
 from tomoskin.server import views
 from tomoskin.server.frames import NewestFrame
-from tomoskin.server.page_connection import Host
+from tomoskin.server.page_connection import Handler, Handlers, Host, Listener, Tasks, during
 from tomoskin.server.page_messages import EventNote, Message, PlayedTimeline, Scale, Scene
 from tomoskin.server.run_handlers import run_handlers
-from tomoskin.server.task import Handler, Handlers, Listener, Tasks, during
 
 _STATE_PERIOD = 0.25
 _FIRST_EVENTS = 20

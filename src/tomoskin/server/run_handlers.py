@@ -14,9 +14,9 @@ from tomoskin.core import DataError, GeometryError, TomoskinError, WireError
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Unresolved
 from tomoskin.run import Runner, SetPresses, commands
+from tomoskin.server.page_connection import Handlers, Listener, Tasks
 from tomoskin.server.page_messages import UnresolvedMap
 from tomoskin.server.requests import AskUnresolved, Painted, SetRecording
-from tomoskin.server.task import Handlers, Listener, Tasks
 from tomoskin.twin import Contact
 
 FILE_NAME = "tomoskin-%Y%m%d-%H%M%S.mcap"

@@ -34,6 +34,7 @@ from tomoskin.files.session.repair import (
 )
 from tomoskin.files.session.replay import ReplayTransport, open_replay, parse_replay
 from tomoskin.files.session.replayed import (
+    Session,
     as_recorded,
     reconstruct_session,
     recorded_calibrations,
@@ -41,7 +42,6 @@ from tomoskin.files.session.replayed import (
     session_touches,
 )
 from tomoskin.files.session.scanned import first_scan, idle_count, scanned_touches
-from tomoskin.files.session.session import Session
 from tomoskin.files.session.session_reader import (
     SessionReader,
     end_time,
