@@ -13,7 +13,7 @@ import pytest
 
 from model.robot.test_robot import URDF
 from tomoskin.cli.robot import chosen_robot
-from tomoskin.files.session import split_names
+from tomoskin.files.session.repair import split_names
 from tomoskin.model.robot import Robot
 
 COMMAND = [sys.executable, "-c", "from tomoskin.cli import main; main()"]

@@ -17,7 +17,7 @@ from tomoskin.model.mesh import Hinge
 from tomoskin.pipeline import voltage_covariance
 from tomoskin.run import Runner
 from tomoskin.run.commands import BendRequest, SetPose
-from tomoskin.server import TwinHandlers
+from tomoskin.server.handlers import TwinHandlers
 from tomoskin.twin import Bent, Face, TwinSettings, TwinSkin
 
 pytestmark = [pytest.mark.page, pytest.mark.usefixtures("built_page")]

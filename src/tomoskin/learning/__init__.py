@@ -15,9 +15,7 @@ from tomoskin.learning.force.kind import FORCE, ForceReport, least_known
 from tomoskin.learning.force.measured import ForceProcess
 from tomoskin.learning.force.weighed_presses import NEWTONS, WeighedPresses, Weight
 from tomoskin.learning.kind import (
-    Applied,
     Calibration,
-    Conditions,
     Differences,
     FrameView,
     Kind,
@@ -60,7 +58,6 @@ __all__ = [
     "NEWTONS",
     "TOUCH",
     "Answers",
-    "Applied",
     "BendExamples",
     "BendModel",
     "BendReader",
@@ -71,7 +68,6 @@ __all__ = [
     "ClassReading",
     "Classifier",
     "Codes",
-    "Conditions",
     "Differences",
     "Examples",
     "ForceModel",

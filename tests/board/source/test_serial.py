@@ -15,7 +15,7 @@ from tomoskin.board.source import Link, Timing
 from tomoskin.board.source import serial as port
 from tomoskin.board.source.silence import SIGN_ON
 from tomoskin.core import SourceError
-from tomoskin.twin import TwinDevice
+from tomoskin.twin.device import TwinDevice
 
 pytest.importorskip("pty")
 

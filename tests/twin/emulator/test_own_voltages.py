@@ -15,7 +15,13 @@ from tomoskin.model.pattern import Pattern, Scan
 from tomoskin.model.skin import Skin
 from tomoskin.twin import ElectronicsSettings, TwinSettings, table_of
 from tomoskin.twin.electrodes import Electrodes
-from tomoskin.twin.emulator import BoardProcess, BoardPrograms, Front, OwnVoltages, SkinMemory
+from tomoskin.twin.emulator.board_process import (
+    BoardProcess,
+    BoardPrograms,
+    Front,
+    OwnVoltages,
+    SkinMemory,
+)
 from tomoskin.twin.emulator.source import open_emulator, own_of
 
 BITS = {"mega": 10, "pico": 12}

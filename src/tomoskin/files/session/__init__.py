@@ -24,15 +24,8 @@ from tomoskin.files.session.recorder import (
     RunMessage,
     RunSettings,
 )
-from tomoskin.files.session.repair import (
-    Lost,
-    Repaired,
-    repair,
-    split,
-    split_names,
-    split_targets,
-)
-from tomoskin.files.session.replay import ReplayTransport, open_replay, parse_replay
+from tomoskin.files.session.repair import Lost, Repaired, repair, split, split_targets
+from tomoskin.files.session.replay import ReplayTransport, parse_replay
 from tomoskin.files.session.replayed import (
     Session,
     as_recorded,
@@ -41,18 +34,9 @@ from tomoskin.files.session.replayed import (
     replayed,
     session_touches,
 )
-from tomoskin.files.session.scanned import first_scan, idle_count, scanned_touches
-from tomoskin.files.session.session_reader import (
-    SessionReader,
-    end_time,
-    indexed_frames,
-    message_counts,
-    start_time,
-    tick_rate,
-    touches_before,
-)
+from tomoskin.files.session.scanned import first_scan, idle_count
+from tomoskin.files.session.session_reader import SessionReader, indexed_frames, message_counts
 from tomoskin.files.session.session_writer import SessionWriter, robot_logs
-from tomoskin.sensing.track import Span
 
 __all__ = [
     "OWN_FILES",
@@ -72,19 +56,16 @@ __all__ = [
     "SessionInfo",
     "SessionReader",
     "SessionWriter",
-    "Span",
     "Timeline",
     "Truth",
     "all_blocks",
     "as_recorded",
-    "end_time",
     "errors_of",
     "first_scan",
     "idle_count",
     "indexed_frames",
     "message_counts",
     "no_report",
-    "open_replay",
     "parse_replay",
     "press_positions",
     "read_session",
@@ -95,14 +76,9 @@ __all__ = [
     "repair",
     "replayed",
     "robot_logs",
-    "scanned_touches",
     "schema_of",
     "session_info",
     "session_touches",
     "split",
-    "split_names",
     "split_targets",
-    "start_time",
-    "tick_rate",
-    "touches_before",
 ]
