@@ -1,15 +1,5 @@
 """Session files: write, read, repair, replay."""
 
-from tomoskin.files.session.blocks import (
-    Advance,
-    Block,
-    Rows,
-    all_blocks,
-    no_report,
-    press_positions,
-    read_session,
-    recording_of,
-)
 from tomoskin.files.session.channels import schema_of
 from tomoskin.files.session.info import OWN_FILES, SessionInfo, session_info
 from tomoskin.files.session.layout import (
@@ -34,7 +24,18 @@ from tomoskin.files.session.replayed import (
     replayed,
     session_touches,
 )
-from tomoskin.files.session.scanned import first_scan, idle_count
+from tomoskin.files.session.scanned import (
+    Advance,
+    Block,
+    Rows,
+    all_blocks,
+    first_scan,
+    idle_count,
+    no_report,
+    press_positions,
+    read_session,
+    recording_of,
+)
 from tomoskin.files.session.session_reader import SessionReader, indexed_frames, message_counts
 from tomoskin.files.session.session_writer import SessionWriter, robot_logs
 

@@ -13,8 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import DataError, Mark, StrPath
-from tomoskin.files.session.blocks import Advance, no_report, read_session
-from tomoskin.files.session.scanned import ScannedFrame, scanned_touches, timed
+from tomoskin.files.session.scanned import (
+    Advance,
+    ScannedFrame,
+    no_report,
+    read_session,
+    scanned_touches,
+    timed,
+)
 from tomoskin.files.session.session_reader import (
     SessionReader,
     indexed_frames,
