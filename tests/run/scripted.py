@@ -6,7 +6,7 @@ from pathlib import Path
 
 from tomoskin.model.skin import Skin
 from tomoskin.run import simulate
-from tomoskin.run.simulate import Simulated
+from tomoskin.run.scripted import Simulated
 from tomoskin.twin import Script
 
 SKIN = Skin.load("textile-disc-8")

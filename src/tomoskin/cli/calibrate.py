@@ -29,9 +29,7 @@ from tomoskin.cli.calibrate_reports import (
 )
 from tomoskin.cli.choices import skin_for_file, skin_if_any
 from tomoskin.cli.named_files import SKIN, ForceFlag, Reads, Writes
-from tomoskin.cli.options import CalibrationOut, KnownSkinOption, ReferenceOption, SkinOption
-from tomoskin.cli.output import Bar, JsonFlag, remark, tell
-from tomoskin.cli.recording import (
+from tomoskin.cli.named_parts import (
     changes,
     idle_frames,
     labelled_frames,
@@ -39,6 +37,8 @@ from tomoskin.cli.recording import (
     reconstructed,
     say_notes,
 )
+from tomoskin.cli.options import CalibrationOut, KnownSkinOption, ReferenceOption, SkinOption
+from tomoskin.cli.output import Bar, JsonFlag, remark, tell
 from tomoskin.core import DataError, FloatArray, write_text
 
 if TYPE_CHECKING:

@@ -20,6 +20,7 @@ from tomoskin.cli.choices import (
     with_time_constant,
 )
 from tomoskin.cli.named_files import TABLE, ForceFlag, Writes
+from tomoskin.cli.named_parts import first_time, reconstructed, say_notes, span_lines
 from tomoskin.cli.options import (
     AlphaOption,
     CalibrationsOption,
@@ -34,7 +35,6 @@ from tomoskin.cli.options import (
     TouchesOut,
 )
 from tomoskin.cli.output import Bar, JsonFlag, remark, tell
-from tomoskin.cli.recording import first_time, reconstructed, say_notes, span_lines
 from tomoskin.core import DataError
 
 if TYPE_CHECKING:

@@ -20,7 +20,7 @@ from tomoskin.cli.named_files import RECORDING, Otherwise, Reads, Writes
 from tomoskin.cli.options import CalibrationsOption, SinkOption, SkinsOption, SourcesOption
 from tomoskin.cli.output import Bar, JsonFlag, emit, remark
 from tomoskin.cli.record import ended_by_signals, recording_to
-from tomoskin.cli.robot import Served, announce, chosen_robot, hub_of, run_robot
+from tomoskin.cli.several_skins import Served, announce, chosen_robot, hub_of, run_robot
 
 if TYPE_CHECKING:
     from tomoskin.pipeline import Prepared

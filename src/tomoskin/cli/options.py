@@ -1,5 +1,5 @@
 """Options and arguments that several commands take, each with its sentence; most of what they mean
-is in :mod:`tomoskin.cli.choices` and :mod:`tomoskin.cli.recording`."""
+is in :mod:`tomoskin.cli.choices` and :mod:`tomoskin.cli.named_parts`."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from tomoskin.run.labelled_frames import (
 )
 from tomoskin.run.robot_run import Member, RobotRun
 from tomoskin.run.runner import Runner
-from tomoskin.run.simulate import simulate
+from tomoskin.run.scripted import simulate
 from tomoskin.run.status import ReplayStatus, Status
 from tomoskin.run.twin_control import way_to_bend
 

@@ -1,11 +1,11 @@
 """A skin without hardware: probes → dents → conductivity → potentials → counts → bytes."""
 
 from tomoskin.twin.bend import BendSettings, Bent, Deformation, Pose, Stretched
-from tomoskin.twin.board import Board, HeldScanning
 from tomoskin.twin.circuit import ElectronicsSettings, ThermalVoltages
 from tomoskin.twin.contact import ContactSettings, Grid, solve_contact
 from tomoskin.twin.course import Disturbance, bent, bent_truth, disturbed, pressed, reboots
 from tomoskin.twin.faults import Faults, Line, LineSettings
+from tomoskin.twin.held_scanning import Board, HeldScanning
 from tomoskin.twin.labelled import COMMON_PRESSES, Population, SetPlan, make_shard
 from tomoskin.twin.material import MaterialSettings
 from tomoskin.twin.presets import PRESETS, TwinSettings
