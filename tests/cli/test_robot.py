@@ -12,7 +12,7 @@ import httpx
 import pytest
 
 from model.robot.test_robot import URDF
-from tomoskin.cli.several_skins import chosen_robot
+from tomoskin.cli.live import chosen_robot
 from tomoskin.files.session.repair import split_names
 from tomoskin.model.robot import Robot
 

@@ -12,7 +12,7 @@ from tomoskin.cli.app import group
 from tomoskin.cli.named_files import SKIN, ForceFlag, Reads, Writes
 from tomoskin.cli.options import SkinArgument
 from tomoskin.cli.output import JsonFlag, tell
-from tomoskin.cli.several_skins import place
+from tomoskin.cli.place import place
 from tomoskin.cli.skin_merit import merit
 
 if TYPE_CHECKING:
