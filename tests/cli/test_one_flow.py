@@ -28,10 +28,10 @@ from tomoskin.files.session import (
     Session,
     SessionReader,
     reconstruct_session,
-    scanned_touches,
     session_info,
     split,
 )
+from tomoskin.files.session.scanned import scanned_touches
 from tomoskin.learning import TOUCH, Locator
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, prepare

@@ -29,7 +29,6 @@ from tomoskin.core import (
     open_input,
     written,
 )
-from tomoskin.files.session.blocks import Advance, no_report
 from tomoskin.files.session.channels import CHANNELS, SCHEMAS, SPAN, TOPICS
 from tomoskin.files.session.container import ContainerWriter
 from tomoskin.files.session.layout import host_time_of
@@ -42,6 +41,7 @@ from tomoskin.files.session.mcap_records import (
     messages_in,
 )
 from tomoskin.files.session.message_log import LIBRARY, errors_of
+from tomoskin.files.session.scanned import Advance, no_report
 from tomoskin.files.session.session_reader import epoch_of
 from tomoskin.files.session.session_writer import (
     ABOUT,

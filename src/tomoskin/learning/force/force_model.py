@@ -11,8 +11,13 @@ from typing import Self
 import numpy as np
 
 from tomoskin.core import DataError, Detection, FloatArray, Force, IntArray
-from tomoskin.learning.force.curve import ForceCurve, basis
-from tomoskin.learning.force.load_memory import SHALLOW, averaged_memory, without_memory
+from tomoskin.learning.force.curve import (
+    SHALLOW,
+    ForceCurve,
+    averaged_memory,
+    basis,
+    without_memory,
+)
 from tomoskin.learning.force.weighed_presses import WeighedPresses, check_rising
 from tomoskin.learning.touch.gaussian_process import nine_in_ten
 from tomoskin.model.skin import MaterialMemory, MemoryState, Skin, advanced, load_of
