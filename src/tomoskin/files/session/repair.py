@@ -26,6 +26,7 @@ from tomoskin.core import (
     SkinError,
     StrPath,
     check_outputs,
+    open_input,
     written,
 )
 from tomoskin.files.session.channels import CHANNELS, SCHEMAS, SPAN, TOPICS
@@ -194,7 +195,7 @@ def _new_file(path: Path) -> Iterator[ContainerWriter]:
 
 def _stretches(source: Path) -> Iterator[tuple[Stretch, int]]:
     """Each stretch of a file, and the file's size."""
-    with errors_of(source), source.open("rb") as file:
+    with errors_of(source), open_input(source) as file:
         if not (size := file.seek(0, 2)):
             raise DataError(EMPTY, where=str(source))
         for stretch in stretches(file, size):

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import ThreadpoolController
 
 from tomoskin.core import DataError, Mark, StrPath
 from tomoskin.files.session.scanned import (
@@ -84,10 +85,12 @@ def gathered(
     """Every frame of ``scan`` but those from before the recording, and what ``pipeline`` makes of
     it: None where it was held, skipped or refused. Not ``marked``: as if the run had followed all
     of them, from one reference on."""
+    threads = ThreadpoolController()
     for frame in timed(session.frames(), tick_rate(session), scan):
         mark = frame.item.mark if marked else Mark.NONE
         try:
-            result = pipeline.push(frame.item.frame, mark)
+            with threads.limit(limits=1):  # as live, so that sums keep their order
+                result = pipeline.push(frame.item.frame, mark)
         except DataError:
             result = None
         if not frame.item.mark & Mark.EARLIER:
