@@ -36,7 +36,7 @@ class Export:
 
     @cached_property
     def prepared(self) -> Prepared:
-        """As in the recording."""
+        """The skin and its calibrations as they are in the recording."""
         return as_recorded(self.session)
 
     @cached_property
