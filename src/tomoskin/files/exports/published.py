@@ -22,6 +22,7 @@ from tomoskin.files.messages import (
     definition,
     encode_cdr,
     ros_messages,
+    time_of,
     touch_colour,
     touch_width,
     type_hash,
@@ -91,8 +92,8 @@ class RerunView:
 
     def log(self, item: Item) -> None:
         """What ``item`` says, at the time of its measurement."""
-        utc = self._stream.utc(item.host_time)
-        when = {"duration": item.host_time} if utc is None else {"timestamp": utc}
+        utc = self._stream.utc(time_of(item))
+        when = {"duration": time_of(item)} if utc is None else {"timestamp": utc}
         self._recording.set_time("time", **when)
         for event in (item,) if isinstance(item, Event) else item.events:
             text = self._rerun.TextLog(f"{event.kind}: {event.text}")
