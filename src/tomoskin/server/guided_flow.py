@@ -35,11 +35,16 @@ EFFORTS: tuple[Effort, ...] = ("softly", "hard")
 
 @dataclass(frozen=True, eq=False)
 class GuidedPress:
-    """One press: the place m, the change (n_meas,) V that it made, and how it was asked for."""
+    """One press: the place m, the change (n_meas,) V that it made, and how it was asked for.
+
+    ``missed``: how far from the place the run itself showed the touch, m; None where it showed
+    none.
+    """
 
     place: Point
     dv: FloatArray
     effort: Effort | None = None
+    missed: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

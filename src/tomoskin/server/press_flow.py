@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any, Literal
 
@@ -39,6 +40,7 @@ def estimate_touch(prepared: Prepared, presses: Sequence[GuidedPress]) -> Estima
     errors = 1e3 * locator.errors
     doubted = sorted({remark.row for remark in locator.remarks})
     text = f"Median error {_by_effort(presses, errors)} (each press left out in turn)"
+    text += _as_it_is(presses, errors)
     left_out = LeftOut.of(locator)
     if left_out.one_force:
         text += (
@@ -54,6 +56,15 @@ def estimate_touch(prepared: Prepared, presses: Sequence[GuidedPress]) -> Estima
     )
     place = locator.next_place() if len(presses) >= _FIRST else None
     return Estimate(text, place, True, figures, locator)
+
+
+def _as_it_is(presses: Sequence[GuidedPress], errors: FloatArray) -> str:
+    """What a calibration brings, where most presses showed without it."""
+    missed = [1e3 * press.missed for press in presses if press.missed is not None]
+    if 2 * len(missed) <= len(presses):
+        return ""
+    brings = "" if np.median(errors) < np.median(missed) else ", and this brings nothing yet"
+    return f"; as it is, touches miss the dots by {np.median(missed):.1f} mm{brings}"
 
 
 def _by_effort(presses: Sequence[GuidedPress], errors: FloatArray) -> str:
@@ -124,7 +135,9 @@ class _DotFlow(GuidedFlow):
         dv = taker.push(result.host_time, result.voltages)
         if dv is None:
             return None if before == (taker.phase, taker.hint) else False
-        self.taken.append(GuidedPress(self._dot, dv, self.effort))
+        away = [math.dist((t.detection.x, t.detection.y), self._dot) for t in result.touches]
+        missed = min(away, default=None)
+        self.taken.append(GuidedPress(self._dot, dv, self.effort, missed))
         self._dot = self._dots.next([p.place for p in self.taken], self.estimate)
         return True
 
