@@ -49,6 +49,9 @@ class RegionFinder:
         """Detections of a frame, strongest first."""
         return self._segmenter(view.image, view.image_noise)
 
+    def rest(self) -> None:
+        """Nothing touches in the newest frame."""
+
 
 class FitFinder:
     """Touches are fitted to the data themselves; a filter over frames does not enter.
@@ -122,6 +125,10 @@ class FitFinder:
         self.like_touch, self.rises = watch.like_touch or jump is not None, watch.rises
         self.problem = watch.problem or (None if jump is None else _jump_text(JUMP * jump))
         return detections
+
+    def rest(self) -> None:
+        """Nothing touches in the newest frame: what it holds of touches, they have left."""
+        self._spots.rest()
 
     def strongest(self, dv: FloatArray) -> Detection | None:
         """The strongest touch in difference data (n_meas,), NaN where a value is missing."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import compress
 from typing import Self
@@ -107,71 +107,106 @@ class FootprintChange:
         return self.is_near(spot) and _STRONGER * abs(self.spot[3]) >= abs(spot[3])
 
 
-@dataclass(frozen=True, eq=False)
+_FALLS, _CREEPS = 0.1, 10.0
+"""Seconds in which what is left is known to have become less; or more, by the sheet's drift."""
+
+_KNOWN = 0.2
+"""Part of what is left by which it may be otherwise in the next frame."""
+
+
 class ResidualResponse:
-    """Where touches have been since the baseline has had time to follow.
+    """What touches have left since the baseline has had time to follow: a part of each footprint's
+    change, unknown until frames come in which nothing touches.
+
+    Parameters
+    ----------
+    seconds
+        Between frames.
+    fading
+        Seconds without a touch after which nothing is left.
 
     Attributes
     ----------
     feet
         Footprints, the newest last.
-    quiet
-        Frames without any touch since each was made.
     """
 
-    feet: tuple[FootprintChange, ...] = ()
-    quiet: tuple[int, ...] = ()
+    def __init__(self, seconds: float, fading: float) -> None:
+        self._seconds, self._fading = seconds, fading
+        self.feet: tuple[FootprintChange, ...] = ()
+        self._parts, self._doubts, self._quiet = np.zeros((3, 0))
+        self._forget_rows()
 
-    def after(
-        self, spots: FloatArray, changes: Callable[[FloatArray], FloatArray], frames: int
-    ) -> Self:
-        """With a frame in which touches ``spots`` (k, 4) were; each is forgotten after so many
-        ``frames`` without one. ``changes`` gives (k, n_meas) V of spots (k, 4), each alone."""
-        if not len(spots):
-            quiet = tuple(q + 1 for q in self.quiet)
-            return self._kept([q < frames for q in quiet], quiet)
+    def _forget_rows(self) -> None:
+        self._matrix = self._rows = self._left = np.zeros((0, 0))
+
+    def after(self, spots: FloatArray, changes: Callable[[FloatArray], FloatArray]) -> None:
+        """Take a frame in which touches ``spots`` (k, 4) were: what they will leave is unknown.
+
+        ``changes`` gives (k, n_meas) V of spots (k, 4), each alone.
+        """
         newest_first = range(len(self.feet) - 1, -1, -1)
-        held = [
-            next((n for n in newest_first if self.feet[n].stands_for(spot)), None)
-            for spot in spots.tolist()
-        ]
-        quiet = tuple(0 if n in held else q for n, q in enumerate(self.quiet))
-        fresh = spots[[n is None for n in held]]
-        if not len(fresh):
-            return self._kept([True] * len(quiet), quiet)
-        new = fresh.tolist()
-        made = map(FootprintChange, map(tuple, new), changes(fresh))
-        kept = self._kept([not any(map(foot.is_near, new)) for foot in self.feet], quiet)
-        none = len(fresh) * (0,)
-        return type(self)((*kept.feet, *made)[-_FOOTPRINTS:], (*kept.quiet, *none)[-_FOOTPRINTS:])
+        fresh = []
+        for spot in spots.tolist():
+            own = next((n for n in newest_first if self.feet[n].stands_for(spot)), None)
+            if own is None:
+                fresh.append(spot)
+            else:
+                self._quiet[own] = 0.0
+                if self._doubts[own] != RESIDUAL.deviation:
+                    self._doubts[own] = RESIDUAL.deviation
+                    self._left = np.zeros((0, 0))
+        if fresh:
+            self._keep([not any(map(foot.is_near, fresh)) for foot in self.feet])
+            made = map(FootprintChange, map(tuple, fresh), changes(np.array(fresh)))
+            self.feet = (*self.feet, *made)[-_FOOTPRINTS:]
+            news = np.outer([0.0, RESIDUAL.deviation, 0.0], np.ones(len(fresh)))
+            each = np.hstack([[self._parts, self._doubts, self._quiet], news])
+            self._parts, self._doubts, self._quiet = each[:, -_FOOTPRINTS:].copy()
+            self._forget_rows()
 
-    def _kept(self, stays: list[bool], quiet: tuple[int, ...]) -> Self:
-        """The footprints that stay, of which the tuple is the same where all do."""
-        if all(stays):
-            return self if quiet == self.quiet else replace(self, quiet=quiet)
-        return type(self)(tuple(compress(self.feet, stays)), tuple(compress(quiet, stays)))
+    def _keep(self, stays: list[bool]) -> None:
+        """The footprints that stay."""
+        if not all(stays):
+            self.feet = tuple(compress(self.feet, stays))
+            each = np.array([self._parts, self._doubts, self._quiet])
+            self._parts, self._doubts, self._quiet = each[:, stays].copy()
+            self._forget_rows()
 
+    def taken_from(self, data: FloatArray) -> FloatArray:
+        """What of ``data`` (n_meas,) V is not known to be left."""
+        for foot, part in zip(self.feet, self._parts.tolist(), strict=True):
+            if part:
+                data = data - part * foot.change
+        return data
 
-class ResidualDirections:
-    """Residual responses as whitened data see them; what was made for the last ones is kept."""
+    def directions(self, matrix: FloatArray) -> FloatArray:
+        """(k, c) of what may be left besides, each as long as its deviation; ``matrix``
+        (c, n_meas) 1/V, from data to whitened data."""
+        if matrix is not self._matrix:
+            self._matrix = matrix
+            rows = [matrix @ foot.change for foot in self.feet]
+            self._rows = np.array(rows).reshape(-1, len(matrix))
+            self._left = self._rows[:0]
+        if len(self._left) != len(self._rows):
+            self._left = self._doubts[:, None] * self._rows
+        return self._left
 
-    def __init__(self) -> None:
-        self._matrix = np.zeros((0, 0))
-        self._feet: tuple[FootprintChange, ...] = ()
-        self._row: dict[FootprintChange, FloatArray] = {}
-        self._rows = np.zeros((0, 0))
-
-    def of(self, matrix: FloatArray, feet: tuple[FootprintChange, ...]) -> FloatArray:
-        """(k, c) each as long as its deviation; ``matrix`` (c, n_meas) 1/V, from data to whitened
-        data."""
-        if matrix is not self._matrix or feet is not self._feet:
-            before = self._row if matrix is self._matrix else {}
-            self._row = {
-                foot: before[foot]
-                if foot in before
-                else RESIDUAL.deviation * (matrix @ foot.change)
-                for foot in feet
-            }
-            self._rows = np.array([*self._row.values()]).reshape(-1, len(matrix))
-            self._matrix, self._feet = matrix, feet
-        return self._rows
+    def idle(self, matrix: FloatArray, data: FloatArray) -> None:
+        """Nothing touched in a frame of such ``data`` (n_meas,) V: see what is left."""
+        if not self.feet:
+            return
+        left = self.directions(matrix)
+        onto = np.linalg.solve(np.eye(len(left)) + left @ left.T, left @ (matrix @ data))
+        step = self._doubts * onto
+        known = self._doubts != RESIDUAL.deviation
+        falls, creeps = (-math.expm1(-self._seconds / time) for time in (_FALLS, _CREEPS))
+        step[known] *= np.where(step[known] < 0, falls, creeps)
+        self._parts = np.maximum(self._parts + step, 0.0)
+        size = np.sqrt(np.einsum("kc,kc->k", self._rows, self._rows))
+        doubts = np.maximum(_KNOWN * self._parts, 1.0 / size)
+        doubts = np.minimum(2.0 ** np.ceil(np.log2(doubts)), 0.9 * RESIDUAL.deviation)
+        if (doubts != self._doubts).any():
+            self._doubts, self._left = doubts, self._rows[:0]
+        self._quiet = self._quiet + self._seconds
+        self._keep((self._quiet < self._fading).tolist())

@@ -14,7 +14,7 @@ from tomoskin.core import Detection, FloatArray, reach
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.skin import Skin
 from tomoskin.sensing.fit.detections import CellDiscs, SpotDetections, joined, judged
-from tomoskin.sensing.fit.expectation import Expectation, ResidualDirections, ResidualResponse
+from tomoskin.sensing.fit.expectation import Expectation, ResidualResponse
 from tomoskin.sensing.fit.hypotheses import CommonModeJump, Explained, Jumps, Rival, challenged
 from tomoskin.sensing.fit.policy import EXHAUSTIVE, DetectionPolicy, Pace, favours, rises_beside
 from tomoskin.sensing.fit.problem import Matched, Problem
@@ -72,7 +72,7 @@ class SpotFinder:
         self._model, self._policy = model, DetectionPolicy.of(skin.touch, pace)
         self._cells = CellDiscs.of(mesh)
         self._reach, self._unrest = pace.reach, 1.0
-        self._residual, self._left = ResidualResponse(), ResidualDirections()
+        self._residual = ResidualResponse(pace.interval, pace.fading)
         self._unit = skin.conductivity
         self._before = self._shown = np.zeros((0, N_PARAMETERS))
         self._deficit = Deficit.none(len(model.solver.table.basis))
@@ -119,7 +119,7 @@ class SpotFinder:
         """
         self._sight.look(nuisance, np.zeros((len(dv), 0)) if jumps is None else jumps)
         self._wander = wander
-        data = dv / self._sight.scale
+        data = self._data = self._residual.taken_from(dv / self._sight.scale)
         self.watch.begin(data, self._sight.of(self.watch.excess).gauge)
         (detected, rival), jump, matched = self._searched(data)
         solver = self._model.solver
@@ -131,10 +131,14 @@ class SpotFinder:
         self._unrest = self._motion(detected.fit.spots)
         self._before, self._deficit = detected.fit.spots, detected.fit.deficit
         self._expected = self._going_on(detected)
-        if frames := self._policy.pace.fading_frames:
-            self._residual = self._residual.after(self._before, self._model.changes, frames)
+        if self._policy.pace.fading:
+            self._residual.after(self._before, self._model.changes)
         self._change = detected.fit.change + detected.fit.deficit.change
         return self._detections(joined(detected))
+
+    def rest(self) -> None:
+        """Nothing touches in the newest frame: what it holds of touches, they have left."""
+        self._residual.idle(self._sight.of(self.watch.excess).table.matrix, self._data)
 
     def others(self) -> FloatArray:
         """(k, n_meas) V of the model: for each touch of the newest frame what all others change."""
@@ -148,7 +152,7 @@ class SpotFinder:
         common mode has jumped."""
         seen, matched, _, jumps = self._sight.of(self.watch.excess).louder(times)
         whitened, rest = seen.whitened(data)
-        left = self._left.of(seen.matrix, self._residual.feet)
+        left = self._residual.directions(seen.matrix)
         problem = Problem(
             response=self._model.response,
             reduced=self._model.reduced,

@@ -189,11 +189,6 @@ class Pace:
         """How far a touch goes within a scan along each axis, standard deviation, m."""
         return self.speed * self.scan_time
 
-    @property
-    def fading_frames(self) -> int:
-        """Frames without a touch after which a residual response is none any more."""
-        return math.ceil(self.fading / self.interval) if self.interval else 0
-
 
 LIVE = Pace()
 """What is not found in this frame is found in the next. With one try, presses that begin together

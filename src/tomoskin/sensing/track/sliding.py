@@ -83,6 +83,11 @@ class FingerTracker:
         self._tracker, self._slides = tracker, SlideCorrection(lag)
 
     @property
+    def follows(self) -> bool:
+        """Whether there is a touch, or what may become one."""
+        return self._tracker.follows
+
+    @property
     def events(self) -> tuple[TouchEvent, ...]:
         """What happened in the newest frame."""
         finger = self._slides.of_finger

@@ -47,6 +47,11 @@ class Tracker:
         self._ledger = IdentityLedger()
 
     @property
+    def follows(self) -> bool:
+        """Whether there is a touch, or what may become one."""
+        return bool(self._traces)
+
+    @property
     def numbered(self) -> int:
         """The last identity that was given."""
         return self._ledger.numbered
