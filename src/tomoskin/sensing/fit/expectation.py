@@ -83,8 +83,9 @@ def less(known: Known, number: int) -> Known:
     return (*known[:number], *known[number + 1 :])
 
 
-_STRONGER = 1.25
-"""A footprint is replaced where a touch is by so much stronger than when it was made."""
+_AWAY, _STRONGER, _WEAKER = 1e-3, 1.1, 0.95
+"""A footprint is made anew where its touch is by so many m elsewhere or by so much stronger, and no
+weaker: a touch that has just begun is known badly, and so is one that is lifted."""
 
 _FOOTPRINTS = 16
 """Footprints that are kept, the newest."""
@@ -92,19 +93,22 @@ _FOOTPRINTS = 16
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FootprintChange:
-    """A footprint: a touch ``spot`` of four numbers, and its ``change`` (n_meas,) V of the rows."""
+    """A footprint: a touch ``spot`` of four numbers, and its ``change`` (n_meas,) V of the rows.
+    ``place``, m, is where the touch was first."""
 
     spot: tuple[float, ...]
     change: FloatArray
+    place: tuple[float, ...]
 
     def is_near(self, spot: Sequence[float]) -> bool:
         """Whether a touch (4,) stands here."""
-        x, y = self.spot[0] - spot[0], self.spot[1] - spot[1]
-        return x * x + y * y < RESIDUAL.spacing**2
+        return math.dist(self.place, spot[:2]) < RESIDUAL.spacing
 
-    def stands_for(self, spot: Sequence[float]) -> bool:
-        """Whether a touch that stands here needs no footprint of its own."""
-        return self.is_near(spot) and _STRONGER * abs(self.spot[3]) >= abs(spot[3])
+    def is_outdated(self, spot: Sequence[float]) -> bool:
+        """Whether the touch that stands here is known better by now."""
+        stronger = spot[3] / self.spot[3]
+        moved = stronger > _STRONGER or math.dist(self.spot[:2], spot[:2]) > _AWAY
+        return moved and stronger > _WEAKER
 
 
 _FALLS, _CREEPS = 0.1, 10.0
@@ -146,23 +150,31 @@ class ResidualResponse:
         ``changes`` gives (k, n_meas) V of spots (k, 4), each alone.
         """
         newest_first = range(len(self.feet) - 1, -1, -1)
-        fresh = []
-        for spot in spots.tolist():
-            own = next((n for n in newest_first if self.feet[n].stands_for(spot)), None)
+        places: dict[int, tuple[float, ...]] = {}
+        for spot in map(tuple, spots.tolist()):
+            own = next((n for n in newest_first if self.feet[n].is_near(spot)), None)
             if own is None:
-                fresh.append(spot)
+                self._new(spot, changes)
             else:
-                self._quiet[own] = 0.0
-                if self._doubts[own] != RESIDUAL.deviation:
-                    self._doubts[own] = RESIDUAL.deviation
-                    self._left = np.zeros((0, 0))
-        if fresh:
-            self._keep([not any(map(foot.is_near, fresh)) for foot in self.feet])
-            made = map(FootprintChange, map(tuple, fresh), changes(np.array(fresh)))
-            self.feet = (*self.feet, *made)[-_FOOTPRINTS:]
-            news = np.outer([0.0, RESIDUAL.deviation, 0.0], np.ones(len(fresh)))
-            each = np.hstack([[self._parts, self._doubts, self._quiet], news])
-            self._parts, self._doubts, self._quiet = each[:, -_FOOTPRINTS:].copy()
+                self._again(own, spot, changes)
+
+    def _new(self, spot, changes) -> None:
+        foot = FootprintChange(spot, changes(np.array([spot]))[0], spot[:2])
+        self.feet = (*self.feet, foot)[-_FOOTPRINTS:]
+        new = [[0.0], [RESIDUAL.deviation], [0.0]]
+        each = np.hstack([[self._parts, self._doubts, self._quiet], new])
+        self._parts, self._doubts, self._quiet = each[:, -_FOOTPRINTS:].copy()
+        self._forget_rows()
+
+    def _again(self, own: int, spot, changes) -> None:
+        foot = self.feet[own]
+        self._quiet[own] = 0.0
+        if self._doubts[own] != RESIDUAL.deviation:
+            self._doubts[own] = RESIDUAL.deviation
+            self._left = np.zeros((0, 0))
+        if foot.is_outdated(spot):
+            foot = FootprintChange(spot, changes(np.array([spot]))[0], foot.place)
+            self.feet = (*self.feet[:own], foot, *self.feet[own + 1 :])
             self._forget_rows()
 
     def _keep(self, stays: list[bool]) -> None:
