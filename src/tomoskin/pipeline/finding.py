@@ -49,8 +49,9 @@ class RegionFinder:
         """Detections of a frame, strongest first."""
         return self._segmenter(view.image, view.image_noise)
 
-    def rest(self) -> None:
-        """Nothing touches in the newest frame."""
+    def rest(self) -> bool:
+        """Nothing touches in the newest frame. Whether it is known now what touches have left."""
+        return False
 
 
 class FitFinder:
@@ -126,9 +127,10 @@ class FitFinder:
         self.problem = watch.problem or (None if jump is None else _jump_text(JUMP * jump))
         return detections
 
-    def rest(self) -> None:
+    def rest(self) -> bool:
         """Nothing touches in the newest frame: what it holds of touches, they have left."""
         self._spots.rest()
+        return True
 
     def strongest(self, dv: FloatArray) -> Detection | None:
         """The strongest touch in difference data (n_meas,), NaN where a value is missing."""

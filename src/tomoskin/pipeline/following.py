@@ -161,8 +161,8 @@ class Following:
             return self._without_touches(measured, failed)
         reach("tracking")
         touches = self._tracker.update(detections, measured.time, measured.host_time)
-        if not self._tracker.follows:
-            self._finder.rest()
+        if not self._tracker.follows and self._finder.rest():
+            self._tracker.rest()
         readings = {}
         if self._applied:
             reach("calibrations")

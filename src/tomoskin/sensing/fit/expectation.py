@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import compress
 from typing import Self
 
 import numpy as np
@@ -90,15 +89,58 @@ weaker: a touch that has just begun is known badly, and so is one that is lifted
 _FOOTPRINTS = 16
 """Footprints that are kept, the newest."""
 
+_FALLS, _CREEPS = 0.1, 10.0
+"""Seconds in which what is left is known to have become less; or more, which is the sheet's drift:
+what grows faster is a new press."""
 
-@dataclass(frozen=True, eq=False, slots=True)
+_OTHERWISE = np.array([1.0, 5e-3, 5e-3, 0.3])
+"""What is left lies elsewhere than the touch, m, and has another radius, as a logarithm: standard
+deviations, as parts of it. On the textile twin, 6 mm and 0.27."""
+
+_LEAST = 1e-6
+"""Part below which nothing is left."""
+
+_FAINT, _GONE = 0.3, 0.5
+"""Deviations of the noise below which it does not matter what else may be left; and seconds without
+a touch after which a footprint is forgotten where less than one is left."""
+
+Shapes = Callable[[FloatArray], FloatArray]
+"""(4, n_meas) V of a spot (4,): its change, and the slopes of that by place and radius."""
+
+
+@dataclass(eq=False, slots=True)
 class FootprintChange:
-    """A footprint: a touch ``spot`` of four numbers, and its ``change`` (n_meas,) V of the rows.
-    ``place``, m, is where the touch was first."""
+    """Where a touch was, and what it left there.
 
-    spot: tuple[float, ...]
-    change: FloatArray
-    place: tuple[float, ...]
+    Attributes
+    ----------
+    spot, shapes
+        The touch as it was strongest, four numbers; and (4, n_meas) V that what it leaves may be
+        made of: its change, and this elsewhere or wider, each by a deviation.
+    place
+        Where it was first, m.
+    parts
+        (4,) of these that are left, as frames have told in which nothing touched.
+    known
+        Whether there have been such frames since.
+    quiet
+        Seconds of them.
+    rows
+        (4, c) the shapes as whitened data show them.
+    """
+
+    spot: Sequence[float]
+    shapes: FloatArray
+    place: Sequence[float]
+    parts: FloatArray = field(default_factory=lambda: np.zeros(4))
+    known: bool = False
+    quiet: float = 0.0
+    rows: FloatArray | None = None
+
+    @classmethod
+    def of(cls, spot: Sequence[float], shapes: FloatArray) -> Self:
+        """Of a touch (4,)."""
+        return cls(spot, shapes, spot[:2])
 
     def is_near(self, spot: Sequence[float]) -> bool:
         """Whether a touch (4,) stands here."""
@@ -106,119 +148,108 @@ class FootprintChange:
 
     def is_outdated(self, spot: Sequence[float]) -> bool:
         """Whether the touch that stands here is known better by now."""
-        stronger = spot[3] / self.spot[3]
+        stronger = spot[CONTENT] / self.spot[CONTENT]
         moved = stronger > _STRONGER or math.dist(self.spot[:2], spot[:2]) > _AWAY
         return moved and stronger > _WEAKER
 
 
-_FALLS, _CREEPS = 0.1, 10.0
-"""Seconds in which what is left is known to have become less; or more, by the sheet's drift."""
-
-_KNOWN = 0.2
-"""Part of what is left by which it may be otherwise in the next frame."""
-
-
 class ResidualResponse:
-    """What touches have left since the baseline has had time to follow: a part of each footprint's
-    change, unknown until frames come in which nothing touches.
+    """What touches have left since the baseline has had time to follow: a part of the change that
+    each footprint's touch was, about there.
+
+    It is unknown until nothing touches: then it counts as noise. Frames in which nothing touches
+    tell it, and from then on it is taken from the data. It fades, so what grows is a new press.
 
     Parameters
     ----------
     seconds
         Between frames.
-    fading
-        Seconds without a touch after which nothing is left.
-
-    Attributes
-    ----------
-    feet
-        Footprints, the newest last.
     """
 
-    def __init__(self, seconds: float, fading: float) -> None:
-        self._seconds, self._fading = seconds, fading
-        self.feet: tuple[FootprintChange, ...] = ()
-        self._parts, self._doubts, self._quiet = np.zeros((3, 0))
-        self._forget_rows()
+    def __init__(self, seconds: float) -> None:
+        self._seconds, self._since = seconds, 0.0
+        self._feet: list[FootprintChange] = []
+        self._doubts: list[float] = []
+        self._made_of: list[FloatArray] = []
+        self._left = self._matrix = np.zeros((0, 0))
 
-    def _forget_rows(self) -> None:
-        self._matrix = self._rows = self._left = np.zeros((0, 0))
-
-    def after(self, spots: FloatArray, changes: Callable[[FloatArray], FloatArray]) -> None:
-        """Take a frame in which touches ``spots`` (k, 4) were: what they will leave is unknown.
-
-        ``changes`` gives (k, n_meas) V of spots (k, 4), each alone.
-        """
-        newest_first = range(len(self.feet) - 1, -1, -1)
-        places: dict[int, tuple[float, ...]] = {}
-        for spot in map(tuple, spots.tolist()):
-            own = next((n for n in newest_first if self.feet[n].is_near(spot)), None)
+    def after(self, spots: FloatArray, shapes: Shapes) -> None:
+        """Take a frame in which touches ``spots`` (k, 4) were."""
+        self._since += self._seconds
+        for spot in spots.tolist():
+            own = next((foot for foot in reversed(self._feet) if foot.is_near(spot)), None)
             if own is None:
-                self._new(spot, changes)
-            else:
-                self._again(own, spot, changes)
+                self._feet.append(FootprintChange.of(spot, self._apart(shapes(np.array(spot)))))
+                continue
+            own.known, own.quiet = False, 0.0
+            if own.is_outdated(spot):
+                own.spot, own.shapes = spot, self._apart(shapes(np.array(spot)))
+                own.rows = None
+        del self._feet[:-_FOOTPRINTS]
 
-    def _new(self, spot, changes) -> None:
-        foot = FootprintChange(spot, changes(np.array([spot]))[0], spot[:2])
-        self.feet = (*self.feet, foot)[-_FOOTPRINTS:]
-        new = [[0.0], [RESIDUAL.deviation], [0.0]]
-        each = np.hstack([[self._parts, self._doubts, self._quiet], new])
-        self._parts, self._doubts, self._quiet = each[:, -_FOOTPRINTS:].copy()
-        self._forget_rows()
+    def _apart(self, shapes: FloatArray) -> FloatArray:
+        """The slopes without what they have of the change itself."""
+        own = _OTHERWISE[:, None] * shapes
+        change, *slopes = own @ self._matrix.T
+        own[1:] -= np.outer(np.array(slopes) @ change / (change @ change), own[0])
+        return own
 
-    def _again(self, own: int, spot, changes) -> None:
-        foot = self.feet[own]
-        self._quiet[own] = 0.0
-        if self._doubts[own] != RESIDUAL.deviation:
-            self._doubts[own] = RESIDUAL.deviation
-            self._left = np.zeros((0, 0))
-        if foot.is_outdated(spot):
-            foot = FootprintChange(spot, changes(np.array([spot]))[0], foot.place)
-            self.feet = (*self.feet[:own], foot, *self.feet[own + 1 :])
-            self._forget_rows()
-
-    def _keep(self, stays: list[bool]) -> None:
-        """The footprints that stay."""
-        if not all(stays):
-            self.feet = tuple(compress(self.feet, stays))
-            each = np.array([self._parts, self._doubts, self._quiet])
-            self._parts, self._doubts, self._quiet = each[:, stays].copy()
-            self._forget_rows()
-
-    def taken_from(self, data: FloatArray) -> FloatArray:
-        """What of ``data`` (n_meas,) V is not known to be left."""
-        for foot, part in zip(self.feet, self._parts.tolist(), strict=True):
-            if part:
-                data = data - part * foot.change
+    def without(self, data: FloatArray) -> FloatArray:
+        """``data`` (n_meas,) V less what is known to be left."""
+        for foot in self._feet:
+            if foot.parts.any():
+                data = data - foot.parts @ foot.shapes
         return data
 
     def directions(self, matrix: FloatArray) -> FloatArray:
-        """(k, c) of what may be left besides, each as long as its deviation; ``matrix``
+        """(k, c) of what may be left beyond that, each as long as its deviation; ``matrix``
         (c, n_meas) 1/V, from data to whitened data."""
+        rows, doubts = self._rows(matrix), [self._doubt(foot) for foot in self._feet]
+        made_of, left = [matrix, *rows], self._left
+        if doubts != self._doubts or list(map(id, made_of)) != list(map(id, self._made_of)):
+            all_left = [doubt * own[0] for doubt, own in zip(doubts, rows, strict=True)]
+            counts = [row for row in all_left if row @ row > _FAINT**2]
+            left = np.array(counts).reshape(-1, len(matrix))
+            self._doubts, self._made_of, self._left = doubts, made_of, left
+        return left
+
+    def _rows(self, matrix: FloatArray) -> list[FloatArray]:
         if matrix is not self._matrix:
             self._matrix = matrix
-            rows = [matrix @ foot.change for foot in self.feet]
-            self._rows = np.array(rows).reshape(-1, len(matrix))
-            self._left = self._rows[:0]
-        if len(self._left) != len(self._rows):
-            self._left = self._doubts[:, None] * self._rows
-        return self._left
+            for foot in self._feet:
+                foot.rows = None
+        rows = []
+        for foot in self._feet:
+            if foot.rows is None:
+                foot.rows = foot.shapes @ matrix.T
+            rows.append(foot.rows)
+        return rows
+
+    def _doubt(self, foot: FootprintChange) -> float:
+        """Deviation of the part that is left: in steps of two, so that it is the same for some
+        time."""
+        if not foot.known:
+            return RESIDUAL.deviation
+        less = -float(foot.parts[0]) * math.expm1(-self._since / RESIDUAL.recovery)
+        steps = math.floor(math.log2(RESIDUAL.deviation / max(less, _LEAST)))
+        return RESIDUAL.deviation / 2.0 ** max(steps, 0)
 
     def idle(self, matrix: FloatArray, data: FloatArray) -> None:
-        """Nothing touched in a frame of such ``data`` (n_meas,) V: see what is left."""
-        if not self.feet:
+        """Take ``data`` (n_meas,) V of a frame in which nothing touched, less what was known."""
+        self._since = self._seconds
+        if not self._feet:
             return
-        left = self.directions(matrix)
-        onto = np.linalg.solve(np.eye(len(left)) + left @ left.T, left @ (matrix @ data))
-        step = self._doubts * onto
-        known = self._doubts != RESIDUAL.deviation
+        rows = np.concatenate(self._rows(matrix))
+        inner = rows @ rows.T
+        inner[np.diag_indices_from(inner)] += RESIDUAL.deviation**-2
+        more = np.linalg.solve(inner, rows @ (matrix @ data)).reshape(-1, len(_OTHERWISE))
         falls, creeps = (-math.expm1(-self._seconds / time) for time in (_FALLS, _CREEPS))
-        step[known] *= np.where(step[known] < 0, falls, creeps)
-        self._parts = np.maximum(self._parts + step, 0.0)
-        size = np.sqrt(np.einsum("kc,kc->k", self._rows, self._rows))
-        doubts = np.maximum(_KNOWN * self._parts, 1.0 / size)
-        doubts = np.minimum(2.0 ** np.ceil(np.log2(doubts)), 0.9 * RESIDUAL.deviation)
-        if (doubts != self._doubts).any():
-            self._doubts, self._left = doubts, self._rows[:0]
-        self._quiet = self._quiet + self._seconds
-        self._keep((self._quiet < self._fading).tolist())
+        kept = []
+        for foot, own in zip(self._feet, more, strict=True):
+            gain = (falls if own[0] < 0 else creeps) if foot.known else 1.0
+            parts = foot.parts + gain * own
+            foot.parts = parts if parts[0] > _LEAST else 0.0 * parts
+            foot.known, foot.quiet = True, foot.quiet + self._seconds
+            if foot.quiet < _GONE or np.linalg.norm(foot.parts @ foot.rows) > 1.0:
+                kept.append(foot)
+        self._feet = kept

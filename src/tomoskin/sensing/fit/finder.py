@@ -72,7 +72,7 @@ class SpotFinder:
         self._model, self._policy = model, DetectionPolicy.of(skin.touch, pace)
         self._cells = CellDiscs.of(mesh)
         self._reach, self._unrest = pace.reach, 1.0
-        self._residual = ResidualResponse(pace.interval, pace.fading)
+        self._residual = ResidualResponse(pace.interval)
         self._unit = skin.conductivity
         self._before = self._shown = np.zeros((0, N_PARAMETERS))
         self._deficit = Deficit.none(len(model.solver.table.basis))
@@ -119,7 +119,7 @@ class SpotFinder:
         """
         self._sight.look(nuisance, np.zeros((len(dv), 0)) if jumps is None else jumps)
         self._wander = wander
-        data = self._data = self._residual.taken_from(dv / self._sight.scale)
+        data = self._data = self._residual.without(dv / self._sight.scale)
         self.watch.begin(data, self._sight.of(self.watch.excess).gauge)
         (detected, rival), jump, matched = self._searched(data)
         solver = self._model.solver
@@ -131,8 +131,8 @@ class SpotFinder:
         self._unrest = self._motion(detected.fit.spots)
         self._before, self._deficit = detected.fit.spots, detected.fit.deficit
         self._expected = self._going_on(detected)
-        if self._policy.pace.fading:
-            self._residual.after(self._before, self._model.changes)
+        if self._policy.pace.speed and self._policy.pace.interval:
+            self._residual.after(self._before, self._model.shapes)
         self._change = detected.fit.change + detected.fit.deficit.change
         return self._detections(joined(detected))
 

@@ -156,14 +156,11 @@ class Pace:
     restart
         Whether a frame that does not go on as it was is looked at without what was there too.
     speed
-        Of touches along each axis, standard deviation, m/s; 0 where they are taken to stand still.
-    fading
-        Seconds for which residual responses of touches count as noise; 0 where frames do
-        not follow each other.
+        Of touches along each axis, standard deviation, m/s; 0 where frames do not follow each other.
     scan_time
         Seconds that a scan takes: in it touches move and grow. 0 where rows are read all at once.
     interval
-        Seconds between two frames: how many of them a residual response lasts.
+        Seconds between two frames.
     """
 
     warm: int = 4
@@ -180,7 +177,6 @@ class Pace:
     joint: int = 0
     restart: bool = False
     speed: float = 0.1
-    fading: float = 8.0
     scan_time: float = 0.0
     interval: float = 0.0
 
@@ -209,7 +205,6 @@ EXHAUSTIVE = Pace(
     joint=10,
     restart=True,
     speed=0.0,
-    fading=0.0,
 )
 """Each frame as if it were the only one, of touches that stand still."""
 

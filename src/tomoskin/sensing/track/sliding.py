@@ -87,6 +87,10 @@ class FingerTracker:
         """Whether there is a touch, or what may become one."""
         return self._tracker.follows
 
+    def rest(self) -> None:
+        """See :meth:`Tracker.rest`."""
+        self._tracker.rest()
+
     @property
     def events(self) -> tuple[TouchEvent, ...]:
         """What happened in the newest frame."""

@@ -51,6 +51,10 @@ class Tracker:
         """Whether there is a touch, or what may become one."""
         return bool(self._traces)
 
+    def rest(self) -> None:
+        """What touches have left does not show in detections from now on."""
+        self._residuals.forget()
+
     @property
     def numbered(self) -> int:
         """The last identity that was given."""
