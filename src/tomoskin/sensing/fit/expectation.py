@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Self
 
 import numpy as np
 
@@ -82,27 +81,24 @@ def less(known: Known, number: int) -> Known:
     return (*known[:number], *known[number + 1 :])
 
 
-_AWAY, _STRONGER, _WEAKER = 1e-3, 1.1, 0.95
+_AWAY, _STRONGER, _WEAKER = 2e-3, 1.1, 0.95
 """A footprint is made anew where its touch is by so many m elsewhere or by so much stronger, and no
 weaker: a touch that has just begun is known badly, and so is one that is lifted."""
 
 _FOOTPRINTS = 16
 """Footprints that are kept, the newest."""
 
-_FALLS, _CREEPS = 0.1, 10.0
-"""Seconds in which what is left is known to have become less; or more, which is the sheet's drift:
-what grows faster is a new press."""
-
 _OTHERWISE = np.array([1.0, 5e-3, 5e-3, 0.3])
 """What is left lies elsewhere than the touch, m, and has another radius, as a logarithm: standard
-deviations, as parts of it. On the textile twin, 6 mm and 0.27."""
+deviations. On the textile twin they are 6 mm and 0.27."""
 
-_LEAST = 1e-6
-"""Part below which nothing is left."""
+_FALLS, _CREEPS = 0.1, 10.0
+"""Seconds in which less is left, and in which more is: that is the sheet's drift, and what grows
+faster is a new press."""
 
-_FAINT, _GONE = 0.3, 0.5
-"""Deviations of the noise below which it does not matter what else may be left; and seconds without
-a touch after which a footprint is forgotten where less than one is left."""
+_GONE, _FAINT = 0.5, 0.3
+"""Seconds without a touch after which a footprint is forgotten where it is below the noise; and
+deviations of that below which it does not matter what else may be left."""
 
 Shapes = Callable[[FloatArray], FloatArray]
 """(4, n_meas) V of a spot (4,): its change, and the slopes of that by place and radius."""
@@ -114,33 +110,28 @@ class FootprintChange:
 
     Attributes
     ----------
-    spot, shapes
-        The touch as it was strongest, four numbers; and (4, n_meas) V that what it leaves may be
-        made of: its change, and this elsewhere or wider, each by a deviation.
     place
         Where it was first, m.
+    spot
+        The touch as it is known best, four numbers.
+    shapes, rows
+        (4, n_meas) V of what is left: the touch's change, and this elsewhere or wider by a
+        deviation; and (4, c) as whitened data show them.
     parts
-        (4,) of these that are left, as frames have told in which nothing touched.
+        (4,) of them that are left, as idle frames have told.
     known
         Whether there have been such frames since.
     quiet
         Seconds of them.
-    rows
-        (4, c) the shapes as whitened data show them.
     """
 
+    place: Sequence[float]
     spot: Sequence[float]
     shapes: FloatArray
-    place: Sequence[float]
-    parts: FloatArray = field(default_factory=lambda: np.zeros(4))
+    rows: FloatArray
+    parts: FloatArray
     known: bool = False
     quiet: float = 0.0
-    rows: FloatArray | None = None
-
-    @classmethod
-    def of(cls, spot: Sequence[float], shapes: FloatArray) -> Self:
-        """Of a touch (4,)."""
-        return cls(spot, shapes, spot[:2])
 
     def is_near(self, spot: Sequence[float]) -> bool:
         """Whether a touch (4,) stands here."""
@@ -149,16 +140,24 @@ class FootprintChange:
     def is_outdated(self, spot: Sequence[float]) -> bool:
         """Whether the touch that stands here is known better by now."""
         stronger = spot[CONTENT] / self.spot[CONTENT]
-        moved = stronger > _STRONGER or math.dist(self.spot[:2], spot[:2]) > _AWAY
-        return moved and stronger > _WEAKER
+        moved = math.dist(self.spot[:2], spot[:2]) > _AWAY
+        return stronger > _STRONGER or (moved and stronger > _WEAKER)
+
+    def doubt(self, since: float) -> float:
+        """Deviation of the part that is left, so many seconds ``since`` an idle frame: it may have
+        faded. In steps of two, so that it is the same for some time."""
+        faded = -self.parts[0] * math.expm1(-since / RESIDUAL.recovery)
+        if not self.known or faded >= RESIDUAL.deviation:
+            return RESIDUAL.deviation
+        return 2.0 ** math.ceil(math.log2(faded)) if faded > 0 else 0.0
 
 
 class ResidualResponse:
-    """What touches have left since the baseline has had time to follow: a part of the change that
-    each footprint's touch was, about there.
+    """What touches have left since the baseline has had time to follow.
 
-    It is unknown until nothing touches: then it counts as noise. Frames in which nothing touches
-    tell it, and from then on it is taken from the data. It fades, so what grows is a new press.
+    It is unknown until nothing touches: then a part of the touch's change counts as noise. Idle
+    frames tell what is left, and from then on that is taken from the data. What else there may be
+    is how far it has faded since. It fades only, so what grows is a new press.
 
     Parameters
     ----------
@@ -169,9 +168,8 @@ class ResidualResponse:
     def __init__(self, seconds: float) -> None:
         self._seconds, self._since = seconds, 0.0
         self._feet: list[FootprintChange] = []
-        self._doubts: list[float] = []
-        self._made_of: list[FloatArray] = []
-        self._left = self._matrix = np.zeros((0, 0))
+        self._matrix = self._left = np.zeros((0, 0))
+        self._doubts: list[float] | None = None
 
     def after(self, spots: FloatArray, shapes: Shapes) -> None:
         """Take a frame in which touches ``spots`` (k, 4) were."""
@@ -179,77 +177,62 @@ class ResidualResponse:
         for spot in spots.tolist():
             own = next((foot for foot in reversed(self._feet) if foot.is_near(spot)), None)
             if own is None:
-                self._feet.append(FootprintChange.of(spot, self._apart(shapes(np.array(spot)))))
-                continue
+                made, rows = self._made(shapes(np.array(spot)))
+                own = FootprintChange(spot[:2], spot, made, rows, np.zeros(len(made)))
+                self._feet = [*self._feet, own][-_FOOTPRINTS:]
+            elif own.is_outdated(spot):
+                own.spot, (own.shapes, own.rows) = spot, self._made(shapes(np.array(spot)))
             own.known, own.quiet = False, 0.0
-            if own.is_outdated(spot):
-                own.spot, own.shapes = spot, self._apart(shapes(np.array(spot)))
-                own.rows = None
-        del self._feet[:-_FOOTPRINTS]
 
-    def _apart(self, shapes: FloatArray) -> FloatArray:
-        """The slopes without what they have of the change itself."""
-        own = _OTHERWISE[:, None] * shapes
-        change, *slopes = own @ self._matrix.T
-        own[1:] -= np.outer(np.array(slopes) @ change / (change @ change), own[0])
-        return own
+    def _made(self, shapes: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """What is left, in V and whitened: slopes are without what they have of the change."""
+        made = _OTHERWISE[:, None] * shapes
+        rows = made @ self._matrix.T
+        along = rows[1:] @ rows[0] / max(float(rows[0] @ rows[0]), 1e-300)
+        for own in (made, rows):
+            own[1:] -= np.outer(along, own[0])
+        self._doubts = None
+        return made, rows
 
     def without(self, data: FloatArray) -> FloatArray:
         """``data`` (n_meas,) V less what is known to be left."""
         for foot in self._feet:
-            if foot.parts.any():
+            if foot.parts[0] > 0:
                 data = data - foot.parts @ foot.shapes
         return data
 
     def directions(self, matrix: FloatArray) -> FloatArray:
-        """(k, c) of what may be left beyond that, each as long as its deviation; ``matrix``
-        (c, n_meas) 1/V, from data to whitened data."""
-        rows, doubts = self._rows(matrix), [self._doubt(foot) for foot in self._feet]
-        made_of, left = [matrix, *rows], self._left
-        if doubts != self._doubts or list(map(id, made_of)) != list(map(id, self._made_of)):
-            all_left = [doubt * own[0] for doubt, own in zip(doubts, rows, strict=True)]
-            counts = [row for row in all_left if row @ row > _FAINT**2]
-            left = np.array(counts).reshape(-1, len(matrix))
-            self._doubts, self._made_of, self._left = doubts, made_of, left
-        return left
-
-    def _rows(self, matrix: FloatArray) -> list[FloatArray]:
+        """(k, c) of what may be left besides, each as long as its deviation; the same array as
+        long as nothing changes. ``matrix`` (c, n_meas) 1/V, from data to whitened data."""
         if matrix is not self._matrix:
-            self._matrix = matrix
+            self._matrix, self._doubts = matrix, None
             for foot in self._feet:
-                foot.rows = None
-        rows = []
-        for foot in self._feet:
-            if foot.rows is None:
                 foot.rows = foot.shapes @ matrix.T
-            rows.append(foot.rows)
-        return rows
+        doubts = [foot.doubt(self._since) for foot in self._feet]
+        if doubts != self._doubts:
+            left = [d * foot.rows[0] for d, foot in zip(doubts, self._feet, strict=True)]
+            counts = [row for row in left if row @ row > _FAINT**2]
+            self._left, self._doubts = np.array(counts).reshape(-1, len(matrix)), doubts
+        return self._left
 
-    def _doubt(self, foot: FootprintChange) -> float:
-        """Deviation of the part that is left: in steps of two, so that it is the same for some
-        time."""
-        if not foot.known:
-            return RESIDUAL.deviation
-        less = -float(foot.parts[0]) * math.expm1(-self._since / RESIDUAL.recovery)
-        steps = math.floor(math.log2(RESIDUAL.deviation / max(less, _LEAST)))
-        return RESIDUAL.deviation / 2.0 ** max(steps, 0)
-
-    def idle(self, matrix: FloatArray, data: FloatArray) -> None:
+    def idle(self, data: FloatArray) -> None:
         """Take ``data`` (n_meas,) V of a frame in which nothing touched, less what was known."""
         self._since = self._seconds
         if not self._feet:
             return
-        rows = np.concatenate(self._rows(matrix))
+        rows = np.concatenate([foot.rows for foot in self._feet])
         inner = rows @ rows.T
         inner[np.diag_indices_from(inner)] += RESIDUAL.deviation**-2
-        more = np.linalg.solve(inner, rows @ (matrix @ data)).reshape(-1, len(_OTHERWISE))
+        more = np.linalg.solve(inner, rows @ (self._matrix @ data)).reshape(-1, len(_OTHERWISE))
         falls, creeps = (-math.expm1(-self._seconds / time) for time in (_FALLS, _CREEPS))
-        kept = []
         for foot, own in zip(self._feet, more, strict=True):
             gain = (falls if own[0] < 0 else creeps) if foot.known else 1.0
-            parts = foot.parts + gain * own
-            foot.parts = parts if parts[0] > _LEAST else 0.0 * parts
+            foot.parts = foot.parts + gain * own
+            if foot.parts[0] <= 0:
+                foot.parts = np.zeros(len(own))
             foot.known, foot.quiet = True, foot.quiet + self._seconds
-            if foot.quiet < _GONE or np.linalg.norm(foot.parts @ foot.rows) > 1.0:
-                kept.append(foot)
-        self._feet = kept
+        self._feet = [
+            foot
+            for foot in self._feet
+            if foot.quiet < _GONE or np.linalg.norm(foot.parts @ foot.rows) > 1.0
+        ]

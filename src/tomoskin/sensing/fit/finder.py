@@ -138,7 +138,7 @@ class SpotFinder:
 
     def rest(self) -> None:
         """Nothing touches in the newest frame: what it holds of touches, they have left."""
-        self._residual.idle(self._sight.of(self.watch.excess).table.matrix, self._data)
+        self._residual.idle(self._data)
 
     def others(self) -> FloatArray:
         """(k, n_meas) V of the model: for each touch of the newest frame what all others change."""

@@ -156,7 +156,8 @@ class Pace:
     restart
         Whether a frame that does not go on as it was is looked at without what was there too.
     speed
-        Of touches along each axis, standard deviation, m/s; 0 where frames do not follow each other.
+        Of touches along each axis, standard deviation, m/s; 0 where frames do not follow each
+        other.
     scan_time
         Seconds that a scan takes: in it touches move and grow. 0 where rows are read all at once.
     interval

@@ -103,7 +103,7 @@ class SpotModel:
         return np.asarray(self.solver.expanded(spots)[:, 0] @ self.solver.table.basis)
 
     def shapes(self, spot: FloatArray) -> FloatArray:
-        """(4, n_meas) V: what a ``spot`` (4,) changes, and the slopes of that by place and radius."""
+        """(4, n_meas) V: what a ``spot`` (4,) changes, and its slopes by place and radius."""
         own = self.solver.expanded(spot[None])[0, : 1 + CONTENT]
         return np.asarray(own @ self.solver.table.basis)
 
