@@ -49,8 +49,9 @@ class RegionFinder:
         """Detections of a frame, strongest first."""
         return self._segmenter(view.image, view.image_noise)
 
-    def rest(self) -> bool:
-        """Nothing touches in the newest frame. Whether it is known now what touches have left."""
+    def learn(self, *, touched: bool) -> bool:
+        """Nothing is learnt of the newest frame, and what touches have left shows in images."""
+        del touched
         return False
 
 
@@ -127,10 +128,10 @@ class FitFinder:
         self.problem = watch.problem or (None if jump is None else _jump_text(JUMP * jump))
         return detections
 
-    def rest(self) -> bool:
-        """Nothing touches in the newest frame: what it holds of touches, they have left."""
-        self._spots.rest()
-        return True
+    def learn(self, *, touched: bool) -> bool:
+        """See :meth:`SpotFinder.learn`; whether what touches have left does not show any more."""
+        self._spots.learn(touched=touched)
+        return not touched
 
     def strongest(self, dv: FloatArray) -> Detection | None:
         """The strongest touch in difference data (n_meas,), NaN where a value is missing."""

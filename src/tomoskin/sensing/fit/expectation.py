@@ -119,10 +119,10 @@ class FootprintChange:
         deviation; and (4, c) as whitened data show them.
     parts
         (4,) of them that are left, as idle frames have told.
-    known
-        Whether there have been such frames since.
+    touched
+        How strong a touch has stood here since, as a part of that one; 0 where none has.
     quiet
-        Seconds of them.
+        Seconds of idle frames since.
     """
 
     place: Sequence[float]
@@ -130,26 +130,38 @@ class FootprintChange:
     shapes: FloatArray
     rows: FloatArray
     parts: FloatArray
-    known: bool = False
+    touched: float = 1.0
     quiet: float = 0.0
 
     def is_near(self, spot: Sequence[float]) -> bool:
         """Whether a touch (4,) stands here."""
         return math.dist(self.place, spot[:2]) < RESIDUAL.spacing
 
-    def is_outdated(self, spot: Sequence[float]) -> bool:
-        """Whether the touch that stands here is known better by now."""
-        stronger = spot[CONTENT] / self.spot[CONTENT]
+    def takes(self, spot: Sequence[float]) -> bool:
+        """Whether the touch (4,) that stands here is known better by now than the footprint is."""
+        size = spot[CONTENT] / self.spot[CONTENT]
+        self.touched, self.quiet = max(self.touched, min(size, 1.0)), 0.0
         moved = math.dist(self.spot[:2], spot[:2]) > _AWAY
-        return stronger > _STRONGER or (moved and stronger > _WEAKER)
+        return size > _STRONGER or (moved and size > _WEAKER)
 
     def doubt(self, since: float) -> float:
-        """Deviation of the part that is left, so many seconds ``since`` an idle frame: it may have
-        faded. In steps of two, so that it is the same for some time."""
-        faded = -self.parts[0] * math.expm1(-since / RESIDUAL.recovery)
-        if not self.known or faded >= RESIDUAL.deviation:
-            return RESIDUAL.deviation
-        return 2.0 ** math.ceil(math.log2(faded)) if faded > 0 else 0.0
+        """Deviation of the part that is left, so many seconds ``since`` an idle frame: a touch has
+        stood here, or it has faded. In steps of two, so that it is the same for some time."""
+        faded = -float(self.parts[0]) * math.expm1(-since / RESIDUAL.recovery)
+        doubt = max(RESIDUAL.deviation * self.touched, faded)
+        return min(2.0 ** math.ceil(math.log2(doubt)), RESIDUAL.deviation) if doubt > 0 else 0.0
+
+    def learn(self, more: FloatArray, falls: float, creeps: float) -> None:
+        """Take what an idle frame shows of the shapes beyond the parts; less comes, and more, by
+        such a share a frame. What is too much for a residual response is none."""
+        if self.touched:
+            if not RESIDUAL.holds(float(more[0]), self.touched):
+                return
+            self.parts, self.touched = self.parts + more, 0.0
+        else:
+            self.parts = self.parts + (falls if more[0] < 0 else creeps) * more
+        if self.parts[0] <= 0:
+            self.parts = np.zeros(len(more))
 
 
 class ResidualResponse:
@@ -180,9 +192,8 @@ class ResidualResponse:
                 made, rows = self._made(shapes(np.array(spot)))
                 own = FootprintChange(spot[:2], spot, made, rows, np.zeros(len(made)))
                 self._feet = [*self._feet, own][-_FOOTPRINTS:]
-            elif own.is_outdated(spot):
+            elif own.takes(spot):
                 own.spot, (own.shapes, own.rows) = spot, self._made(shapes(np.array(spot)))
-            own.known, own.quiet = False, 0.0
 
     def _made(self, shapes: FloatArray) -> tuple[FloatArray, FloatArray]:
         """What is left, in V and whitened: slopes are without what they have of the change."""
@@ -221,16 +232,14 @@ class ResidualResponse:
         if not self._feet:
             return
         rows = np.concatenate([foot.rows for foot in self._feet])
+        sizes = np.repeat([foot.touched or 1.0 for foot in self._feet], len(_OTHERWISE))
         inner = rows @ rows.T
-        inner[np.diag_indices_from(inner)] += RESIDUAL.deviation**-2
-        more = np.linalg.solve(inner, rows @ (self._matrix @ data)).reshape(-1, len(_OTHERWISE))
-        falls, creeps = (-math.expm1(-self._seconds / time) for time in (_FALLS, _CREEPS))
-        for foot, own in zip(self._feet, more, strict=True):
-            gain = (falls if own[0] < 0 else creeps) if foot.known else 1.0
-            foot.parts = foot.parts + gain * own
-            if foot.parts[0] <= 0:
-                foot.parts = np.zeros(len(own))
-            foot.known, foot.quiet = True, foot.quiet + self._seconds
+        inner[np.diag_indices_from(inner)] += (RESIDUAL.deviation * sizes) ** -2
+        parts = np.linalg.solve(inner, rows @ (self._matrix @ data))
+        shares = [-math.expm1(-self._seconds / time) for time in (_FALLS, _CREEPS)]
+        for foot, more in zip(self._feet, parts.reshape(-1, len(_OTHERWISE)), strict=True):
+            foot.learn(more, *shares)
+            foot.quiet += self._seconds
         self._feet = [
             foot
             for foot in self._feet

@@ -131,14 +131,18 @@ class SpotFinder:
         self._unrest = self._motion(detected.fit.spots)
         self._before, self._deficit = detected.fit.spots, detected.fit.deficit
         self._expected = self._going_on(detected)
-        if self._policy.pace.speed and self._policy.pace.interval:
-            self._residual.after(self._before, self._model.shapes)
         self._change = detected.fit.change + detected.fit.deficit.change
         return self._detections(joined(detected))
 
-    def rest(self) -> None:
-        """Nothing touches in the newest frame: what it holds of touches, they have left."""
-        self._residual.idle(self._data)
+    def learn(self, *, touched: bool) -> None:
+        """Whether something touches in the newest frame: its touches leave something behind, or
+        what it holds of touches, others have left."""
+        if not (self._policy.pace.speed and self._policy.pace.interval):
+            return
+        if touched:
+            self._residual.after(self._before, self._model.shapes)
+        else:
+            self._residual.idle(self._data)
 
     def others(self) -> FloatArray:
         """(k, n_meas) V of the model: for each touch of the newest frame what all others change."""
