@@ -92,7 +92,7 @@ _OTHERWISE = np.array([1.0, 5e-3, 5e-3, 0.3])
 """What is left lies elsewhere than the touch, m, and has another radius, as a logarithm: standard
 deviations. On the textile twin they are 6 mm and 0.27."""
 
-_FALLS, _CREEPS = 0.1, 10.0
+_FALLS, _CREEPS = 0.2, 10.0
 """Seconds in which less is left, and in which more is: that is the sheet's drift, and what grows
 faster is a new press."""
 
@@ -152,16 +152,15 @@ class FootprintChange:
         return min(2.0 ** math.ceil(math.log2(doubt)), RESIDUAL.deviation) if doubt > 0 else 0.0
 
     def learn(self, more: FloatArray, falls: float, creeps: float) -> None:
-        """Take what an idle frame shows of the shapes beyond the parts; less comes, and more, by
-        such a share a frame. What is too much for a residual response is none."""
-        if self.touched:
-            if not RESIDUAL.holds(float(more[0]), self.touched):
-                return
+        """Take what an idle frame shows of the shapes beyond the parts. These fall by such a share
+        of it, and creep. What is too much for a residual response is none."""
+        if not self.touched:
+            size = np.abs(self.parts)
+            less = np.clip(falls * more, -size, size)
+            self.parts = self.parts + np.where(self.parts * more < 0, less, creeps * more)
+        elif RESIDUAL.holds(float(more[0]), self.touched):
             self.parts, self.touched = self.parts + more, 0.0
-        else:
-            self.parts = self.parts + (falls if more[0] < 0 else creeps) * more
-        if self.parts[0] <= 0:
-            self.parts = np.zeros(len(more))
+        self.parts[0] = max(self.parts[0], 0.0)
 
 
 class ResidualResponse:
@@ -208,7 +207,7 @@ class ResidualResponse:
     def without(self, data: FloatArray) -> FloatArray:
         """``data`` (n_meas,) V less what is known to be left."""
         for foot in self._feet:
-            if foot.parts[0] > 0:
+            if foot.parts.any():
                 data = data - foot.parts @ foot.shapes
         return data
 

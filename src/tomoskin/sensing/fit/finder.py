@@ -140,7 +140,7 @@ class SpotFinder:
         if not (self._policy.pace.speed and self._policy.pace.interval):
             return
         if touched:
-            self._residual.after(self._before, self._model.shapes)
+            self._residual.after(self._shown, self._model.shapes)
         else:
             self._residual.idle(self._data)
 

@@ -362,7 +362,8 @@ def leaves_much(policy: DetectionPolicy, fit: Fit) -> bool:
 def rises_beside(policy: DetectionPolicy, fit: Fit, both: Fit, ratio: FloatArray) -> bool:
     """Whether touches of ``both`` signs explain what those of a ``fit`` leave: some clearly are
     not of the skin's sign, and little remains then. Where much does, more touches come."""
-    clear = bool((ratio[policy.is_wrong(both.spots[:, CONTENT])] > _CLEAR * policy.least).any())
+    wrong = ratio[policy.is_wrong(both.spots[:, CONTENT])]
+    clear = bool((wrong > _CLEAR * policy.threshold(fit)).any())
     return clear and both.beyond < _HALF * fit.beyond
 
 
