@@ -96,9 +96,8 @@ _FALLS, _CREEPS = 0.2, 10.0
 """Seconds in which less is left, and in which more is: that is the sheet's drift, and what grows
 faster is a new press."""
 
-_GONE, _FAINT = 0.5, 0.3
-"""Seconds without a touch after which a footprint is forgotten where it is below the noise; and
-deviations of that below which it does not matter what else may be left."""
+_FAINT = 0.3
+"""Deviations of the noise below which it does not matter what else may be left."""
 
 Shapes = Callable[[FloatArray], FloatArray]
 """(4, n_meas) V of a spot (4,): its change, and the slopes of that by place and radius."""
@@ -239,8 +238,6 @@ class ResidualResponse:
         for foot, more in zip(self._feet, parts.reshape(-1, len(_OTHERWISE)), strict=True):
             foot.learn(more, *shares)
             foot.quiet += self._seconds
-        self._feet = [
-            foot
-            for foot in self._feet
-            if foot.quiet < _GONE or np.linalg.norm(foot.parts @ foot.rows) > 1.0
-        ]
+        shown = [float(np.linalg.norm(foot.parts @ foot.rows)) for foot in self._feet]
+        pairs = zip(self._feet, shown, strict=True)
+        self._feet = [foot for foot, size in pairs if size > 1.0 or foot.quiet < RESIDUAL.gone]
