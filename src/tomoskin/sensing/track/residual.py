@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -52,7 +53,7 @@ class ResidualResponses:
     def forget(self) -> None:
         """Forget all: nothing of them shows in detections any more."""
         self._residuals: list[Residual] = []
-        self._quiet_since: float | None = None
+        self._shown = -math.inf
 
     def leave(self, trace: Trace, time: float) -> None:
         """Remember where a touch was that has ended."""
@@ -67,11 +68,8 @@ class ResidualResponses:
         """Follow whether frames are ``quiet``, without any detection: where they stay so, the
         residual responses are below the noise."""
         if not quiet:
-            self._quiet_since = None
-            return
-        if self._quiet_since is None:
-            self._quiet_since = time
-        if time - self._quiet_since >= RESIDUAL.gone:
+            self._shown = time
+        elif time - self._shown >= RESIDUAL.gone:
             self._residuals.clear()
 
     def explain(self, detection: Detection, time: float, traces: Iterable[Trace]) -> bool:
