@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from tomoskin.core import FloatArray, TomoskinError, watch_stages
+from tomoskin.core import FloatArray, TomoskinError, WireError, watch_stages
 from tomoskin.learning import Kind
 from tomoskin.pipeline import FrameResult, Prepared
 from tomoskin.run import Runner, commands
@@ -77,6 +77,8 @@ class GuidedFlow(ABC):
         Whether something newer is being estimated, and how far that is, in words.
     paused
         Whether frames are left out, because no page shows the flow.
+    taken
+        What it has recorded: presses, or placed weights.
     answers
         What a page may ask of it, by the type of the request: called with the request, it says
         whether there is something to estimate. WireError refuses.
@@ -90,6 +92,8 @@ class GuidedFlow(ABC):
         self.trouble = self.stage = ""
         self.estimating = self.paused = False
         self.answers: Mapping[type, Callable[[Any], bool]] = {}
+        self.taken: list[Any] = []
+        self._dots = Dots(prepared)
         self.lock = threading.RLock()
         self._stopped = threading.Event()
 
@@ -101,9 +105,15 @@ class GuidedFlow(ABC):
     def restart(self) -> None:
         """Forget what has begun and is not recorded yet."""
 
-    @abstractmethod
     def examples(self) -> tuple[Any, ...]:
         """What an estimate rests on now."""
+        return tuple(self.taken)
+
+    def take_back(self, number: int) -> Any:
+        """Remove what was recorded ``number``-th; WireError where there is none."""
+        if not 0 <= number < len(self.taken):
+            raise WireError("there is no press to undo")
+        return self.taken.pop(number)
 
     @abstractmethod
     def estimate_from(self, examples: tuple[Any, ...]) -> Estimate:
