@@ -9,6 +9,8 @@ Thesis saw: adjacent driving with a NOSER or Gaussian prior places a press to wi
 (chapter 8); no table.
 Checked: for every pattern and prior the mean ERR75 is below 20 mm, and for adjacent driving with
 NOSER below 10 mm; RES75 ≥ RES50 and 0 < shape angle ≤ 90° everywhere.
+Assumed: the same number of readings of each row. A pattern with fewer rows is then as quick as one
+with more, which a board is not: at equal time for a frame it would average more readings of each.
 """
 
 from __future__ import annotations
