@@ -8,7 +8,7 @@ pictures. Pages are written from the file each time; ``--check`` only says what 
 A table ``[PART.NAME]`` of the file has a ``command`` that prints JSON, its ``values``, which hold
 ``within`` a part of themselves, and ``pages`` with the texts that show them: ``{KEY|2}`` is a value
 with two decimals. A key of an example is the name of its number; that of a benchmark is
-``TITLE > FIRST CELLS OF THE ROW: COLUMN``. ``needs`` names public recordings.
+``TITLE > FIRST / CELLS / OF THE ROW → COLUMN``. ``needs`` names public recordings.
 """
 
 from __future__ import annotations
@@ -55,6 +55,8 @@ class Claim:
 
     def broken(self, found: Mapping[str, float]) -> list[str]:
         """Values that are not what was found."""
+        if not found:
+            return [f"{self.name}: {self.command} failed"]
         return [
             f"{self.name}, {key}: {value:g} is published, {found.get(key)} was found"
             for key, value in self.values.items()
@@ -120,7 +122,7 @@ def read(document: Any, key: str) -> float | None:
     if isinstance(document, dict):
         return document.get(key)
     title, _, rest = key.rpartition(" > ")
-    label, _, column = rest.rpartition(": ")
+    label, _, column = rest.partition(" → ")
     first = label.split(" / ")
     for report in document:
         for row in report["rows"] if title in report["title"] else ():
@@ -174,9 +176,9 @@ def run(every: Sequence[Claim], part: str | None, *, accept: bool) -> Iterator[s
         found = measured(one) if part in {None, one.part} else None
         if found is None:
             continue
-        broken = one.broken(found)
-        yield from broken
-        if accept and found:
+        if not (accept and found):
+            yield from one.broken(found)
+        else:
             today = {"date": datetime.date.today(), "commit": commit.decode().strip()}
             keys = found if one.part == "gallery" else one.values
             values = {key: found.get(key, one.values.get(key)) for key in keys}
@@ -202,7 +204,7 @@ def main() -> int:
     else:
         wrong = list(run(every, options.part, accept=options.accept))
     print(*wrong, sep="\n", end="\n" if wrong else "", file=sys.stderr)
-    return bool(wrong) and not options.accept
+    return bool(wrong)
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ at most 1.5; area and maximum grow with the radius.
 Assumed: both angles, so that the maximum grows. Wrapped by the same 60°, the area grows, but the
 maximum falls (below), for strain is the foam's height over the radius; with 70° and 50° it falls
 more. So the growth of the maximum is not explained by the model: a skin that lies close to either
-shows less on the larger. Wrapped all around 70 mm the whole sheet changes alike, and what stands
+shows less on the larger. Wrapped all around 70 mm the whole sheet changes evenly, and what stands
 out is no region along the cylinder. The order of the cylinders matters little (below).
 """
 

@@ -5,8 +5,8 @@ References are taken after the skin is attached, as in the thesis. The probe pre
 bent by 30°, and in the middle of the chair's back. The arm has a radius of 30 mm, and its joint
 bends over 60 mm. One step with NOSER's prior on normalised differences, threshold 70 %.
 
-Shown: above the press at (25, 20) mm on the three bodies; in the middle that on the most curved
-part of cylinder and chair, and the arm with its joint at 37° by a reference taken there; below the
+Shown: above the press at (25, 20) mm on the three bodies. In the middle that on the most curved
+part of cylinder and chair, and the arm with its joint at 37° by a reference taken there. Below the
 flat skin, and the joint by two other references; in the last the joint hides the press.
 Thesis saw: the touch found on all of them, on the most curved part too; moving the joint needs a
 new reference, by its encoder.

@@ -284,7 +284,7 @@ def draw(
 def draw_sweep(ax: Axes, counts: Mapping[str, int]) -> None:
     """Balls found against the response."""
     styles = {"fit": "o-", "regions": "s:"}
-    for electrodes, colour in zip(ELECTRODES, (figures.BLUE, figures.ORANGE), strict=True):
+    for electrodes, colour in zip(ELECTRODES, (figures.BLUE, figures.ORANGE), strict=False):
         for method, style in styles.items():
             found = [
                 counts[f"{electrodes} electrodes, response {response:g}, {method}"]
