@@ -218,6 +218,7 @@ class DeferredImage(Image):
 class Force:
     """Force of a touch across the sheet, N: its median, and an interval that nine in ten lie in.
 
+    ``high`` is infinite where the force is beyond those that were taught.
     ``calibrated`` is False where it rests on the skin file's material alone.
     """
 
@@ -235,6 +236,8 @@ class Force:
     def text(self) -> str:
         """The force with its interval, in words."""
         state = "" if self.calibrated else ", uncalibrated"
+        if math.isinf(self.high):
+            return f"more than {self.low:.2g} N{state}"
         return f"{self.newtons:.2g} N ({self.low:.2g} to {self.high:.2g}{state})"
 
 
