@@ -13,8 +13,8 @@ ROOT = Path(__file__).resolve().parent.parent
 EXAMPLES = ROOT / "examples"
 IMAGES = ROOT / "docs" / "images" / "gallery"
 PAGE = ROOT / "docs" / "gallery.md"
-QUALITY, OF_FILM = 85, 70
-"""Of WebP: at 85 a line of a pixel stays sharp, and no figure has 60 kB; a film has 200 kB."""
+QUALITIES, OF_FILM, LARGEST = (85, 70, 55, 40), 70, 60_000
+"""Of WebP: at 85 a line of a pixel stays sharp; a figure has at most so many bytes."""
 
 MARK = "<!-- made by make gallery: what follows is not written by hand -->"
 
@@ -99,7 +99,10 @@ def save_picture(drawn: Path) -> None:
         pause = figure.info.get("duration", 0)
     first, *rest = pictures
     if not rest:
-        first.save(shown, quality=QUALITY, method=6)
+        for quality in QUALITIES:
+            first.save(shown, quality=quality, method=6)
+            if shown.stat().st_size < LARGEST:
+                return
         return
     first.save(
         shown, save_all=True, append_images=rest, duration=pause, loop=0, quality=OF_FILM, method=6

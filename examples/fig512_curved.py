@@ -161,7 +161,7 @@ def check_joint(moved: Sequence[Shown], alone: Sequence[float]) -> dict[str, flo
 
 def draw(lab: Lab, imager: Imager, shown: Sequence[Shown]) -> None:
     """Three rows, each with a colour scale of its own."""
-    made, axes = figures.figure(3, 3, (7.6, 7.8), sharex=True, sharey=True)
+    made, axes = figures.figure(3, 3, (6.8, 6.9), sharex=True, sharey=True)
     rows: list[tuple[FloatArray, Sequence[Shown]]] = [
         (axes[k], shown[3 * k : 3 * k + 3]) for k in range(3)
     ]

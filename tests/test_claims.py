@@ -80,6 +80,7 @@ def test_what_is_found_is_published_only_when_that_is_asked_for(
     monkeypatch.setattr(claims, "pages", lambda _: iter(()))
     monkeypatch.setattr(claims, "measured", lambda _: {KEY: 900.0, "b": 2.0})
     other = replace(claim, part="learning", name="two")
+    file.write_text(claims.dumped([claim, other]), encoding="utf-8")
     assert len(list(claims.run([claim, other], "touch", accept=False))) == 1
     assert [one.values[KEY] for one in claims.claims()] == [1020.0, 1020.0]
     assert list(claims.run([claim, other], "touch", accept=True)) == []
