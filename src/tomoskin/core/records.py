@@ -92,6 +92,8 @@ class Voltages:
     time, host_time
         s, of the device's clock and of the host's: host times of frames that were read together
         are the same.
+    scanned, scan_time
+        Middle of the scan by the host's clock, and how long it took, s; NaN where nothing tells.
     sequence
         The frame's number.
     samples
@@ -108,6 +110,8 @@ class Voltages:
     sequence: int = 0
     samples: NDArray[np.uint16] | None = None
     own: FloatArray | None = None
+    scanned: float = math.nan
+    scan_time: float = math.nan
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -268,6 +268,8 @@ class Following:
             baseline=self.conditioning.state,
             readings=readings,
             unexplained=bent or conditioned.problem or (shows and self._finder.problem) or None,
+            scanned=measured.scanned,
+            scan_time=measured.scan_time,
         )
 
 

@@ -77,8 +77,8 @@ class FrameResult:
 
     Attributes
     ----------
-    sequence, host_time
-        As in the frame that it was made from.
+    sequence, host_time, scanned, scan_time
+        As in the voltages that it was made from.
     ready
         Whether a reference stands; until then the image is zero and there are no touches.
     has_image
@@ -116,6 +116,8 @@ class FrameResult:
     baseline: BaselineState | None = None
     readings: Mapping[str, Any] = field(default_factory=dict)
     unexplained: str | None = None
+    scanned: float = math.nan
+    scan_time: float = math.nan
 
     @classmethod
     def at_rest(
@@ -139,6 +141,8 @@ class FrameResult:
             left_out=int(np.count_nonzero(measured.excluded)),
             events=events,
             baseline=baseline,
+            scanned=measured.scanned,
+            scan_time=measured.scan_time,
         )
 
     @property

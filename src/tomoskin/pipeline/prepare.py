@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from tomoskin.board.source import Configuration, ScanSettings
 from tomoskin.core import FloatArray, Image, IntArray, ModelError, reach
 from tomoskin.imaging import (
     AlphaChoice,
@@ -169,6 +170,11 @@ class Prepared:
             matrix = subspace.projected(matrix)
         spread = matrix * self.difference_noise(reference)
         return ImageNoise.of(spread, self.mesh.identity)
+
+    @cached_property
+    def longest_scan(self) -> float:
+        """Duration of a scan on the slowest board, s."""
+        return Configuration.of(self.scan, ScanSettings.of(self.skin)).scan_time
 
     def difference_noise(self, reference: Reference) -> FloatArray:
         """(n_meas,) standard deviation of difference data against that reference."""
