@@ -260,11 +260,11 @@ class DetectionPolicy:
 
     def left_by(self, fit: Fit) -> float:
         """Deviations that a wrong profile of the spots of a fit may leave."""
-        return self.misshapen * float(np.linalg.norm(fit.predicted))
+        return self.misshapen * math.sqrt(fit.predicted @ fit.predicted)
 
     def threshold(self, fit: Fit, part: float = 1.0) -> float:
         """Deviations for that ``part`` of a touch; a wrong profile adds to the noise."""
-        return part * self.least * float(np.hypot(1.0, self.left_by(fit) / self.least))
+        return part * math.hypot(self.least, self.left_by(fit))
 
     def look(self, fit: Fit) -> float:
         """Deviations from which a candidate is looked at."""
