@@ -46,7 +46,7 @@ _FAVOURS = math.log(200)
 """Logarithm of the odds from which one explanation is favoured."""
 
 _FURTHER = 1.0
-"""Evidence that a further spot needs where that decides, with faint ones: they may explain much."""
+"""Evidence that a further spot needs where the evidence decides. Faint ones may explain much."""
 
 _DETOUR = 1.5
 """Evidence that a spot may cost beside which one more is tried: the two may be worth it."""
