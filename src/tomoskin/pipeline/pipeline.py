@@ -127,12 +127,13 @@ class Pipeline:
 
     def push(self, frame: Frame, mark: Mark = Mark.NONE) -> FrameResult | None:
         """Take one frame as its ``mark`` says; None where it is left out or not of this scan."""
-        if mark & Mark.SKIPPED:
-            return None
-        if mark & Mark.REFERENCE:
-            self.take_reference()
-        if mark & Mark.HELD:
-            return None
+        if mark is not Mark.NONE:
+            if mark & Mark.SKIPPED:
+                return None
+            if mark & Mark.REFERENCE:
+                self.take_reference()
+            if mark & Mark.HELD:
+                return None
         given = self._given
         if len(frame.samples) != given.scan.n_samples:
             self.refused += 1

@@ -27,7 +27,7 @@ def test_density_of_what_is_expected() -> None:
 def test_nothing_is_expected_of_what_is_no_number() -> None:
     covariance = np.eye(8)
     covariance[5, 5] = np.nan
-    assert not len(Expectation.of(TWO, covariance, (5e-3, 5e-3, 0.1)).spots)
+    assert not len(Expectation.of(TWO, covariance, np.diag([25e-6, 25e-6, 1e-2])).spots)
 
 
 def test_how_far_touches_are_from_where_they_are_expected() -> None:

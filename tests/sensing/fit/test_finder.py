@@ -144,6 +144,14 @@ def test_one_strong_press_is_one() -> None:
         assert len(finder().push(data(press(0.07, 0.01, depth=-1.5)) + n, NOTHING)) == 1
 
 
+def test_a_faint_press_far_from_strong_ones_is_found() -> None:
+    """A wrong profile of the strong ones is no explanation of what is far from them."""
+    strong = [press(x, y, depth=-0.8) for x, y in ((-0.06, 0.0), (0.06, 0.01))]
+    both = np.concatenate([*strong, press(0.0, 0.05, radius=0.018, depth=-0.1)])
+    for n in noise(16, 4, 3):
+        assert len(finder().push(data(both) + n, NOTHING)) == 3
+
+
 def test_two_at_one_place_are_one_or_said_to_be_close() -> None:
     spots = np.concatenate([press(0.0, 0.012, 0.012), press(0.0, -0.012, 0.012)])
     for n in noise(16, 4, 8):

@@ -29,7 +29,7 @@ def expected(spots: FloatArray) -> Expectation:
     """Of touches whose columns are correlated."""
     k = len(spots)
     one = SPREAD[:, None] * SPREAD * np.where(np.eye(4, dtype=bool), 1.0, 0.3)
-    return Expectation.of(spots, np.kron(np.eye(k), one), (5e-3, 5e-3, 0.1))
+    return Expectation.of(spots, np.kron(np.eye(k), one), np.diag([25e-6, 25e-6, 1e-2]))
 
 
 def drawn(count: int, within: float) -> list[FloatArray]:

@@ -39,15 +39,15 @@ class Expectation:
         return cls(np.zeros((0, N_PARAMETERS)), np.zeros((0, CONTENT, CONTENT)))
 
     @classmethod
-    def of(cls, spots: FloatArray, covariance: FloatArray, wander: Sequence[float]) -> Expectation:
-        """Of ``spots`` (m, 4) of that ``covariance`` (4m, 4m), with deviations (3,) of what they
-        ``wander`` until the next frame; nothing where the covariance is no number."""
+    def of(cls, spots: FloatArray, covariance: FloatArray, wander: FloatArray) -> Expectation:
+        """Of ``spots`` (m, 4) of that ``covariance`` (4m, 4m), with the covariance (3, 3) of what
+        they ``wander`` until the next frame; nothing where the covariance is no number."""
         k, n = len(spots), N_PARAMETERS
         own = covariance.reshape(k, n, k, n).diagonal(0, 0, 2)  # (n, n, k)
         own = own[:CONTENT, :CONTENT].transpose(2, 0, 1)
         if not np.isfinite(own).all():
             return cls.none()
-        return cls(spots, own + np.diag(np.square(wander)))
+        return cls(spots, own + wander)
 
     @cached_property
     def weights(self) -> FloatArray:

@@ -72,6 +72,7 @@ class SpotFinder:
         self._model, self._policy = model, DetectionPolicy.of(skin.touch, pace)
         self._cells, self._rim = CellDiscs.of(mesh), model.reduced.rim
         self._reach, self._unrest = pace.reach, 1.0
+        self._wanders = np.diag(np.square([self._reach, self._reach, _SWELLS]))
         self._residual = ResidualResponse(pace.interval)
         self._unit = skin.conductivity
         self._before = self._shown = np.zeros((0, N_PARAMETERS))
@@ -221,8 +222,7 @@ class SpotFinder:
         """What is expected of the touches of this frame in the next one."""
         if not self._reach or not len(detected.fit.spots):
             return Expectation.none()
-        wander = self._reach, self._reach, _SWELLS
-        return Expectation.of(detected.fit.spots, detected.covariance, wander)
+        return Expectation.of(detected.fit.spots, detected.covariance, self._wanders)
 
     def _motion(self, spots: FloatArray) -> float:
         """How much of what touches may do they have done since the frame before; 1 where there are

@@ -179,12 +179,6 @@ class Jumps:
         return Jumps(self.rows / math.sqrt(times), self.left)
 
     @cached_property
-    def _responses(self) -> FloatArray:
-        """(k, c) from a residual to the likeliest sizes of the residual responses."""
-        inner = np.eye(len(self.left)) + self.left @ self.left.T
-        return np.asarray(np.linalg.solve(inner, self.left))
-
-    @cached_property
     def _size(self) -> float:
         return float(np.linalg.norm(self.rows[0]))
 
@@ -201,7 +195,11 @@ class Jumps:
     @cached_property
     def _weighed(self) -> FloatArray:
         """(j, c) rows by the inverse of the covariance that the residual responses make."""
-        return self.rows - (self.rows @ self._responses.T) @ self.left
+        left = self.left
+        if not len(left):
+            return self.rows
+        sizes = np.linalg.solve(np.eye(len(left)) + left @ left.T, left @ self.rows.T)
+        return np.asarray(self.rows - sizes.T @ left)
 
     @cached_property
     def _inverse(self) -> FloatArray:

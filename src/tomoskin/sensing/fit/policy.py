@@ -45,12 +45,8 @@ _REMAINS = 1.0
 _FAVOURS = math.log(200)
 """Logarithm of the odds from which one explanation is favoured."""
 
-_FAINT = 0.7
-"""Part of the ratio at which a touch begins that each spot keeps where the evidence decides: a
-faint one may explain much."""
-
 _FURTHER = 1.0
-"""Evidence that a further spot needs beyond what a wrong profile of the others may give."""
+"""Evidence that a further spot needs where the evidence decides. Faint ones may explain much."""
 
 _DETOUR = 1.5
 """Evidence that a spot may cost beside which one more is tried: the two may be worth it."""
@@ -194,7 +190,7 @@ are one touch between them for some frames."""
 EXHAUSTIVE = Pace(
     warm=6,
     glance=5,
-    cold=15,
+    cold=30,
     finalists=3,
     rounds=4,
     closing=0,
@@ -255,11 +251,11 @@ class DetectionPolicy:
 
     def left_by(self, fit: Fit) -> float:
         """Deviations that a wrong profile of the spots of a fit may leave."""
-        return self.misshapen * float(np.linalg.norm(fit.predicted))
+        return self.misshapen * math.sqrt(fit.predicted @ fit.predicted)
 
     def threshold(self, fit: Fit, part: float = 1.0) -> float:
         """Deviations for that ``part`` of a touch; a wrong profile adds to the noise."""
-        return part * self.least * float(np.hypot(1.0, self.left_by(fit) / self.least))
+        return part * math.hypot(self.least, self.left_by(fit))
 
     def look(self, fit: Fit) -> float:
         """Deviations from which a candidate is looked at."""
@@ -290,11 +286,10 @@ class DetectionPolicy:
 
     def accepts(self, fit: Fit, more: Fit, weakest: float, gain: float) -> bool:
         """Whether one spot ``more`` than a ``fit`` has is worth it, by the ratio of its weakest."""
+        gain -= self.against(fit, more)
         if self.weighs_sets(fit):
-            odds = _FURTHER + self.left_by(fit) ** 2 / 2
-            return weakest >= self.threshold(fit, _FAINT) and gain > odds
-        odds = self.pace.rare + self.against(fit, more)
-        return weakest >= self.threshold(fit) and gain > odds
+            return self.stays(weakest) and gain > _FURTHER
+        return weakest >= self.threshold(fit) and gain > self.pace.rare
 
     def goes_on(self, fit: Fit, gain: float) -> bool:
         """Whether yet another spot is tried beside one that was not worth it."""

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 
 from tomoskin.core import FloatArray
 from tomoskin.sensing.fit.expectation import Expectation, Known
 from tomoskin.sensing.fit.prior import SpotPrior
-from tomoskin.sensing.fit.spot import CONTENT, LOG_RADIUS, N_PARAMETERS
+from tomoskin.sensing.fit.spot import N_PARAMETERS
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,14 +39,13 @@ class Deficit:
         ``part`` of radius and content."""
         if len(spots) != len(self.spots):
             return False
-        return all(map(partial(_alike, part), spots.tolist(), self.spots.tolist()))
-
-
-def _alike(part: float, spot: list[float], other: list[float]) -> bool:
-    """Whether a ``spot`` is where the other one was, but for a ``part`` of that."""
-    x, y, log_radius, content = (here - there for here, there in zip(spot, other, strict=True))
-    near = math.hypot(x, y) <= part * math.exp(other[LOG_RADIUS])
-    return near and abs(log_radius) <= part and abs(content) <= part * abs(other[CONTENT])
+        pairs = zip(spots.tolist(), self.spots.tolist(), strict=True)
+        return all(
+            math.hypot(x - at_x, y - at_y) <= part * math.exp(log_radius)
+            and abs(new_log_radius - log_radius) <= part
+            and abs(new_content - content) <= part * abs(content)
+            for (x, y, new_log_radius, new_content), (at_x, at_y, log_radius, content) in pairs
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -79,7 +79,7 @@ class FrameWatch:
         taken, or all round it there would seem to be touches.
         """
         policy = self._policy
-        if policy.sign == "both" or self.wrong(self._before).any():
+        if policy.sign == "both" or self._lifted is not None:
             return "both"
         if len(self._before) or not may_be_lifted(policy, problem.square, len(problem.seen.full)):
             return policy.sign
