@@ -19,6 +19,7 @@ from tomoskin.files.imports import (
     ktc,
     open_eit,
     pyeit_arrays,
+    sciospec,
     serial_log,
     sixteen,
 )
@@ -46,6 +47,7 @@ TEXT_FORMATS: tuple[
     (csv_table.detects, csv_table.parse),
     (open_eit.detects, open_eit.parse),
     (eit_kit.detects, eit_kit.parse),
+    (sciospec.detects, sciospec.parse),
     (serial_log.detects, serial_log.parse),
 )
 """The same for text, by its first lines."""

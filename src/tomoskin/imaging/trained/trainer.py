@@ -60,7 +60,7 @@ def desired_images(mesh: Mesh, positions: FloatArray) -> csr_array:
 class Trainer:
     """What is the same for every weight of the noise.
 
-    ``data`` (n_meas, n) and ``noise`` (n_meas,) are scaled to equal mean power; ``desired`` are
+    ``data`` (n_meas, n) are, in units of the ``noise`` (n_meas,), of mean power 1; ``desired`` are
     the images (n_cells, n), ``middle`` (n_meas,) the data of the target nearest to the centre.
     """
 
@@ -80,7 +80,7 @@ class Trainer:
         sd = np.broadcast_to(sd, (len(data),))
         if not (np.isfinite(sd).all() and (sd > 0).all()):
             raise ModelError(f"expected finite noise above 0, got {sd.min():g} to {sd.max():g}")
-        scaled = sd * np.sqrt((data**2).sum() / (sd**2).sum())
+        scaled = sd * np.sqrt(((data / sd[:, None]) ** 2).sum() / len(sd))
         centre = int(np.linalg.norm(training.places - centre_of(mesh), axis=1).argmin())
         return cls(mesh, data, scaled, desired_images(mesh, training.places), data[:, centre])
 
@@ -135,6 +135,8 @@ class Greit(Operator):
     noise_figure
         Chooses the weight of the noise; see :func:`tomoskin.imaging.noise_figure`, with the
         training target nearest to the centre.
+    noise_weight
+        Of the noise, where no noise figure is to choose it.
     count
         Number of training targets, evenly spread over the sheet.
 
@@ -168,6 +170,7 @@ class Greit(Operator):
         difference: str = "plain",
         noise: ArrayLike = 1.0,
         noise_figure: float = 1.0,
+        noise_weight: float | None = None,
         count: int = 500,
     ) -> None:
         simulator = model if simulated_on is None else simulated_on
@@ -182,7 +185,7 @@ class Greit(Operator):
             difference=difference,
         )
         trainer = Trainer.of(model.mesh, self.training, noise)
-        self.noise_weight = trainer.weight_for(noise_figure)
+        self.noise_weight = noise_weight or trainer.weight_for(noise_figure)
         matrix, precision = trainer.matrix(self.noise_weight)
         super().__init__(
             model,
