@@ -16,7 +16,7 @@ from tomoskin.pipeline.prepare import Prepared
 from tomoskin.pipeline.tune import with_choice
 from tomoskin.sensing.signal import Reference
 
-_GREIT_ERROR = 0.002
+_GREIT_ERROR = 0.003
 """What a model gets wrong in a measurement, as a part of the data of a training target."""
 
 _TIMES = 5.0
@@ -39,9 +39,11 @@ def tuned_by_file(prepared: Prepared, reference: Reference | None) -> Prepared:
     the recording's idle frames and by what models get wrong (:func:`for_recording`), and the noise
     of a trained operator is weighed likewise. Of normalised differences, those that divide by
     less than the model expects weigh less. What was set by hand stays. Where no idle frames show
-    that all voltages drift alike, changes that are alike show in the image.
+    that all voltages drift alike, changes that are alike show in the image, but for calibrations,
+    which were learnt without them.
     """
-    if reference is None or not reference.noise_is_known:
+    drifts = reference is not None and reference.noise_is_known
+    if not drifts and not prepared.calibrations:
         kept = prepared.skin.altered({"signal": {"common_modes": "kept"}})
         prepared = replace(prepared, skin=kept)
     inverse = prepared.skin.inverse
@@ -69,19 +71,14 @@ def _weights(prepared: Prepared, reference: Reference | None) -> FloatArray:
 
 def _trained_by_file(prepared: Prepared, reference: Reference | None) -> Prepared:
     """The trained operator, where its noise figure is the usual one; it says what it rests on."""
-    skin = prepared.skin
-    if skin.inverse.noise_figure != InverseSettings.noise_figure:
+    operator = prepared.operator
+    figure = prepared.skin.inverse.noise_figure
+    if not isinstance(operator, Greit) or figure != InverseSettings.noise_figure:
         return prepared
-    operator = Greit(
-        prepared.model,
-        conductivity=skin.conductivity,
-        difference=skin.inverse.difference,
-        noise=1.0 / np.sqrt(_weights(prepared, reference)),
-        noise_weight=_GREIT_ERROR**2 * prepared.pattern.n_meas,
-    )
+    weight = _GREIT_ERROR**2 * prepared.pattern.n_meas
+    trained = operator.weighed(1.0 / np.sqrt(_weights(prepared, reference)), weight)
     reason = f"measurements are trusted to {100 * _GREIT_ERROR:g} % of a target's data"
-    choice = AlphaChoice(operator.noise_weight, "model-error", reason)
-    return replace(prepared, operator=operator, choice=choice)
+    return replace(prepared, operator=trained, choice=AlphaChoice(weight, "model-error", reason))
 
 
 def open_electrodes(pattern: Pattern, measured: NDArray[Any], model: FloatArray) -> list[int]:

@@ -65,7 +65,9 @@ def _channels(header: list[str], word: str, source: str) -> NDArray[np.int64]:
             numbers = numbers_in(line.removeprefix(word))
             if numbers:
                 return np.array(numbers, dtype=np.int64)
-    raise DataError(f"expected a list of channels in {word}", where=source)
+    raise DataError(
+        f"expected numbers of channels after {word} in the header, got none", where=source
+    )
 
 
 def _potentials(

@@ -157,9 +157,7 @@ class Operator:
         """``dv`` with zeros in excluded rows; see :meth:`__call__` for what is refused."""
         n = self.matrix.shape[1]
         if dv.ndim not in (1, 2) or dv.shape[-1] != n:
-            raise DataError(
-                f"expected difference data of shape ({n},) or (frames, {n}), got {dv.shape}"
-            )
+            raise DataError(f"expected difference data of shape ({n},), got {dv.shape}")
         counted = np.where(self.left_out, 0.0, dv) if self._leaves_out else dv
         finite = np.isfinite(counted)
         if not finite.all():

@@ -135,8 +135,6 @@ class Greit(Operator):
     noise_figure
         Chooses the weight of the noise; see :func:`tomoskin.imaging.noise_figure`, with the
         training target nearest to the centre.
-    noise_weight
-        Of the noise, where no noise figure is to choose it.
     count
         Number of training targets, evenly spread over the sheet.
 
@@ -170,7 +168,6 @@ class Greit(Operator):
         difference: str = "plain",
         noise: ArrayLike = 1.0,
         noise_figure: float = 1.0,
-        noise_weight: float | None = None,
         count: int = 500,
     ) -> None:
         simulator = model if simulated_on is None else simulated_on
@@ -185,7 +182,7 @@ class Greit(Operator):
             difference=difference,
         )
         trainer = Trainer.of(model.mesh, self.training, noise)
-        self.noise_weight = noise_weight or trainer.weight_for(noise_figure)
+        self.noise_weight = trainer.weight_for(noise_figure)
         matrix, precision = trainer.matrix(self.noise_weight)
         super().__init__(
             model,
@@ -193,6 +190,17 @@ class Greit(Operator):
             precision=precision,
             reference=model.at(conductivity).voltages,
             difference=difference,
+        )
+
+    def weighed(self, noise: ArrayLike, weight: float) -> Operator:
+        """The operator trained on the same targets for another noise and its weight μ."""
+        matrix, precision = Trainer.of(self.model.mesh, self.training, noise).matrix(weight)
+        return Operator(
+            self.model,
+            matrix,
+            precision=precision,
+            reference=self.reference,
+            difference=self.difference,
         )
 
 

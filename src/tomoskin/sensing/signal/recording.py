@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tomoskin.core import DataError, FloatArray, IntArray, PatternError
 from tomoskin.model.pattern import Pattern, match_rows
-from tomoskin.sensing.signal.repeats import Repeats
+from tomoskin.sensing.signal.repeats import RepeatedRows
 
 _MOST = 1e12
 """No instrument has a unit in which a voltage is a larger number."""
@@ -149,8 +149,8 @@ class Recording:
         return min(_MOST, _MOST_OF_MEDIAN * median)
 
     def without_repeats(self, pattern: Pattern | None = None) -> Recording:
-        """The recording with each measurement once: see :class:`Repeats`; a note says so."""
-        repeats = Repeats.of(self.drive, self.measure, self.voltages, pattern)
+        """The recording with each measurement once: see :class:`RepeatedRows`; a note says so."""
+        repeats = RepeatedRows.of(self.drive, self.measure, self.voltages, pattern)
         if repeats is None:
             return self
         return replace(

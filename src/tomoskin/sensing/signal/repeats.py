@@ -16,7 +16,7 @@ _AGREE = 0.5
 
 
 @dataclass(frozen=True, eq=False)
-class Repeats:
+class RepeatedRows:
     """Which rows measure the same: of n, m are others.
 
     Attributes
