@@ -24,14 +24,8 @@ from tomoskin.files.imports import read_recording
 from tomoskin.model.pattern import Scan
 from tomoskin.pipeline import FrameResult, Pipeline, Prepared, colour_limit, prepare
 from tomoskin.run import Runner, in_this_process, make_set
-from tomoskin.server import (
-    AccessPolicy,
-    Hub,
-    Server,
-    SettingsHandlers,
-    application,
-    listen,
-)
+from tomoskin.server import AccessPolicy, Hub, Server, application, listen
+from tomoskin.server.settings_handlers import SettingsHandlers
 from tomoskin.twin import (
     COMMON_PRESSES,
     Faults,

@@ -21,7 +21,8 @@ from tomoskin.core import Frame
 from tomoskin.model.pattern import Pattern, Scan
 from tomoskin.model.skin import Skin
 from tomoskin.sensing.signal import FIGURES, Readout
-from tomoskin.twin.emulator import BoardProcess, Front, OwnVoltages, SkinMemory, programs_of
+from tomoskin.twin.emulator.board_process import BoardProcess, Front, OwnVoltages, SkinMemory
+from tomoskin.twin.emulator.program import programs_of
 
 FRAMES, PICO_FRAMES, CHOPPED_FRAMES = 100_000, 2_000, 100
 """Of a case of the Mega, of the Pico, and with alternating drive."""

@@ -26,7 +26,7 @@ from tomoskin.pipeline import Prepared, prepare
 from tomoskin.run import Runner, commands
 from tomoskin.run.sinks import ContactListener, Contacts
 from tomoskin.twin import Press, TwinSettings, TwinSkin
-from tomoskin.twin.emulator import SkinMemory
+from tomoskin.twin.emulator.board_process import SkinMemory
 from tomoskin.twin.emulator.program import BUILD, make_firmware
 from tomoskin.twin.emulator.source import front_of
 

@@ -21,7 +21,8 @@ from tomoskin.model.robot import Place
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Pipeline, Prepared, prepare
 from tomoskin.run.sinks import Contacts, Stream
-from tomoskin.twin import Press, open_twin
+from tomoskin.twin import Press
+from tomoskin.twin.source import open_twin
 
 SKINS, CELLS, TIME_CONSTANTS = ("textile-disc-8", "textile-disc-16"), (660, 3000), ("0 s", "0.2 s")
 BY_FIT = (1, 2, 3)

@@ -24,7 +24,8 @@ from tomoskin.model.mesh import triangulate
 from tomoskin.model.pattern import Scan
 from tomoskin.sensing.segment import Region
 from tomoskin.sensing.signal import Readout
-from tomoskin.twin import Press, Stretched, TwinElectronics, TwinSettings, TwinSkin, table_of
+from tomoskin.twin import Press, Stretched, TwinSettings, TwinSkin, table_of
+from tomoskin.twin.electronics import TwinElectronics
 
 SKIN, SEEDS = "textile-disc-8", (71, 72)
 LEARNT, LABELS, RUBBED, ASKED = 60, 10, 200, 60

@@ -23,7 +23,7 @@ from tomoskin.core import Detection, Image, Touch
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import FrameResult, Prepared, colour_limit, prepare
 from tomoskin.run import Runner, Snapshot
-from tomoskin.server import STATIC
+from tomoskin.server.server import STATIC
 
 _FLAGS = Path(__file__).resolve().parents[1] / "scripts" / "chromium.flags"
 ARGUMENTS = tuple(_FLAGS.read_text(encoding="utf-8").split())

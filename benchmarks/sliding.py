@@ -13,7 +13,8 @@ import numpy as np
 from bench_rig import evenly, scan_time, stage
 from report import Floats, Report, mm, progress, table
 from tomoskin.core import Frame, Touch
-from tomoskin.files.session import SessionReader, tick_rate
+from tomoskin.files.session import SessionReader
+from tomoskin.files.session.session_reader import tick_rate
 from tomoskin.pipeline import Pipeline, Prepared
 from tomoskin.run import simulate
 from tomoskin.sensing.track import SlideCorrection

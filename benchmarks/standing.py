@@ -16,7 +16,8 @@ from tomoskin.board.source import Link, ScanSettings
 from tomoskin.core import FloatArray, Frame, Touch
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Pipeline, Prepared, prepare
-from tomoskin.twin import Press, SteppedSkin, TwinSettings, open_twin
+from tomoskin.twin import Press, SteppedSkin, TwinSettings
+from tomoskin.twin.source import open_twin
 
 SEEDS = (41, 42)
 """Nothing was chosen on them; 31 to 33 are there to choose on."""

@@ -30,7 +30,7 @@ from report import Report, cell, clock, medians, progress
 from tomoskin import ForwardModel, Locator, Skin
 from tomoskin.core import FloatArray
 from tomoskin.pipeline import prepare
-from tomoskin.server import STATIC
+from tomoskin.server.server import STATIC
 
 CELLS, SECONDS = 3000, 8.0
 REPEATS = 5

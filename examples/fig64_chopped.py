@@ -48,7 +48,7 @@ from tomoskin.core import FloatArray
 from tomoskin.learning import Classifier
 from tomoskin.model.pattern import Scan
 from tomoskin.twin import ElectronicsSettings, SampleTable, ScanClock, chopped_table, sample_table
-from tomoskin.twin.electrodes import Electrodes
+from tomoskin.twin.circuit import Electrodes
 from tomoskin.twin.presets import POLARISING
 
 SCAN = Scan.of(PATTERN)

@@ -98,7 +98,7 @@ def chromium() -> Path:
 @pytest.fixture(scope="session")
 def built_page() -> None:
     """The page has been built; skip where it has not (under CI=true: fail)."""
-    from tomoskin.server import STATIC
+    from tomoskin.server.server import STATIC
 
     if not (STATIC / "index.html").is_file():
         missing("the page: it has not been built (make page)")

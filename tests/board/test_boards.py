@@ -20,24 +20,19 @@ from tomoskin.board.source import (
     ScanSettings,
     list_ports,
     open_source,
-    read_boards,
 )
+from tomoskin.board.source.boards import read_boards
 from tomoskin.core import Frame, SourceError, WallClock
 from tomoskin.model.pattern import Scan
 from tomoskin.model.skin import Skin
 from tomoskin.run import CheckFinding, check_board
 from tomoskin.sensing.signal import LoadRing, Readout
-from tomoskin.twin import (
-    Board,
-    ElectronicsSettings,
-    Faults,
-    SampleTable,
-    TwinDevice,
-    TwinTransport,
-    convert,
-    line_potentials,
-)
-from tomoskin.twin.emulator import build_firmware, programs_of
+from tomoskin.twin import Board, ElectronicsSettings, Faults, SampleTable, TwinTransport
+from tomoskin.twin.circuit import line_potentials
+from tomoskin.twin.device import TwinDevice
+from tomoskin.twin.electronics import convert
+from tomoskin.twin.emulator import build_firmware
+from tomoskin.twin.emulator.program import programs_of
 
 TEXT = files("tomoskin.board.source").joinpath("boards.toml").read_text(encoding="utf-8")
 THIRD = """

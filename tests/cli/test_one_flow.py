@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import csv
 import math
+import os
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -25,10 +28,10 @@ from tomoskin.files.session import (
     Session,
     SessionReader,
     reconstruct_session,
-    scanned_touches,
     session_info,
     split,
 )
+from tomoskin.files.session.scanned import scanned_touches
 from tomoskin.learning import TOUCH, Locator
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, prepare
@@ -200,3 +203,24 @@ def bag_positions(path: Path) -> list[tuple[float, float]]:
         tracks: list[Any] = [reader.deserialize(d, c.msgtype) for c, _, d in read]
     poses = [track.pose.pose for track in tracks]
     return [(pose.position.x, pose.position.y) for pose in poses]
+
+
+_TOLD = """import sys; from tomoskin.files.session import Session
+print({name: column.tolist() for name, column in Session(sys.argv[1]).touches().items()})"""
+
+
+def test_the_number_of_threads_changes_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "press.mcap"
+    simulate(Script.from_toml(HEAD + A), Skin.load("textile-disc-16"), path)
+    told = [
+        subprocess.run(
+            [sys.executable, "-c", _TOLD, str(path)],
+            env=os.environ | {"OPENBLAS_NUM_THREADS": threads},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for threads in "12"
+    ]
+    assert told[0] == told[1]
+    assert "'x_m': []" not in told[0]

@@ -12,8 +12,8 @@ import httpx
 import pytest
 
 from model.robot.test_robot import URDF
-from tomoskin.cli.robot import chosen_robot
-from tomoskin.files.session import split_names
+from tomoskin.cli.live import chosen_robot
+from tomoskin.files.session.repair import split_names
 from tomoskin.model.robot import Robot
 
 COMMAND = [sys.executable, "-c", "from tomoskin.cli import main; main()"]

@@ -12,7 +12,8 @@ from core.seeing import EYES, blue_beside_red, seen
 from files.session.runs import TOUCH
 from shapes import disc
 from tomoskin.core import AMOUNT, CHANGE, CHANGE_ON_DARK, DataError
-from tomoskin.files.exports import FILMS, Panel, rendered, write_picture
+from tomoskin.files.exports import FILMS, Panel, write_picture
+from tomoskin.files.exports.picture import rendered
 from tomoskin.files.messages import Contact, scene_message
 from tomoskin.model.mesh import Plane
 

@@ -18,6 +18,7 @@ from tomoskin.core import DataError, OutputError, write_text, written
 from tomoskin.files import exports
 from tomoskin.files.session import SessionReader
 from tomoskin.model.pattern import Pattern
+from tomoskin.run.labelled_frames import write_whole
 from tomoskin.sensing.signal import Recording
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -125,7 +126,7 @@ def writes(write: Callable[..., Any], *arguments: Any) -> Callable[..., None]:
 WRITERS: dict[str, Callable[..., None]] = {
     "x.toml": writes(core.write_text, "text"),
     "x.npz": writes(core.save_arrays, {"a": np.ones(2)}),
-    "whole.npz": writes(exports.write_whole, {"a": np.ones(2)}),
+    "whole.npz": writes(write_whole, {"a": np.ones(2)}),
     "interchange.npz": writes(exports.write_interchange, recording),
     "touches.csv": writes(exports.write_touches, ()),
     "merit.csv": writes(exports.write_merit_table, {}),

@@ -44,7 +44,8 @@ from tomoskin.board.wire import (
     encode,
 )
 from tomoskin.core import Event, Frame, SourceError
-from tomoskin.twin import Board, TwinDevice
+from tomoskin.twin import Board
+from tomoskin.twin.device import TwinDevice
 
 LIMITS = BoardLimits(0, b"Linux process".ljust(24, b"\0"), 10, 5000, 1000, 1000, 0, 813)
 TWIN = Board(16, 10, 0.1, 250e3, 128, 448, unique_id=b"host\0\0\0\0", limits=LIMITS)

@@ -123,6 +123,21 @@ def test_reading_is_pure_and_a_spot_goes_on_where_it_was():
     assert len(both) == 2
 
 
+def test_beyond_what_was_taught_a_force_is_only_said_to_be_more():
+    model = ForceModel.learn(
+        WeighedPresses.of(*presses(4, tops=np.geomspace(1.0, 8.0, 20))), SHEET, UNIT
+    )
+    rng, beyond = np.random.default_rng(9), []
+    for top in rng.uniform(9.0, 25.0, 60):
+        touches, _ = press(rng, float(top), steps=(1.0,))
+        (force,) = read(model, touches)
+        beyond.append((force, force.low <= top <= force.high))
+    assert np.mean([held for _, held in beyond]) >= 0.9
+    strongest = max((force for force, _ in beyond), key=lambda force: force.newtons)
+    assert strongest.text == "more than 8 N"
+    assert all(force.low <= model.most for force, _ in beyond)
+
+
 def test_a_noisy_touch_has_a_wider_interval():
     model = learnt()
     clear, noisy = (

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from learning.labelled import Floats
-from tomoskin.learning.touch.kind import Standing
+from tomoskin.learning.touch.located_touch import Standing
 
 NOISE, ROWS = 0.1, 40
 

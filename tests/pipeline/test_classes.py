@@ -13,7 +13,8 @@ from run.test_replay import Recorded, noisy
 from tomoskin.cli import main
 from tomoskin.core import DataError, Frame
 from tomoskin.files.imports import read_recording
-from tomoskin.files.session import SessionReader, as_recorded, replayed, tick_rate
+from tomoskin.files.session import SessionReader, as_recorded, replayed
+from tomoskin.files.session.session_reader import tick_rate
 from tomoskin.learning import CLASSES, Classifier, ClassReading
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Pipeline, prepare, reconstruct

@@ -13,7 +13,9 @@ from tomoskin.board.source import open_source
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import prepare
 from tomoskin.run import Runner
-from tomoskin.server import STATIC, SettingsHandlers, TwinHandlers
+from tomoskin.server.handlers import TwinHandlers
+from tomoskin.server.server import STATIC
+from tomoskin.server.settings_handlers import SettingsHandlers
 
 pytestmark = [pytest.mark.page, pytest.mark.usefixtures("built_page")]
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from tomoskin.model.skin import Skin
-from tomoskin.run import Simulated, simulate
+from tomoskin.run import simulate
+from tomoskin.run.scripted import Simulated
 from tomoskin.twin import Script
 
 SKIN = Skin.load("textile-disc-8")

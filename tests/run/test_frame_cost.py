@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tomoskin.core import Frame, reach
-from tomoskin.run.frame_cost import CostMeter
+from tomoskin.run.counters import CostMeter
 
 
 class Clock:

@@ -33,6 +33,7 @@ def test_forces_are_recorded_and_are_the_same_again(prepared, tmp_path):
     forces = [row[-1] for rows in found.values() for row in rows]
     assert len(forces) >= 6
     assert all(0 < f.low < f.newtons < f.high and f.calibrated for f in forces)
+    assert any(f.high == np.inf for f in forces)  # more than was taught
     with SessionReader(path) as session:
         again = {r.sequence: touches_of(r) for r in replayed(as_recorded(session), session)}
     assert all(same(again[n], rows) for n, rows in found.items())

@@ -11,7 +11,8 @@ from mcap.reader import make_reader
 
 from run.board import Board, samples_of
 from tomoskin.core import DataError, OutputError, SourceError
-from tomoskin.files.session import SessionReader, repair, split, split_names
+from tomoskin.files.session import SessionReader, repair, split
+from tomoskin.files.session.repair import split_names
 from tomoskin.model.robot import Place, Pose
 from tomoskin.run import Member, RobotRun
 from tomoskin.run.publisher import Turns

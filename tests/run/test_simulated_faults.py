@@ -12,7 +12,7 @@ from tomoskin.board.wire import FrameFlag
 from tomoskin.core import Frame
 from tomoskin.files.session import SessionReader
 from tomoskin.model.pattern import Scan
-from tomoskin.run import Simulated
+from tomoskin.run.scripted import Simulated
 
 LEAD_IN, START, END = 0.5, 0.3, 0.7
 SCAN = Scan.of(SKIN.pattern())

@@ -65,7 +65,7 @@ def sinks(gate):
 
 @pytest.fixture
 def runner(prepared, board, sinks, monkeypatch):
-    monkeypatch.setattr("tomoskin.run.sinks.consumer.GRACE", 0.1)
+    monkeypatch.setattr("tomoskin.run.sinks.sink.GRACE", 0.1)
     runner = Runner(prepared, lambda: board, sinks=tuple(sinks.values()))
     yield runner
     runner.stop()

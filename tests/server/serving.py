@@ -8,7 +8,8 @@ import httpx
 from websockets.sync.client import connect
 
 from tomoskin.pipeline import colour_limit
-from tomoskin.server import STATIC, AccessPolicy, Hub, Server, application, listen
+from tomoskin.server import AccessPolicy, Hub, Server, application, listen
+from tomoskin.server.server import STATIC
 
 PATIENCE = 300
 

@@ -7,7 +7,7 @@ import pytest
 from server.serving import Site
 from server.watching import distance
 from tomoskin.run import Runner
-from tomoskin.server import TwinHandlers
+from tomoskin.server.handlers import TwinHandlers
 from tomoskin.twin.emulator.source import open_emulator
 from twin.emulator.conftest import programs
 

@@ -13,14 +13,8 @@ from run.test_runner import Watch
 from server.flowing import flowing
 from tomoskin.board.source import open_source
 from tomoskin.core import DataError
-from tomoskin.files.session import (
-    SessionReader,
-    as_recorded,
-    end_time,
-    first_scan,
-    replayed,
-    start_time,
-)
+from tomoskin.files.session import SessionReader, as_recorded, first_scan, replayed
+from tomoskin.files.session.session_reader import end_time, start_time
 from tomoskin.learning import TOUCH, ChannelMapping
 from tomoskin.model.skin import Skin
 from tomoskin.run import commands

@@ -14,8 +14,9 @@ from run.test_replay import run, same, touches_of  # the recorded run
 from run.test_runner import PATIENCE, Watch
 from server.serving import Site
 from tomoskin.core import DataError, Mark
-from tomoskin.files.session import SessionReader, end_time, read_timeline, replayed
+from tomoskin.files.session import SessionReader, read_timeline, replayed
 from tomoskin.files.session.replay import open_replay
+from tomoskin.files.session.session_reader import end_time
 from tomoskin.run import Runner, commands
 
 __all__ = ["run"]

@@ -6,7 +6,7 @@ import pytest
 
 from tomoskin.core import WireError
 from tomoskin.run import SetPresses, commands
-from tomoskin.run.twin_requests import PressRequest
+from tomoskin.run.commands import PressRequest
 from tomoskin.server.requests import MAX_REQUEST, SetRecording, decode_request
 
 PRESS = {"x": 0.01, "y": -0.02, "force": 3.0, "radius": 0.015}

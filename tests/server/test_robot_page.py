@@ -14,7 +14,7 @@ from run.test_robot_run import Watch
 from server.serving import PATIENCE, Site
 from server.watching import Watched
 from tomoskin.core import WallClock
-from tomoskin.files.session import split_names
+from tomoskin.files.session.repair import split_names
 from tomoskin.model.robot import Robot
 from tomoskin.pipeline import colour_limit
 from tomoskin.run import Member, RobotRun

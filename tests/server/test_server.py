@@ -23,12 +23,12 @@ from tomoskin.server import (
     AccessPolicy,
     Hub,
     Server,
-    ServerError,
     application,
     check_page,
     listen,
     page_connection,
 )
+from tomoskin.server.server import ServerError
 
 
 @pytest.fixture

@@ -18,10 +18,10 @@ from tomoskin.files.session import SessionReader, replayed
 from tomoskin.model.pattern import named
 from tomoskin.pipeline import colour_limit, prepare
 from tomoskin.run import Runner, commands
-from tomoskin.server import Hub, SettingsHandlers
+from tomoskin.server import Hub
 from tomoskin.server.requests import decode_request
 from tomoskin.server.settings_form import table_of
-from tomoskin.server.settings_handlers import STAGES
+from tomoskin.server.settings_handlers import STAGES, SettingsHandlers
 
 CHANGES = {
     "alpha": {"inverse": {"alpha": 0.05}},

@@ -14,9 +14,10 @@ from tomoskin.core import GeometryError, WireError
 from tomoskin.files.session import SessionReader
 from tomoskin.model.mesh import Arm, Cap, Hinge
 from tomoskin.run import Runner, commands
+from tomoskin.run.commands import BendRequest, SetPose, StretchRequest
 from tomoskin.run.twin_control import sheet_pose, way_to_bend
-from tomoskin.run.twin_requests import BendRequest, SetPose, StretchRequest
-from tomoskin.server import Hub, TwinHandlers
+from tomoskin.server import Hub
+from tomoskin.server.handlers import TwinHandlers
 from tomoskin.server.requests import decode_request
 from tomoskin.twin import FACES, Bent, Face, Press, Probe, Square, Stretched
 

@@ -16,8 +16,8 @@ from tomoskin.learning import BENDS, CLASSES, BendExamples, BendModel, Classifie
 from tomoskin.model.mesh import Hinge
 from tomoskin.pipeline import voltage_covariance
 from tomoskin.run import Runner
-from tomoskin.run.twin_requests import BendRequest, SetPose
-from tomoskin.server import TwinHandlers
+from tomoskin.run.commands import BendRequest, SetPose
+from tomoskin.server.handlers import TwinHandlers
 from tomoskin.twin import Bent, Face, TwinSettings, TwinSkin
 
 pytestmark = [pytest.mark.page, pytest.mark.usefixtures("built_page")]

@@ -12,7 +12,7 @@ from playwright.sync_api import Error
 import tomoskin
 from server.still import PANELS, show, still_site
 from server.watching import Watched
-from tomoskin.server import STATIC
+from tomoskin.server.server import STATIC
 
 pytestmark = [pytest.mark.page, pytest.mark.usefixtures("built_page")]
 

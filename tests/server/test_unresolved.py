@@ -10,9 +10,9 @@ import pytest
 
 from server.test_settings import Heard
 from tomoskin.pipeline import Unresolved, prepare
+from tomoskin.server.hub import run_handlers
+from tomoskin.server.page_connection import Tasks
 from tomoskin.server.requests import AskUnresolved, decode_request
-from tomoskin.server.run_handlers import run_handlers
-from tomoskin.server.task import Tasks
 
 
 def at_one_moment(prepared, lost=()):

@@ -21,9 +21,8 @@ from tomoskin.twin import (
     TwinSettings,
     TwinSkin,
     make_electronics,
-    strain_of,
 )
-from tomoskin.twin.bend import layer_metric
+from tomoskin.twin.bend import layer_metric, strain_of
 
 GEOMETRY = MaterialSettings(gauge=0.0, gauge_across=2.0)
 """A sheet whose material conducts on as it did, whatever its strain."""

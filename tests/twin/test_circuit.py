@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from tomoskin.core import ModelError
-from tomoskin.twin import ElectronicsSettings, Faults, line_potentials
-from tomoskin.twin.circuit import driven, settling, shorted
+from tomoskin.twin import ElectronicsSettings, Faults
+from tomoskin.twin.circuit import driven, line_potentials, settling, shorted
 from tomoskin.twin.faults import check_electrodes
 
 PERFECT = ElectronicsSettings()

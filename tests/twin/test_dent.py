@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.ndimage import map_coordinates
 
-from tomoskin.twin import Circle, ContactSettings, Finger, Grid, Probe, Square, indent
-from tomoskin.twin.dent import bulge_strain, drag_strain, slope_strain, solved_dent
+from tomoskin.twin import Circle, ContactSettings, Finger, Grid, Probe, Square
+from tomoskin.twin.dent import bulge_strain, drag_strain, indent, slope_strain, solved_dent
 
 FOAM = ContactSettings()
 LINEAR = replace(FOAM, lock=math.inf)

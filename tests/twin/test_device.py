@@ -26,11 +26,12 @@ from tomoskin.board.wire import (
     SetScan,
     Start,
     Stop,
-    enclose,
     encode,
 )
+from tomoskin.board.wire.framing import enclose
 from tomoskin.core import Frame
-from tomoskin.twin import Board, TwinDevice
+from tomoskin.twin import Board
+from tomoskin.twin.device import TwinDevice
 
 BOARD = Board(channels=8, adc_bits=10, current=0.1, tick_rate=250e3, max_drives=4, max_samples=20)
 SCAN = SetScan(1, 7, 2, 1000, 0, 1, 64, 100_000)

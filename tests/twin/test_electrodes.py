@@ -21,7 +21,7 @@ from tomoskin.twin import (
     sample_table,
     table_of,
 )
-from tomoskin.twin.electrodes import Electrodes
+from tomoskin.twin.circuit import Electrodes
 from tomoskin.twin.presets import POLARISING, PRESETS
 
 CURRENT = 1e-3

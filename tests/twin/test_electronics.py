@@ -16,12 +16,11 @@ from tomoskin.twin import (
     Faults,
     Press,
     ScanClock,
-    TwinElectronics,
     TwinSettings,
     TwinSkin,
-    convert,
     sample_table,
 )
+from tomoskin.twin.electronics import TwinElectronics, convert
 from tomoskin.twin.presets import BOARD
 
 QUIET = ElectronicsSettings(noise=0.0)

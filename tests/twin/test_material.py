@@ -9,8 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tomoskin.core import ModelError
-from tomoskin.twin import Load, MaterialSettings, MaterialState, TwinSettings, advance, conductivity
-from tomoskin.twin.material import spread_over
+from tomoskin.twin import MaterialSettings, TwinSettings
+from tomoskin.twin.dent import Load
+from tomoskin.twin.material import MaterialState, advance, conductivity, spread_over
 
 TEXTILE = TwinSettings.preset("textile").material
 PLAIN = MaterialSettings()

@@ -18,8 +18,6 @@ from tomoskin.twin import (
     Circle,
     Contact,
     Finger,
-    Load,
-    MaterialState,
     Probe,
     Square,
     Stretched,
@@ -28,7 +26,8 @@ from tomoskin.twin import (
     make_electronics,
     table_of,
 )
-from tomoskin.twin.material import stepped
+from tomoskin.twin.dent import Load
+from tomoskin.twin.material import MaterialState, stepped
 
 SEEDS = (101, 102, 103)
 BRITTLE = {"breakdown": (1.4, 0.3), "breakdown_times": (0.2, 3.0), "wear": 3e-4}

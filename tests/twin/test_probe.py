@@ -7,7 +7,8 @@ import pytest
 
 from tomoskin.core import GeometryError, ModelError
 from tomoskin.model.mesh import Disc
-from tomoskin.twin import FACES, Circle, ContactSettings, Face, Finger, Press, Probe, Square, indent
+from tomoskin.twin import FACES, Circle, ContactSettings, Face, Finger, Press, Probe, Square
+from tomoskin.twin.dent import indent
 from tomoskin.twin.probe import check_on_skin
 
 

@@ -10,7 +10,8 @@ from tomoskin.core import Frame
 from tomoskin.model.pattern import Scan
 from tomoskin.model.skin import ReadoutSettings
 from tomoskin.sensing.signal import Readout
-from tomoskin.twin import ElectronicsSettings, TwinElectronics, convert, sample_table
+from tomoskin.twin import ElectronicsSettings, sample_table
+from tomoskin.twin.electronics import TwinElectronics, convert
 
 SETTINGS = ReadoutSettings(offset=0.5)
 LSB = 5.0 / 1024

@@ -89,7 +89,7 @@ def test_shapes() -> None:
     assert isinstance(triangle, Face)
     assert triangle.area == pytest.approx(200e-6)
     turned = script(PRESS + 'angle = "45 deg"').presses[0]
-    assert turned.angle == pytest.approx(math.pi / 4)
+    assert turned.given.angle == pytest.approx(math.pi / 4)
 
 
 def test_ids_may_come_again_later() -> None:

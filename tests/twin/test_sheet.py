@@ -20,8 +20,8 @@ from tomoskin.twin import (
     Probe,
     TwinSettings,
     TwinSkin,
-    line_potentials,
 )
+from tomoskin.twin.circuit import line_potentials
 
 
 def potentials(sheet, skin, drives):

@@ -11,15 +11,8 @@ from tomoskin.core import Frame, GeometryError, SkinError, SourceError, WallCloc
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.pattern import Scan
 from tomoskin.sensing.signal import Readout
-from tomoskin.twin import (
-    PRESETS,
-    Faults,
-    LineSettings,
-    Press,
-    TwinSettings,
-    make_twin,
-    open_twin,
-)
+from tomoskin.twin import PRESETS, Faults, LineSettings, Press, TwinSettings, make_twin
+from tomoskin.twin.source import open_twin
 
 PRESS = Press(0.02, 0.01, 3.0, 0.015)
 

@@ -2,7 +2,7 @@
 
 import * as wire from "./wire";
 
-/** Median, and an interval that nine in ten lie in, N. */
+/** Median, and an interval that nine in ten lie in, N; `high` is infinite beyond what was taught. */
 export interface Force {
   readonly newtons: number;
   readonly low: number;

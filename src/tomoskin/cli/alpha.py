@@ -9,9 +9,9 @@ import typer
 
 from tomoskin.cli.choices import meant
 from tomoskin.cli.named_files import FIGURE, ForceFlag, Reads, Writes
+from tomoskin.cli.named_parts import frame_range, idle_frames
 from tomoskin.cli.options import FramesOption, ReferenceOption, SkinArgument
 from tomoskin.cli.output import JsonFlag, tell
-from tomoskin.cli.recording import frame_range, idle_frames
 from tomoskin.core import TomoskinError
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ import typer
 from typer.core import TyperGroup
 
 from tomoskin import __version__
-from tomoskin.cli.named_files import guarded
+from tomoskin.cli.named_files import guarded, spread
 from tomoskin.core import OutputError, TomoskinError
 
 DEBUG = "TOMOSKIN_DEBUG"
@@ -52,7 +52,7 @@ class Commands(typer.Typer):
         register = super().command(name, **options)
 
         def add(function: Any) -> Any:
-            register(guarded(function))
+            register(guarded(spread(function)))
             return function
 
         return add

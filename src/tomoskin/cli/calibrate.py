@@ -28,10 +28,8 @@ from tomoskin.cli.calibrate_reports import (
     touch_lines,
 )
 from tomoskin.cli.choices import skin_for_file, skin_if_any
-from tomoskin.cli.named_files import SKIN, ForceFlag, Reads, Writes
-from tomoskin.cli.options import CalibrationOut, KnownSkinOption, ReferenceOption, SkinOption
-from tomoskin.cli.output import Bar, JsonFlag, remark, tell
-from tomoskin.cli.recording import (
+from tomoskin.cli.named_files import SKIN, ForceFlag, Reads, Writes, with_options
+from tomoskin.cli.named_parts import (
     changes,
     idle_frames,
     labelled_frames,
@@ -39,6 +37,8 @@ from tomoskin.cli.recording import (
     reconstructed,
     say_notes,
 )
+from tomoskin.cli.options import CalibrationOut, KnownSkinOption, ReferenceOption, SkinOption
+from tomoskin.cli.output import Bar, JsonFlag, remark, tell
 from tomoskin.core import DataError, FloatArray, write_text
 
 if TYPE_CHECKING:
@@ -162,38 +162,22 @@ def _kind(
                 raise found.problem
 
         needs_skin = skin is SkinOption
-        _describe(command, learn, {"recording": _input(about), "out": out, "skin": skin})
-        app.command(name)(command)
+        hints, needed = get_type_hints(learn, include_extras=True), inspect.Parameter.empty
+        own = list(inspect.signature(learn).parameters.values())[1:]
+        argument = Annotated[Path, typer.Argument(metavar="INPUT", help=about), Reads()]
+        options = {
+            "recording": (argument, needed),
+            "out": (out, needed),
+            "skin": (skin, None),
+            **{one.name: (hints[one.name], one.default) for one in own},
+            "reference": (ReferenceOption, None),
+            "force": (ForceFlag, False),
+            "json": (JsonFlag, False),
+        }
+        app.command(name)(with_options(command, learn, options))
         return learn
 
     return register
-
-
-def _input(about: str) -> Any:
-    return Annotated[Path, typer.Argument(metavar="INPUT", help=about), Reads()]
-
-
-def _describe(command: Callable[..., None], learn: Learn, first: dict[str, Any]) -> None:
-    """Give ``command`` the sentence and the own options of ``learn``, for the command line."""
-    hints = get_type_hints(learn, include_extras=True)
-    options = {"reference": ReferenceOption, "force": ForceFlag, "json": JsonFlag}
-    defaults = {"skin": None, "reference": None, "force": False, "json": False}
-    own = list(inspect.signature(learn).parameters.values())[1:]
-    defaults |= {parameter.name: parameter.default for parameter in own}
-    kinds = {**first, **{p.name: hints[p.name] for p in own}, **options}
-    command.__doc__ = learn.__doc__
-    command.__annotations__ = kinds
-    command.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
-        [
-            inspect.Parameter(
-                name,
-                inspect.Parameter.KEYWORD_ONLY,
-                default=defaults.get(name, inspect.Parameter.empty),
-                annotation=kind,
-            )
-            for name, kind in kinds.items()
-        ]
-    )
 
 
 _TOUCHED = "Frames with labels, one touch in each."

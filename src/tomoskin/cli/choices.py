@@ -14,8 +14,6 @@ from tomoskin.cli.output import remark
 from tomoskin.core import DataError
 
 if TYPE_CHECKING:
-    from tomoskin.files.exports import Display
-    from tomoskin.imaging import AlphaChoice
     from tomoskin.model.skin import Skin
     from tomoskin.pipeline import Prepared
     from tomoskin.run import BoardMemory
@@ -71,56 +69,10 @@ def say_headroom(headroom: Headroom) -> None:
         remark(headroom.problem)
 
 
-def with_alpha(skin: Skin, given: str | None) -> tuple[Skin, str | None]:
-    """The skin with the alpha of the option, and the rule that is to choose it, if one is."""
-    from tomoskin.imaging import RULES
-
-    if given is None or given in RULES:
-        return skin, given
-    alpha: str | float = "auto"
-    if given != "auto":
-        try:
-            alpha = float(given)
-        except ValueError:
-            alpha = -1.0
-        if not 1e-9 <= alpha <= 1e9:
-            rules = ", ".join(RULES)
-            raise typer.BadParameter(
-                f'expected a number above 0, auto, or a rule among {rules}; got "{given}"'
-                f"{meant(given, (*RULES, 'auto'))}",
-                param_hint="--alpha",
-            )
-    return skin.altered({"inverse": {"alpha": alpha}}), None
-
-
 def meant(given: str, known: Iterable[str]) -> str:
     """A question after the one of the ``known`` words that was probably meant; "" for none."""
     close = get_close_matches(given, list(known), n=1)
     return f'; did you mean "{close[0]}"?' if close else ""
-
-
-def alpha_line(choice: AlphaChoice) -> str:
-    """One line about the alpha that was chosen."""
-    return f"alpha {choice.alpha:.4g} ({choice.rule}: {choice.reason})"
-
-
-def with_time_constant(skin: Skin, given: str | None) -> Skin:
-    """The skin with the time constant of the option."""
-    if given is None:
-        return skin
-    quantity(given, "time", "--time-constant")
-    return skin.altered({"inverse": {"time_constant": given}})
-
-
-def display_of(skin: Skin, *, percent: bool, limit: float | None, smooth: str | None) -> Display:
-    """How images of ``skin`` are shown. Raises DataError for what cannot be."""
-    from tomoskin.files.exports import Display
-
-    return Display(
-        conductivity=skin.conductivity if percent else None,
-        smoothing=0.0 if smooth is None else quantity(smooth, "length", "--smooth"),
-        limit=limit / 100.0 if percent and limit is not None else limit,
-    )
 
 
 def quantity(text: str, dimension: str, option: str) -> float:

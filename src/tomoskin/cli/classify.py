@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tomoskin.cli.named_files import TABLE, ForceFlag, Reads, Writes
+from tomoskin.cli.named_parts import changes, say_notes
 from tomoskin.cli.options import RecordingArgument, ReferenceOption, SameSkinOption
 from tomoskin.cli.output import Bar, JsonFlag, emit
-from tomoskin.cli.recording import changes, say_notes
 
 if TYPE_CHECKING:
     from tomoskin.learning import Answers

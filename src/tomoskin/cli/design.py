@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -34,6 +35,41 @@ _HEADINGS = (
 )
 
 
+@dataclass(frozen=True)
+class PressAsked:
+    """The press that is to be resolved, and how surely it is to be noticed."""
+
+    radius: Annotated[
+        str | None,
+        typer.Option(metavar='"15 mm"', help="Radius of the press. Default: 7.5 % of the sheet."),
+    ] = None
+    depth: Annotated[
+        float, typer.Option(help="Part of the conductivity that the press takes away.")
+    ] = 0.25
+    false_alarm: Annotated[
+        float, typer.Option(help="Probability of a false alarm at a position, in a frame.")
+    ] = 1e-4
+    found: Annotated[
+        float, typer.Option(help="Probability that a press is detected in a frame.")
+    ] = 0.95
+
+    def of(self, skin: Skin) -> Demand:
+        """On a ``skin``; DataError for a press that covers the sheet, which has no place."""
+        import numpy as np
+
+        from tomoskin.sensing.fit import Demand
+
+        radius = quantity(self.radius, "length", "--radius") if self.radius else None
+        most = float(np.ptp(skin.mesh().points, axis=0)[:2].min()) / 2
+        if radius is not None and radius >= most:
+            raise DataError(
+                f"expected a radius below {1e3 * most:.0f} mm, half of the sheet, got "
+                f"{1e3 * radius:.0f} mm",
+                where="--radius",
+            )
+        return Demand(radius, self.depth, self.false_alarm, self.found)
+
+
 def design(
     skin: NamedSkinOption = DEFAULT_SKIN,
     out: Annotated[
@@ -41,19 +77,8 @@ def design(
         typer.Option(metavar="MAP.png", help="File for the map of the skin."),
         Writes(FIGURE),
     ] = None,
-    radius: Annotated[
-        str | None,
-        typer.Option(metavar='"15 mm"', help="Radius of the press. Default: 7.5 % of the sheet."),
-    ] = None,
-    depth: Annotated[
-        float, typer.Option(help="Part of the conductivity that the press takes away.")
-    ] = 0.25,
-    false_alarm: Annotated[
-        float, typer.Option(help="Probability of a false alarm at a position, in a frame.")
-    ] = 1e-4,
-    found: Annotated[
-        float, typer.Option(help="Probability that a press is detected in a frame.")
-    ] = 0.95,
+    *,
+    press: PressAsked,
     electrodes: Annotated[
         str, typer.Option(metavar="N,N", help='Numbers of electrodes to compare; "" compares none.')
     ] = _ELECTRODES,
@@ -70,13 +95,11 @@ def design(
     """
     from tomoskin.files.exports import write_promise
     from tomoskin.model.skin import Skin
-    from tomoskin.sensing.fit import Demand, resolution_bounds
+    from tomoskin.sensing.fit import resolution_bounds
 
     counts = _counts(electrodes)
     chosen = Skin.load(skin)
-    size = quantity(radius, "length", "--radius") if radius else None
-    _check_size(size, chosen)
-    demand = Demand(size, depth, false_alarm, found)
+    demand = press.of(chosen)
     with Bar("bounding") as bar:
         jobs = 1 + len(counts) * len(patterns.split(","))
         own = resolution_bounds(chosen, demand, _PLACES, _part(bar, 0, jobs))
@@ -85,9 +108,9 @@ def design(
     say_headroom(own.headroom)
     document = {
         "skin": chosen.name,
-        "press": {"radius_m": radius_m, "depth": depth},
-        "false_alarm": false_alarm,
-        "found": found,
+        "press": {"radius_m": radius_m, "depth": press.depth},
+        "false_alarm": press.false_alarm,
+        "found": press.found,
         **own.figures(),
         "compared": rows,
     }
@@ -95,21 +118,10 @@ def design(
     if out is not None:  # last: what may fail must not cost the table
         title = (
             f"{chosen.name}: one frame, press of radius {1e3 * radius_m:.0f} mm taking "
-            f"{100 * depth:.0f} %; noticed: {100 * found:g} % found, {false_alarm:g} false alarms"
+            f"{100 * press.depth:.0f} %; noticed: {100 * press.found:g} % found, "
+            f"{press.false_alarm:g} false alarms"
         )
         write_promise(out, chosen, own, title, overwrite=force)
-
-
-def _check_size(radius: float | None, skin: Skin) -> None:
-    """A press that covers the sheet has no place."""
-    low, high = skin.mesh().points.min(axis=0), skin.mesh().points.max(axis=0)
-    most = float((high - low)[:2].min()) / 2
-    if radius is not None and radius >= most:
-        raise DataError(
-            f"expected a radius below {1e3 * most:.0f} mm, half of the sheet, got "
-            f"{1e3 * radius:.0f} mm",
-            where="--radius",
-        )
 
 
 def _counts(text: str) -> list[int]:

@@ -4,37 +4,31 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from dataclasses import asdict
+from contextlib import suppress
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from tomoskin.cli.choices import (
-    alpha_line,
-    display_of,
+    meant,
+    quantity,
     skin_for_file,
-    with_alpha,
     with_calibrations,
     with_recorded_calibrations,
-    with_time_constant,
 )
 from tomoskin.cli.named_files import TABLE, ForceFlag, Writes
+from tomoskin.cli.named_parts import first_time, reconstructed, say_notes, span_lines
 from tomoskin.cli.options import (
-    AlphaOption,
     CalibrationsOption,
     FramesOption,
-    LimitOption,
-    PercentFlag,
     RecordingArgument,
     ReferenceOption,
     SkinOption,
-    SmoothOption,
-    TimeConstantOption,
     TouchesOut,
 )
 from tomoskin.cli.output import Bar, JsonFlag, remark, tell
-from tomoskin.cli.recording import first_time, reconstructed, say_notes, span_lines
 from tomoskin.core import DataError
 
 if TYPE_CHECKING:
@@ -42,6 +36,7 @@ if TYPE_CHECKING:
 
     from tomoskin.core import Touch
     from tomoskin.files.exports import Display
+    from tomoskin.model.skin import Skin
     from tomoskin.pipeline import Prepared, Reconstruction, Unresolved
     from tomoskin.sensing.signal import Recording
     from tomoskin.sensing.track import Span
@@ -60,24 +55,97 @@ IMAGES = {
 }
 
 
-def image(
-    recording: RecordingArgument,
-    skin: SkinOption = None,
-    reference: ReferenceOption = None,
-    frames: FramesOption = None,
-    alpha: AlphaOption = None,
-    time_constant: TimeConstantOption = None,
-    calibration: CalibrationsOption = None,
+@dataclass(frozen=True)
+class Tuned:
+    """With what images are made, instead of what the skin or the session says."""
+
+    alpha: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NUMBER|auto|RULE",
+            help="Weight of the prior instead of the skin's; `skin alpha` lists the values of "
+            "RULE.",
+        ),
+    ] = None
+    time_constant: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TIME",
+            help='Time constant of the images, such as "0.2 s", instead of the skin\'s. With '
+            '"0 s" each image uses its own frame alone.',
+        ),
+    ] = None
+    calibration: CalibrationsOption = None
+
+    def of(self, skin: Skin) -> tuple[Skin, str | None]:
+        """The skin with them, and the rule that is to choose alpha, if one was named."""
+        from tomoskin.imaging import RULES
+
+        if self.time_constant is not None:
+            quantity(self.time_constant, "time", "--time-constant")
+            skin = skin.altered({"inverse": {"time_constant": self.time_constant}})
+        given = self.alpha
+        if given is None or given in RULES:
+            return skin, given
+        alpha: str | float = given
+        if given != "auto":
+            with suppress(ValueError):
+                alpha = float(given)
+            if not (isinstance(alpha, float) and 1e-9 <= alpha <= 1e9):
+                raise typer.BadParameter(
+                    f"expected a number above 0, auto, or a rule among {', '.join(RULES)}; "
+                    f'got "{given}"{meant(given, (*RULES, "auto"))}',
+                    param_hint="--alpha",
+                )
+        return skin.altered({"inverse": {"alpha": alpha}}), None
+
+
+@dataclass(frozen=True)
+class Shown:
+    """How images are shown."""
+
+    percent: Annotated[
+        bool,
+        typer.Option("--percent", help="Show changes in per cent of the skin's own conductivity."),
+    ] = False
+    limit: Annotated[
+        float | None,
+        typer.Option(
+            metavar="X", help="End of the colour scale, in the unit shown: S or per cent."
+        ),
+    ] = None
+    smooth: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LENGTH",
+            help='Average over discs of this radius, such as "8 mm". It changes the picture, not '
+            "the touches.",
+        ),
+    ] = None
+
+    def of(self, skin: Skin) -> Display:
+        """For images of ``skin``. Raises DataError for what cannot be."""
+        from tomoskin.files.exports import Display
+
+        percent, limit = self.percent, self.limit
+        return Display(
+            conductivity=skin.conductivity if percent else None,
+            smoothing=quantity(self.smooth, "length", "--smooth") if self.smooth else 0.0,
+            limit=limit / 100.0 if percent and limit is not None else limit,
+        )
+
+
+@dataclass(frozen=True)
+class Results:
+    """What is written."""
+
     out: Annotated[
         Path | None,
         typer.Option(metavar="X.png|.npz|.vtu", help="File for the images."),
         Writes(IMAGES),
-    ] = None,
-    touches: TouchesOut = None,
-    force: ForceFlag = False,
-    percent: PercentFlag = False,
-    limit: LimitOption = None,
-    smooth: SmoothOption = None,
+    ] = None
+    touches: TouchesOut = None
+    force: ForceFlag = False
     thorough: Annotated[
         Path | None,
         typer.Option(
@@ -85,7 +153,18 @@ def image(
             help="File for what a longer search of each frame by itself finds; slower.",
         ),
         Writes(TABLE),
-    ] = None,
+    ] = None
+
+
+def image(
+    recording: RecordingArgument,
+    skin: SkinOption = None,
+    reference: ReferenceOption = None,
+    frames: FramesOption = None,
+    *,
+    tuned: Tuned,
+    shown: Shown,
+    results: Results,
     json: JsonFlag = False,
 ) -> None:
     """Write the images of a recording and the touches in them, or say what they are."""
@@ -96,14 +175,14 @@ def image(
     from tomoskin.sensing.track import touch_spans
 
     own = skin_for_file(skin, recording)
-    chosen, rule = with_alpha(own, alpha)
-    chosen = with_time_constant(chosen, time_constant)
-    display = display_of(chosen, percent=percent, limit=limit, smooth=smooth)
+    chosen, rule = tuned.of(own)
+    display = shown.of(chosen)
+    touches, thorough, force = results.touches, results.thorough, results.force
     data = read_recording(recording)  # what cannot be read is said before the work
     with Bar("preparing"):
         prepared = prepare(chosen)
-        if calibration or skin is not None:
-            prepared = with_calibrations(prepared, calibration, own)
+        if tuned.calibration or skin is not None:
+            prepared = with_calibrations(prepared, tuned.calibration, own)
         else:
             prepared = with_recorded_calibrations(prepared, recording)
     recorded = data.in_order_of(prepared.pattern)
@@ -121,8 +200,9 @@ def image(
         if path is not None:
             rows = zip(found.frames.tolist(), found.time.tolist(), found.touches, strict=True)
             write_touches(path, rows, surface, forces=forces, overwrite=force)
-    if out is not None:
-        WRITERS[out.suffix.lower()](out, prepared, result, display, overwrite=force)
+    if results.out is not None:
+        write = WRITERS[results.out.suffix.lower()]
+        write(results.out, prepared, result, display, overwrite=force)
     _warn(recorded, result)
     if located_alone(prepared, result.model_agreement):
         remark(f"{recording}: the calibration alone locates touches, one at a time")
@@ -144,7 +224,8 @@ def _lines(result: Reconstruction, spans: tuple[Span, ...], prepared: Prepared) 
         lines.append(f"{len(result.unseen)} of them were held or skipped in the run")
     if math.isfinite(result.agreement):
         lines.append(result.model_agreement.text)
-    lines.append(alpha_line(result.choice))
+    choice = result.choice
+    lines.append(f"alpha {choice.alpha:.4g} ({choice.rule}: {choice.reason})")
     if prepared.modes is not None:
         seconds = prepared.skin.inverse.time_constant
         lines.append(f"filtered over frames, time constant {seconds:g} s")

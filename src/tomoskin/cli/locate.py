@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tomoskin.cli.named_files import ForceFlag, Reads
+from tomoskin.cli.named_parts import changes, reconstructed, say_notes
 from tomoskin.cli.options import RecordingArgument, ReferenceOption, SameSkinOption, TouchesOut
 from tomoskin.cli.output import Bar, JsonFlag, emit, remark
-from tomoskin.cli.recording import changes, reconstructed, say_notes
 
 if TYPE_CHECKING:
     from tomoskin.core import FloatArray, Touch

@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 import inspect
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args, get_type_hints
@@ -82,6 +82,44 @@ class Writes:
         if self.files is not None:
             return self.files(value, given, called)
         return () if value is None else (Output(value, self.endings, called),)
+
+
+def spread(command: Callable[..., None]) -> Callable[..., None]:
+    """The command with the options of its groups, which are records, as parameters of its own."""
+    hints = get_type_hints(command, include_extras=True)
+    groups: dict[str, Any] = {name: hint for name, hint in hints.items() if is_dataclass(hint)}
+    if not groups:
+        return command
+
+    def run(**given: Any) -> None:
+        for name, group in groups.items():
+            given[name] = group(**{one.name: given.pop(one.name) for one in fields(group)})
+        command(**given)
+
+    options: dict[str, tuple[Any, Any]] = {}
+    for name, parameter in inspect.signature(command).parameters.items():
+        if name in groups:
+            own = get_type_hints(groups[name], include_extras=True)
+            options |= {one.name: (own[one.name], one.default) for one in fields(groups[name])}
+        else:
+            options[name] = hints[name], parameter.default
+    return with_options(run, command, options)
+
+
+def with_options(
+    run: Callable[..., None], command: Callable[..., Any], options: Mapping[str, tuple[Any, Any]]
+) -> Callable[..., None]:
+    """``run``, which takes ``options``, annotation and default, described as the ``command`` is."""
+    run.__name__, run.__doc__ = command.__name__, command.__doc__
+    run.__annotations__ = {name: annotation for name, (annotation, _) in options.items()}
+    parameters = [
+        inspect.Parameter(
+            name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation
+        )
+        for name, (annotation, default) in options.items()
+    ]
+    run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    return run
 
 
 def guarded(command: Callable[..., None]) -> Callable[..., None]:

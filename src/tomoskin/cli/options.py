@@ -1,5 +1,5 @@
 """Options and arguments that several commands take, each with its sentence; most of what they mean
-is in :mod:`tomoskin.cli.choices` and :mod:`tomoskin.cli.recording`."""
+is in :mod:`tomoskin.cli.choices` and :mod:`tomoskin.cli.named_parts`."""
 
 from __future__ import annotations
 
@@ -43,9 +43,6 @@ SameSkinOption = Annotated[
 RecordingArgument = Annotated[
     Path, typer.Argument(metavar="INPUT", help="Recording or .npz file."), Reads()
 ]
-LabelledArgument = Annotated[
-    Path, typer.Argument(metavar="INPUT", help="Frames with labels, one touch in each."), Reads()
-]
 _SOURCE = "Source of the frames: twin, serial:PORT, replay:FILE@SPEED, …"
 SourceOption = Annotated[str, typer.Option(help=_SOURCE)]
 SourcesOption = Annotated[
@@ -73,42 +70,6 @@ CalibrationsOption = Annotated[
         "estimated in each frame. Once for each kind.",
     ),
     Reads(),
-]
-
-# What of the skin is changed for this run.
-
-AlphaOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="NUMBER|auto|RULE",
-        help="Weight of the prior instead of the skin's; `skin alpha` lists the values of RULE.",
-    ),
-]
-TimeConstantOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="TIME",
-        help='Time constant of the images, such as "0.2 s", instead of the skin\'s. With "0 s" '
-        "each image uses its own frame alone.",
-    ),
-]
-
-# How images are shown.
-
-PercentFlag = Annotated[
-    bool, typer.Option("--percent", help="Show changes in per cent of the skin's own conductivity.")
-]
-LimitOption = Annotated[
-    float | None,
-    typer.Option(metavar="X", help="End of the colour scale, in the unit shown: S or per cent."),
-]
-SmoothOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="LENGTH",
-        help='Average over discs of this radius, such as "8 mm". It changes the picture, not the '
-        "touches.",
-    ),
 ]
 
 # Where results go.

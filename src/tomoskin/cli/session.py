@@ -11,8 +11,8 @@ import typer
 
 from tomoskin.cli.app import group
 from tomoskin.cli.named_files import RECORDING, TABLE, ForceFlag, Given, Reads, Writes
+from tomoskin.cli.named_parts import say_notes, span_lines
 from tomoskin.cli.output import Bar, JsonFlag, remark, tell
-from tomoskin.cli.recording import say_notes, span_lines
 
 if TYPE_CHECKING:
     from tomoskin.core import Output

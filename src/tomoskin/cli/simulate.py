@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -35,6 +36,42 @@ def _simulated(out: Path | None, given: Given, called: str) -> list[Output]:
     return [Output(out, endings, called, makes_folders=True)]
 
 
+@dataclass(frozen=True)
+class WorkersAsked:
+    """Who makes labelled frames."""
+
+    processes: Annotated[
+        int | None,
+        typer.Option(
+            min=1, help="With --presses: number of processes. Default: one for each processor."
+        ),
+    ] = None
+    cluster: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS", help="With --presses: address of a Dask scheduler, tcp://HOST:8786."
+        ),
+    ] = None
+
+    @property
+    def some(self) -> bool:
+        """Whether any are named."""
+        return self.processes is not None or self.cluster is not None
+
+    def of(self) -> Workers:
+        """Those processes or machines; one process for each processor where none are named."""
+        from tomoskin.run import in_processes, in_this_process, on_cluster, processors
+
+        if self.cluster is not None:
+            if self.processes is not None:
+                raise typer.BadParameter(
+                    "cannot be combined with --cluster", param_hint="--processes"
+                )
+            return on_cluster(self.cluster)
+        n = self.processes or processors()
+        return in_this_process if n == 1 else in_processes(n)
+
+
 def simulate(
     *,
     skin: NamedSkinOption = DEFAULT_SKIN,
@@ -63,18 +100,7 @@ def simulate(
             help="Seed of all noise; it overrides the script's. The same seed gives the same data.",
         ),
     ] = None,
-    processes: Annotated[
-        int | None,
-        typer.Option(
-            min=1, help="With --presses: number of processes. Default: one for each processor."
-        ),
-    ] = None,
-    cluster: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ADDRESS", help="With --presses: address of a Dask scheduler, tcp://HOST:8786."
-        ),
-    ] = None,
+    workers: WorkersAsked,
     force: ForceFlag = False,
     json: JsonFlag = False,
 ) -> None:
@@ -85,15 +111,14 @@ def simulate(
     chosen = Skin.load(skin)
     say_headroom(Headroom.of_skin(chosen))
     if presses is not None:
-        workers = _workers(processes, cluster)
         plan = _plan(chosen, script, seed or 0, presses)
-        _labelled(plan, out, workers, overwrite=force, json=json)
+        _labelled(plan, out, workers.of(), overwrite=force, json=json)
         return
     if script is None:
         raise typer.BadParameter(
             "expected --script FILE or --presses N, got neither", param_hint="--script"
         )
-    if processes is not None or cluster is not None:
+    if workers.some:
         raise typer.BadParameter(
             "has an effect only with --presses", param_hint="--processes, --cluster"
         )
@@ -150,14 +175,3 @@ def _labelled(plan: SetPlan, out: Path, workers: Workers, *, overwrite: bool, js
     document = {"frames": n, "made": made.made, "found": made.found, "files": files}
     before = f"; {made.found} of {plan.n_shards} parts existed already" if made.found else ""
     tell(document, [f"{out}: {n} labelled frames in {took:.1f} s{before}"], json=json)
-
-
-def _workers(processes: int | None, cluster: str | None) -> Workers:
-    from tomoskin.run import in_processes, in_this_process, on_cluster, processors
-
-    if cluster is not None:
-        if processes is not None:
-            raise typer.BadParameter("cannot be combined with --cluster", param_hint="--processes")
-        return on_cluster(cluster)
-    n = processes or processors()
-    return in_this_process if n == 1 else in_processes(n)

@@ -9,11 +9,11 @@ import typer
 
 from tomoskin.cli.alpha import alpha
 from tomoskin.cli.app import group
-from tomoskin.cli.merit import merit
 from tomoskin.cli.named_files import SKIN, ForceFlag, Reads, Writes
 from tomoskin.cli.options import SkinArgument
 from tomoskin.cli.output import JsonFlag, tell
-from tomoskin.cli.robot import place
+from tomoskin.cli.place import place
+from tomoskin.cli.skin_merit import merit
 
 if TYPE_CHECKING:
     from tomoskin.core import FloatArray

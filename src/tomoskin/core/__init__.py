@@ -17,6 +17,7 @@ from tomoskin.core.errors import (
     TomoskinError,
     WireError,
 )
+from tomoskin.core.inputs import check_is_file, open_input
 from tomoskin.core.outputs import MAGIC, RECORDING, Output, StrPath, check_outputs
 from tomoskin.core.stages import finished, reach, watch_stages
 from tomoskin.core.units import DIMENSIONS, parse_quantity
@@ -138,6 +139,7 @@ __all__ = [
     "Worker",
     "cache_folder",
     "check_fits",
+    "check_is_file",
     "check_outputs",
     "clock_ahead",
     "electrode_table",
@@ -150,6 +152,7 @@ __all__ = [
     "most_bytes",
     "needed",
     "numbers",
+    "open_input",
     "pack_arrays",
     "parse_quantity",
     "plain_values",

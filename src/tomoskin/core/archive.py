@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core.errors import EMPTY, DataError
+from tomoskin.core.inputs import open_input
 from tomoskin.core.memory import check_fits
 from tomoskin.core.outputs import StrPath
 from tomoskin.core.written import written
@@ -83,16 +84,17 @@ class Archive(Arrays):
     def _opened(self) -> Iterator[zipfile.ZipFile]:
         """The archive; whatever it does not say as it should is a DataError."""
         where = self._where
-        file = io.BytesIO(self._file) if isinstance(self._file, bytes) else self._file
+        file = self._file
         try:
-            with zipfile.ZipFile(file) as archive:
+            with (
+                io.BytesIO(file) if isinstance(file, bytes) else open_input(file) as opened,
+                zipfile.ZipFile(opened) as archive,
+            ):
                 yield archive
-        except FileNotFoundError as error:
-            raise DataError("there is no such file", where=where) from error
         except OSError as error:
             raise DataError(f"cannot be read: {error.strerror or error}", where=where) from error
         except (zipfile.BadZipFile, EOFError, zipfile.LargeZipFile) as error:
-            if not (len(file.getbuffer()) if isinstance(file, io.BytesIO) else file.stat().st_size):
+            if not (len(file) if isinstance(file, bytes) else file.stat().st_size):
                 raise DataError(EMPTY, where=where) from error
             raise DataError(
                 f"is not a whole .npz archive: {error}",

@@ -92,6 +92,8 @@ class Voltages:
     time, host_time
         s, of the device's clock and of the host's: host times of frames that were read together
         are the same.
+    scanned, scan_time
+        Middle of the scan by the host's clock, and how long it took, s; NaN where nothing tells.
     sequence
         The frame's number.
     samples
@@ -108,6 +110,8 @@ class Voltages:
     sequence: int = 0
     samples: NDArray[np.uint16] | None = None
     own: FloatArray | None = None
+    scanned: float = math.nan
+    scan_time: float = math.nan
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -219,6 +223,7 @@ class DeferredImage(Image):
 class Force:
     """Force of a touch across the sheet, N: its median, and an interval that nine in ten lie in.
 
+    ``high`` is infinite where the force is beyond those that were taught.
     ``calibrated`` is False where it rests on the skin file's material alone.
     """
 
@@ -236,6 +241,8 @@ class Force:
     def text(self) -> str:
         """The force with its interval, in words."""
         state = "" if self.calibrated else ", uncalibrated"
+        if math.isinf(self.high):
+            return f"more than {self.low:.2g} N{state}"
         return f"{self.newtons:.2g} N ({self.low:.2g} to {self.high:.2g}{state})"
 
 

@@ -5,19 +5,17 @@ from typing import Any
 
 from tomoskin.core import DataError, StrPath, load_arrays
 from tomoskin.learning.bend.bend_model import BendModel
-from tomoskin.learning.bend.kind import BENDS, BendReader, BendReading
+from tomoskin.learning.bend.bend_reader import BENDS, BendReader, BendReading
 from tomoskin.learning.bend.recorded_bends import BendExamples, JointReference
+from tomoskin.learning.classes.classifier import CLASSES, Answers, Classifier, ClassReading
 from tomoskin.learning.classes.examples import Codes, Examples, against_rest
-from tomoskin.learning.classes.kind import CLASSES, Answers, Classifier, ClassReading
 from tomoskin.learning.force.force_model import ForceModel
+from tomoskin.learning.force.force_report import FORCE, ForceReport, least_known
 from tomoskin.learning.force.identify import identify
-from tomoskin.learning.force.kind import FORCE, ForceReport, least_known
 from tomoskin.learning.force.measured import ForceProcess
 from tomoskin.learning.force.weighed_presses import NEWTONS, WeighedPresses, Weight
 from tomoskin.learning.kind import (
-    Applied,
     Calibration,
-    Conditions,
     Differences,
     FrameView,
     Kind,
@@ -28,7 +26,7 @@ from tomoskin.learning.kind import (
 from tomoskin.learning.mapping.mapping import ChannelMapping, ring_of
 from tomoskin.learning.mapping.solve import MappingAnswer, solve_channel_mapping
 from tomoskin.learning.touch.calibration_health import CalibrationHealth, LeftOut
-from tomoskin.learning.touch.kind import TOUCH
+from tomoskin.learning.touch.located_touch import TOUCH
 from tomoskin.learning.touch.locator import Locator, detection_at
 from tomoskin.learning.touch.presses import Presses
 from tomoskin.learning.touch.rubbing import Rubbing, quiet_electrodes
@@ -60,7 +58,6 @@ __all__ = [
     "NEWTONS",
     "TOUCH",
     "Answers",
-    "Applied",
     "BendExamples",
     "BendModel",
     "BendReader",
@@ -71,7 +68,6 @@ __all__ = [
     "ClassReading",
     "Classifier",
     "Codes",
-    "Conditions",
     "Differences",
     "Examples",
     "ForceModel",

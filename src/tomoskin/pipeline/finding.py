@@ -8,7 +8,6 @@ from typing import Self
 
 import numpy as np
 
-from tomoskin.board.source import Configuration, ScanSettings
 from tomoskin.core import Detection, FloatArray, finished
 from tomoskin.learning import FrameView, TouchFit
 from tomoskin.pipeline.frame_result import ModelAgreement
@@ -89,9 +88,8 @@ class FitFinder:
         gain = _gain(model, prepared, reference)
         noise = yield from _noise(prepared, reference, gain)
         skin = prepared.skin
-        longest = Configuration.of(prepared.scan, ScanSettings.of(skin)).scan_time
-        between = interval if interval > 0 else longest
-        scan_time = min(longest, between)
+        between = interval if interval > 0 else prepared.longest_scan
+        scan_time = min(prepared.longest_scan, between)
         spots = SpotFinder(
             model, skin, prepared.mesh, noise, gain,
             pace=replace(pace, scan_time=scan_time, interval=between),

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tomoskin.core import Detection, FloatArray, Image, ModelError, Touch, Voltages, reach
-from tomoskin.learning import Differences, FrameView
+from tomoskin.learning import BENDS, Differences, FrameView
 from tomoskin.model.pattern import Scan
 from tomoskin.pipeline.collecting import Rest
 from tomoskin.pipeline.conditioning import (
@@ -25,7 +25,7 @@ from tomoskin.pipeline.finding import (
     finder_of,
     located_alone,
 )
-from tomoskin.pipeline.frame_result import FrameResult
+from tomoskin.pipeline.frame_result import FrameResult, looks_bent
 from tomoskin.pipeline.imaging import Filtered, SingleFrame
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.pipeline.tune import tune, tuned_sheet
@@ -252,6 +252,7 @@ class Following:
         readings: dict[str, Any],
     ) -> FrameResult:
         shows = conditioned.differences is not None
+        bent = None if BENDS.name in readings else looks_bent(touches, self.prepared.mesh)
         return FrameResult(
             sequence=measured.sequence,
             host_time=measured.host_time,
@@ -266,7 +267,9 @@ class Following:
             health=conditioned.health,
             baseline=self.conditioning.state,
             readings=readings,
-            unexplained=conditioned.problem or (shows and self._finder.problem) or None,
+            unexplained=bent or conditioned.problem or (shows and self._finder.problem) or None,
+            scanned=measured.scanned,
+            scan_time=measured.scan_time,
         )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Self
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from tomoskin.core import FloatArray, Image, Touch, Voltages
 from tomoskin.learning import BENDS, CLASSES, TOUCH, BendReading, CalibrationHealth, ClassReading
+from tomoskin.model.mesh import Mesh
 from tomoskin.sensing.signal import BaselineState, Health
 from tomoskin.sensing.track import TouchEvent
 
@@ -76,8 +77,8 @@ class FrameResult:
 
     Attributes
     ----------
-    sequence, host_time
-        As in the frame that it was made from.
+    sequence, host_time, scanned, scan_time
+        As in the voltages that it was made from.
     ready
         Whether a reference stands; until then the image is zero and there are no touches.
     has_image
@@ -115,6 +116,8 @@ class FrameResult:
     baseline: BaselineState | None = None
     readings: Mapping[str, Any] = field(default_factory=dict)
     unexplained: str | None = None
+    scanned: float = math.nan
+    scan_time: float = math.nan
 
     @classmethod
     def at_rest(
@@ -138,6 +141,8 @@ class FrameResult:
             left_out=int(np.count_nonzero(measured.excluded)),
             events=events,
             baseline=baseline,
+            scanned=measured.scanned,
+            scan_time=measured.scan_time,
         )
 
     @property
@@ -179,6 +184,29 @@ class FrameResult:
         if not self.has_image:
             return f"{health.text}; too few rows are left for an image: check the electrodes"
         return f"{health.text}; the image is made without {self.left_out} rows"
+
+
+_FOLD = 3
+"""Touches in a line that are doubted; a sheet that is bent by 15° or more shows as many."""
+
+_ACROSS, _ASIDE = 0.7, 0.1
+"""They go across this part of the sheet, and lie within this part of it beside their line."""
+
+
+def looks_bent(touches: Sequence[Touch], mesh: Mesh) -> str | None:
+    """A sentence where touches lie in a line across the sheet, as those of a fold do; else None."""
+    if len(touches) < _FOLD:
+        return None
+    places = np.array([(touch.detection.x, touch.detection.y) for touch in touches])
+    places -= places.mean(axis=0)
+    along, aside = np.linalg.svd(places, full_matrices=False)[2]
+    size = float(np.ptp(mesh.points[:, :2] @ along))
+    if np.ptp(places @ along) < _ACROSS * size or np.ptp(places @ aside) > _ASIDE * size:
+        return None
+    return (
+        f"{len(touches)} touches lie in a line across the sheet: if it is bent, they are its fold, "
+        "and others are misplaced; teach its bends with tomoskin calibrate bend"
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from tomoskin.core import DataError, FloatArray, Image, IntArray, Touch, Voltages, check_fits
 from tomoskin.imaging import AlphaChoice
@@ -202,7 +203,8 @@ def reconstruct(
     )
     stop = len(recording) if stop is None else stop
     wanted = (recorded.frames >= start) & (recorded.frames < stop)
-    flow = sorted(_flow(pipeline, recorded, stop, advance))
+    with threadpool_limits(1):  # as live, so that sums keep their order
+        flow = sorted(_flow(pipeline, recorded, stop, advance))
     found = Reconstruction.of(pipeline, prepared, (one for one in flow if one.number >= start))
     return replace(
         found,

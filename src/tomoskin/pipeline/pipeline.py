@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from tomoskin.board.source import ScanClock
 from tomoskin.core import Frame, Mark, Voltages, reach
 from tomoskin.imaging import AlphaChoice
 from tomoskin.pipeline.collecting import Collecting
@@ -50,6 +51,7 @@ class Pipeline:
         self._tracker = self._new_tracker()
         self.tick_rate = prepared.readout.tick_rate
         self.refused = 0
+        self._clock = ScanClock()
         self.take_reference()
 
     def take_reference(self) -> None:
@@ -135,7 +137,9 @@ class Pipeline:
         if len(frame.samples) != given.scan.n_samples:
             self.refused += 1
             return None
-        return self.follow(given.readout(frame, self.tick_rate))
+        rate = self.tick_rate or given.readout.tick_rate
+        scan = self._clock.middle(frame, given.longest_scan, rate)
+        return self.follow(given.readout(frame, rate, scan))
 
     def follow(self, measured: Voltages) -> FrameResult:
         """Take one frame whose voltages are known already: what :meth:`push` does with counts."""

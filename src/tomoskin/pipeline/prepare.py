@@ -9,7 +9,9 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
+from tomoskin.board.source import Configuration, ScanSettings
 from tomoskin.core import FloatArray, Image, IntArray, ModelError, reach
 from tomoskin.imaging import (
     AlphaChoice,
@@ -169,6 +171,11 @@ class Prepared:
         spread = matrix * self.difference_noise(reference)
         return ImageNoise.of(spread, self.mesh.identity)
 
+    @cached_property
+    def longest_scan(self) -> float:
+        """Duration of a scan on the slowest board, s."""
+        return Configuration.of(self.scan, ScanSettings.of(self.skin)).scan_time
+
     def difference_noise(self, reference: Reference) -> FloatArray:
         """(n_meas,) standard deviation of difference data against that reference."""
         return difference_noise(reference.noise, reference.mean, self.operator.difference)
@@ -191,15 +198,19 @@ def prepare(skin: Skin, previous: Prepared | None = None) -> Prepared:
         When the skin cannot be meshed, modelled or inverted, or a calibration cannot serve it any
         more; the message says which.
     """
-    if previous is not None and previous.skin.body == skin.body:
-        for calibration in previous.calibrations.values():
-            calibration.check(skin)
-        return _prepared(skin, _problem_after(previous, skin), previous)
+    with threadpool_limits(1):  # faster, and sums keep their order on a machine of more cores
+        if previous is not None and previous.skin.body == skin.body:
+            for calibration in previous.calibrations.values():
+                calibration.check(skin)
+            return _prepared(skin, _problem_after(previous, skin), previous)
+        return _prepared(skin, _problem(_model(skin), skin))
+
+
+def _model(skin: Skin) -> ForwardModel:
     reach("mesh")
     mesh = skin.mesh()
     reach("model")
-    model = ForwardModel(mesh, skin.pattern(), skin.contact_impedance, skin.polarity * skin.current)
-    return _prepared(skin, _problem(model, skin))
+    return ForwardModel(mesh, skin.pattern(), skin.contact_impedance, skin.polarity * skin.current)
 
 
 def _problem(model: ForwardModel, skin: Skin) -> LinearProblem:

@@ -3,9 +3,9 @@
 from tomoskin.run import commands
 from tomoskin.run.board_check import CheckFinding, check_board
 from tomoskin.run.board_memory import BoardMemory
+from tomoskin.run.commands import MAX_FORCE, SetPose, SetPresses, SetTwin, StrictRequest
 from tomoskin.run.flow import Snapshot
 from tomoskin.run.labelled_frames import (
-    SetMade,
     Workers,
     in_processes,
     in_this_process,
@@ -15,10 +15,9 @@ from tomoskin.run.labelled_frames import (
 )
 from tomoskin.run.robot_run import Member, RobotRun
 from tomoskin.run.runner import Runner
-from tomoskin.run.simulate import Simulated, simulate
+from tomoskin.run.scripted import simulate
 from tomoskin.run.status import ReplayStatus, Status
 from tomoskin.run.twin_control import way_to_bend
-from tomoskin.run.twin_requests import MAX_FORCE, SetPose, SetPresses, SetTwin, StrictRequest
 
 __all__ = [
     "MAX_FORCE",
@@ -28,11 +27,9 @@ __all__ = [
     "ReplayStatus",
     "RobotRun",
     "Runner",
-    "SetMade",
     "SetPose",
     "SetPresses",
     "SetTwin",
-    "Simulated",
     "Snapshot",
     "Status",
     "StrictRequest",

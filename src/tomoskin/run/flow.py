@@ -12,10 +12,8 @@ from tomoskin.board.wire import Info
 from tomoskin.core import Event, Frame, Mark, MarkedFrame, TomoskinError
 from tomoskin.files.session import BoardInfo, RawRead, Truth
 from tomoskin.pipeline import FrameResult, Pipeline, Prepared, ReferenceState
-from tomoskin.run.counters import Latency
-from tomoskin.run.frame_cost import CostMeter
-from tomoskin.run.intake import Intake
-from tomoskin.run.marker import Marker, replay_status
+from tomoskin.run.counters import CostMeter, Latency
+from tomoskin.run.intake import Intake, Marker, replay_status
 from tomoskin.run.publisher import Audience, Publisher
 from tomoskin.run.recall import Recall
 from tomoskin.run.status import Status

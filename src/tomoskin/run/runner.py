@@ -8,20 +8,69 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 
 from tomoskin.board.source import Transport
+from tomoskin.core import Event, ModelError, WireError
 from tomoskin.files.session import ReplayTransport
 from tomoskin.model.robot import Place
 from tomoskin.pipeline import Prepared
 from tomoskin.run.board_memory import BoardMemory
-from tomoskin.run.commands import Command, DirectCommand, Opener
+from tomoskin.run.commands import (
+    Command,
+    DirectCommand,
+    Note,
+    Opener,
+    ReplayCommand,
+    SetPose,
+    SetTwin,
+)
 from tomoskin.run.counters import Latency
-from tomoskin.run.direct import do
-from tomoskin.run.flow import Snapshot
+from tomoskin.run.flow import Flow, Snapshot
+from tomoskin.run.intake import play
 from tomoskin.run.loop import Loop
 from tomoskin.run.publisher import Audience, Turns
 from tomoskin.run.sinks import Sink
 from tomoskin.run.status import Status
 from tomoskin.run.twin_control import TwinControl
 from tomoskin.sensing.signal import Reference
+
+
+def do(flow: Flow, command: DirectCommand) -> None:
+    """Carry out what any thread may do.
+
+    Raises
+    ------
+    WireError
+        For what the source cannot do or does not have.
+    GeometryError
+        For a shape that its sheet cannot take.
+    """
+    match command:
+        case Note():
+            newest = flow.newest
+            host_time = newest.result.host_time if newest else flow.now()
+            flow.out.put(Event(host_time, "note", command.text))
+        case SetTwin():
+            _break(flow, command)
+        case SetPose():
+            if not flow.twin.bendable:
+                raise WireError(f"{flow.source} cannot be bent on the page")
+            flow.twin.set_pose(command, flow.prepared.skin.surface)
+        case _:
+            _play(flow, command)
+
+
+def _break(flow: Flow, command: SetTwin) -> None:
+    if not flow.twin.breakable:
+        raise WireError(f"{flow.source} cannot simulate faults")
+    try:
+        flow.twin.set_harm(command)
+    except ModelError as error:
+        raise WireError(str(error)) from None
+
+
+def _play(flow: Flow, command: ReplayCommand) -> None:
+    if flow.marker.replay is None:
+        raise WireError(f"{flow.source} is not a replay")
+    play(flow.marker.replay, command)
 
 
 class Runner:

@@ -10,8 +10,7 @@ from tomoskin.board.wire import Info
 from tomoskin.imaging import AlphaChoice
 from tomoskin.learning import BendReading, CalibrationHealth, ClassReading
 from tomoskin.pipeline import ReferenceState
-from tomoskin.run.counters import StageLatency
-from tomoskin.run.frame_cost import FrameCost
+from tomoskin.run.counters import FrameCost, StageLatency
 from tomoskin.run.sinks import SinkReport
 from tomoskin.sensing.signal import ElectrodeHealth
 

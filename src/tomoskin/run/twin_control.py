@@ -9,7 +9,7 @@ from typing import Any, Protocol, runtime_checkable
 
 from tomoskin.core import TomoskinError, WireError
 from tomoskin.model.mesh import Arm, Hinge, Plane, Surface
-from tomoskin.run.twin_requests import BendRequest, SetPose, SetTwin
+from tomoskin.run.commands import BendRequest, SetPose, SetTwin
 from tomoskin.twin import Bent, Contact, Faults, Pose, Press, Stretched
 
 

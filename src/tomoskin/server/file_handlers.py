@@ -12,6 +12,7 @@ from tomoskin.files.session import SessionReader
 from tomoskin.run import Runner
 from tomoskin.server.folder import SESSION, Folder
 from tomoskin.server.hub import Hub
+from tomoskin.server.page_connection import Listener
 from tomoskin.server.page_messages import Exported, FileEntry, Files
 from tomoskin.server.requests import (
     Annotate,
@@ -23,7 +24,6 @@ from tomoskin.server.requests import (
     RenameSession,
 )
 from tomoskin.server.source_handlers import SourceSwitch
-from tomoskin.server.task import Listener
 
 _T = TypeVar("_T")
 

@@ -15,6 +15,7 @@ from tomoskin.run import Runner
 from tomoskin.server.folder import Folder
 from tomoskin.server.guided_flow import GuidedFlow, StoppedError
 from tomoskin.server.hub import Hub
+from tomoskin.server.page_connection import Listener
 from tomoskin.server.page_messages import FlowNow
 from tomoskin.server.press_flow import MappingFlow, TouchFlow
 from tomoskin.server.requests import (
@@ -31,7 +32,6 @@ from tomoskin.server.requests import (
     UndoPress,
 )
 from tomoskin.server.rub_flow import RubFlow
-from tomoskin.server.task import Listener
 from tomoskin.server.weigh_flow import WeighFlow
 
 _OF_FLOWS = (UndoPress, DeletePress, SetWeight, AskPoint, LearnFlow, StopLearning)

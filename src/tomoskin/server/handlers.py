@@ -15,12 +15,12 @@ from tomoskin.server.file_handlers import FileHandlers
 from tomoskin.server.folder import Folder
 from tomoskin.server.guide_handlers import GuideHandlers
 from tomoskin.server.hub import Hub
+from tomoskin.server.page_connection import Listener
 from tomoskin.server.page_messages import Calibrations
 from tomoskin.server.requests import UseCalibration
 from tomoskin.server.settings_handlers import SettingsHandlers
 from tomoskin.server.settings_messages import TwinBend, TwinRefused, TwinState, TwinStretch
 from tomoskin.server.source_handlers import SourceHandlers, SourceSwitch
-from tomoskin.server.task import Listener
 
 _OFFERED: dict[str, Kind[Any]] = {"touch": TOUCH, "force": FORCE}
 

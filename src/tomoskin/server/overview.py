@@ -16,7 +16,8 @@ from tomoskin.core import FloatArray, WireError, encode_json
 from tomoskin.files.messages import Contacts, Stream
 from tomoskin.model.robot import PlacedSkin, Pose, Robot
 from tomoskin.run import RobotRun, Runner, StrictRequest, commands
-from tomoskin.server.page_connection import Host
+from tomoskin.server.hub import FILE_NAME
+from tomoskin.server.page_connection import Host, Listener, Tasks, during
 from tomoskin.server.page_messages import (
     PlacedShape,
     RobotScene,
@@ -27,8 +28,6 @@ from tomoskin.server.page_messages import (
     TouchesOfSkin,
 )
 from tomoskin.server.requests import SetRecording
-from tomoskin.server.run_handlers import FILE_NAME
-from tomoskin.server.task import Listener, Tasks, during
 from tomoskin.server.views import flat
 
 PERIOD = 1 / 20

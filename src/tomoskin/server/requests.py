@@ -1,6 +1,6 @@
 """What a page may ask for, decoded strictly: unknown fields and impossible numbers are errors.
 
-Requests that are commands to the run stand in ``run/commands.py`` and ``run/twin_requests.py``.
+Requests that are commands to the run stand in ``run/commands.py``.
 """
 
 from __future__ import annotations

@@ -26,6 +26,7 @@ from tomoskin.pipeline import Prepared, colour_limit, prepare, tuned_image
 from tomoskin.run import Runner, commands
 from tomoskin.server.folder import Folder
 from tomoskin.server.hub import Hub
+from tomoskin.server.page_connection import Listener
 from tomoskin.server.page_messages import Message
 from tomoskin.server.requests import (
     AskPattern,
@@ -37,7 +38,6 @@ from tomoskin.server.requests import (
 )
 from tomoskin.server.settings_form import altered, refusal, schema, table_of
 from tomoskin.server.settings_messages import Progress, Settings, StageName
-from tomoskin.server.task import Listener
 
 STAGES = get_args(StageName)
 """What a change of settings comes to, one after the other; many begin later, or end earlier."""

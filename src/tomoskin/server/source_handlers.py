@@ -20,9 +20,9 @@ from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared
 from tomoskin.run import commands
 from tomoskin.server.hub import Hub
+from tomoskin.server.page_connection import Listener
 from tomoskin.server.page_messages import BoardNow, Offer, Sources
 from tomoskin.server.requests import Connect, ListSources
-from tomoskin.server.task import Listener
 
 EMULATED = {
     "emulator"

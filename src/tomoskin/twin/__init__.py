@@ -1,24 +1,13 @@
 """A skin without hardware: probes → dents → conductivity → potentials → counts → bytes."""
 
-from tomoskin.twin.bend import BendSettings, Bent, Deformation, Pose, Stretched, strain_of
-from tomoskin.twin.board import Board, HeldScanning
-from tomoskin.twin.circuit import ElectronicsSettings, Lines, line_potentials
+from tomoskin.twin.bend import BendSettings, Bent, Deformation, Pose, Stretched
+from tomoskin.twin.circuit import ElectronicsSettings, ThermalVoltages
 from tomoskin.twin.contact import ContactSettings, Grid, solve_contact
-from tomoskin.twin.course import bent, bent_truth, pressed
-from tomoskin.twin.dent import Load, indent
-from tomoskin.twin.device import TwinDevice
-from tomoskin.twin.electrodes import ThermalVoltages
-from tomoskin.twin.electronics import TwinElectronics, convert
-from tomoskin.twin.faults import (
-    Disturbance,
-    Faults,
-    Line,
-    LineSettings,
-    disturbed,
-    reboots,
-)
+from tomoskin.twin.course import Disturbance, bent, bent_truth, disturbed, pressed, reboots
+from tomoskin.twin.faults import Faults, Line, LineSettings
+from tomoskin.twin.held_scanning import Board, HeldScanning
 from tomoskin.twin.labelled import COMMON_PRESSES, Population, SetPlan, make_shard
-from tomoskin.twin.material import MaterialSettings, MaterialState, advance, conductivity
+from tomoskin.twin.material import MaterialSettings
 from tomoskin.twin.presets import PRESETS, TwinSettings
 from tomoskin.twin.probe import Contact, Press, Probe
 from tomoskin.twin.scanning import (
@@ -37,10 +26,9 @@ from tomoskin.twin.source import (
     make_electronics,
     make_twin,
     on_converter,
-    open_twin,
     read_settings,
 )
-from tomoskin.twin.stepped import Step, SteppedSkin
+from tomoskin.twin.stepped import SteppedSkin
 
 __all__ = [
     "COMMON_PRESSES",
@@ -62,10 +50,7 @@ __all__ = [
     "HeldScanning",
     "Line",
     "LineSettings",
-    "Lines",
-    "Load",
     "MaterialSettings",
-    "MaterialState",
     "Population",
     "Pose",
     "Press",
@@ -76,36 +61,26 @@ __all__ = [
     "SetPlan",
     "Shape",
     "Square",
-    "Step",
     "SteppedSkin",
     "Stretched",
     "ThermalVoltages",
-    "TwinDevice",
-    "TwinElectronics",
     "TwinSettings",
     "TwinSkin",
     "TwinTransport",
-    "advance",
     "bent",
     "bent_truth",
     "check_script",
     "check_settling",
     "chopped_table",
-    "conductivity",
-    "convert",
     "disturbed",
-    "indent",
-    "line_potentials",
     "make_electronics",
     "make_shard",
     "make_twin",
     "on_converter",
-    "open_twin",
     "pressed",
     "read_settings",
     "reboots",
     "sample_table",
     "solve_contact",
-    "strain_of",
     "table_of",
 ]

@@ -1,19 +1,22 @@
-"""What a script does at a moment: forces, positions and bends between the rows of their courses."""
+"""What a script does at a moment: forces, positions and bends between the rows of their courses,
+and what is broken."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Self
+from typing import Generic, Self, TypeVar
 
 import numpy as np
 
 from tomoskin.core import FloatArray, GeometryError, ScriptError
 from tomoskin.model.mesh import Arm, Hinge, Outline
+from tomoskin.model.section import Section
 from tomoskin.twin.bend import Bent, Deformation, Pose, Stretched
+from tomoskin.twin.faults import Faults, LineSettings
 from tomoskin.twin.probe import Probe
-from tomoskin.twin.script_schema import BendSection, StretchSection
+from tomoskin.twin.script_schema import BendSection, FaultSection, PressSection, StretchSection
 from tomoskin.twin.shape import Shape
 
 Rows = tuple[tuple[float, ...], ...]
@@ -29,46 +32,44 @@ _ON_PATH = 200
 """A path is looked at in so many positions when it is checked to lie on the skin."""
 
 
-@dataclass(frozen=True)
-class ScriptedMark:
-    """A note at a time, s; ``where`` it stands in the script."""
+S_co = TypeVar("S_co", bound=Section, covariant=True)
 
-    at: float
-    text: str
+
+@dataclass(frozen=True)
+class Scripted(Generic[S_co]):
+    """A table of a script as it is ``given``, and ``where`` it stands, for messages."""
+
+    given: S_co
     where: str
 
 
 @dataclass(frozen=True)
-class ScriptedPress:
+class ScriptedPress(Scripted[PressSection]):
     """A probe with the courses of its force and position.
 
     Attributes
     ----------
-    id
-        Name in the script.
-    shape, angle
-        Face of the probe, and by how much it is turned, rad.
-    motion
-        "slide" or "roll" along the path.
-    start
-        s since the end of the lead-in.
+    shape
+        Face of the probe.
     force
-        Rows of (s since ``start``, N), from 0 N to 0 N.
+        Rows of (s since the start, N), from 0 N to 0 N.
     path
-        Rows of (s since ``start``, x, y in m).
-    force_key, where
-        Key of the force and place of the press in the script, for messages.
+        Rows of (s since the start, x, y in m).
     """
 
-    id: str
     shape: Shape
-    angle: float
-    motion: str
-    start: float
     force: Rows
     path: Rows
-    force_key: str
-    where: str
+
+    @property
+    def start(self) -> float:
+        """Seconds since the end of the lead-in."""
+        return self.given.start
+
+    @property
+    def force_key(self) -> str:
+        """The key of the script that the force is from."""
+        return "profile" if self.given.profile else "hold"
 
     @property
     def end(self) -> float:
@@ -82,8 +83,8 @@ class ScriptedPress:
         if not (0 <= since <= self.force[-1][0] and force > 0):
             return None
         x, y = along(self._path, since).tolist()
-        probe = Probe(self.shape, x, y, force, self.angle)
-        return probe.moving(*_speed(self._path, since), friction[self.motion])
+        probe = Probe(self.shape, x, y, force, self.given.angle)
+        return probe.moving(*_speed(self._path, since), friction[self.given.motion])
 
     def stages(self) -> Iterator[tuple[str, float]]:
         """Key and length in s of each piece of the courses."""
@@ -121,22 +122,13 @@ class ScriptedPress:
 
 
 @dataclass(frozen=True)
-class ScriptedBend:
+class ScriptedBend(Scripted[BendSection | StretchSection]):
     """A bend or stretch with the course of its amount.
 
-    Attributes
-    ----------
-    given
-        Its section of the script.
-    course
-        Rows of (s since its start, rad or elongation), from 0 to 0.
-    where
-        Place in the script, for messages.
+    ``course``: rows of (s since its start, rad or elongation), from 0 to 0.
     """
 
-    given: BendSection | StretchSection
     course: Rows
-    where: str
 
     @classmethod
     def of(cls, given: BendSection | StretchSection, where: str) -> Self:
@@ -154,7 +146,7 @@ class ScriptedBend:
                     hint="the profile begins with 0 at 0 s by itself",
                 )
             course = ((0.0, 0.0), *rows)
-        made = cls(given, course, where)
+        made = cls(given, where, course)
         try:
             for _, amount in course:
                 made.shape(amount)
@@ -249,3 +241,49 @@ def _speed(rows: FloatArray, time: float) -> tuple[float, float]:
     row = int(np.searchsorted(rows[:, 0], time, side="right"))
     duration, dx, dy = rows[row] - rows[row - 1]
     return float(dx / duration), float(dy / duration)
+
+
+@dataclass(frozen=True)
+class Disturbance:
+    """All that is wrong at a moment.
+
+    ``noise`` LSB of one conversion, None where it is the twin's own; ``warmer`` K.
+    """
+
+    faults: Faults = field(default_factory=Faults)
+    line: LineSettings = field(default_factory=LineSettings)
+    noise: float | None = None
+    warmer: float = 0.0
+
+
+def disturbed(faults: Iterable[Scripted[FaultSection]], time: float) -> Disturbance:
+    """What is wrong at ``time`` s; of two of a kind that set a number, the later one counts."""
+    now = Disturbance()
+    for fault in sorted((one.given for one in faults), key=lambda fault: fault.start):
+        if fault.kind == "temperature" and fault.start <= time:
+            now = replace(now, warmer=now.warmer + fault.amount)
+        elif fault.start <= time < fault.stop:
+            now = _with(now, fault)
+    return now
+
+
+def reboots(faults: Iterable[Scripted[FaultSection]], since: float, time: float) -> bool:
+    """Whether the board loses its power after ``since``, up to ``time`` s."""
+    return any(f.given.kind == "reboot" and since < f.given.start <= time for f in faults)
+
+
+def _with(now: Disturbance, fault: FaultSection) -> Disturbance:
+    pair = tuple(sorted((fault.electrode or 0, fault.other or 0)))
+    wires = {
+        "cut": ("cut", fault.electrode),
+        "short": ("shorts", pair),
+        "rail": ("railed", fault.electrode),
+    }
+    if fault.kind in wires:
+        name, broken = wires[fault.kind]
+        faults = replace(now.faults, **{name: getattr(now.faults, name) | {broken}})
+        return replace(now, faults=faults)
+    if fault.kind == "noise":
+        return replace(now, noise=fault.amount)
+    name = {"loss": "loss", "corruption": "corruption", "delay": "hold"}[fault.kind]
+    return replace(now, line=replace(now.line, **{name: fault.amount}))

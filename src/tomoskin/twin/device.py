@@ -35,7 +35,7 @@ from tomoskin.board.wire import (
     is_command,
 )
 from tomoskin.core import Frame
-from tomoskin.twin.board import OK, Board, HeldScanning, Verdict
+from tomoskin.twin.held_scanning import OK, Board, HeldScanning, Verdict
 from tomoskin.twin.scanning import Analogue, SampleTable, ScanClock, chopped_table, sample_table
 
 _HELLO_INTERVAL = 0.5

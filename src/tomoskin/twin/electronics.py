@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from tomoskin.core import FloatArray, IntArray
 from tomoskin.model.forward import choose_engine
 from tomoskin.twin.bend import Pose
-from tomoskin.twin.circuit import ElectronicsSettings, Lines, line_potentials, settling
-from tomoskin.twin.electrodes import Electrodes
+from tomoskin.twin.circuit import Electrodes, ElectronicsSettings, Lines, line_potentials, settling
 from tomoskin.twin.faults import Faults, check_electrodes
 from tomoskin.twin.parameters import wandered
 from tomoskin.twin.probe import Contact

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -93,76 +92,3 @@ def check_electrodes(faults: Faults, n: int) -> None:
         raise ModelError(
             f"expected electrodes from 0 (E1) to {n - 1}, got {wrong[0]}", where="twin: fault"
         )
-
-
-@dataclass(frozen=True)
-class ScriptedFault:
-    """A fault of a script.
-
-    Attributes
-    ----------
-    kind
-        "cut", "short", "rail", "noise", "loss", "corruption", "delay", "reboot", "temperature".
-    start, end
-        s since the end of the lead-in; equal for what happens at a moment.
-    electrode, other
-        Of cut, short and rail; −1 where there is none.
-    amount
-        LSB of noise, a probability of the line, or kelvin.
-    where
-        Place in the script, for messages.
-    """
-
-    kind: str
-    start: float
-    end: float
-    electrode: int
-    other: int
-    amount: float
-    where: str
-
-
-@dataclass(frozen=True)
-class Disturbance:
-    """All that is wrong at a moment.
-
-    ``noise`` LSB of one conversion, None where it is the twin's own; ``warmer`` K.
-    """
-
-    faults: Faults = field(default_factory=Faults)
-    line: LineSettings = field(default_factory=LineSettings)
-    noise: float | None = None
-    warmer: float = 0.0
-
-
-def disturbed(faults: Iterable[ScriptedFault], time: float) -> Disturbance:
-    """What is wrong at ``time`` s; of two of a kind that set a number, the later one counts."""
-    now = Disturbance()
-    for fault in sorted(faults, key=lambda fault: fault.start):
-        if fault.kind == "temperature" and fault.start <= time:
-            now = replace(now, warmer=now.warmer + fault.amount)
-        elif fault.start <= time < fault.end:
-            now = _with(now, fault)
-    return now
-
-
-def reboots(faults: Iterable[ScriptedFault], since: float, time: float) -> bool:
-    """Whether the board loses its power after ``since``, up to ``time`` s."""
-    return any(fault.kind == "reboot" and since < fault.start <= time for fault in faults)
-
-
-def _with(now: Disturbance, fault: ScriptedFault) -> Disturbance:
-    low, high = sorted((fault.electrode, fault.other))
-    wires = {
-        "cut": ("cut", fault.electrode),
-        "short": ("shorts", (low, high)),
-        "rail": ("railed", fault.electrode),
-    }
-    if fault.kind in wires:
-        name, broken = wires[fault.kind]
-        faults = replace(now.faults, **{name: getattr(now.faults, name) | {broken}})
-        return replace(now, faults=faults)
-    if fault.kind == "noise":
-        return replace(now, noise=fault.amount)
-    name = {"loss": "loss", "corruption": "corruption", "delay": "hold"}[fault.kind]
-    return replace(now, line=replace(now.line, **{name: fault.amount}))

@@ -10,8 +10,7 @@ from typing import Any, Self, TypeVar
 
 from tomoskin.core import GeometryError, ScriptError, SkinError
 from tomoskin.model.section import Section, check_names, show, toml_tables
-from tomoskin.twin.course import Rows, ScriptedBend, ScriptedMark, ScriptedPress, ramp
-from tomoskin.twin.faults import ScriptedFault
+from tomoskin.twin.course import Rows, Scripted, ScriptedBend, ScriptedPress, ramp
 from tomoskin.twin.script_schema import (
     FORMAT,
     SECTIONS,
@@ -56,8 +55,8 @@ class Script:
     lead_in: float
     seed: int
     presses: tuple[ScriptedPress, ...]
-    faults: tuple[ScriptedFault, ...]
-    marks: tuple[ScriptedMark, ...]
+    faults: tuple[Scripted[FaultSection], ...]
+    marks: tuple[Scripted[MarkSection], ...]
     preset: str | None = None
     bends: tuple[ScriptedBend, ...] = ()
 
@@ -82,9 +81,7 @@ class Script:
             head = ScriptSection.read(tables.get("script", {}), f"{source}: [script]")
             presses = tuple(_press(s, w) for s, w in _each(PressSection, tables, source))
             faults = tuple(_fault(s, w) for s, w in _each(FaultSection, tables, source))
-            marks = tuple(
-                ScriptedMark(s.at, s.text, w) for s, w in _each(MarkSection, tables, source)
-            )
+            marks = tuple(Scripted(s, w) for s, w in _each(MarkSection, tables, source))
             bends = [ScriptedBend.of(s, w) for s, w in _each(BendSection, tables, source)]
             bends += [ScriptedBend.of(s, w) for s, w in _each(StretchSection, tables, source)]
         return cls(
@@ -131,26 +128,17 @@ def _each(section: type[S], tables: Mapping[str, Any], source: str) -> Iterator[
 
 def _press(given: PressSection, where: str) -> ScriptedPress:
     if given.force is not None and given.hold is not None:
-        force, key = ramp(given.force, given.rise, given.hold, given.fall), "hold"
+        force = ramp(given.force, given.rise, given.hold, given.fall)
     else:
-        force, key = _course((0.0, 0.0), given.profile, f"{where} profile"), "profile"
+        force = _course((0.0, 0.0), given.profile, f"{where} profile")
         if force[-1][1] != 0.0:
             raise ScriptError(
                 f"expected 0 N in the last row, got {force[-1][1]:g} N",
                 where=f"{where} profile",
                 hint="add a row with the time at which the probe has left the sheet",
             )
-    return ScriptedPress(
-        id=given.id,
-        shape=_shape(given, where),
-        angle=given.angle,
-        motion=given.motion,
-        start=given.start,
-        force=force,
-        path=_course((0.0, *given.at), given.path, f"{where} path"),
-        force_key=key,
-        where=where,
-    )
+    path = _course((0.0, *given.at), given.path, f"{where} path")
+    return ScriptedPress(given, where, _shape(given, where), force, path)
 
 
 def _shape(given: PressSection, where: str) -> Shape:
@@ -168,11 +156,10 @@ def _shape(given: PressSection, where: str) -> Shape:
         raise ScriptError(error.message, where=f"{where} vertices", hint=error.hint) from None
 
 
-def _fault(given: FaultSection, where: str) -> ScriptedFault:
-    start = given.start
-    if given.end is not None and not given.end > start:
+def _fault(given: FaultSection, where: str) -> Scripted[FaultSection]:
+    if given.end is not None and not given.end > given.start:
         raise ScriptError(
-            f"expected a time after start, {start:g} s, got {given.end:g} s",
+            f"expected a time after start, {given.start:g} s, got {given.end:g} s",
             where=f"{where} end",
             hint="times count from the end of the lead-in, not from start",
         )
@@ -182,15 +169,7 @@ def _fault(given: FaultSection, where: str) -> ScriptedFault:
             where=f"{where} other",
             hint="an electrode is always connected to itself",
         )
-    return ScriptedFault(
-        kind=given.kind,
-        start=start,
-        end=start if given.end is None else given.end,
-        electrode=-1 if given.electrode is None else given.electrode,
-        other=-1 if given.other is None else given.other,
-        amount=given.lsb or given.probability or given.kelvin or 0.0,
-        where=where,
-    )
+    return Scripted(given, where)
 
 
 def _course(first: tuple[float, ...], rows: Rows | None, where: str) -> Rows:

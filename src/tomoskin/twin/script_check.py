@@ -84,15 +84,17 @@ def check_settling(skin: Skin, preset: str) -> None:
 
 def _check_faults(script: Script, skin: Skin, frame_time: float) -> None:
     for fault in script.faults:
-        if 0 < fault.end - fault.start < frame_time:
+        lasts = fault.given.stop - fault.given.start
+        if 0 < lasts < frame_time:
             raise ScriptError(
-                f"it lasts {1e3 * (fault.end - fault.start):g} ms, shorter than a frame of this "
+                f"it lasts {1e3 * lasts:g} ms, shorter than a frame of this "
                 f"skin, {1e3 * frame_time:.3g} ms",
                 where=f"{fault.where} end",
                 hint=NO_FRAME,
             )
-        for key, electrode in (("electrode", fault.electrode), ("other", fault.other)):
-            if electrode >= skin.n_electrodes:
+        for key in ("electrode", "other"):
+            electrode = getattr(fault.given, key)
+            if electrode is not None and electrode >= skin.n_electrodes:
                 raise ScriptError(
                     "expected an electrode from 0 (E1) to "
                     f"{skin.n_electrodes - 1}, got {electrode}",
@@ -103,9 +105,9 @@ def _check_faults(script: Script, skin: Skin, frame_time: float) -> None:
 def _check_ids(presses: tuple[ScriptedPress, ...]) -> None:
     for first, second in combinations(presses, 2):
         together = min(first.end, second.end) > max(first.start, second.start) + _ROUNDING
-        if first.id == second.id and together:
+        if first.given.id == second.given.id and together:
             raise ScriptError(
-                f'"{first.id}" already presses from {first.start:g} s to {first.end:g} s',
+                f'"{first.given.id}" already presses from {first.start:g} s to {first.end:g} s',
                 where=f"{second.where} id",
                 hint="two presses at once need different ids",
             )
@@ -123,8 +125,11 @@ def _check_ends(script: Script) -> None:
         (bend.end, f"{bend.where} {'profile' if bend.given.profile else 'hold'}")
         for bend in script.bends
     ]
-    last += [(f.end, f"{f.where} {'end' if f.end > f.start else 'start'}") for f in script.faults]
-    last += [(mark.at, f"{mark.where} at") for mark in script.marks]
+    last += [
+        (one.given.stop, f"{one.where} {'end' if one.given.end else 'start'}")
+        for one in script.faults
+    ]
+    last += [(mark.given.at, f"{mark.where} at") for mark in script.marks]
     for time, where in last:
         if time > script.duration + _ROUNDING:
             raise ScriptError(

@@ -220,6 +220,16 @@ class FaultSection(Section, section="fault", many=True):
         Number(-100, 100), "Step of the sheet's temperature, K.", kind="temperature"
     )
 
+    @property
+    def stop(self) -> float:
+        """When it ends; its start for what happens at a moment."""
+        return self.start if self.end is None else self.end
+
+    @property
+    def amount(self) -> float:
+        """LSB of noise, a probability of the line, or kelvin."""
+        return self.lsb or self.probability or self.kelvin or 0.0
+
 
 class MarkSection(Section, section="mark", many=True):
     """A note that is written into the recording."""

@@ -13,10 +13,10 @@ from tomoskin.board.source import BOARDS, BoardRecord, ScanSettings, read_option
 from tomoskin.core import Clock, Frame, SourceError, WallClock
 from tomoskin.model.pattern import Scan
 from tomoskin.twin.bend import Pose
-from tomoskin.twin.board import Board
 from tomoskin.twin.device import TwinDevice
 from tomoskin.twin.electronics import TwinElectronics
 from tomoskin.twin.faults import Faults, Line, LineSettings
+from tomoskin.twin.held_scanning import Board
 from tomoskin.twin.presets import PRESETS, TwinSettings
 from tomoskin.twin.probe import Contact
 from tomoskin.twin.scanning import table_of

@@ -31,7 +31,8 @@ from tomoskin.board.wire import (
 )
 from tomoskin.core import Event, Frame, SourceError
 from tomoskin.model.pattern import Pattern, Scan
-from tomoskin.twin import Board, TwinDevice, TwinTransport
+from tomoskin.twin import Board, TwinTransport
+from tomoskin.twin.device import TwinDevice
 
 SCAN = Scan.of(Pattern.adjacent(8))
 SETTINGS = ScanSettings(oversampling=4, settling=200e-6, current_limit=0.1, adc_bits=10)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tomoskin.board.source.clock import ClockFitter, ClockWatch
+from tomoskin.board.source.clock import ClockFitter, ClockWatch, ScanClock
 from tomoskin.core import Frame
 
 RATE, FAST, OFFSET = 250e3, 37e-6, 1234.5
@@ -73,11 +73,15 @@ def test_frames_of_one_tick_are_no_clock():
     assert fitted([(5, 1.0)] * 50).fit is None
 
 
+def framed(sequence, ticks, host_time):
+    return Frame(sequence, ticks, host_time, 1, 0, 0, np.zeros(1, np.uint16))
+
+
 def said(seconds, factor):
     """What is said of a clock that runs ``factor`` times as fast as its board states."""
     watch = ClockWatch()
     frames = (
-        Frame(0, ticks, host_time, 1, 0, 0, np.zeros(1, np.uint16))
+        framed(0, ticks, host_time)
         for ticks, host_time in arrivals(seconds, batch=0.016, stalls=0.05)
     )
     return [event for frame in frames if (event := watch.push(frame, RATE / factor))]
@@ -92,3 +96,26 @@ def test_a_clock_that_is_not_as_stated_is_said_once(factor):
 
 def test_a_clock_as_stated_is_no_event():
     assert said(20, 1.02) == said(3, 2) == []
+
+
+@pytest.mark.parametrize("wander", [0.0, 2e-5])
+def test_a_scan_is_stamped_with_its_middle_however_late_the_frame_came(wander):
+    """Frames up to 30 ms late, of a clock that is 300 ppm fast and wanders over ten minutes."""
+    rng, clock, missed = np.random.default_rng(8), ScanClock(), []
+    interval = 0.055
+    for k in range(int(600 / interval)):
+        start = 5.0 + k * interval
+        ticks = start * 1.0003 + wander * 100 * np.sin(start / 100)
+        arrival = start + interval + rng.exponential(0.006) % 0.03
+        frame = framed(k, round(16e6 * ticks), arrival)
+        middle, duration = clock.middle(frame, 0.06, 16e6)
+        if k > 100:
+            missed.append(middle - (start + 0.5 * interval))
+            assert duration == pytest.approx(interval, rel=1e-3)
+    assert np.abs(missed).max() < 3e-3
+    assert np.percentile(np.abs(missed), 50) < 1e-3
+
+
+def test_without_a_clock_a_scan_is_stamped_by_its_arrival():
+    frame = framed(0, 0, 7.0)
+    assert ScanClock().middle(frame, 0.06, 16e6) == (pytest.approx(6.97), 0.06)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tomoskin.board.source.silence import BAUD, is_bootloader, likely_cause
+from tomoskin.board.source.serial import BAUD, is_bootloader, likely_cause
 
 BOOTLOADER = bytes.fromhex("1b01000b0e010008") + b"AVRISP_2\x40"
 NOISE = bytes(range(128, 200))

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 from hypothesis import strategies as st
 
-from tomoskin.board.wire import ENUMS, RECORDS, SCHEMA, Drive
+from tomoskin.board.wire import SCHEMA, Drive
+from tomoskin.board.wire.messages import ENUMS, RECORDS
 from tomoskin.core import Frame
 
 BITS = {"u8": 8, "u16": 16, "u32": 32, "u64": 64}

@@ -16,7 +16,6 @@ from tomoskin.board.wire import (
     Ping,
     Result,
     SetPattern,
-    cobs_decode,
     crc16,
     decode_payload,
     encode,
@@ -24,6 +23,7 @@ from tomoskin.board.wire import (
     is_command,
     type_byte,
 )
+from tomoskin.board.wire.framing import cobs_decode
 from tomoskin.core import Frame, WireError
 
 

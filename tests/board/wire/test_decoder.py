@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from board.wire.messages_strategy import messages, same
-from tomoskin.board.wire import SCHEMA, Ack, Decoder, Hello, Ping, Result, enclose, encode
+from tomoskin.board.wire import SCHEMA, Ack, Decoder, Hello, Ping, Result, encode
+from tomoskin.board.wire.framing import enclose
 from tomoskin.core import Frame
 
 HELLO = Hello(1, 0, 0xDEADBEEF)

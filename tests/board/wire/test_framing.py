@@ -3,7 +3,8 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tomoskin.board.wire import cobs_decode, cobs_encode, crc16, enclose
+from tomoskin.board.wire import crc16
+from tomoskin.board.wire.framing import cobs_decode, cobs_encode, enclose
 
 
 def test_crc_check_value():

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from tomoskin.board.wire import ENUMS, OLDER, RECORDS, SCHEMA, BoardLimits, FaultCode, Info, Schema
+from tomoskin.board.wire import OLDER, SCHEMA, BoardLimits, FaultCode, Info, Schema
+from tomoskin.board.wire.messages import ENUMS, RECORDS
 from tomoskin.board.wire.schema import SCALARS
 
 TEXT = files("tomoskin.board.wire").joinpath("protocol.toml").read_text(encoding="utf-8")

@@ -12,7 +12,8 @@ import pytest
 
 from shapes import box, disc
 from tomoskin.core import DataError, Detection, FloatArray, Image, Touch
-from tomoskin.files.exports import Display, Panel, circular_average, plot, write_picture
+from tomoskin.files.exports import Display, Panel, plot, write_picture
+from tomoskin.files.exports.display import circular_average
 from tomoskin.model.mesh import Mesh
 
 

@@ -18,7 +18,7 @@ from tomoskin.core import DataError
 from tomoskin.files.exports import FILMS
 from tomoskin.files.imports import read_recording
 from tomoskin.files.session import SessionReader, SessionWriter
-from tomoskin.files.session.blocks import MOST_FRAMES
+from tomoskin.files.session.scanned import MOST_FRAMES
 
 PATTERN = SKIN.pattern()
 

@@ -9,9 +9,10 @@ from mcap.opcode import Opcode
 
 from files.session.runs import INFO, SKIN, frame_of, put
 from tomoskin.core import DataError, Event
-from tomoskin.files.session import SessionReader, SessionWriter, tick_rate
+from tomoskin.files.session import SessionReader, SessionWriter
 from tomoskin.files.session.container_reader import ContainerReader
 from tomoskin.files.session.mcap_records import PREFIX, Summary
+from tomoskin.files.session.session_reader import tick_rate
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ from tomoskin.core import Mark
 from tomoskin.files.exports import WRITERS, Export, write_touches
 from tomoskin.files.imports import read_recording
 from tomoskin.files.session import SessionReader, SessionWriter
-from tomoskin.files.session.blocks import no_report
+from tomoskin.files.session.scanned import no_report
 
 
 @pytest.fixture

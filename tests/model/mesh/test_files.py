@@ -231,7 +231,7 @@ def test_unknown_ending(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("ending", [".msh", ".vtu", ".stl", ".obj"])
 def test_missing_file(tmp_path: Path, ending: str) -> None:
-    with pytest.raises(GeometryError, match="No such file") as caught:
+    with pytest.raises(GeometryError, match="no such file") as caught:
         MeshFile.read(tmp_path / f"none{ending}")
     assert f"none{ending}" in caught.value.where
 

@@ -337,8 +337,8 @@ def test_texts_are_json(stream):
     assert [t.pop("id") for t in told["touches"]] == [4, 5]
     (found, _) = told.pop("touches")
     assert told == {
-        "host_time": 0.25, "utc_s": EPOCH + 0.25, "skin": stream.skin, "frame_id": "skin",
-        "sequence": 7, "latency_s": 0.012, "valid": True, "problem": None,
+        "host_time": 0.25, "utc_s": EPOCH + 0.25, "scan_s": None, "frame_id": "skin",
+        "skin": stream.skin, "sequence": 7, "latency_s": 0.012, "valid": True, "problem": None,
     }  # fmt: skip
     assert found["position"] == [TOUCH.detection.x, TOUCH.detection.y, 0]
     assert (found["normal"], found["covariance"], found["force"]) == ([0, 0, 1], None, None)

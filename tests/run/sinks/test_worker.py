@@ -11,7 +11,7 @@ from run.sinks.conftest import EVENT, PATIENCE, result_at
 from tomoskin.core import Capacity, Consumer, Event, SinkError, Worker, stop_workers
 from tomoskin.files.messages.reporter import IMAGE_PERIOD
 from tomoskin.run.sinks import Sink, sink_report, sink_worker
-from tomoskin.run.sinks.consumer import MOST_WAITING
+from tomoskin.run.sinks.sink import MOST_WAITING
 
 
 class Shelf(Sink):
@@ -93,8 +93,8 @@ def test_images_are_the_newest_only_and_now_and_then(running, news):
 
 
 def test_a_sink_that_hangs_delays_nobody_and_is_left_to_itself(running, news, monkeypatch):
-    monkeypatch.setattr("tomoskin.run.sinks.consumer.GRACE", 0.05)
-    monkeypatch.setattr("tomoskin.run.sinks.consumer._LONG", 0.0)
+    monkeypatch.setattr("tomoskin.run.sinks.sink.GRACE", 0.05)
+    monkeypatch.setattr("tomoskin.run.sinks.sink._LONG", 0.0)
     asked, for_ever = threading.Event(), threading.Event()
 
     def hang():
@@ -135,7 +135,7 @@ def test_a_slow_sink_loses_results_which_are_counted_and_said(running, news):
 
 
 def test_a_sink_that_raises_is_closed_and_opened_again(running, news, monkeypatch, caplog):
-    monkeypatch.setattr("tomoskin.run.sinks.consumer._FIRST_DELAY", 0.001)
+    monkeypatch.setattr("tomoskin.run.sinks.sink._FIRST_DELAY", 0.001)
     faults = deque([ConnectionResetError(104, "peer is gone"), None])
 
     def fail():
@@ -155,7 +155,7 @@ def test_a_sink_that_raises_is_closed_and_opened_again(running, news, monkeypatc
 
 
 def test_a_sink_that_cannot_be_opened_is_said_once_and_tried_again(running, news, monkeypatch):
-    monkeypatch.setattr("tomoskin.run.sinks.consumer._FIRST_DELAY", 0.001)
+    monkeypatch.setattr("tomoskin.run.sinks.sink._FIRST_DELAY", 0.001)
     refused = SinkError("no broker there", where="shelf")
     both_are_there = threading.Event()
     sink = Shelf(news, opens=[refused, refused, refused, both_are_there])
@@ -171,7 +171,7 @@ def test_a_sink_that_cannot_be_opened_is_said_once_and_tried_again(running, news
 
 
 def test_while_it_is_away_that_is_its_state(running, news, monkeypatch):
-    monkeypatch.setattr("tomoskin.run.sinks.consumer._FIRST_DELAY", PATIENCE)
+    monkeypatch.setattr("tomoskin.run.sinks.sink._FIRST_DELAY", PATIENCE)
     worker = running(
         Shelf(news, opens=[SinkError("no broker there", where="shelf", hint="start it")])
     )

@@ -10,7 +10,9 @@ import pytest
 from tomoskin.cli import main
 from tomoskin.run import CheckFinding, check_board
 from tomoskin.sensing.signal import LoadRing
-from tomoskin.twin.emulator import BoardFaults, Programs, emulate_load
+from tomoskin.twin.emulator import emulate_load
+from tomoskin.twin.emulator.board_process import BoardFaults
+from tomoskin.twin.emulator.program import Programs
 
 CURRENT = 0.1
 FAULTS = {

@@ -10,7 +10,7 @@ import pytest
 from firmware.boards import running
 from tomoskin.board.source import Link, ScanSettings, SerialTransport
 from tomoskin.model.pattern import Pattern, Scan
-from tomoskin.twin.emulator import Programs
+from tomoskin.twin.emulator.program import Programs
 from twin.emulator.test_emulator import frames_of
 from twin.emulator.watch import Watch, symbol
 

@@ -32,8 +32,13 @@ from tomoskin.board.wire import (
     Stop,
 )
 from tomoskin.core import Frame, SourceError
-from tomoskin.twin.emulator import BoardProcess, Front, OwnVoltages, SkinMemory
-from tomoskin.twin.emulator.board_process import BoardPrograms
+from tomoskin.twin.emulator.board_process import (
+    BoardProcess,
+    BoardPrograms,
+    Front,
+    OwnVoltages,
+    SkinMemory,
+)
 from twin.emulator.test_mutants import mutated as mutated_elf
 from twin.emulator.test_pico import mutated as mutated_image
 from twin.emulator.watch import CLOCK, Watch

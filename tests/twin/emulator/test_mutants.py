@@ -27,7 +27,7 @@ from tomoskin.board.wire import (
     Start,
 )
 from tomoskin.core import Frame
-from tomoskin.twin.emulator import Programs
+from tomoskin.twin.emulator.program import Programs
 from twin.emulator.watch import CLOCK, Watch
 
 SETTLING, DEAD, OVERSAMPLING = 200, 45, 2

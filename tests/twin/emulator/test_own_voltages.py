@@ -14,8 +14,14 @@ from tomoskin.core import Frame
 from tomoskin.model.pattern import Pattern, Scan
 from tomoskin.model.skin import Skin
 from tomoskin.twin import ElectronicsSettings, TwinSettings, table_of
-from tomoskin.twin.electrodes import Electrodes
-from tomoskin.twin.emulator import BoardProcess, BoardPrograms, Front, OwnVoltages, SkinMemory
+from tomoskin.twin.circuit import Electrodes
+from tomoskin.twin.emulator.board_process import (
+    BoardProcess,
+    BoardPrograms,
+    Front,
+    OwnVoltages,
+    SkinMemory,
+)
 from tomoskin.twin.emulator.source import open_emulator, own_of
 
 BITS = {"mega": 10, "pico": 12}

@@ -40,7 +40,8 @@ from tomoskin.model.skin import Skin
 from tomoskin.pipeline import prepare
 from tomoskin.run import Runner
 from tomoskin.twin import TwinSettings, TwinSkin
-from tomoskin.twin.emulator import BoardFaults, BoardProcess, PicoPrograms, SkinMemory
+from tomoskin.twin.emulator.board_process import BoardFaults, BoardProcess, SkinMemory
+from tomoskin.twin.emulator.program import PicoPrograms
 from tomoskin.twin.emulator.source import front_of, open_emulator
 from tomoskin.twin.emulator.uf2 import pack_uf2
 from twin.emulator.pico import CURRENT, PATIENCE, Pico, events_of, frames_of, powered, star

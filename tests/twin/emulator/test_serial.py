@@ -18,7 +18,8 @@ from tomoskin.model.skin import Skin
 from tomoskin.pipeline import prepare
 from tomoskin.run import Runner, commands
 from tomoskin.twin import TwinSettings, TwinSkin
-from tomoskin.twin.emulator import Programs, SkinMemory
+from tomoskin.twin.emulator.board_process import SkinMemory
+from tomoskin.twin.emulator.program import Programs
 from tomoskin.twin.emulator.source import front_of
 from twin.emulator.test_emulator import frames_of
 from twin.emulator.watch import CLOCK, Watch

@@ -11,7 +11,7 @@ import pytest
 from firmware.boards import running, star_counts
 from tomoskin.board.source import Link, ScanSettings, SerialTransport
 from tomoskin.model.pattern import Pattern, Scan
-from tomoskin.twin.emulator import Programs
+from tomoskin.twin.emulator.program import Programs
 from twin.emulator.test_emulator import frames_of
 
 # Electrodes, settling s, least frames/s; prescaler 64, no oversampling.

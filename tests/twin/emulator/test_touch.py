@@ -14,7 +14,7 @@ from tomoskin.model.skin import Skin
 from tomoskin.pipeline import FrameResult, prepare
 from tomoskin.run import Runner, commands
 from tomoskin.twin import Press
-from tomoskin.twin.emulator import Programs
+from tomoskin.twin.emulator.program import Programs
 from tomoskin.twin.emulator.source import open_emulator
 
 MOST_FRAMES = 400

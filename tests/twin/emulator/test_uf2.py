@@ -11,8 +11,9 @@ from typer.testing import CliRunner
 from firmware.boards import FIRMWARE
 from tomoskin.cli.app import app
 from tomoskin.core import SourceError
-from tomoskin.twin.emulator import PicoPrograms, find_boot_drive, write_uf2
-from tomoskin.twin.emulator.uf2 import FLASH, boot_checksum, check_boot, pack_uf2
+from tomoskin.twin.emulator import write_uf2
+from tomoskin.twin.emulator.program import PicoPrograms
+from tomoskin.twin.emulator.uf2 import FLASH, boot_checksum, check_boot, find_boot_drive, pack_uf2
 from twin.emulator.pico import powered
 
 IMAGE = bytes(range(256)) * 2 + b"end"

@@ -25,6 +25,7 @@ function tooClose(touch: Touch): string | undefined {
 /** A force with its interval, in words. */
 function forceInWords({ newtons, low, high, calibrated }: Force): string {
   const state = calibrated ? "" : ", uncalibrated";
+  if (high === Infinity) return `more than ${fixed(low, 1)} newtons, beyond what was taught${state}`;
   return `${fixed(newtons, 1)} newtons, ${fixed(low, 1)} to ${fixed(high, 1)}${state}`;
 }
 
@@ -34,10 +35,12 @@ function Strength({ touch, scale }: { touch: Touch; scale: Scale }) {
     return (
       <td class="large" title={`${forceInWords(force)} (nine in ten)`} data-testid="force">
         {!force.calibrated && "~"}
-        {fixed(force.newtons, 1)}
-        <span class="small interval">
-          {fixed(force.low, 0)}–{fixed(force.high, 0)}
-        </span>
+        {force.high === Infinity ? `> ${fixed(force.low, 1)}` : fixed(force.newtons, 1)}
+        {force.high < Infinity && (
+          <span class="small interval">
+            {fixed(force.low, 0)}–{fixed(force.high, 0)}
+          </span>
+        )}
       </td>
     );
   }

@@ -4,18 +4,16 @@ from tomoskin.board.source.agreement import BOARDS_SINCE
 from tomoskin.board.source.boards import (
     BOARDS,
     DEFAULT_BOARD,
-    BoardFigures,
     BoardRecord,
     Converter,
     FirmwareFiles,
     board_named,
-    read_boards,
 )
-from tomoskin.board.source.clock import TICK_RATES, ClockFit, ClockFitter
+from tomoskin.board.source.clock import TICK_RATES, ClockFit, ClockFitter, ScanClock
 from tomoskin.board.source.command_queue import FrameCounters
 from tomoskin.board.source.configuration import Configuration
 from tomoskin.board.source.link import Link
-from tomoskin.board.source.serial import Port, SerialTransport, list_ports
+from tomoskin.board.source.serial import SerialTransport, list_ports
 from tomoskin.board.source.settings import (
     PRESCALERS,
     ScanSettings,
@@ -24,7 +22,6 @@ from tomoskin.board.source.settings import (
     chop_limit,
 )
 from tomoskin.board.source.transport import (
-    GROUP,
     Exchange,
     Transport,
     open_source,
@@ -36,10 +33,8 @@ __all__ = [
     "BOARDS",
     "BOARDS_SINCE",
     "DEFAULT_BOARD",
-    "GROUP",
     "PRESCALERS",
     "TICK_RATES",
-    "BoardFigures",
     "BoardRecord",
     "ClockFit",
     "ClockFitter",
@@ -49,7 +44,7 @@ __all__ = [
     "FirmwareFiles",
     "FrameCounters",
     "Link",
-    "Port",
+    "ScanClock",
     "ScanSettings",
     "SerialTransport",
     "Timing",
@@ -59,7 +54,6 @@ __all__ = [
     "chop_limit",
     "list_ports",
     "open_source",
-    "read_boards",
     "read_options",
     "source_names",
 ]

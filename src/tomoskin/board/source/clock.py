@@ -18,6 +18,9 @@ _MOST_CORNERS = 256
 _WATCHED = 5.0
 """s after which the rate of a clock is known well enough to be doubted."""
 
+_TURN = 60.0
+"""s after which a newer fit of the clock takes over."""
+
 _MOST_DRIFT = 0.05
 """Crystals and resonators are off by less than 1 %."""
 
@@ -110,6 +113,37 @@ class ClockFitter:
             return None
         late = run.sums.misfit(a, b)
         return ClockFit(1 / b, run.first_time + a - b * run.first, late, run.sums.n)
+
+
+class ScanClock:
+    """When scans were, by the host's clock: frames come late by chance, scans do not.
+
+    Two fits take turns, so that a clock that wanders is followed.
+    """
+
+    def __init__(self) -> None:
+        self._now, self._next, self._until = ClockFitter(), ClockFitter(), -math.inf
+        self._before: int | None = None
+        self._shortest = math.inf
+
+    def middle(self, frame: Frame, longest: float, tick_rate: float) -> tuple[float, float]:
+        """Host time of the middle of the frame's scan, and the scan's duration, s.
+
+        A scan takes ``longest`` s at most, and no longer than from one frame to the next by a
+        clock of ``tick_rate`` Hz.
+        """
+        if frame.host_time > self._until:
+            self._now, self._next = self._next, ClockFitter()
+            self._until = frame.host_time + _TURN
+        for fitter in (self._now, self._next):
+            fitter.add(frame.ticks, frame.host_time)
+        if self._before is not None and frame.ticks > self._before:
+            self._shortest = min(self._shortest, (frame.ticks - self._before) / tick_rate)
+        self._before = frame.ticks
+        duration, fit, came = min(longest, self._shortest), self._now.fit, frame.host_time
+        if fit is not None:
+            came = min(came, fit.offset + frame.ticks / fit.tick_rate)
+        return came - duration / 2, duration
 
 
 class ClockWatch:

@@ -9,10 +9,8 @@ from tomoskin.board.wire.codec import (
     is_command,
     type_byte,
 )
-from tomoskin.board.wire.framing import Deframer, cobs_decode, cobs_encode, crc16, enclose
+from tomoskin.board.wire.framing import Deframer, crc16
 from tomoskin.board.wire.messages import (
-    ENUMS,
-    RECORDS,
     Ack,
     BoardLimits,
     Command,
@@ -49,9 +47,7 @@ from tomoskin.board.wire.messages import (
 from tomoskin.board.wire.schema import OLDER, SCHEMA, Schema
 
 __all__ = [
-    "ENUMS",
     "OLDER",
-    "RECORDS",
     "SCHEMA",
     "Ack",
     "BoardLimits",
@@ -89,11 +85,8 @@ __all__ = [
     "SetScan",
     "Start",
     "Stop",
-    "cobs_decode",
-    "cobs_encode",
     "crc16",
     "decode_payload",
-    "enclose",
     "encode",
     "encode_payload",
     "is_command",

@@ -1,18 +1,17 @@
 """Recordings, images and touches in the formats of other programs; pictures and films."""
 
-from tomoskin.files.exports.bag import write_bag
-from tomoskin.files.exports.curves import write_choices, write_merit, write_merit_table
-from tomoskin.files.exports.design_picture import write_promise
-from tomoskin.files.exports.display import Display, circular_average
-from tomoskin.files.exports.hdf5 import write_hdf5
-from tomoskin.files.exports.labelled_set import is_done, join_shards, shard_path, write_whole
+from tomoskin.files.exports.curves import (
+    write_choices,
+    write_merit,
+    write_merit_table,
+    write_promise,
+)
+from tomoskin.files.exports.display import Display
 from tomoskin.files.exports.matlab_file import write_matlab
-from tomoskin.files.exports.movie import FILMS
-from tomoskin.files.exports.picture import MOST_PANELS, Panel, plot, rendered, write_picture
-from tomoskin.files.exports.rerun_file import RerunView, rerun_recording, write_rerun
+from tomoskin.files.exports.picture import FILMS, MOST_PANELS, Panel, plot, write_picture
+from tomoskin.files.exports.rerun_file import RerunView, rerun_recording
 from tomoskin.files.exports.session_export import WRITERS, Export, omitted
-from tomoskin.files.exports.session_table import write_csv, write_parquet
-from tomoskin.files.exports.touch_csv import write_touches
+from tomoskin.files.exports.session_table import write_csv, write_hdf5, write_parquet, write_touches
 from tomoskin.files.exports.vtu import series_files, write_series, write_vtu
 from tomoskin.files.imports import write_interchange
 
@@ -24,16 +23,10 @@ __all__ = [
     "Export",
     "Panel",
     "RerunView",
-    "circular_average",
-    "is_done",
-    "join_shards",
     "omitted",
     "plot",
-    "rendered",
     "rerun_recording",
     "series_files",
-    "shard_path",
-    "write_bag",
     "write_choices",
     "write_csv",
     "write_hdf5",
@@ -44,9 +37,7 @@ __all__ = [
     "write_parquet",
     "write_picture",
     "write_promise",
-    "write_rerun",
     "write_series",
     "write_touches",
     "write_vtu",
-    "write_whole",
 ]

@@ -1,22 +1,65 @@
-"""A sheet of images with their touches, drawn by matplotlib (extra ``plot``)."""
+"""A sheet of images with their touches, drawn by matplotlib (extra ``plot``), and films of it: GIF
+by Pillow, MP4 by ffmpeg where it is installed."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import shutil
+import subprocess
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import CHANGE, DataError, FloatArray, Image, StrPath, Touch
+from tomoskin.core import CHANGE, DataError, FloatArray, Image, StrPath, Touch, needed, written
 from tomoskin.files.exports.display import Display
-from tomoskin.files.exports.figure import new_figure, save_figure
 from tomoskin.model.mesh import Mesh
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+
+_MARGIN = 0.12
+"""Empty rim of a picture and of each of its panels, inch: titles keep off the edge."""
+
+
+def new_figure(path: StrPath, width: float, height: float) -> Figure:
+    """Empty figure of that size in inches, for the file ``path``.
+
+    Raises DataError when matplotlib is not installed.
+    """
+    parts = ("figure", "layout_engine", "backends.backend_agg")
+    plain, layouts, canvas = (needed(f"matplotlib.{part}", "plot", path) for part in parts)
+    layout = layouts.ConstrainedLayoutEngine(h_pad=_MARGIN, w_pad=_MARGIN, hspace=0.0, wspace=0.0)
+    figure: Figure = plain.Figure(figsize=(width, height), layout=layout)
+    canvas.FigureCanvasAgg(figure)
+    return figure
+
+
+def dress(ax: Any, title: str, x: str, y: str) -> None:
+    """Give a plot of curves its title, the names of its axes, small numbers and a pale grid."""
+    ax.set_title(title, fontsize=10)
+    ax.set_xlabel(x, fontsize=8)
+    ax.set_ylabel(y, fontsize=8)
+    ax.tick_params(labelsize=7, which="both")
+    ax.grid(alpha=0.25)
+
+
+def save_figure(path: StrPath, figure: Figure, *, overwrite: bool = False) -> None:
+    """Write ``figure`` as the ending of ``path`` says.
+
+    Raises DataError for an ending that is not known, and as :func:`written` does.
+    """
+    path = Path(path)
+    try:
+        with written(path, overwrite=overwrite) as part:
+            figure.savefig(part, dpi=120, format=path.suffix[1:].lower() or "png")
+    except ValueError as error:
+        raise DataError(f"cannot be written: {error}", where=str(path)) from error
+
 
 MOST_PANELS = 16
 _MM = 1e3
@@ -181,3 +224,83 @@ def _mark(ax: Axes, mesh: Mesh, panel: Panel) -> None:
     ax.set_xlabel("mm", fontsize=7)
     ax.tick_params(labelsize=6)
     ax.margins(0.09)
+
+
+Pictures = Iterable[NDArray[np.uint8]]
+
+
+def write_gif(path: StrPath, pictures: Pictures, fps: float, *, overwrite: bool = False) -> None:
+    """Write pictures (h, w, 3) as a GIF that repeats.
+
+    Raises
+    ------
+    DataError
+        When Pillow is missing, and as :func:`written` does.
+    """
+    pillow = needed("PIL.Image", "plot", path)
+    images = (pillow.fromarray(figure) for figure in pictures)
+    first = next(images)
+    with written(path, overwrite=overwrite) as part:
+        first.save(part, "GIF", save_all=True, append_images=images, duration=1e3 / fps, loop=0)
+
+
+def write_mp4(path: StrPath, pictures: Pictures, fps: float, *, overwrite: bool = False) -> None:
+    """Write pictures (h, w, 3) as H.264 through ffmpeg.
+
+    Raises
+    ------
+    DataError
+        When there is no ffmpeg or it cannot write the file, and as :func:`written` does.
+    """
+    program = shutil.which("ffmpeg")
+    if program is None:
+        raise DataError(
+            "MP4 needs the program ffmpeg, which is not installed",
+            where=str(path),
+            hint="install ffmpeg, or export to .gif",
+        )
+    stream = iter(pictures)
+    first = next(stream)
+    height, width = first.shape[:2]
+    command = [
+        *(program, "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24"),
+        *("-s", f"{width}x{height}", "-r", str(fps), "-i", "-"),
+        *("-pix_fmt", "yuv420p", "-vf", "crop=trunc(iw/2)*2:trunc(ih/2)*2"),
+    ]
+    with written(path, overwrite=overwrite) as part:
+        reason = _encoded([*command, str(part)], first, stream)
+        if reason:
+            raise DataError(f"cannot be written: {reason}", where=str(path))
+
+
+class Film(Protocol):
+    """What writes pictures (h, w, 3) as a film."""
+
+    def __call__(
+        self, path: StrPath, pictures: Pictures, fps: float, *, overwrite: bool = False
+    ) -> None:
+        """Write the film. Raises DataError."""
+
+
+FILMS: dict[str, Film] = {".gif": write_gif, ".mp4": write_mp4}
+"""What writes a film, by the ending of its name."""
+
+
+def _encoded(command: list[str], first: NDArray[np.uint8], rest: Pictures) -> str:
+    """Feed a program; why it failed, or ""."""
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        _feed(process, first, rest)
+        _, errors = process.communicate()
+    if not process.returncode:
+        return ""
+    text = errors.decode(errors="replace").strip().splitlines()
+    return text[-1] if text else f"ffmpeg ended with the code {process.returncode}"
+
+
+def _feed(process: Any, first: NDArray[np.uint8], rest: Pictures) -> None:
+    try:
+        process.stdin.write(first.tobytes())
+        for figure in rest:
+            process.stdin.write(figure.tobytes())
+    except BrokenPipeError:
+        pass  # it has ended, and says why

@@ -10,7 +10,7 @@ import numpy as np
 
 from tomoskin.core import CHANGE, Event, Image, SinkError, StrPath, needed, written
 from tomoskin.files.exports.bag import recorded_items, recorded_stream
-from tomoskin.files.messages import Contacts, Item, Stream, touch_colour, touch_width
+from tomoskin.files.messages import Contacts, Item, Stream, time_of, touch_colour, touch_width
 from tomoskin.files.session import as_recorded
 
 if TYPE_CHECKING:
@@ -39,8 +39,8 @@ class RerunView:
 
     def log(self, item: Item) -> None:
         """What ``item`` says, at the time of its measurement."""
-        utc = self._stream.utc(item.host_time)
-        when = {"duration": item.host_time} if utc is None else {"timestamp": utc}
+        utc = self._stream.utc(time_of(item))
+        when = {"duration": time_of(item)} if utc is None else {"timestamp": utc}
         self._recording.set_time("time", **when)
         for event in (item,) if isinstance(item, Event) else item.events:
             text = self._rerun.TextLog(f"{event.kind}: {event.text}")

@@ -11,14 +11,11 @@ import numpy as np
 
 from tomoskin.core import DataError, StrPath
 from tomoskin.files.exports.bag import write_bag
-from tomoskin.files.exports.hdf5 import write_hdf5
 from tomoskin.files.exports.lerobot import write_lerobot
 from tomoskin.files.exports.matlab_file import write_matlab
-from tomoskin.files.exports.movie import FILMS
-from tomoskin.files.exports.picture import MOST_PANELS, Panel, rendered, write_picture
+from tomoskin.files.exports.picture import FILMS, MOST_PANELS, Panel, rendered, write_picture
 from tomoskin.files.exports.rerun_file import write_rerun
-from tomoskin.files.exports.session_table import write_csv, write_parquet
-from tomoskin.files.exports.touch_csv import write_touches
+from tomoskin.files.exports.session_table import write_csv, write_hdf5, write_parquet, write_touches
 from tomoskin.files.exports.vtu import write_series
 from tomoskin.files.imports import write_interchange
 from tomoskin.files.messages import Every

@@ -1,8 +1,11 @@
-"""Voltages of a session as a table, .csv or .parquet, block by block."""
+"""Voltages and touches of a session as tables, .csv or .parquet, block by block; and everything of
+it in one HDF5 file (extra ``hdf5``)."""
 
 from __future__ import annotations
 
+import csv
 import math
+from collections.abc import Iterable
 from typing import Any
 
 import msgspec
@@ -19,7 +22,10 @@ from tomoskin.files.session import (
     all_blocks,
     idle_count,
     press_positions,
+    session_touches,
 )
+from tomoskin.model.mesh import Surface
+from tomoskin.sensing.track import ELAPSED, TouchedFrame, columns_of, force_values, touch_rows
 
 Column = NDArray[Any]
 
@@ -103,3 +109,113 @@ def _about(session: SessionReader, rows: Rows) -> dict[str, str]:
     tables = {"drive": pattern.drive.tolist(), "measure": pattern.measure.tolist()}
     written = {name: msgspec.json.encode(table).decode() for name, table in tables.items()}
     return written | {"skin": session.skin.to_toml(), "epoch_s": repr(session.epoch)}
+
+
+def write_touches(
+    path: StrPath,
+    frames: Iterable[TouchedFrame],
+    surface: Surface | None = None,
+    *,
+    forces: bool = False,
+    begun: float | None = None,
+    overwrite: bool = False,
+) -> int:
+    """Write touches of (frame, time, touches); return the number of rows.
+
+    A frame is its index in the recording, from 0, and empty where that does not hold it; its time
+    is the recording's own.
+
+    ``forces`` adds those of the touches, which are empty where a touch has none; ``begun``, the
+    time of the recording's own first frame, adds the time since then.
+
+    A standard deviation that is not known is an empty field; the kind is :attr:`Touch.said`. On
+    a ``surface`` that is not flat each row ends with the touch's position on it.
+
+    Raises as :func:`written` does.
+    """
+    names, count = columns_of(surface, forces=forces, begun=begun), 0
+    with (
+        written(path, overwrite=overwrite) as part,
+        part.open("w", newline="", encoding="utf-8") as file,
+    ):
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(names)
+        for row in touch_rows(frames, surface, forces=forces, begun=begun):
+            table.writerow(_touch_text(name, value) for name, value in zip(names, row, strict=True))
+            count += 1
+    return count
+
+
+def _touch_text(name: str, value: object) -> str:
+    if name in ("time_s", ELAPSED):
+        return f"{value:.6f}"
+    if isinstance(value, float):
+        return "" if math.isnan(value) else f"{value:.6g}"
+    return "" if name == "frame" and value == -1 else str(value)
+
+
+_FRAMES = ("number", "time", "host_time", "sequence", "ticks", "mark", "samples", "voltages")
+_TOUCH = np.dtype(
+    [("frame", "i8"), ("time", "f8"), ("id", "i8"), ("kind", "S32"), ("since", "f8")]
+    + [(name, "f8") for name in ("x", "y", "sd_x", "sd_y", "area", "peak")]
+    + [("force", "f8"), ("force_low", "f8"), ("force_high", "f8"), ("force_state", "S12")]
+)
+
+
+def write_hdf5(
+    path: StrPath, session: SessionReader, advance: Advance, *, overwrite: bool = False
+) -> None:
+    """Groups ``frames`` (one dataset a column), ``touches``, ``truth`` and ``events``.
+
+    ``drive`` and ``measure`` (n_meas, 2) beside them; the skin file, device and settings are
+    attributes.
+
+    Raises
+    ------
+    DataError
+        When h5py is missing or the session is damaged, and as :func:`written` does.
+    """
+    h5py = needed("h5py", "hdf5", path)
+    rows = Rows.of(session)
+    with written(path, overwrite=overwrite) as part, h5py.File(part, "w") as file:
+        file.attrs["skin"] = session.skin.to_toml()
+        file.attrs["epoch_s"] = session.epoch
+        file.attrs["device"] = _json(session.device())
+        file.attrs["settings"] = _json(session.settings())
+        file["drive"], file["measure"] = rows.pattern.drive, rows.pattern.measure
+        group = file.create_group("frames")
+        for block in all_blocks(session, rows, advance):
+            _append(group, block)
+        file["touches"] = _touches(session)
+        text = h5py.string_dtype()
+        for name, items in (("truth", session.truth()), ("events", session.events())):
+            lines = [_json(item) for item in items]
+            file.create_dataset(name, data=np.array(lines, dtype=object), dtype=text)
+
+
+def _append(group: Any, block: Block) -> None:
+    for name in _FRAMES:
+        values = getattr(block, name)
+        if name not in group:
+            limits = (None, *values.shape[1:])
+            group.create_dataset(name, data=values, maxshape=limits, chunks=True)
+        else:
+            dataset = group[name]
+            dataset.resize(len(dataset) + len(values), axis=0)
+            dataset[-len(values) :] = values
+
+
+def _touches(session: SessionReader) -> Any:
+    """By frame, as in every table; -1 where a touch's frame is not in the file."""
+    table = [
+        (-1 if frame is None else frame, time, t.id, t.said.encode(), t.since,
+         r.x, r.y, r.sd_x, r.sd_y, r.area, r.peak, *force_values(r.force))
+        for frame, time, touches in session_touches(session)
+        for t in touches
+        for r in [t.detection]
+    ]  # fmt: skip
+    return np.array(table, dtype=_TOUCH)
+
+
+def _json(item: Any) -> str:
+    return msgspec.json.encode(item).decode()

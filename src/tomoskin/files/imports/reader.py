@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from tomoskin.core import EMPTY, MAGIC, Arrays, DataError, StrPath, load_arrays
+from tomoskin.core import EMPTY, MAGIC, Arrays, DataError, StrPath, load_arrays, open_input
 from tomoskin.files.imports import (
     csv_table,
     eidors,
@@ -136,12 +136,7 @@ def _from_text(head: bytes, path: Path) -> Recording:
 
 
 def _beginning(path: Path) -> bytes:
-    try:
-        with path.open("rb") as file:
-            if head := file.read(_HEAD):
-                return head
-        raise DataError(EMPTY, where=str(path))
-    except FileNotFoundError as error:
-        raise DataError("there is no such file", where=str(path)) from error
-    except OSError as error:
-        raise DataError(f"cannot be read: {error.strerror or error}", where=str(path)) from error
+    with open_input(path) as file:
+        if head := file.read(_HEAD):
+            return head
+    raise DataError(EMPTY, where=str(path))

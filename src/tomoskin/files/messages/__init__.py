@@ -5,6 +5,7 @@ from tomoskin.files.messages.contacts import (
     Contacts,
     event_content,
     event_of,
+    time_of,
     touch_row,
 )
 from tomoskin.files.messages.foxglove_records import (
@@ -52,6 +53,7 @@ __all__ = [
     "ros_messages",
     "row_labels",
     "scene_message",
+    "time_of",
     "touch_colour",
     "touch_row",
     "touch_width",

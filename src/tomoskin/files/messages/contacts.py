@@ -141,7 +141,7 @@ class Contacts:
     problem
         What is wrong, in a sentence, or None.
     latency
-        s from ``host_time`` until this record was made; None for what was recorded.
+        s from the middle of the scan until this record was made; None for what was recorded.
     tracked
         The touches on the sheet, in the order of their identities.
     happened
@@ -150,6 +150,9 @@ class Contacts:
         (n_meas,) V; None where no frame came, or no reference stands.
     image
         Change of conductivity; None where a newer frame waits, or one was sent a moment ago.
+    scanned, scan_time
+        Middle of the scan on the same clock as ``host_time``, and how long it took, s; NaN where
+        no frame came, or its board has no clock.
     is_due
         Whether the touches are worth a message.
     reports
@@ -167,6 +170,8 @@ class Contacts:
     voltages: FloatArray | None = field(default=None, repr=False)
     reference: FloatArray | None = field(default=None, repr=False)
     image: Image | None = field(default=None, repr=False)
+    scanned: float = math.nan
+    scan_time: float = math.nan
     is_due: bool = True
     reports: bool = True
 
@@ -180,12 +185,14 @@ class Contacts:
             host_time=result.host_time,
             valid=valid,
             problem=result.problem if result.ready else NO_REFERENCE,
-            latency=stream.latency(result.host_time),
+            latency=stream.latency(_when(result.scanned, result.host_time)),
             tracked=result.touches,
             happened=result.events,
             voltages=result.voltages,
             reference=result.reference if result.ready else None,
             image=result.image if valid else None,
+            scanned=result.scanned,
+            scan_time=result.scan_time,
         )
 
     @property
@@ -199,9 +206,14 @@ class Contacts:
         return self.stream.naming.frame_id
 
     @property
+    def when(self) -> float:
+        """The time that the touches are of: the middle of the scan where it is known, s."""
+        return _when(self.scanned, self.host_time)
+
+    @property
     def utc(self) -> float | None:
-        """S since 1970 of ``host_time``; None in a simulation."""
-        return self.stream.utc(self.host_time)
+        """S since 1970 of the middle of the scan; None in a simulation."""
+        return self.stream.utc(self.when)
 
     @cached_property
     def touches(self) -> tuple[Contact, ...]:
@@ -222,6 +234,7 @@ class Contacts:
         return {
             "host_time": self.host_time,
             "utc_s": self.utc,
+            "scan_s": None if math.isnan(self.scan_time) else round(self.scan_time, 6),
             "skin": self.skin,
             "frame_id": self.frame_id,
             "sequence": self.sequence,
@@ -242,6 +255,15 @@ class Contacts:
             | Contact.of(event.touch, self.stream.surface).content()
             for event in self.happened
         ]
+
+
+def time_of(item: Contacts | Event) -> float:
+    """The time that a message is stamped with, on the host's clock, s."""
+    return item.host_time if isinstance(item, Event) else item.when
+
+
+def _when(scanned: float, host_time: float) -> float:
+    return host_time if math.isnan(scanned) else scanned
 
 
 def touch_row(touch: Touch) -> dict[str, Any]:

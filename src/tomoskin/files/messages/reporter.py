@@ -86,7 +86,9 @@ class Reporter:
         if not self._is_lost or self._newest is None:
             return None
         now = self._now(self._newest.host_time)
-        return replace(self._paced(replace(self._newest, host_time=now)), reports=True)
+        return replace(
+            self._paced(replace(self._newest, host_time=now, scanned=math.nan)), reports=True
+        )
 
     def repeat(self) -> None:
         """Send what comes next whatever was sent before, since somebody new listens."""

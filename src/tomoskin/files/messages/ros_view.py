@@ -8,7 +8,7 @@ from typing import Any
 
 from tomoskin.core import Event, Image, encode_json
 from tomoskin.files.messages import ros_fields
-from tomoskin.files.messages.contacts import Contacts, event_content
+from tomoskin.files.messages.contacts import Contacts, event_content, time_of
 from tomoskin.files.messages.reporter import Item
 from tomoskin.files.messages.ros_fields import Value
 from tomoskin.files.messages.stream import Stream
@@ -49,8 +49,8 @@ class RosMessage:
 
 def ros_messages(stream: Stream, item: Item) -> Iterator[RosMessage]:
     """Messages of one frame, or of an event."""
-    stamp = stream.log_time(item.host_time)
     of_frame = not isinstance(item, Event)
+    stamp = stream.log_time(time_of(item))
     for event in (item,) if isinstance(item, Event) else item.events:
         content = event_content(stream, event, of_frame=of_frame)
         yield RosMessage("events", _json(content), stamp)

@@ -1,15 +1,5 @@
 """Session files: write, read, repair, replay."""
 
-from tomoskin.files.session.blocks import (
-    Advance,
-    Block,
-    Rows,
-    all_blocks,
-    no_report,
-    press_positions,
-    read_session,
-    recording_of,
-)
 from tomoskin.files.session.channels import schema_of
 from tomoskin.files.session.info import OWN_FILES, SessionInfo, session_info
 from tomoskin.files.session.layout import (
@@ -24,35 +14,30 @@ from tomoskin.files.session.recorder import (
     RunMessage,
     RunSettings,
 )
-from tomoskin.files.session.repair import (
-    Lost,
-    Repaired,
-    repair,
-    split,
-    split_names,
-    split_targets,
-)
-from tomoskin.files.session.replay import ReplayTransport, open_replay, parse_replay
+from tomoskin.files.session.repair import Lost, Repaired, repair, split, split_targets
+from tomoskin.files.session.replay import ReplayTransport, parse_replay
 from tomoskin.files.session.replayed import (
+    Session,
     as_recorded,
     reconstruct_session,
     recorded_calibrations,
     replayed,
     session_touches,
 )
-from tomoskin.files.session.scanned import first_scan, idle_count, scanned_touches
-from tomoskin.files.session.session import Session
-from tomoskin.files.session.session_reader import (
-    SessionReader,
-    end_time,
-    indexed_frames,
-    message_counts,
-    start_time,
-    tick_rate,
-    touches_before,
+from tomoskin.files.session.scanned import (
+    Advance,
+    Block,
+    Rows,
+    all_blocks,
+    first_scan,
+    idle_count,
+    no_report,
+    press_positions,
+    read_session,
+    recording_of,
 )
+from tomoskin.files.session.session_reader import SessionReader, indexed_frames, message_counts
 from tomoskin.files.session.session_writer import SessionWriter, robot_logs
-from tomoskin.sensing.track import Span
 
 __all__ = [
     "OWN_FILES",
@@ -72,19 +57,16 @@ __all__ = [
     "SessionInfo",
     "SessionReader",
     "SessionWriter",
-    "Span",
     "Timeline",
     "Truth",
     "all_blocks",
     "as_recorded",
-    "end_time",
     "errors_of",
     "first_scan",
     "idle_count",
     "indexed_frames",
     "message_counts",
     "no_report",
-    "open_replay",
     "parse_replay",
     "press_positions",
     "read_session",
@@ -95,14 +77,9 @@ __all__ = [
     "repair",
     "replayed",
     "robot_logs",
-    "scanned_touches",
     "schema_of",
     "session_info",
     "session_touches",
     "split",
-    "split_names",
     "split_targets",
-    "start_time",
-    "tick_rate",
-    "touches_before",
 ]

@@ -7,12 +7,11 @@ from collections import deque
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import BinaryIO
 
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Footer, Metadata
 
-from tomoskin.core import EMPTY, MAGIC, DataError
+from tomoskin.core import EMPTY, MAGIC, DataError, open_input
 from tomoskin.files.session.mcap_records import (
     LARGEST,
     LARGEST_SUMMARY,
@@ -56,13 +55,8 @@ class ContainerReader:
     def __init__(self, path: Path) -> None:
         self.where, self.torn = str(path), ""
         self.summary: Summary | None = None
-        try:
-            self._file: BinaryIO = path.open("rb", buffering=1 << 18)
-            self.size = self._end = self._file.seek(0, io.SEEK_END)
-        except OSError as error:
-            reason = "there is no such file" if isinstance(error, FileNotFoundError) else (
-                f"cannot be read: {error.strerror or error}")  # fmt: skip
-            raise DataError(reason, where=self.where) from error
+        self._file = open_input(path, buffering=1 << 18)
+        self.size = self._end = self._file.seek(0, io.SEEK_END)
         try:
             self._open()
         except BaseException:

@@ -11,8 +11,7 @@ from typing import Any
 
 from tomoskin.board.source import ClockFit, ClockFitter
 from tomoskin.core import Mark, MarkedFrame, StrPath
-from tomoskin.files.session.blocks import Advance, no_report
-from tomoskin.files.session.scanned import first_scan, scanned_touches
+from tomoskin.files.session.scanned import Advance, first_scan, no_report, scanned_touches
 from tomoskin.files.session.session_reader import (
     SessionReader,
     indexed_frames,

@@ -145,6 +145,7 @@ def _touch_of(item: dict[str, Any]) -> Touch:
     force = None
     if item.get("force") is not None:
         low, high = item["force_interval"]
+        high = math.inf if high is None else high  # beyond what was taught
         force = Force(item["force"], low, high, item["force_calibrated"])
     reading = Detection(*place, cov_xy=cov_xy or 0.0, close=bool(close), force=force)
     return Touch(item["id"], item["kind"], item["since"], reading, tuple(merged or ()), possible)

@@ -26,9 +26,9 @@ from tomoskin.core import (
     SkinError,
     StrPath,
     check_outputs,
+    open_input,
     written,
 )
-from tomoskin.files.session.blocks import Advance, no_report
 from tomoskin.files.session.channels import CHANNELS, SCHEMAS, SPAN, TOPICS
 from tomoskin.files.session.container import ContainerWriter
 from tomoskin.files.session.layout import host_time_of
@@ -41,6 +41,7 @@ from tomoskin.files.session.mcap_records import (
     messages_in,
 )
 from tomoskin.files.session.message_log import LIBRARY, errors_of
+from tomoskin.files.session.scanned import Advance, no_report
 from tomoskin.files.session.session_reader import epoch_of
 from tomoskin.files.session.session_writer import (
     ABOUT,
@@ -194,7 +195,7 @@ def _new_file(path: Path) -> Iterator[ContainerWriter]:
 
 def _stretches(source: Path) -> Iterator[tuple[Stretch, int]]:
     """Each stretch of a file, and the file's size."""
-    with errors_of(source), source.open("rb") as file:
+    with errors_of(source), open_input(source) as file:
         if not (size := file.seek(0, 2)):
             raise DataError(EMPTY, where=str(source))
         for stretch in stretches(file, size):

@@ -1,16 +1,27 @@
-"""A recorded session through the pipeline again, without a clock: the same touches to the bit."""
+"""A recorded session through the pipeline again, without a clock: the same touches to the bit;
+and a session for those who compute with it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import ThreadpoolController
 
-from tomoskin.core import DataError, Mark
-from tomoskin.files.session.blocks import Advance, no_report
-from tomoskin.files.session.scanned import ScannedFrame, scanned_touches, timed
+from tomoskin.core import DataError, Mark, StrPath
+from tomoskin.files.session.scanned import (
+    Advance,
+    ScannedFrame,
+    no_report,
+    read_session,
+    scanned_touches,
+    timed,
+)
 from tomoskin.files.session.session_reader import (
     SessionReader,
     indexed_frames,
@@ -20,6 +31,7 @@ from tomoskin.files.session.session_reader import (
     touches_before,
 )
 from tomoskin.learning import KINDS, Calibration
+from tomoskin.model.mesh import Mesh
 from tomoskin.model.pattern import Scan
 from tomoskin.pipeline import (
     FrameResult,
@@ -30,7 +42,8 @@ from tomoskin.pipeline import (
     Setting,
     prepare,
 )
-from tomoskin.sensing.track import TouchedFrame
+from tomoskin.sensing.signal import Recording
+from tomoskin.sensing.track import TouchedFrame, has_forces, touch_columns
 
 
 def as_recorded(session: SessionReader) -> Prepared:
@@ -72,10 +85,12 @@ def gathered(
     """Every frame of ``scan`` but those from before the recording, and what ``pipeline`` makes of
     it: None where it was held, skipped or refused. Not ``marked``: as if the run had followed all
     of them, from one reference on."""
+    threads = ThreadpoolController()
     for frame in timed(session.frames(), tick_rate(session), scan):
         mark = frame.item.mark if marked else Mark.NONE
         try:
-            result = pipeline.push(frame.item.frame, mark)
+            with threads.limit(limits=1):  # as live, so that sums keep their order
+                result = pipeline.push(frame.item.frame, mark)
         except DataError:
             result = None
         if not frame.item.mark & Mark.EARLIER:
@@ -162,3 +177,68 @@ def reconstruct_session(
             hint="choose untouched frames with --reference",
         )
     return replace(whole, unseen=np.array(without, dtype=np.int64))
+
+
+class Session:
+    """A recorded session; iterate over it for what the pipeline makes of each frame.
+
+    Every loop begins at the first frame and gives the same results, those of the live run to the
+    bit. Until the reference stands, ``ready`` of a frame is False. The file is open only while it
+    is read.
+
+    Parameters
+    ----------
+    path
+        The file, such as "run.mcap".
+
+    Attributes
+    ----------
+    path
+        The file.
+    skin
+        The skin that it was recorded with.
+
+    Raises
+    ------
+    DataError
+        When the file cannot be read, is no session, or is damaged; from every method.
+    """
+
+    def __init__(self, path: StrPath) -> None:
+        self.path = Path(path)
+        with SessionReader(self.path) as reader:
+            self.skin = reader.skin
+
+    def __iter__(self) -> Iterator[FrameResult]:
+        """Frame by frame: voltages, image, touches."""
+        with SessionReader(self.path) as reader:
+            yield from replayed(self.prepared, reader)
+
+    @property
+    def mesh(self) -> Mesh:
+        """The mesh that the images live on."""
+        return self.prepared.mesh
+
+    @cached_property
+    def prepared(self) -> Prepared:
+        """What the pipeline needs of the skin and of the calibrations that were on."""
+        with SessionReader(self.path) as reader:
+            return as_recorded(reader)
+
+    def voltages(self) -> Recording:
+        """All frames at once, as voltages in the order of the skin's pattern."""
+        return read_session(self.path)
+
+    def touches(self) -> dict[str, NDArray[np.generic]]:
+        """All touches as columns, one row a touch, as ``pandas.DataFrame`` takes them.
+
+        The columns are those of :func:`tomoskin.sensing.track.touch_columns`.
+        """
+        with SessionReader(self.path) as reader:
+            pipeline = replaying(self.prepared, reader)
+            frames = [
+                (frame.number, frame.time, result.touches)
+                for frame, result in gathered(pipeline, reader, self.prepared.scan)
+                if result is not None
+            ]
+        return touch_columns(frames, self.skin.surface, forces=has_forces(frames))

@@ -1,18 +1,25 @@
-"""What ``frame`` and ``time_s`` are in every table: frames of a session, numbered and timed."""
+"""What ``frame`` and ``time_s`` are in every table: frames of a session, numbered and timed; their
+voltages, a block at a time, so that memory does not grow, or all."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
+from dataclasses import dataclass
+from itertools import islice
 from typing import NamedTuple
 
-from tomoskin.core import DataError, Frame, Mark, MarkedFrame
+import numpy as np
+from numpy.typing import NDArray
+
+from tomoskin.core import DataError, FloatArray, Frame, IntArray, Mark, MarkedFrame, StrPath
 from tomoskin.files.session.session_reader import (
     SessionReader,
     indexed_frames,
     reference_frames,
     tick_rate,
 )
-from tomoskin.model.pattern import Scan
+from tomoskin.model.pattern import Pattern, Scan
+from tomoskin.sensing.signal import Readout, Recording
 from tomoskin.sensing.track import TouchedFrame
 
 
@@ -104,3 +111,174 @@ def idle_count(session: SessionReader, scan: Scan) -> int:
     first = next(scanned_frames(session, scan), None)
     begins = first is not None and first.item.mark & Mark.REFERENCE
     return reference_frames(session.settings()) if begins else 1
+
+
+Advance = Callable[[float, float], None]
+"""Called with how much of how much is done."""
+
+
+def no_report(_done: float, _total: float) -> None:
+    """An :data:`Advance` for those who do not want to know."""
+
+
+MOST_FRAMES = 2048
+"""Frames of a block."""
+
+_LISTED = 5
+"""Frames that a note names."""
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Successive frames, one row each.
+
+    ``number`` (n,) from the first in the file; ``time`` (n,) s when they were scanned and
+    ``host_time`` (n,) when they were read, host monotonic; ``sequence``, ``ticks``, ``mark``
+    (n,); ``samples`` (n, n_samples) counts; ``voltages`` (n, n_meas) V, NaN where a sample stood
+    at a rail.
+    """
+
+    number: IntArray
+    time: FloatArray
+    host_time: FloatArray
+    sequence: IntArray
+    ticks: NDArray[np.uint64]
+    mark: IntArray
+    samples: NDArray[np.uint16]
+    voltages: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """What the columns of the voltages are: the pattern, and how counts become volts."""
+
+    pattern: Pattern
+    readout: Readout
+
+    @classmethod
+    def of(cls, session: SessionReader) -> Rows:
+        """Rows of a session's own skin."""
+        pattern = session.skin.pattern()
+        return cls(pattern, Readout.of(Scan.of(pattern), session.skin.readout))
+
+    def voltages(
+        self, samples: NDArray[np.uint16], sums: NDArray[np.uint16] | None = None
+    ) -> FloatArray:
+        """(n, n_meas) V of (n, n_samples) counts, as the read-out gives them frame by frame.
+
+        NaN where a sample stood at a rail; ``sums``, if any, as in a frame.
+        """
+        volts, railed = self.readout.rows(samples, sums)
+        volts[railed] = np.nan
+        return volts
+
+
+def all_blocks(session: SessionReader, rows: Rows, advance: Advance = no_report) -> Iterator[Block]:
+    """Every frame of the session's scan, in blocks; frames of another scan are left out.
+
+    ``advance`` is called with how many frames of how many are done.
+
+    Raises
+    ------
+    DataError
+        When the file is damaged, frames that were written are missing, or there is none.
+    """
+    done, total = 0, indexed_frames(session)
+    for block in _blocks(session, rows):
+        yield block
+        done += len(block.number)
+        advance(done, max(done, total))
+    if not done:
+        but = f"; it {session.torn}" if session.torn else ""
+        raise DataError(f"holds no frame of its skin{but}", where=str(session.path))
+
+
+def read_session(path: StrPath) -> Recording:
+    """All frames of a session file as voltages; see :func:`recording_of`."""
+    with SessionReader(path) as session:
+        return recording_of(session)
+
+
+def recording_of(session: SessionReader) -> Recording:
+    """All frames as voltages in the order of the skin's pattern.
+
+    Frames of another scan are left out. A measurement at a rail of the converter is NaN.
+    ``labels`` are there when the file holds truth: the position of the press where there was
+    exactly one, else NaN. ``idle`` are the frames that the run took its first reference from.
+
+    Raises
+    ------
+    DataError
+        When the file is damaged, no frame is in it, or some that were written are missing.
+    """
+    rows = Rows.of(session)
+    blocks = list(all_blocks(session, rows))
+    positions = press_positions(session)
+    n_frames = sum(len(block.number) for block in blocks)
+    return Recording(
+        voltages=np.concatenate([block.voltages for block in blocks]),
+        drive=rows.pattern.drive,
+        measure=rows.pattern.measure,
+        time=np.concatenate([block.time for block in blocks]),
+        reference=None,
+        labels=None if positions is None else np.concatenate(list(map(positions, blocks))),
+        is_change=False,
+        source=str(session.path),
+        notes=_notes(session, blocks),
+        idle=min(idle_count(session, rows.readout.scan), n_frames),
+    )
+
+
+def _notes(session: SessionReader, blocks: list[Block]) -> tuple[str, ...]:
+    """What is missing at the end, and where the board's clock did not go on."""
+    notes = [f"the file {session.torn}"] if session.torn else []
+    ticks = np.concatenate([block.ticks for block in blocks]).astype(np.int64)
+    again = 1 + np.flatnonzero(np.diff(ticks) <= 0)
+    if len(again):
+        listed = ", ".join(map(str, again[:_LISTED].tolist()))
+        more = ", …" if len(again) > _LISTED else ""
+        notes.append(
+            f"the board's clock does not go on in {len(again)} frames: {listed}{more}; each counts "
+            "from when it was read"
+        )
+    return tuple(notes)
+
+
+def press_positions(session: SessionReader) -> Callable[[Block], FloatArray] | None:
+    """Gives (n, 2) m, where exactly one press was on the twin in each frame of a block, else NaN.
+
+    None where the file holds no truth.
+    """
+    truth = list(session.truth())
+    if not truth:
+        return None
+    positions = np.full((len(truth) + 1, 2), np.nan)
+    for number, item in enumerate(truth, start=1):
+        if len(item.presses) == 1:
+            [press] = item.presses
+            positions[number] = float(press["x"]), float(press["y"])
+    changes = np.array([item.host_time for item in truth])
+    return lambda block: positions[np.searchsorted(changes, block.host_time, side="right")]
+
+
+def _blocks(session: SessionReader, rows: Rows) -> Iterator[Block]:
+    frames = scanned_frames(session, rows.readout.scan)
+    while some := list(islice(frames, MOST_FRAMES)):
+        yield _block(some, rows)
+
+
+def _block(items: list[ScannedFrame], rows: Rows) -> Block:
+    frames = [item.frame for _, _, item in items]
+    samples = np.stack([frame.samples for frame in frames])
+    given = [frame.sums for frame in frames if frame.sums is not None]
+    sums = np.stack(given) if len(given) == len(frames) else None
+    return Block(
+        number=np.array([number for number, _, _ in items]),
+        time=np.array([time for _, time, _ in items]),
+        host_time=np.array([frame.host_time for frame in frames]),
+        sequence=np.array([frame.sequence for frame in frames]),
+        ticks=np.array([frame.ticks for frame in frames], dtype=np.uint64),
+        mark=np.array([int(item.mark) for _, _, item in items]),
+        samples=samples,
+        voltages=rows.voltages(samples, sums),
+    )

@@ -11,8 +11,13 @@ from typing import Self
 import numpy as np
 
 from tomoskin.core import DataError, Detection, FloatArray, Force, IntArray
-from tomoskin.learning.force.curve import ForceCurve, basis
-from tomoskin.learning.force.load_memory import SHALLOW, averaged_memory, without_memory
+from tomoskin.learning.force.curve import (
+    SHALLOW,
+    ForceCurve,
+    averaged_memory,
+    basis,
+    without_memory,
+)
 from tomoskin.learning.force.weighed_presses import WeighedPresses, check_rising
 from tomoskin.learning.touch.gaussian_process import nine_in_ten
 from tomoskin.model.skin import MaterialMemory, MemoryState, Skin, advanced, load_of
@@ -198,9 +203,9 @@ class ForceModel:
         force = self.presses.force[self.presses.labelled]
         return np.asarray(self.left_out[:, 0] / force - 1)
 
-    @property
+    @cached_property
     def most(self) -> float:
-        """The largest force that it was learnt from, N."""
+        """The largest force that it was learnt from, N; of more it says only that it is more."""
         return float(np.nanmax(self.presses.force))
 
     @property
@@ -222,8 +227,12 @@ class ForceModel:
         return float(np.nanmedian(1 / known**2)) if np.isfinite(known).any() else 0.0
 
     def _forces(self, terms: FloatArray, depth: FloatArray, sd: FloatArray) -> list[Force]:
-        points = _widened(self.curve.log_forces(terms, depth, sd), self.scale)
-        return [Force(newtons, low, high) for newtons, low, high in points.tolist()]
+        points = _widened(self.curve.log_forces(terms, depth, sd), self.scale).tolist()
+        most = self.most
+        return [
+            Force(newtons, min(low, most), math.inf if newtons > most else high)
+            for newtons, low, high in points
+        ]
 
 
 def depth_of(peak: FloatArray, area: FloatArray, conductivity: float, radius: float) -> FloatArray:

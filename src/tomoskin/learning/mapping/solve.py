@@ -10,13 +10,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tomoskin.core import DataError, FloatArray
-from tomoskin.learning.mapping.mapping import ChannelMapping, ring_of, swaps, turns
-from tomoskin.learning.mapping.mapping_likelihood import (
+from tomoskin.learning.mapping.mapping import (
+    ChannelMapping,
     IndentationResponses,
     MappingLikelihood,
     agreement,
     likelihood,
     quiet_noise,
+    ring_of,
+    swaps,
+    turns,
 )
 from tomoskin.learning.touch.presses import Presses
 from tomoskin.model.skin import Skin

@@ -10,7 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from tomoskin.core import FloatArray, GeometryError, IntArray, install_hint
+from tomoskin.core import (
+    DataError,
+    FloatArray,
+    GeometryError,
+    IntArray,
+    check_is_file,
+    install_hint,
+)
 
 READERS = {".msh": "gmsh", ".vtu": "vtu", ".stl": "stl", ".obj": "obj", ".ply": "ply"}
 """meshio's reader for each ending."""
@@ -20,6 +27,9 @@ TOO_LARGE = 10.0
 
 MARKER = "electrode"
 """Cell data of this name number facets: n > 0 belongs to the group En."""
+
+_LARGEST = 50_000_000
+"""Bytes that a mesh file may have; a million triangles of a .stl take so many."""
 
 _CORNERS = {"vertex": 1, "line": 2, "triangle": 3, "tetra": 4}
 
@@ -44,6 +54,7 @@ def parsed(file: Path) -> Any:
         raise GeometryError(
             "mesh files need meshio", where=str(file), hint=install_hint("mesh")
         ) from error
+    _check_readable(file)
     try:
         with np.errstate(over="ignore"):  # its test for binary STL multiplies text
             return reader.read(file)
@@ -54,6 +65,20 @@ def parsed(file: Path) -> Any:
         raise GeometryError(
             f"cannot be read as a {file.suffix} file{detail}", where=str(file)
         ) from error
+
+
+def _check_readable(file: Path) -> None:
+    try:
+        check_is_file(file)
+    except DataError as error:
+        raise GeometryError(error.message, where=error.where, hint=error.hint) from error
+    if file.stat().st_size > _LARGEST:
+        raise GeometryError(
+            f"is too large for a mesh ({file.stat().st_size / 1e6:.0f} MB, at most "
+            f"{_LARGEST / 1e6:.0f} MB, some million triangles)",
+            where=str(file),
+            hint="simplify it first; cells of a millimetre are fine enough",
+        )
 
 
 def check_repeats(cells: IntArray) -> None:

@@ -1,8 +1,16 @@
 """Where results go while they are made: Foxglove, MQTT, LSL, ROS 2, and others by name."""
 
 from tomoskin.files.messages import Contact, Contacts, Item, Naming, Stream
-from tomoskin.run.sinks.consumer import SinkConsumer, SinkReport, sink_report, sink_worker
-from tomoskin.run.sinks.sink import ContactListener, Sink, make_sink, sink_names
+from tomoskin.run.sinks.sink import (
+    ContactListener,
+    Sink,
+    SinkConsumer,
+    SinkReport,
+    make_sink,
+    sink_names,
+    sink_report,
+    sink_worker,
+)
 
 __all__ = [
     "Contact",

@@ -16,6 +16,7 @@ from tomoskin.files.messages import (
     grid_message,
     log_message,
     scene_message,
+    time_of,
 )
 from tomoskin.files.session import schema_of
 from tomoskin.run.sinks.sink import Sink, port_of
@@ -69,7 +70,7 @@ class FoxgloveSink(Sink):
 
     def publish(self, item: Item) -> None:
         """Send the messages of ``item``."""
-        now = self._stream.log_time(item.host_time)
+        now = self._stream.log_time(time_of(item))
         for event in (item,) if isinstance(item, Event) else item.events:
             self._send("/events", log_message(event, now), now)
         if isinstance(item, Event):

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from tomoskin.core import Event, FloatArray, SinkError, clock_ahead, encode_json, needed
-from tomoskin.files.messages import Contacts, Item, Naming, Stream, row_labels
+from tomoskin.files.messages import Contacts, Item, Naming, Stream, row_labels, time_of
 from tomoskin.run.sinks.sink import Sink
 
 MOST_TOUCHES = 5
@@ -65,7 +65,7 @@ class LslSink(Sink):
         self._outlets = {}
 
     def _push(self, name: str, sample: FloatArray | list[str], item: Item) -> None:
-        self._outlets[name].push_sample(sample, item.host_time + self._offset)
+        self._outlets[name].push_sample(sample, time_of(item) + self._offset)
 
     def _announce(
         self,

@@ -1,13 +1,18 @@
-"""What a sink is, and sinks by their names."""
+"""What a sink is, sinks by their names, what of a run goes to one, and how it is doing."""
 
 from __future__ import annotations
 
+import contextlib
+import logging
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from importlib.metadata import entry_points
+from typing import Any
 
-from tomoskin.core import Event, SinkError
-from tomoskin.files.messages import Contacts, Item, Naming, Stream
+from tomoskin.core import Capacity, Consumer, Event, Say, SinkError, TomoskinError, Worker
+from tomoskin.files.messages import Contacts, Item, Naming, Reporter, Stream
+from tomoskin.pipeline import FrameResult
 
 GROUP = "tomoskin.sinks"
 """Entry-point group: each entry is a function ``argument -> Sink`` that does no I/O."""
@@ -105,3 +110,126 @@ def options_of(words: Iterable[str], known: tuple[str, ...], where: str) -> dict
             raise SinkError(f'expected {form}, got "{word}"', where=where)
         options[key] = value
     return options
+
+
+MOST_WAITING = 256
+"""Results and events that may wait for one sink; the oldest make room, and are counted."""
+
+GRACE = 2.0
+"""Seconds in which a sink must send what waits when it is stopped."""
+
+_FIRST_DELAY, _LONGEST_DELAY = 0.5, 10.0
+_LONG = 2.0
+"""Seconds in one call after which a sink is said not to answer."""
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class SinkReport:
+    """How a sink is doing: ``well`` or not, in words, and what it sent and what was left out."""
+
+    name: str
+    well: bool
+    text: str
+    sent: int
+    left_out: int
+
+
+class SinkConsumer(Consumer):
+    """Gives a sink results and events; opens it again whenever it has failed.
+
+    Of results that wait only the newest keeps its image, ten a second at most. Those that came
+    while the sink was away are no news any more; events are.
+
+    Attributes
+    ----------
+    trouble
+        Why nothing is sent, or "".
+    """
+
+    kind = "sink"
+    slow, ready = "is too slow, and results are left out", "takes results"
+
+    def __init__(self, sink: Sink, stream: Stream, say: Say) -> None:
+        self.name = sink.name
+        self.trouble = "connecting"
+        self._sink, self._stream, self._say = sink, stream.named(sink.naming), say
+        self._reporter = Reporter(self._stream, period=sink.period)
+        self._newest: FrameResult | None = None
+        self._delay = _FIRST_DELAY
+
+    def admit(self, message: Any) -> FrameResult | Event | None:
+        """Results and events, and nothing else of a run."""
+        if isinstance(message, FrameResult):
+            self._newest = message
+            return message
+        return message if isinstance(message, Event) else None
+
+    def durable(self, item: FrameResult | Event) -> bool:
+        """Events are news however late."""
+        return isinstance(item, Event)
+
+    def open(self) -> None:
+        """Open the sink, which gets what comes next in full."""
+        self._sink.open(self._stream)
+        self.trouble = ""
+        self._reporter.repeat()
+
+    def take(self, item: FrameResult | Event) -> None:
+        """Send it; and of an event that the source is lost what that means for touches."""
+        if isinstance(item, FrameResult):
+            self._sink.publish(self._reporter.of(item, with_image=item is self._newest))
+        else:
+            self._sink.publish(item)
+            if (last := self._reporter.lost(item)) is not None:
+                self._sink.publish(last)
+        self._delay = _FIRST_DELAY
+
+    def tend(self) -> None:
+        """Report that the source is still lost, where it is."""
+        if (report := self._reporter.still_lost()) is not None:
+            self._sink.publish(report)
+
+    def close(self) -> None:
+        """Close the sink, which may be what has failed."""
+        with contextlib.suppress(Exception):
+            self._sink.close()
+
+    def handle_failure(self, error: Exception) -> float:
+        """Say so once; it is opened again after a pause that doubles."""
+        before, self.trouble = self.trouble, f"is not reachable: {_why(error)}"
+        if self.trouble != before:
+            text = f"{self.name} {self.trouble}"
+            _log.warning("%s", text)
+            self._say("sink-away", text)
+        delay = self._delay
+        self._delay = min(2 * delay, _LONGEST_DELAY)
+        return delay
+
+
+def sink_worker(sink: Sink, stream: Stream, say: Say) -> Worker[SinkConsumer]:
+    """A worker before ``sink``, not started."""
+    consumer = SinkConsumer(sink, stream, say)
+    return Worker(consumer, Capacity(MOST_WAITING, "newest", GRACE), say)
+
+
+def sink_report(worker: Worker[SinkConsumer]) -> SinkReport:
+    """How a sink is doing at this moment."""
+    consumer = worker.consumer
+    text = consumer.trouble or f"{worker.taken} sent"
+    if (silent := worker.silent) > _LONG:
+        text = f"has not answered for {silent:.0f} s, {text}"
+    if worker.left_out:
+        text += f", {worker.left_out} left out"
+    well = not consumer.trouble and silent <= _LONG
+    return SinkReport(consumer.name, well, text, worker.taken, worker.left_out)
+
+
+def _why(error: Exception) -> str:
+    """In words; the sink's name stands before them already."""
+    if isinstance(error, TomoskinError):
+        return f"{error.message} ({error.hint})" if error.hint else error.message
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror
+    return f"{type(error).__name__}: {error}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Self
@@ -97,8 +98,15 @@ class Readout:
         )
         return cls(scan, volts, n, (levels - 2) * n, noise, rounding, settings.tick_rate)
 
-    def __call__(self, frame: Frame, tick_rate: float | None = None) -> Voltages:
+    def __call__(
+        self,
+        frame: Frame,
+        tick_rate: float | None = None,
+        scan: tuple[float, float] = (math.nan, math.nan),
+    ) -> Voltages:
         """Voltages of one frame, whose clock runs at ``tick_rate`` Hz.
+
+        ``scan``: host time of its middle, and its duration, s.
 
         The amplifier's offset is common to both samples of a row and leaves with the difference.
 
@@ -121,6 +129,8 @@ class Readout:
             sequence=frame.sequence,
             samples=frame.samples,
             own=None if frame.sums is None else self.own_voltage(frame.sums),
+            scanned=scan[0],
+            scan_time=scan[1],
         )
 
     @cached_property

@@ -123,7 +123,7 @@ class _Run:
         self._friction = {"slide": contact.friction, "roll": contact.rolling_friction}
         self._truth: tuple[tuple[Contact, ...], list[dict[str, float | str]]] = ((), [])
         self._disturbance = Disturbance()
-        self._marks = sorted(script.marks, key=lambda mark: mark.at)
+        self._marks = sorted(script.marks, key=lambda mark: mark.given.at)
         self._frames = 0
 
     def to_the_end(self, advance: Advance) -> Simulated:
@@ -175,8 +175,8 @@ class _Run:
         self._disturb(disturbed(self._script.faults, time))
         if reboots(self._script.faults, last, time):
             self._twin.reboot()
-        while self._marks and begin + self._marks[0].at < middle:
-            self._writer.note(middle, self._marks.pop(0).text)
+        while self._marks and begin + self._marks[0].given.at < middle:
+            self._writer.note(middle, self._marks.pop(0).given.text)
 
     def _pressed(self, time: float) -> tuple[Probe, ...]:
         return pressed(self._script.presses, time, self._friction)
@@ -203,8 +203,9 @@ class _Run:
 
 def _idle_frames(script: Script, frame_time: float) -> int:
     """Whole frames before anything presses or breaks, of at most what a live reference takes."""
-    starts = [press.start for press in script.presses] + [fault.start for fault in script.faults]
+    starts = [press.start for press in script.presses]
     starts += [bend.start for bend in script.bends]
+    starts += [fault.given.start for fault in script.faults]
     quiet = script.lead_in + min(starts, default=script.duration)
     return max(1, min(REFERENCE_FRAMES, int(quiet / frame_time)))
 
