@@ -110,16 +110,20 @@ def test_model_error_rests_on_neither_the_mesh_nor_repeated_rows(prior: str) -> 
 
 
 def test_a_recording_is_trusted_by_its_noise_but_never_more_than_a_model_can_be() -> None:
-    s = spectrum()
+    """Noise as large as the model's error in each measurement adds to it as its square does."""
+    s, (frames, _) = spectrum(), touches(1)
     least = choose(s, "model-error", Evidence()).alpha
-    noise = np.full(len(s.values), SIGMA)
-    loud, quiet, unknown = (for_recording(s, n) for n in (100 * noise, 1e-6 * noise, None))
-    assert loud.rule == "light-touch"
-    assert loud.alpha == LightTouch.of(s)(100 * noise).alpha > least
-    assert "measured on its idle frames" in loud.reason
-    assert (quiet.rule, quiet.alpha) == (unknown.rule, unknown.alpha) == ("model-error", least)
-    assert "idle frames have less noise" in quiet.reason
+    size = float(np.linalg.norm(frames[0]))
+    noise = np.full(len(s.values), 0.01 * size / np.sqrt(1.0 + 1e-4 * len(s.values)))
+    known = for_recording(s, Evidence(noise, np.vstack([0 * frames, frames])))
+    assert known.alpha == pytest.approx(np.sqrt(2.0) * least, rel=1e-3)
+    assert "noise of its idle frames is 1 %" in known.reason
+    assert for_recording(s, Evidence(1e-9 * noise, frames)).alpha == pytest.approx(least)
+    unknown = for_recording(s, Evidence())
+    assert (unknown.rule, unknown.alpha) == ("model-error", least)
     assert "no idle frames" in unknown.reason
+    lost = for_recording(s, Evidence(100 * noise, frames)).alpha  # nothing but noise in them
+    assert lost == pytest.approx(least * 100 * np.hypot(0.01, len(s.values) ** -0.5), rel=1e-3)
 
 
 @given(seed=st.integers(0, 1000))

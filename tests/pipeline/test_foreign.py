@@ -11,8 +11,8 @@ import pytest
 from tomoskin.core import FloatArray
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, prepare, reconstruct
-from tomoskin.pipeline.foreign import open_electrodes
-from tomoskin.sensing.signal import Recording
+from tomoskin.pipeline.foreign import open_electrodes, tuned_by_file
+from tomoskin.sensing.signal import Recording, Reference
 
 
 @cache
@@ -93,6 +93,20 @@ def test_a_board_that_is_not_known_has_no_noise_to_predict(skin: str, own: str) 
         one = replace(recording(made, values), board_known=known)
         rules.append(reconstruct(made, one, values[:1]).choice.rule)
     assert rules == ["model-error", own]
+
+
+def test_changes_in_common_show_unless_idle_frames_have_them_too() -> None:
+    made = prepared()
+    rng = np.random.default_rng(3)
+    voltages = touched(made)[0]
+    noise = 1e-3 * np.abs(voltages).mean() * rng.standard_normal((20, len(voltages)))
+    for gain, expected in ((0.0, "kept"), (0.02, "projected")):
+        idle = voltages * (1.0 + gain * rng.standard_normal((20, 1))) + noise
+        tuned = tuned_by_file(made, Reference.of(idle), voltages - idle[:1])
+        assert tuned.skin.signal.common_modes == expected
+    single = tuned_by_file(made, Reference.of(voltages[None]), noise)
+    assert single.skin.signal.common_modes == "kept"
+    assert made.skin.signal.common_modes == "projected"
 
 
 def test_normalised_rows_that_read_next_to_nothing_do_not_rule_the_image() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray
-from tomoskin.imaging import AlphaChoice, Greit, Spectrum, for_recording
+from tomoskin.imaging import AlphaChoice, Evidence, Greit, Spectrum, for_recording
 from tomoskin.model.pattern import Pattern
 from tomoskin.model.skin import InverseSettings
 from tomoskin.pipeline.prepare import Prepared
@@ -18,6 +18,9 @@ from tomoskin.sensing.signal import Reference
 
 _GREIT_ERROR = 0.003
 """What a model gets wrong in a measurement, as a part of the data of a training target."""
+
+_COMMON = 10.0
+"""All voltages waver in common where their sum's variance is so many times that of noise."""
 
 _TIMES = 5.0
 """A measurement is off that is so many times the model's, or so many times less."""
@@ -32,18 +35,17 @@ _LEFT = 0.25
 """At least this part of the measurements stays, or nothing is said of electrodes."""
 
 
-def tuned_by_file(prepared: Prepared, reference: Reference | None) -> Prepared:
+def tuned_by_file(prepared: Prepared, reference: Reference | None, frames: FloatArray) -> Prepared:
     """The skin prepared for a recording of another board than its own.
 
     What the skin's read-out predicts holds nothing there: alpha "auto" is chosen by the noise of
-    the recording's idle frames and by what models get wrong (:func:`for_recording`), and the noise
-    of a trained operator is weighed likewise. Of normalised differences, those that divide by
-    less than the model expects weigh less. What was set by hand stays. Where no idle frames show
-    that all voltages drift alike, changes that are alike show in the image, but for calibrations,
-    which were learnt without them.
+    the recording's idle frames, its ``frames`` (n, n_meas) of differences and what models get wrong
+    (:func:`for_recording`); the noise of a trained operator is weighed by the last alone. Of
+    normalised differences, those that divide by less than the model expects weigh less. What was
+    set by hand stays. Where no idle frames show that all voltages waver in common, changes in
+    common show in the image, but for calibrations, which were learnt without them.
     """
-    drifts = reference is not None and reference.noise_is_known
-    if not drifts and not prepared.calibrations:
+    if not _wavers_in_common(reference) and not prepared.calibrations:
         kept = prepared.skin.altered({"signal": {"common_modes": "kept"}})
         prepared = replace(prepared, skin=kept)
     inverse = prepared.skin.inverse
@@ -52,11 +54,19 @@ def tuned_by_file(prepared: Prepared, reference: Reference | None) -> Prepared:
     if prepared.light_touch is None:
         return prepared
     problem = prepared.problem.weighed(inverse.record("prior"), _weights(prepared, reference))
-    noise = None
-    if reference is not None and reference.noise_is_known:
-        noise = prepared.difference_noise(reference)
-    choice = for_recording(Spectrum.of(problem), noise)
+    evidence = Evidence()
+    if reference is not None and reference.noise_is_known and frames.any():
+        evidence = Evidence(prepared.difference_noise(reference), frames)
+    choice = for_recording(Spectrum.of(problem), evidence)
     return with_choice(replace(prepared, problem=problem), choice)
+
+
+def _wavers_in_common(reference: Reference | None) -> bool:
+    """Whether the size of idle frames varies by more than the noise of each measurement does it."""
+    if reference is None or reference.scatter is None:
+        return False
+    mean, scatter = reference.mean, reference.scatter.matrix
+    return bool(mean @ scatter @ mean > _COMMON * (np.diag(scatter) @ mean**2))
 
 
 def _weights(prepared: Prepared, reference: Reference | None) -> FloatArray:

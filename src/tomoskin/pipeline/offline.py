@@ -195,7 +195,7 @@ def reconstruct(
     if rule is not None:
         prepared = tuned_by_rule(prepared, rule, recorded.evidence())
     elif not recording.board_known:
-        prepared = tuned_by_file(prepared, recorded.reference)
+        prepared = tuned_by_file(prepared, recorded.reference, recorded.differences)
     pipeline = Pipeline(
         prepared,
         reference_frames=len(recorded.idle),

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.io import savemat
+from scipy.io.matlab import MatlabOpaque
 
 from tomoskin.core import DataError
-from tomoskin.files.imports import read_recording
+from tomoskin.files.imports import read_recording, reader
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.pattern import Pattern
 from tomoskin.model.skin import Skin
@@ -94,4 +96,14 @@ def test_complex_voltages_as_text(tmp_path):
     assert got.time.tolist() == [0.0, 1.0, 2.0]
     path.write_text("time_s,v_1_0_2_3\n1j,1.5\n")
     with pytest.raises(DataError, match="real numbers in time_s"):
+        read_recording(path)
+
+
+def test_matlab_objects_are_refused_with_what_to_do(tmp_path, monkeypatch):
+    """Written by MATLAB alone, so what scipy makes of one stands for it."""
+    path = tmp_path / "class.mat"
+    savemat(path, {"a": 1.0})
+    thing = MatlabOpaque(np.zeros(1, dtype=[("s0", "O"), ("s1", "O"), ("s2", "O"), ("arr", "O")]))
+    monkeypatch.setattr(reader, "load_matlab", lambda _: {"eit": thing, "n": np.ones(2)})
+    with pytest.raises(DataError, match=r"objects \(eit\), which only MATLAB.*struct\(object\)"):
         read_recording(path)

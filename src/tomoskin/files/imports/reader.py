@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.io.matlab import MatlabObject, MatlabOpaque
 
 from tomoskin.core import EMPTY, MAGIC, Arrays, DataError, StrPath, load_arrays, open_input
 from tomoskin.files.imports import (
@@ -103,6 +104,12 @@ def _from_arrays(arrays: Arrays, path: Path) -> Recording:
 def _from_matlab(variables: dict[str, Any], path: Path) -> Recording:
     if eidors.detects(variables):
         return eidors.parse(variables, str(path))
+    if objects := [k for k, v in variables.items() if isinstance(v, MatlabObject | MatlabOpaque)]:
+        raise DataError(
+            f"holds MATLAB objects ({', '.join(objects)}), which only MATLAB can read",
+            where=str(path),
+            hint='in MATLAB: s = struct(object); save("plain.mat", "-struct", "s", "-v7")',
+        )
     arrays = {
         key: value
         for key, value in variables.items()

@@ -34,6 +34,9 @@ ERROR = 0.01
 """What a model gets wrong in a measurement, as a part of the change of the whole frame: a tank's
 shape, electrodes and contacts are never quite those of its model."""
 
+_GREATER = 0.9
+"""Quantile of the frames' energy that stands for a frame which shows something."""
+
 FOLDS = 5
 
 _PER_DECADE = 8
@@ -119,18 +122,28 @@ def model_error(spectrum: Spectrum, evidence: Evidence) -> AlphaChoice:
     )
 
 
-def for_recording(spectrum: Spectrum, noise: FloatArray | None) -> AlphaChoice:
-    """Alpha of a recording of a board that is not known: by its ``noise`` (n_meas,), if it has one.
+def for_recording(spectrum: Spectrum, evidence: Evidence) -> AlphaChoice:
+    """Alpha of a recording of a board that is not known, by what the file says.
 
-    However still its idle frames are, the model errs; without noise, this alone decides.
+    As :func:`model_error`, to which the noise of idle frames is added where the evidence has it:
+    as a part of the change of its own frames, by the weights of the problem. Of many frames the
+    greater changes count, as some may show nothing.
     """
-    least = model_error(spectrum, Evidence())
-    if noise is None or not np.any(noise):
+    least = model_error(spectrum, evidence)
+    if evidence.noise is None or not np.any(evidence.noise):
         return replace(least, reason=f"{least.reason}, as no idle frames tell its noise")
-    by_noise = light_touch(spectrum, Evidence(noise=noise))
-    if by_noise.alpha >= least.alpha:
-        return replace(by_noise, reason=f"{by_noise.reason}, measured on its idle frames")
-    return replace(least, reason=f"{least.reason}, as its idle frames have less noise than this")
+    weights = spectrum.problem.weights
+    noise = evidence.known_noise(len(weights)) ** 2 * weights
+    frames = evidence.touched(len(weights))
+    change = float(np.quantile((frames**2 * weights).sum(axis=1), _GREATER)) - noise.sum()
+    part = float(np.sqrt(noise.mean() / max(change, noise.sum())))
+    error = float(np.hypot(ERROR, part))
+    reason = f"{least.reason}, and the noise of its idle frames is {100 * part:.2g} %"
+    alpha = least.alpha * error / ERROR
+    curve = least.curve
+    if curve is not None:
+        curve = replace(curve, chosen=int(np.abs(np.log(curve.x / alpha)).argmin()))
+    return AlphaChoice(alpha, "model-error", reason, curve)
 
 
 def discrepancy(spectrum: Spectrum, evidence: Evidence) -> AlphaChoice:
