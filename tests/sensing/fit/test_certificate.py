@@ -108,3 +108,14 @@ def test_a_live_frame_asks_the_exact_model_where_more_may_be_wrong(
         # of an exact one the spots have moved by two steps since
         allowed = LIVE.tolerance * np.sqrt(len(frame.seen.full))
         assert wrong < (3 if often else 1) * allowed
+
+
+def test_near_the_rim_a_place_is_doubted_towards_the_middle_and_outwards() -> None:
+    rim = model().reduced.rim
+    radius, size = 0.02, float(np.abs(rim.tree.data).max())
+    middle, near, at = (rim.doubt(x, 0.0, radius) for x in (0.0, 0.75 * size, 0.9 * size))
+    assert np.sqrt(np.trace(middle)) < 1e-4
+    assert np.trace(middle) < np.trace(near) < np.trace(at)
+    across, along = np.linalg.eigh(at)[0]
+    assert across < 1e-12 < along
+    assert abs(np.linalg.eigh(at)[1][0, 1]) > 0.99  # along the way to the rim

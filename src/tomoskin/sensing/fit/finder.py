@@ -70,7 +70,7 @@ class SpotFinder:
         pace: Pace = EXHAUSTIVE,
     ) -> None:
         self._model, self._policy = model, DetectionPolicy.of(skin.touch, pace)
-        self._cells = CellDiscs.of(mesh)
+        self._cells, self._rim = CellDiscs.of(mesh), model.reduced.rim
         self._reach, self._unrest = pace.reach, 1.0
         self._residual, self._left = ResidualResponse(), ResidualDirections()
         self._unit = skin.conductivity
@@ -236,8 +236,9 @@ class SpotFinder:
 
     def _detection(self, detected: SpotDetections, k: int, spot: list[float]) -> Detection:
         x, y, log_radius, content = spot
-        (xx, xy), (_, yy) = detected.covariance[4 * k : 4 * k + 2, 4 * k : 4 * k + 2].tolist()
         radius = math.exp(log_radius)
+        spread = detected.covariance[4 * k : 4 * k + 2, 4 * k : 4 * k + 2]
+        (xx, xy), (_, yy) = (spread + self._rim.doubt(x, y, radius)).tolist()
         return Detection(
             x=x,
             y=y,
