@@ -24,7 +24,10 @@ from tomoskin.sensing.signal import Recording
 
 _COLUMN = re.compile(r"(dv|v)_(\d+)_(\d+)_(\d+)_(\d+)")
 _KNOWN = ("time_s", "idle", "x_m", "y_m")
-_IGNORED = ("frame", "sequence", "ticks", "mark")
+OWN = "ticks"
+"""Column of the board's own clock: the table is the export of a session."""
+
+_IGNORED = ("frame", "sequence", OWN, "mark")
 """Columns that an export has beside them; not needed here."""
 
 
@@ -79,7 +82,7 @@ def parse(lines: Iterable[str], source: str) -> Recording:
         is_change=kinds == {"dv"},
     )
     idle = _idle(by_name["idle"], source) if "idle" in by_name else 1
-    return replace(recording, idle=idle)
+    return replace(recording, idle=idle, board_known=OWN in by_name)
 
 
 def column_names(drive: IntArray, measure: IntArray, kind: str = "v") -> list[str]:
