@@ -16,7 +16,7 @@ import numpy as np
 from report import Report, resident, table
 from tomoskin.board.wire import encode
 from tomoskin.core import Capacity, Frame, Mark, MarkedFrame, Worker
-from tomoskin.files.exports import write_parquet
+from tomoskin.files.exports import Export, write_parquet
 from tomoskin.files.session import (
     RawRead,
     Recorder,
@@ -153,6 +153,6 @@ def opened(path: Path, seconds: int) -> dict[str, Any]:
 def _exported(path: Path, target: Path) -> dict[str, Any]:
     start = time.perf_counter()
     with SessionReader(path) as session:
-        write_parquet(target, session, lambda _done, _total: None)
+        write_parquet(Export(session), target)
     taken = time.perf_counter() - start
     return {"Parquet s": round(taken, 1), "Parquet MB": round(target.stat().st_size / 1e6)}

@@ -110,7 +110,7 @@ def frames() -> Iterator[np.ndarray]:
 def of_session(write: Callable[..., None]) -> Callable[..., None]:
     def run(path: Path, whole: Path, **options: Any) -> None:
         with SessionReader(whole) as session:
-            write(path, session, lambda _done, _total: None, **options)
+            write(exports.Export(session, **options), path)
 
     return run
 

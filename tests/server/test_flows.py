@@ -352,6 +352,7 @@ def test_presses_become_a_calibration(taught, prepared):
     assert len(told["figures"]["errors_mm"]) == 10
     assert "mm pressed softly, " in told["text"], "what is promised is promised of both"
     assert "equally hard" not in told["text"]
+    assert "as it is, touches miss the dots by" in told["text"], "what it brings is said"
     found = TOUCH.read(folder / "finger.npz")
     assert found.model.presses.xy == pytest.approx(np.array(told["presses"]))
     outline = prepared.skin.outline

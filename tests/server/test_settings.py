@@ -20,8 +20,8 @@ from tomoskin.pipeline import colour_limit, prepare
 from tomoskin.run import Runner, commands
 from tomoskin.server import Hub
 from tomoskin.server.requests import decode_request
-from tomoskin.server.settings_form import table_of
 from tomoskin.server.settings_handlers import STAGES, SettingsHandlers
+from tomoskin.server.settings_messages import table_of
 
 CHANGES = {
     "alpha": {"inverse": {"alpha": 0.05}},

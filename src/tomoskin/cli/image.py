@@ -102,7 +102,7 @@ class Tuned:
 
 @dataclass(frozen=True)
 class Shown:
-    """How images are shown."""
+    """The unit, filter and colour scale in which images are shown."""
 
     percent: Annotated[
         bool,
@@ -137,7 +137,7 @@ class Shown:
 
 @dataclass(frozen=True)
 class Results:
-    """What is written."""
+    """The files that are written, and whether older ones may be."""
 
     out: Annotated[
         Path | None,

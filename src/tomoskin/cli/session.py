@@ -146,7 +146,7 @@ def export(
     force: ForceFlag = False,
 ) -> None:
     """Convert a session to tables, images or the format of another program."""
-    from tomoskin.files.exports import WRITERS, Export, omitted
+    from tomoskin.files.exports import WRITERS, Export, export_touches, omitted
     from tomoskin.files.session import SessionReader
 
     write = WRITERS[out.suffix.lower()]
@@ -154,7 +154,7 @@ def export(
         job = Export(session, every, bar, overwrite=force)
         write(job, out)
         if touches is not None:
-            job.touches(touches)
+            export_touches(job, touches)
         if session.torn:
             remark(f"{file}: {session.torn}")
         without = ", ".join(omitted(session, out.suffix.lower()))

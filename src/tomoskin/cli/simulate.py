@@ -38,7 +38,7 @@ def _simulated(out: Path | None, given: Given, called: str) -> list[Output]:
 
 @dataclass(frozen=True)
 class WorkersAsked:
-    """Who makes labelled frames."""
+    """The processes or machines that make labelled frames."""
 
     processes: Annotated[
         int | None,
@@ -55,7 +55,7 @@ class WorkersAsked:
 
     @property
     def some(self) -> bool:
-        """Whether any are named."""
+        """Whether processes or machines are named."""
         return self.processes is not None or self.cluster is not None
 
     def of(self) -> Workers:

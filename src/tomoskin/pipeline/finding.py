@@ -48,6 +48,11 @@ class RegionFinder:
         """Detections of a frame, strongest first."""
         return self._segmenter(view.image, view.image_noise)
 
+    def learn(self, *, touched: bool) -> bool:
+        """Nothing is learnt of the newest frame, and what touches have left shows in images."""
+        del touched
+        return False
+
 
 class FitFinder:
     """Touches are fitted to the data themselves; a filter over frames does not enter.
@@ -120,6 +125,11 @@ class FitFinder:
         self.like_touch, self.rises = watch.like_touch or jump is not None, watch.rises
         self.problem = watch.problem or (None if jump is None else _jump_text(JUMP * jump))
         return detections
+
+    def learn(self, *, touched: bool) -> bool:
+        """See :meth:`SpotFinder.learn`; whether what touches have left does not show any more."""
+        self._spots.learn(touched=touched)
+        return not touched
 
     def strongest(self, dv: FloatArray) -> Detection | None:
         """The strongest touch in difference data (n_meas,), NaN where a value is missing."""

@@ -161,6 +161,9 @@ class Following:
             return self._without_touches(measured, failed)
         reach("tracking")
         touches = self._tracker.update(detections, measured.time, measured.host_time)
+        tracker = self._tracker.tracker
+        if self._finder.learn(touched=bool(tracker.traces)):
+            tracker.residuals.forget()
         readings = {}
         if self._applied:
             reach("calibrations")

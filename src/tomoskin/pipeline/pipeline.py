@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tomoskin.board.source import ScanClock
+from tomoskin.board.source import ScanTimer
 from tomoskin.core import Frame, Mark, Voltages, reach
 from tomoskin.imaging import AlphaChoice
 from tomoskin.pipeline.collecting import Collecting
@@ -51,7 +51,7 @@ class Pipeline:
         self._tracker = self._new_tracker()
         self.tick_rate = prepared.readout.tick_rate
         self.refused = 0
-        self._clock = ScanClock()
+        self._clock = ScanTimer()
         self.take_reference()
 
     def take_reference(self) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from tomoskin.core import DataError, WireError
-from tomoskin.files.exports import WRITERS, Export
+from tomoskin.files.exports import WRITERS, Export, export_touches
 from tomoskin.files.session import SessionReader
 from tomoskin.run import Runner
 from tomoskin.server.folder import SESSION, Folder
@@ -149,7 +149,7 @@ class FileHandlers:
     def _written(self, path: Path, form: str) -> Path:
         ending = ".csv" if form == "touches" else f".{form}"
         stem = f"{path.stem}-touches" if form == "touches" else path.stem
-        write = Export.touches if form == "touches" else WRITERS[ending]
+        write = export_touches if form == "touches" else WRITERS[ending]
         out = self._folder.free(stem, ending)
         with SessionReader(path) as session:
             write(Export(session, _EVERY, self._advance), out)

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from tomoskin.core import FloatArray, TomoskinError, watch_stages
+from tomoskin.core import FloatArray, TomoskinError, WireError, watch_stages
 from tomoskin.learning import Kind
 from tomoskin.pipeline import FrameResult, Prepared
 from tomoskin.run import Runner, commands
@@ -35,11 +35,16 @@ EFFORTS: tuple[Effort, ...] = ("softly", "hard")
 
 @dataclass(frozen=True, eq=False)
 class GuidedPress:
-    """One press: the place m, the change (n_meas,) V that it made, and how it was asked for."""
+    """One press: the place m, the change (n_meas,) V that it made, and how it was asked for.
+
+    ``missed``: how far from the place the run itself showed the touch, m; None where it showed
+    none.
+    """
 
     place: Point
     dv: FloatArray
     effort: Effort | None = None
+    missed: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +82,8 @@ class GuidedFlow(ABC):
         Whether something newer is being estimated, and how far that is, in words.
     paused
         Whether frames are left out, because no page shows the flow.
+    taken
+        What it has recorded: presses, or placed weights.
     answers
         What a page may ask of it, by the type of the request: called with the request, it says
         whether there is something to estimate. WireError refuses.
@@ -90,6 +97,8 @@ class GuidedFlow(ABC):
         self.trouble = self.stage = ""
         self.estimating = self.paused = False
         self.answers: Mapping[type, Callable[[Any], bool]] = {}
+        self.taken: list[Any] = []
+        self._dots = Dots(prepared)
         self.lock = threading.RLock()
         self._stopped = threading.Event()
 
@@ -101,9 +110,15 @@ class GuidedFlow(ABC):
     def restart(self) -> None:
         """Forget what has begun and is not recorded yet."""
 
-    @abstractmethod
     def examples(self) -> tuple[Any, ...]:
         """What an estimate rests on now."""
+        return tuple(self.taken)
+
+    def take_back(self, number: int) -> Any:
+        """Remove what was recorded ``number``-th; WireError where there is none."""
+        if not 0 <= number < len(self.taken):
+            raise WireError("there is no press to undo")
+        return self.taken.pop(number)
 
     @abstractmethod
     def estimate_from(self, examples: tuple[Any, ...]) -> Estimate:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any, Literal
 
 import numpy as np
 
-from tomoskin.core import FloatArray, WireError, write_text
+from tomoskin.core import FloatArray, write_text
 from tomoskin.learning import (
     TOUCH,
     LeftOut,
@@ -19,7 +20,7 @@ from tomoskin.learning import (
 from tomoskin.pipeline import FrameResult, Prepared, prepare
 from tomoskin.run import Runner, commands
 from tomoskin.server.folder import Folder
-from tomoskin.server.guided_flow import EFFORTS, Dots, Effort, Estimate, GuidedFlow, GuidedPress
+from tomoskin.server.guided_flow import EFFORTS, Effort, Estimate, GuidedFlow, GuidedPress
 from tomoskin.server.page_messages import Figures
 from tomoskin.server.press_taker import PressTaker
 from tomoskin.server.requests import UndoPress
@@ -39,6 +40,7 @@ def estimate_touch(prepared: Prepared, presses: Sequence[GuidedPress]) -> Estima
     errors = 1e3 * locator.errors
     doubted = sorted({remark.row for remark in locator.remarks})
     text = f"Median error {_by_effort(presses, errors)} (each press left out in turn)"
+    text += _as_it_is(presses, errors)
     left_out = LeftOut.of(locator)
     if left_out.one_force:
         text += (
@@ -54,6 +56,15 @@ def estimate_touch(prepared: Prepared, presses: Sequence[GuidedPress]) -> Estima
     )
     place = locator.next_place() if len(presses) >= _FIRST else None
     return Estimate(text, place, True, figures, locator)
+
+
+def _as_it_is(presses: Sequence[GuidedPress], errors: FloatArray) -> str:
+    """What a calibration brings, where most presses showed without it."""
+    missed = [1e3 * press.missed for press in presses if press.missed is not None]
+    if 2 * len(missed) <= len(presses):
+        return ""
+    brings = "" if np.median(errors) < np.median(missed) else ", and this brings nothing yet"
+    return f"; as it is, touches miss the dots by {np.median(missed):.1f} mm{brings}"
 
 
 def _by_effort(presses: Sequence[GuidedPress], errors: FloatArray) -> str:
@@ -110,11 +121,9 @@ class _DotFlow(GuidedFlow):
 
     def __init__(self, kind: Literal["touch", "mapping"], prepared: Prepared) -> None:
         super().__init__(kind, prepared)
-        self.presses: list[GuidedPress] = []
         self.answers = {UndoPress: lambda _: self._undo()}
         self._taker = PressTaker.of(prepared)
         self._undone = False
-        self._dots = Dots(prepared)
         self._dot = self._dots.next((), None)
 
     def see(self, result: FrameResult) -> bool | None:
@@ -126,8 +135,10 @@ class _DotFlow(GuidedFlow):
         dv = taker.push(result.host_time, result.voltages)
         if dv is None:
             return None if before == (taker.phase, taker.hint) else False
-        self.presses.append(GuidedPress(self._dot, dv, self.effort))
-        self._dot = self._dots.next([p.place for p in self.presses], self.estimate)
+        away = [math.dist((t.detection.x, t.detection.y), self._dot) for t in result.touches]
+        missed = min(away, default=None)
+        self.taken.append(GuidedPress(self._dot, dv, self.effort, missed))
+        self._dot = self._dots.next([p.place for p in self.taken], self.estimate)
         return True
 
     def restart(self) -> None:
@@ -137,19 +148,13 @@ class _DotFlow(GuidedFlow):
     @property
     def effort(self) -> Effort | None:
         """How to press the dot; None where that does not matter."""
-        return self.efforts[len(self.presses) % len(self.efforts)]
+        return self.efforts[len(self.taken) % len(self.efforts)]
 
     def _undo(self) -> bool:
         """Remove the last press, and ask for it again."""
-        if not self.presses:
-            raise WireError("there is no press to undo")
-        self._dot = self.presses.pop().place
+        self._dot = self.take_back(len(self.taken) - 1).place
         self.estimate, self._undone = None, True
         return True
-
-    def examples(self) -> tuple[GuidedPress, ...]:
-        """The presses that have been made so far."""
-        return tuple(self.presses)
 
     def details(self) -> dict[str, Any]:
         """What the page shows: the dot to press, the presses, and a hint."""
@@ -158,7 +163,7 @@ class _DotFlow(GuidedFlow):
             "phase": self._taker.phase,
             "dot": self._dot,
             "effort": self.effort,
-            "presses": [press.place for press in self.presses],
+            "presses": [press.place for press in self.taken],
         }
 
 

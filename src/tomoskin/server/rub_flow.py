@@ -11,7 +11,7 @@ from tomoskin.core import DataError, FloatArray, WireError, reach
 from tomoskin.learning import TOUCH, Rubbing, quiet_electrodes
 from tomoskin.pipeline import FrameResult, Prepared
 from tomoskin.sensing.segment import Region
-from tomoskin.server.guided_flow import Dots, Estimate, GuidedFlow, GuidedPress
+from tomoskin.server.guided_flow import Estimate, GuidedFlow, GuidedPress
 from tomoskin.server.page_messages import Figures, Point, RubbedNow
 from tomoskin.server.press_taker import OFTEN, PressTaker
 from tomoskin.server.requests import AskPoint, LearnFlow, StopLearning, UndoPress
@@ -155,10 +155,7 @@ class RubbedTouches:
 class RubFlow(GuidedFlow):
     """What was rubbed so far; see :class:`GuidedFlow`. It learns when it is asked to.
 
-    Attributes
-    ----------
-    rubbed, points
-        Touches everywhere, and presses at known positions.
+    ``rubbed``: touches everywhere; ``taken``: presses at known positions.
     """
 
     teaches = TOUCH
@@ -167,7 +164,6 @@ class RubFlow(GuidedFlow):
         super().__init__("rub", prepared)
         self._touches = RubbedTouches(prepared)
         self.rubbed = self._touches.now()
-        self.points: list[GuidedPress] = []
         self.answers = {
             AskPoint: lambda request: self._ask(on=request.on),
             UndoPress: lambda _: self._undo(),
@@ -175,7 +171,6 @@ class RubFlow(GuidedFlow):
             StopLearning: lambda _: self._stop(),
         }
         self._taker: PressTaker | None = None
-        self._dots = Dots(prepared)
         self._dot: Point | None = None
         self._examples: tuple[Any, ...] = ()
         self._shown = -np.inf
@@ -190,7 +185,7 @@ class RubFlow(GuidedFlow):
             dv = taker.push(result.host_time, result.voltages)
             moved = taker.phase != phase
         if dv is not None and self._dot is not None:
-            self.points.append(GuidedPress(self._dot, dv))
+            self.taken.append(GuidedPress(self._dot, dv))
             self._dot = self._next_dot()
         elif not moved and 0 <= result.host_time - self._shown < _PERIOD:
             return None
@@ -204,7 +199,7 @@ class RubFlow(GuidedFlow):
             self._taker.restart()
 
     def _next_dot(self) -> Point:
-        return self._dots.next([point.place for point in self.points], None)
+        return self._dots.next([point.place for point in self.taken], None)
 
     def _ask(self, *, on: bool) -> bool:
         self._taker = PressTaker.of(self.prepared) if on else None
@@ -212,16 +207,14 @@ class RubFlow(GuidedFlow):
         return False
 
     def _undo(self) -> bool:
-        if not self.points:
-            raise WireError("there is no press to undo")
-        self.points.pop()
+        self.take_back(len(self.taken) - 1)
         self._dot = self._next_dot() if self._taker is not None else None
         return False
 
     def _learn(self) -> bool:
         if len(self.rubbed.dv) < _FEWEST:
             raise WireError(f"{_FEWEST - len(self.rubbed.dv)} more touches are needed")
-        self._examples = (self.rubbed, tuple(self.points))
+        self._examples = (self.rubbed, tuple(self.taken))
         self.estimate = None
         return True
 
@@ -264,7 +257,7 @@ class RubFlow(GuidedFlow):
         return {
             "phase": "rub" if self._taker is None else self._taker.phase,
             "dot": self._dot,
-            "presses": [point.place for point in self.points],
+            "presses": [point.place for point in self.taken],
             "stage": self.stage,
             "rubbed": RubbedNow.of(
                 rubbed,

@@ -36,8 +36,15 @@ from tomoskin.server.requests import (
     SetSettings,
     UndoSettings,
 )
-from tomoskin.server.settings_form import altered, refusal, schema, table_of
-from tomoskin.server.settings_messages import Progress, Settings, StageName
+from tomoskin.server.settings_messages import (
+    Progress,
+    Settings,
+    StageName,
+    altered,
+    refusal,
+    schema,
+    table_of,
+)
 
 STAGES = get_args(StageName)
 """What a change of settings comes to, one after the other; many begin later, or end earlier."""

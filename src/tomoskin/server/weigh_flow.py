@@ -11,7 +11,7 @@ import numpy as np
 from tomoskin.core import DataError, Detection, FloatArray, Touch, WireError
 from tomoskin.learning import FORCE, ForceModel, ForceReport, WeighedPresses, Weight, least_known
 from tomoskin.pipeline import FrameResult, Prepared
-from tomoskin.server.guided_flow import Dots, Estimate, GuidedFlow
+from tomoskin.server.guided_flow import Estimate, GuidedFlow
 from tomoskin.server.page_messages import Figures, Phase, Point, WeightNow
 from tomoskin.server.press_taker import OFTEN
 from tomoskin.server.requests import DeletePress, SetWeight, UndoPress
@@ -139,7 +139,7 @@ class WeighFlow(GuidedFlow):
 
     Attributes
     ----------
-    weighed
+    taken
         Placements so far, each with its weight.
     weight
         What lies there, or comes next; None where that has not been said.
@@ -151,17 +151,15 @@ class WeighFlow(GuidedFlow):
 
     def __init__(self, prepared: Prepared) -> None:
         super().__init__("force", prepared)
-        self.weighed: list[Weighed] = []
         self.weight: Weight | None = None
         self.asked: Weight | None = None
         self.answers = {
             SetWeight: self._set,
             DeletePress: lambda request: self._delete(request.number),
-            UndoPress: lambda _: self._delete(len(self.weighed) - 1),
+            UndoPress: lambda _: self._delete(len(self.taken) - 1),
         }
         self._taker = PlacementTaker()
         self._waiting: Placement | None = None
-        self._dots = Dots(prepared)
 
     def see(self, result: FrameResult) -> bool | None:
         """Take a placement, or say that a phase has begun."""
@@ -181,7 +179,7 @@ class WeighFlow(GuidedFlow):
         """Put the placement that waits on the list, once its weight has been said."""
         if self._waiting is None or self.weight is None:
             return False
-        self.weighed.append(Weighed(self._waiting, self.weight))
+        self.taken.append(Weighed(self._waiting, self.weight))
         self._waiting = None
         return True
 
@@ -195,15 +193,9 @@ class WeighFlow(GuidedFlow):
         return self._record()
 
     def _delete(self, number: int) -> bool:
-        if not 0 <= number < len(self.weighed):
-            raise WireError("there is no press to undo")
-        del self.weighed[number]
+        self.take_back(number)
         self.estimate = None
         return True
-
-    def examples(self) -> tuple[Weighed, ...]:
-        """The weights that have been placed so far."""
-        return tuple(self.weighed)
 
     def estimate_from(self, examples: tuple[Weighed, ...]) -> Estimate:
         """Estimate the forces of touches from these weights."""
@@ -225,13 +217,13 @@ class WeighFlow(GuidedFlow):
 
     def details(self) -> dict[str, Any]:
         """What the page shows: the dot, the weights so far, and a hint."""
-        places = [one.placement.xy for one in self.weighed]
+        places = [one.placement.xy for one in self.taken]
         hint = {"text": self._taker.hint} if self._taker.hint else {}
         return hint | {
             "phase": "name" if self._waiting else self._taker.phase,
             "dot": self._dots.next(places, self.estimate),
             "presses": places,
-            "weights": [one.weight.text for one in self.weighed],
+            "weights": [one.weight.text for one in self.taken],
             "weight": _shown(self.weight),
             "asked": _shown(self.asked),
             "meant": _shown(self.asked and self.asked.meant),

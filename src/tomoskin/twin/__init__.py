@@ -9,7 +9,7 @@ from tomoskin.twin.held_scanning import Board, HeldScanning
 from tomoskin.twin.labelled import COMMON_PRESSES, Population, SetPlan, make_shard
 from tomoskin.twin.material import MaterialSettings
 from tomoskin.twin.presets import PRESETS, TwinSettings
-from tomoskin.twin.probe import Contact, Press, Probe
+from tomoskin.twin.probe import FACES, Circle, Contact, Face, Finger, Press, Probe, Shape, Square
 from tomoskin.twin.scanning import (
     SampleTable,
     ScanClock,
@@ -19,7 +19,6 @@ from tomoskin.twin.scanning import (
 )
 from tomoskin.twin.script import Script
 from tomoskin.twin.script_check import check_script, check_settling
-from tomoskin.twin.shape import FACES, Circle, Face, Finger, Shape, Square
 from tomoskin.twin.sheet import TwinSkin
 from tomoskin.twin.source import (
     TwinTransport,

@@ -15,9 +15,8 @@ from tomoskin.model.mesh import Arm, Hinge, Outline
 from tomoskin.model.section import Section
 from tomoskin.twin.bend import Bent, Deformation, Pose, Stretched
 from tomoskin.twin.faults import Faults, LineSettings
-from tomoskin.twin.probe import Probe
+from tomoskin.twin.probe import Probe, Shape
 from tomoskin.twin.script_schema import BendSection, FaultSection, PressSection, StretchSection
-from tomoskin.twin.shape import Shape
 
 Rows = tuple[tuple[float, ...], ...]
 """A course: time since its start, then values; straight lines between the rows."""

@@ -16,8 +16,7 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 from tomoskin.core import FloatArray
 from tomoskin.model.forward import choose_engine
 from tomoskin.twin.contact import ContactSettings, Grid, solve_contact
-from tomoskin.twin.probe import Contact, Probe
-from tomoskin.twin.shape import Shape
+from tomoskin.twin.probe import Contact, Probe, Shape
 
 _NODES = 128
 _ROUND = ((0, 0), (_NODES // 2, _NODES // 2), (_NODES // 2, _NODES // 2))

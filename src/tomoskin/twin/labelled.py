@@ -18,10 +18,9 @@ from tomoskin.model.mesh import Outline
 from tomoskin.model.skin import Skin
 from tomoskin.sensing.signal import Readout
 from tomoskin.twin.presets import TwinSettings
-from tomoskin.twin.probe import Probe
+from tomoskin.twin.probe import FACES, Probe
 from tomoskin.twin.script import of_script, tables_of
 from tomoskin.twin.script_schema import PressesSection
-from tomoskin.twin.shape import FACES
 from tomoskin.twin.source import Scans
 
 _STEP = 0.5e-3

@@ -11,6 +11,7 @@ from typing import Any, Self, TypeVar
 from tomoskin.core import GeometryError, ScriptError, SkinError
 from tomoskin.model.section import Section, check_names, show, toml_tables
 from tomoskin.twin.course import Rows, Scripted, ScriptedBend, ScriptedPress, ramp
+from tomoskin.twin.probe import Circle, Face, Finger, Shape, Square
 from tomoskin.twin.script_schema import (
     FORMAT,
     SECTIONS,
@@ -22,7 +23,6 @@ from tomoskin.twin.script_schema import (
     ScriptSection,
     StretchSection,
 )
-from tomoskin.twin.shape import Circle, Face, Finger, Shape, Square
 
 _DEFAULT_SOURCE = "script"
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tomoskin.board.source.clock import ClockFitter, ClockWatch, ScanClock
+from tomoskin.board.source.clock import ClockFitter, ClockWatch, ScanTimer
 from tomoskin.core import Frame
 
 RATE, FAST, OFFSET = 250e3, 37e-6, 1234.5
@@ -101,7 +101,7 @@ def test_a_clock_as_stated_is_no_event():
 @pytest.mark.parametrize("wander", [0.0, 2e-5])
 def test_a_scan_is_stamped_with_its_middle_however_late_the_frame_came(wander):
     """Frames up to 30 ms late, of a clock that is 300 ppm fast and wanders over ten minutes."""
-    rng, clock, missed = np.random.default_rng(8), ScanClock(), []
+    rng, clock, missed = np.random.default_rng(8), ScanTimer(), []
     interval = 0.055
     for k in range(int(600 / interval)):
         start = 5.0 + k * interval
@@ -118,4 +118,4 @@ def test_a_scan_is_stamped_with_its_middle_however_late_the_frame_came(wander):
 
 def test_without_a_clock_a_scan_is_stamped_by_its_arrival():
     frame = framed(0, 0, 7.0)
-    assert ScanClock().middle(frame, 0.06, 16e6) == (pytest.approx(6.97), 0.06)
+    assert ScanTimer().middle(frame, 0.06, 16e6) == (pytest.approx(6.97), 0.06)

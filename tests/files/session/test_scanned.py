@@ -10,7 +10,7 @@ import pytest
 
 from files.session.runs import INFO, SCAN, SKIN, TOUCH, frame_of, put
 from tomoskin.core import Mark
-from tomoskin.files.exports import WRITERS, Export, write_touches
+from tomoskin.files.exports import WRITERS, Export, export_touches, write_touches
 from tomoskin.files.imports import read_recording
 from tomoskin.files.session import SessionReader, SessionWriter
 from tomoskin.files.session.scanned import no_report
@@ -41,7 +41,7 @@ def exported(session: Path, name: str) -> list[dict[str, str]]:
     path = session.with_name(f"{name}.csv")
     with SessionReader(session) as reader:
         export = Export(reader, 0.1, no_report)
-        (Export.touches if name == "touches" else WRITERS[".csv"])(export, path)
+        (export_touches if name == "touches" else WRITERS[".csv"])(export, path)
     with path.open(encoding="utf-8") as file:
         return list(csv.DictReader(file))
 

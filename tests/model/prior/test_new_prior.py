@@ -18,7 +18,7 @@ import numpy as np
 from tomoskin import OneStep, Skin
 from tomoskin.imaging import prior_matrix
 from tomoskin.pipeline import prepare
-from tomoskin.server.settings_form import schema
+from tomoskin.server.settings_messages import schema
 
 skin = Skin.load("textile-disc-8")
 skin = skin.altered({"mesh": {"cells": 300}, "inverse": {"prior": "central", "slope": 3}})

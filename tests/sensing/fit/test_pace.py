@@ -40,6 +40,11 @@ def is_at(detection: Detection, x: float, y: float) -> bool:
     return bool(away @ np.linalg.solve(spread(detection), away) < 9 and detection.sd_x < 5e-3)
 
 
+def is_near(detection: Detection, spots: FloatArray) -> bool:
+    """Within a radius."""
+    return bool(np.linalg.norm(place(detection) - spots[0, :2]) < 0.012)
+
+
 def moving(begin: FloatArray, end: FloatArray) -> FloatArray:
     """Rows of a press that goes from one place to the other while they are read."""
     response, pattern = model().response, model().response.state.model.pattern
@@ -152,15 +157,24 @@ def test_a_frame_has_a_bounded_number_of_steps() -> None:
     assert 0 < max(steps) <= 3 * one + (3 * LIVE.tries + 1) * more + 3
 
 
+def rested(ours: SpotFinder, left: FloatArray, count: int, seed: int) -> int:
+    """How many of so many frames show a touch, in which this is left; the others are idle."""
+    found = 0
+    for n in noise(16, count, seed):
+        touched = bool(ours.push(left + n, NOTHING))
+        ours.learn(touched=touched)
+        found += touched
+    return found
+
+
 def after_a_slide(pace: Pace) -> tuple[SpotFinder, list[Detection], FloatArray]:
     """A finder, what it finds of a press that has left a part of itself behind, and that part."""
     ours = finder(pace)
     here = data(STANDING)
-    for n in noise(16, 3, 7):
-        ours.push(here + n, NOTHING)
+    rested(ours, here, 3, 7)
     there = data(press(-0.04, 0.0)) + LEFT * here
-    seen = [ours.push(there + n, NOTHING) for n in noise(16, 3, 8)]
-    return ours, seen[-1], LEFT * here
+    rested(ours, there, 2, 8)
+    return ours, ours.push(there + noise(16, 1, 6)[0], NOTHING), LEFT * here
 
 
 def test_what_is_left_behind_is_no_touch_beside_one() -> None:
@@ -179,16 +193,44 @@ def test_how_far_a_touch_stands_out_is_told_by_the_noise_alone() -> None:
     assert known.snr == pytest.approx(fresh.snr, rel=0.05)
 
 
-def test_after_some_time_without_a_touch_the_trail_is_forgotten() -> None:
+def test_what_is_left_is_no_touch_however_long_it_stays() -> None:
     ours, _, left = after_a_slide(LIVE)
-    found = [bool(ours.push(left + n, NOTHING)) for n in noise(16, 60, 9)]
-    quiet = round(LIVE.fading / SCAN)
-    assert not any(found[:quiet])
-    assert all(found[quiet + 2 :])
+    assert not rested(ours, left, 150, 9)
+
+
+def test_what_is_left_beside_its_press_and_narrower_is_no_touch() -> None:
+    ours, _, _ = after_a_slide(LIVE)
+    elsewhere = LEFT * data(press(0.046, 0.004, depth=-0.5, radius=0.009))
+    assert not rested(ours, elsewhere, 150, 9)
+
+
+def test_what_is_left_may_fade() -> None:
+    ours, _, left = after_a_slide(LIVE)
+    for part in np.exp(-np.arange(40) * SCAN):
+        assert not rested(ours, part * left, 1, round(1e3 * part))
+    assert not ours.push(noise(16, 1, 11)[0], NOTHING)
+
+
+def test_a_light_press_on_what_is_left_of_a_heavy_one_is_found() -> None:
+    ours, _, left = after_a_slide(LIVE)
+    rested(ours, left, 8, 9)
+    light = left + 0.15 * data(STANDING)
+    (detection,) = ours.push(light + noise(16, 1, 10)[0], NOTHING)
+    assert is_near(detection, STANDING)
+    assert not detection.weak
+
+
+def test_a_press_that_comes_down_slowly_is_not_taken_for_what_is_left() -> None:
+    ours, _, left = after_a_slide(LIVE)
+    rested(ours, left, 8, 9)
+    found = [
+        rested(ours, left + part * data(STANDING), 1, 20 + k)
+        for k, part in enumerate(np.linspace(0, 0.3, 30))
+    ]
+    assert all(found[15:])
 
 
 def test_a_new_press_where_one_was_is_found() -> None:
     ours, _, left = after_a_slide(LIVE)
     frames = [left, left, 0.6 * data(STANDING), 0.6 * data(STANDING)]
-    found = [ours.push(dv + n, NOTHING) for dv, n in zip(frames, noise(16, 4, 10), strict=True)]
-    assert [len(detections) for detections in found] == [0, 0, 1, 1]
+    assert [rested(ours, dv, 1, 10 + k) for k, dv in enumerate(frames)] == [0, 0, 1, 1]

@@ -9,7 +9,7 @@ from tomoskin.board.source.boards import (
     FirmwareFiles,
     board_named,
 )
-from tomoskin.board.source.clock import TICK_RATES, ClockFit, ClockFitter, ScanClock
+from tomoskin.board.source.clock import TICK_RATES, ClockFit, ClockFitter, ScanTimer
 from tomoskin.board.source.command_queue import FrameCounters
 from tomoskin.board.source.configuration import Configuration
 from tomoskin.board.source.link import Link
@@ -44,8 +44,8 @@ __all__ = [
     "FirmwareFiles",
     "FrameCounters",
     "Link",
-    "ScanClock",
     "ScanSettings",
+    "ScanTimer",
     "SerialTransport",
     "Timing",
     "Transport",

@@ -115,7 +115,7 @@ class ClockFitter:
         return ClockFit(1 / b, run.first_time + a - b * run.first, late, run.sums.n)
 
 
-class ScanClock:
+class ScanTimer:
     """When scans were, by the host's clock: frames come late by chance, scans do not.
 
     Two fits take turns, so that a clock that wanders is followed.

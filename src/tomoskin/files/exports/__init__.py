@@ -7,10 +7,11 @@ from tomoskin.files.exports.curves import (
     write_promise,
 )
 from tomoskin.files.exports.display import Display
+from tomoskin.files.exports.export import Export
 from tomoskin.files.exports.matlab_file import write_matlab
 from tomoskin.files.exports.picture import FILMS, MOST_PANELS, Panel, plot, write_picture
-from tomoskin.files.exports.rerun_file import RerunView, rerun_recording
-from tomoskin.files.exports.session_export import WRITERS, Export, omitted
+from tomoskin.files.exports.published import RerunView, rerun_recording
+from tomoskin.files.exports.session_export import WRITERS, export_touches, omitted
 from tomoskin.files.exports.session_table import write_csv, write_hdf5, write_parquet, write_touches
 from tomoskin.files.exports.vtu import series_files, write_series, write_vtu
 from tomoskin.files.imports import write_interchange
@@ -23,6 +24,7 @@ __all__ = [
     "Export",
     "Panel",
     "RerunView",
+    "export_touches",
     "omitted",
     "plot",
     "rerun_recording",

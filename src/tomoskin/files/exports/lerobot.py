@@ -12,7 +12,7 @@ import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -26,13 +26,9 @@ from tomoskin.core import (
     needed,
     write_text,
 )
-from tomoskin.files.exports.bag import recorded_stream
+from tomoskin.files.exports.export import Export
 from tomoskin.files.messages import Contacts, row_labels
-from tomoskin.files.session import as_recorded
 from tomoskin.model.pattern import Pattern
-
-if TYPE_CHECKING:
-    from tomoskin.files.exports.session_export import Export
 
 VOLTAGES, TOUCHES = "observation.tactile.voltages", "observation.tactile.touches"
 VALID = "observation.tactile.valid"
@@ -92,12 +88,10 @@ def _rate(every: float, path: StrPath) -> int:
 
 def _rows(job: Export, rate: int) -> Columns:
     """Columns by name, a row at each even time: the newest frame that was there by then."""
-    prepared = as_recorded(job.session)
-    stream = recorded_stream(job, prepared)
     times, voltages, touches, valid = [], [], [], []
-    for result in job.results(prepared):
+    for result in job.results():
         if result.ready:
-            contacts = Contacts.of(stream, result)
+            contacts = Contacts.of(job.stream, result)
             times.append(result.host_time)
             voltages.append(result.voltages - result.reference)
             touches.append(_touches(contacts))

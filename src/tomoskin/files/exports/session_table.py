@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import StrPath, needed, written
+from tomoskin.files.exports.export import Export
 from tomoskin.files.imports import column_names
 from tomoskin.files.session import (
-    Advance,
     Block,
     Rows,
     SessionReader,
@@ -46,9 +46,7 @@ class _FrameColumns:
         return block.number, block.time, block.sequence, block.ticks, block.mark, idle, *place
 
 
-def write_csv(
-    path: StrPath, session: SessionReader, advance: Advance, *, overwrite: bool = False
-) -> None:
+def write_csv(job: Export, path: StrPath) -> None:
     """One line a frame, in the interchange table's columns: ``tomoskin image`` reads it again.
 
     Raises
@@ -56,23 +54,21 @@ def write_csv(
     DataError
         When the session is damaged, and as :func:`written` does.
     """
-    rows = Rows.of(session)
+    rows = Rows.of(job.session)
     names = column_names(rows.pattern.drive, rows.pattern.measure)
-    columns_of = _FrameColumns(session, rows)
+    columns_of = _FrameColumns(job.session, rows)
     with (
-        written(path, overwrite=overwrite) as part,
+        written(path, overwrite=job.overwrite) as part,
         part.open("w", encoding="utf-8", newline="") as file,
     ):
         file.write(",".join([*columns_of.names, *names]) + "\n")
-        for block in all_blocks(session, rows, advance):
+        for block in all_blocks(job.session, rows, job.advance):
             columns = [column.tolist() for column in columns_of(block)]
             for *first, voltages in zip(*columns, block.voltages.tolist(), strict=True):
                 file.write(",".join(map(_text, [*first, *voltages])) + "\n")
 
 
-def write_parquet(
-    path: StrPath, session: SessionReader, advance: Advance, *, overwrite: bool = False
-) -> None:
+def write_parquet(job: Export, path: StrPath) -> None:
     """One row a frame: the columns beside, and ``voltages`` as a list of floats.
 
     The tables ``drive`` and ``measure`` are JSON in the schema's metadata, with the skin.
@@ -83,18 +79,18 @@ def write_parquet(
         When pyarrow is missing or the session is damaged, and as :func:`written` does.
     """
     pa, pq = (needed(name, "parquet", path) for name in ("pyarrow", "pyarrow.parquet"))
-    rows = Rows.of(session)
+    rows = Rows.of(job.session)
     n = rows.pattern.n_meas
-    columns_of = _FrameColumns(session, rows)
+    columns_of = _FrameColumns(job.session, rows)
     kinds = {"time_s": pa.float64(), "ticks": pa.uint64(), "x_m": pa.float64(), "y_m": pa.float64()}
     fields = [pa.field(name, kinds.get(name, pa.int64())) for name in columns_of.names]
     fields.append(pa.field("voltages", pa.list_(pa.float64(), n)))
-    schema = pa.schema(fields, metadata=_about(session, rows))
+    schema = pa.schema(fields, metadata=_about(job.session, rows))
     with (
-        written(path, overwrite=overwrite) as part,
+        written(path, overwrite=job.overwrite) as part,
         pq.ParquetWriter(part, schema, compression="zstd") as file,
     ):
-        for block in all_blocks(session, rows, advance):
+        for block in all_blocks(job.session, rows, job.advance):
             values = pa.FixedSizeListArray.from_arrays(pa.array(block.voltages.reshape(-1)), n)
             arrays = [pa.array(column) for column in columns_of(block)]
             file.write_batch(pa.record_batch([*arrays, values], schema=schema))
@@ -162,9 +158,7 @@ _TOUCH = np.dtype(
 )
 
 
-def write_hdf5(
-    path: StrPath, session: SessionReader, advance: Advance, *, overwrite: bool = False
-) -> None:
+def write_hdf5(job: Export, path: StrPath) -> None:
     """Groups ``frames`` (one dataset a column), ``touches``, ``truth`` and ``events``.
 
     ``drive`` and ``measure`` (n_meas, 2) beside them; the skin file, device and settings are
@@ -175,16 +169,17 @@ def write_hdf5(
     DataError
         When h5py is missing or the session is damaged, and as :func:`written` does.
     """
+    session = job.session
     h5py = needed("h5py", "hdf5", path)
     rows = Rows.of(session)
-    with written(path, overwrite=overwrite) as part, h5py.File(part, "w") as file:
+    with written(path, overwrite=job.overwrite) as part, h5py.File(part, "w") as file:
         file.attrs["skin"] = session.skin.to_toml()
         file.attrs["epoch_s"] = session.epoch
         file.attrs["device"] = _json(session.device())
         file.attrs["settings"] = _json(session.settings())
         file["drive"], file["measure"] = rows.pattern.drive, rows.pattern.measure
         group = file.create_group("frames")
-        for block in all_blocks(session, rows, advance):
+        for block in all_blocks(session, rows, job.advance):
             _append(group, block)
         file["touches"] = _touches(session)
         text = h5py.string_dtype()

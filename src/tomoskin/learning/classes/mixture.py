@@ -6,10 +6,11 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, eigh
+from scipy.linalg import cho_factor, cho_solve
 
 from tomoskin.core import DataError, FloatArray, IntArray
 from tomoskin.learning.classes.examples import Examples
+from tomoskin.learning.touch.gaussian_process import leading
 
 _MOST = 20
 """Directions: eight electrodes have n(n − 3)/2 = 20 independent readings."""
@@ -47,7 +48,7 @@ class Subspace:
             parts.append(_filled((data - middles[-1]) / scale))
         stacked = np.vstack(parts)
         d = int(np.clip(len(stacked) // _FRAMES_EACH, 2, min(_MOST, *stacked.shape)))
-        axes = _largest(stacked, d)
+        axes = leading(stacked, d, 1e-12)
         outside = (stacked**2).sum() - ((stacked @ axes) ** 2).sum()
         free = max(len(stacked) * (stacked.shape[1] - d), 1)
         return cls(middles[-1], scale, axes, max(float(outside / free), 1e-12))
@@ -91,16 +92,6 @@ def session_mean(data: FloatArray) -> FloatArray:
 
 def _filled(data: FloatArray) -> FloatArray:
     return np.where(np.isfinite(data), data, 0.0)
-
-
-def _largest(data: FloatArray, d: int) -> FloatArray:
-    """(n_meas, d) directions of the largest variance, by the smaller Gram matrix."""
-    n, rows = data.shape
-    if rows <= n:
-        return np.asarray(eigh(data.T @ data, subset_by_index=(rows - d, rows - 1))[1])
-    size, residual = eigh(data @ data.T, subset_by_index=(n - d, n - 1))
-    kept = size > 1e-12 * size[-1]
-    return np.asarray(data.T @ (residual[:, kept] / np.sqrt(size[kept])))
 
 
 _TRUST = 2.0

@@ -8,18 +8,21 @@ from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.linalg import eigh
 from scipy.special import ndtri
 
 from tomoskin.core import DataError, FloatArray
-from tomoskin.learning.touch.gaussian_process import Process, nine_in_ten, squared_distances
+from tomoskin.learning.touch.gaussian_process import (
+    Process,
+    leading,
+    nine_in_ten,
+    squared_distances,
+)
 from tomoskin.learning.touch.presses import Features, frames
 
 _TERMS = (("change", "rest"), ("pressed",), ("rest",))
 _COMPONENTS = {"change": 60, "pressed": 60, "rest": 10}
 """Principal components of each block that count; chosen by left-out presses of one skin."""
 
-_ROUNDING = 1e-9
 _FEWEST = 20
 _WHERE = "force labels"
 _HALF = float(ndtri(0.95))
@@ -53,7 +56,7 @@ class FeatureBlock:
         features = Features.of(data - middle)
         values = features(data - middle)
         mean = values.mean(axis=0)
-        axes = _principal(values - mean, components)
+        axes = leading(values - mean, components)
         inputs = (values - mean) @ axes
         square = squared_distances(inputs, inputs)
         unit = float(np.median(square[square > 0]))
@@ -150,15 +153,6 @@ class ForceProcess:
         middle = self.process(squares)[:, 0]
         half = _HALF * self.scale * self.process.deviation(squares)
         return middle, middle - half, middle + half
-
-
-def _principal(values: FloatArray, count: int) -> FloatArray:
-    """(k, c) axes along which ``values`` (n, k) scatter most, from their products (n, n)."""
-    n = len(values)
-    last = max(n - count, 0)
-    variance, rows = eigh(values @ values.T, subset_by_index=[last, n - 1])
-    keep = variance > _ROUNDING * variance[-1]
-    return np.asarray(values.T @ (rows[:, keep] / np.sqrt(variance[keep])))
 
 
 def _named(rest: FloatArray, pressed: FloatArray) -> dict[str, FloatArray]:

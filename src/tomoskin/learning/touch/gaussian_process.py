@@ -41,6 +41,19 @@ def squared_distances(
     return np.asarray(np.maximum(square - 2 * (a @ b.T), 0.0))
 
 
+def leading(data: FloatArray, count: int, rounding: float = _ROUNDING) -> FloatArray:
+    """(k, c) orthonormal directions in which ``data`` (n, k) are largest, ``count`` at most.
+
+    By the smaller of the two Gram matrices; what is ``rounding`` alone is left out.
+    """
+    n, k = data.shape
+    if k <= n:
+        return np.asarray(eigh(data.T @ data, subset_by_index=(max(k - count, 0), k - 1))[1])
+    size, rows = eigh(data @ data.T, subset_by_index=(max(n - count, 0), n - 1))
+    kept = size > rounding * size[-1]
+    return np.asarray(data.T @ (rows[:, kept] / np.sqrt(size[kept])))
+
+
 def nearness(a: FloatArray, b: FloatArray, length: float) -> FloatArray:
     """(n, m) exp(−d²/2 ``length``²) of the distances d between rows of ``a`` and ``b``."""
     return np.asarray(np.exp(-0.5 * squared_distances(a, b) / length**2))

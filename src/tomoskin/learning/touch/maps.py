@@ -10,7 +10,7 @@ import numpy as np
 from scipy.linalg import eigh
 
 from tomoskin.core import FloatArray
-from tomoskin.learning.touch.gaussian_process import Basis, Likeness
+from tomoskin.learning.touch.gaussian_process import Basis, Likeness, leading
 
 _PSEUDO_ROWS = 60.0
 """Weight of the prior of both covariances, which is their own diagonal."""
@@ -115,16 +115,10 @@ with their cube."""
 def principal(features: FloatArray) -> FloatArray:
     """(k, d) orthonormal directions of the largest variance of features (n, k); all where they
     are few."""
-    centred = features - features.mean(axis=0)
-    n, k = centred.shape
-    d = min(_DIRECTIONS, n - 1)
+    n, k = features.shape
     if k <= _MANY:
         return np.eye(k)
-    if k <= n:
-        return np.asarray(eigh(centred.T @ centred, subset_by_index=(k - d, k - 1))[1])
-    size, left = eigh(centred @ centred.T, subset_by_index=(n - d, n - 1))
-    kept = size > _ROUNDING * size[-1]
-    return np.asarray(centred.T @ (left[:, kept] / np.sqrt(size[kept])))
+    return leading(features - features.mean(axis=0), min(_DIRECTIONS, n - 1))
 
 
 @dataclass(frozen=True, eq=False)

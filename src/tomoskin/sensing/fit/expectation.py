@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from itertools import compress
-from typing import Self
 
 import numpy as np
 
@@ -83,95 +81,163 @@ def less(known: Known, number: int) -> Known:
     return (*known[:number], *known[number + 1 :])
 
 
-_STRONGER = 1.25
-"""A footprint is replaced where a touch is by so much stronger than when it was made."""
+_AWAY, _STRONGER, _WEAKER = 2e-3, 1.1, 0.95
+"""A footprint is made anew where its touch is by so many m elsewhere or by so much stronger, and no
+weaker: a touch that has just begun is known badly, and so is one that is lifted."""
 
 _FOOTPRINTS = 16
 """Footprints that are kept, the newest."""
 
+_OTHERWISE = np.array([1.0, 5e-3, 5e-3, 0.3])
+"""What is left lies elsewhere than the touch, m, and has another radius, as a logarithm: standard
+deviations. On the textile twin they are 6 mm and 0.27."""
 
-@dataclass(frozen=True, eq=False, slots=True)
+_FALLS, _CREEPS = 0.2, 10.0
+"""Seconds in which less is left, and in which more is: that is the sheet's drift, and what grows
+faster is a new press."""
+
+_FAINT = 0.3
+"""Deviations of the noise below which it does not matter what else may be left."""
+
+Shapes = Callable[[FloatArray], FloatArray]
+"""(4, n_meas) V of a spot (4,): its change, and the slopes of that by place and radius."""
+
+
+@dataclass(eq=False, slots=True)
 class FootprintChange:
-    """A footprint: a touch ``spot`` of four numbers, and its ``change`` (n_meas,) V of the rows."""
-
-    spot: tuple[float, ...]
-    change: FloatArray
-
-    def is_near(self, spot: Sequence[float]) -> bool:
-        """Whether a touch (4,) stands here."""
-        x, y = self.spot[0] - spot[0], self.spot[1] - spot[1]
-        return x * x + y * y < RESIDUAL.spacing**2
-
-    def stands_for(self, spot: Sequence[float]) -> bool:
-        """Whether a touch that stands here needs no footprint of its own."""
-        return self.is_near(spot) and _STRONGER * abs(self.spot[3]) >= abs(spot[3])
-
-
-@dataclass(frozen=True, eq=False)
-class ResidualResponse:
-    """Where touches have been since the baseline has had time to follow.
+    """Where a touch was, and what it left there.
 
     Attributes
     ----------
-    feet
-        Footprints, the newest last.
+    place
+        Where it was first, m.
+    spot
+        The touch as it is known best, four numbers.
+    shapes, rows
+        (4, n_meas) V of what is left: the touch's change, and this elsewhere or wider by a
+        deviation; and (4, c) as whitened data show them.
+    parts
+        (4,) of them that are left, as idle frames have told.
+    touched
+        How strong a touch has stood here since, as a part of that one; 0 where none has.
     quiet
-        Frames without any touch since each was made.
+        Seconds of idle frames since.
     """
 
-    feet: tuple[FootprintChange, ...] = ()
-    quiet: tuple[int, ...] = ()
+    place: Sequence[float]
+    spot: Sequence[float]
+    shapes: FloatArray
+    rows: FloatArray
+    parts: FloatArray
+    touched: float = 1.0
+    quiet: float = 0.0
 
-    def after(
-        self, spots: FloatArray, changes: Callable[[FloatArray], FloatArray], frames: int
-    ) -> Self:
-        """With a frame in which touches ``spots`` (k, 4) were; each is forgotten after so many
-        ``frames`` without one. ``changes`` gives (k, n_meas) V of spots (k, 4), each alone."""
-        if not len(spots):
-            quiet = tuple(q + 1 for q in self.quiet)
-            return self._kept([q < frames for q in quiet], quiet)
-        newest_first = range(len(self.feet) - 1, -1, -1)
-        held = [
-            next((n for n in newest_first if self.feet[n].stands_for(spot)), None)
-            for spot in spots.tolist()
-        ]
-        quiet = tuple(0 if n in held else q for n, q in enumerate(self.quiet))
-        fresh = spots[[n is None for n in held]]
-        if not len(fresh):
-            return self._kept([True] * len(quiet), quiet)
-        new = fresh.tolist()
-        made = map(FootprintChange, map(tuple, new), changes(fresh))
-        kept = self._kept([not any(map(foot.is_near, new)) for foot in self.feet], quiet)
-        none = len(fresh) * (0,)
-        return type(self)((*kept.feet, *made)[-_FOOTPRINTS:], (*kept.quiet, *none)[-_FOOTPRINTS:])
+    def is_near(self, spot: Sequence[float]) -> bool:
+        """Whether a touch (4,) stands here."""
+        return math.dist(self.place, spot[:2]) < RESIDUAL.spacing
 
-    def _kept(self, stays: list[bool], quiet: tuple[int, ...]) -> Self:
-        """The footprints that stay, of which the tuple is the same where all do."""
-        if all(stays):
-            return self if quiet == self.quiet else replace(self, quiet=quiet)
-        return type(self)(tuple(compress(self.feet, stays)), tuple(compress(quiet, stays)))
+    def takes(self, spot: Sequence[float]) -> bool:
+        """Whether the touch (4,) that stands here is known better by now than the footprint is."""
+        size = spot[CONTENT] / self.spot[CONTENT]
+        self.touched, self.quiet = max(self.touched, min(size, 1.0)), 0.0
+        moved = math.dist(self.spot[:2], spot[:2]) > _AWAY
+        return size > _STRONGER or (moved and size > _WEAKER)
+
+    def doubt(self, since: float) -> float:
+        """Deviation of the part that is left, so many seconds ``since`` an idle frame: a touch has
+        stood here, or it has faded. In steps of two, so that it is the same for some time."""
+        faded = -float(self.parts[0]) * math.expm1(-since / RESIDUAL.recovery)
+        doubt = max(RESIDUAL.deviation * self.touched, faded)
+        return min(2.0 ** math.ceil(math.log2(doubt)), RESIDUAL.deviation) if doubt > 0 else 0.0
+
+    def learn(self, more: FloatArray, falls: float, creeps: float) -> None:
+        """Take what an idle frame shows of the shapes beyond the parts. These fall by such a share
+        of it, and creep. What is too much for a residual response is none."""
+        if not self.touched:
+            size = np.abs(self.parts)
+            less = np.clip(falls * more, -size, size)
+            self.parts = self.parts + np.where(self.parts * more < 0, less, creeps * more)
+        elif RESIDUAL.holds(float(more[0]), self.touched):
+            self.parts, self.touched = self.parts + more, 0.0
+        self.parts[0] = max(self.parts[0], 0.0)
 
 
-class ResidualDirections:
-    """Residual responses as whitened data see them; what was made for the last ones is kept."""
+class ResidualResponse:
+    """What touches have left since the baseline has had time to follow.
 
-    def __init__(self) -> None:
-        self._matrix = np.zeros((0, 0))
-        self._feet: tuple[FootprintChange, ...] = ()
-        self._row: dict[FootprintChange, FloatArray] = {}
-        self._rows = np.zeros((0, 0))
+    It is unknown until nothing touches: then a part of the touch's change counts as noise. Idle
+    frames tell what is left, and from then on that is taken from the data. What else there may be
+    is how far it has faded since. It fades only, so what grows is a new press.
 
-    def of(self, matrix: FloatArray, feet: tuple[FootprintChange, ...]) -> FloatArray:
-        """(k, c) each as long as its deviation; ``matrix`` (c, n_meas) 1/V, from data to whitened
-        data."""
-        if matrix is not self._matrix or feet is not self._feet:
-            before = self._row if matrix is self._matrix else {}
-            self._row = {
-                foot: before[foot]
-                if foot in before
-                else RESIDUAL.deviation * (matrix @ foot.change)
-                for foot in feet
-            }
-            self._rows = np.array([*self._row.values()]).reshape(-1, len(matrix))
-            self._matrix, self._feet = matrix, feet
-        return self._rows
+    Parameters
+    ----------
+    seconds
+        Between frames.
+    """
+
+    def __init__(self, seconds: float) -> None:
+        self._seconds, self._since = seconds, 0.0
+        self._feet: list[FootprintChange] = []
+        self._matrix = self._left = np.zeros((0, 0))
+        self._doubts: list[float] | None = None
+
+    def after(self, spots: FloatArray, shapes: Shapes) -> None:
+        """Take a frame in which touches ``spots`` (k, 4) were."""
+        self._since += self._seconds
+        for spot in spots.tolist():
+            own = next((foot for foot in reversed(self._feet) if foot.is_near(spot)), None)
+            if own is None:
+                made, rows = self._made(shapes(np.array(spot)))
+                own = FootprintChange(spot[:2], spot, made, rows, np.zeros(len(made)))
+                self._feet = [*self._feet, own][-_FOOTPRINTS:]
+            elif own.takes(spot):
+                own.spot, (own.shapes, own.rows) = spot, self._made(shapes(np.array(spot)))
+
+    def _made(self, shapes: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """What is left, in V and whitened: slopes are without what they have of the change."""
+        made = _OTHERWISE[:, None] * shapes
+        rows = made @ self._matrix.T
+        along = rows[1:] @ rows[0] / max(float(rows[0] @ rows[0]), 1e-300)
+        for own in (made, rows):
+            own[1:] -= np.outer(along, own[0])
+        self._doubts = None
+        return made, rows
+
+    def without(self, data: FloatArray) -> FloatArray:
+        """``data`` (n_meas,) V less what is known to be left."""
+        for foot in self._feet:
+            if foot.parts.any():
+                data = data - foot.parts @ foot.shapes
+        return data
+
+    def directions(self, matrix: FloatArray) -> FloatArray:
+        """(k, c) of what may be left besides, each as long as its deviation; the same array as
+        long as nothing changes. ``matrix`` (c, n_meas) 1/V, from data to whitened data."""
+        if matrix is not self._matrix:
+            self._matrix, self._doubts = matrix, None
+            for foot in self._feet:
+                foot.rows = foot.shapes @ matrix.T
+        doubts = [foot.doubt(self._since) for foot in self._feet]
+        if doubts != self._doubts:
+            left = [d * foot.rows[0] for d, foot in zip(doubts, self._feet, strict=True)]
+            counts = [row for row in left if row @ row > _FAINT**2]
+            self._left, self._doubts = np.array(counts).reshape(-1, len(matrix)), doubts
+        return self._left
+
+    def idle(self, data: FloatArray) -> None:
+        """Take ``data`` (n_meas,) V of a frame in which nothing touched, less what was known."""
+        self._since = self._seconds
+        if not self._feet:
+            return
+        rows = np.concatenate([foot.rows for foot in self._feet])
+        sizes = np.repeat([foot.touched or 1.0 for foot in self._feet], len(_OTHERWISE))
+        inner = rows @ rows.T
+        inner[np.diag_indices_from(inner)] += (RESIDUAL.deviation * sizes) ** -2
+        parts = np.linalg.solve(inner, rows @ (self._matrix @ data))
+        shares = [-math.expm1(-self._seconds / time) for time in (_FALLS, _CREEPS)]
+        for foot, more in zip(self._feet, parts.reshape(-1, len(_OTHERWISE)), strict=True):
+            foot.learn(more, *shares)
+            foot.quiet += self._seconds
+        shown = [float(np.linalg.norm(foot.parts @ foot.rows)) for foot in self._feet]
+        pairs = zip(self._feet, shown, strict=True)
+        self._feet = [foot for foot, size in pairs if size > 1.0 or foot.quiet < RESIDUAL.gone]

@@ -14,7 +14,7 @@ from tomoskin.core import Detection, FloatArray, reach
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.skin import Skin
 from tomoskin.sensing.fit.detections import CellDiscs, SpotDetections, joined, judged
-from tomoskin.sensing.fit.expectation import Expectation, ResidualDirections, ResidualResponse
+from tomoskin.sensing.fit.expectation import Expectation, ResidualResponse
 from tomoskin.sensing.fit.hypotheses import CommonModeJump, Explained, Jumps, Rival, challenged
 from tomoskin.sensing.fit.policy import EXHAUSTIVE, DetectionPolicy, Pace, favours, rises_beside
 from tomoskin.sensing.fit.problem import Matched, Problem
@@ -72,7 +72,7 @@ class SpotFinder:
         self._model, self._policy = model, DetectionPolicy.of(skin.touch, pace)
         self._cells, self._rim = CellDiscs.of(mesh), model.reduced.rim
         self._reach, self._unrest = pace.reach, 1.0
-        self._residual, self._left = ResidualResponse(), ResidualDirections()
+        self._residual = ResidualResponse(pace.interval)
         self._unit = skin.conductivity
         self._before = self._shown = np.zeros((0, N_PARAMETERS))
         self._deficit = Deficit.none(len(model.solver.table.basis))
@@ -119,7 +119,7 @@ class SpotFinder:
         """
         self._sight.look(nuisance, np.zeros((len(dv), 0)) if jumps is None else jumps)
         self._wander = wander
-        data = dv / self._sight.scale
+        data = self._data = self._residual.without(dv / self._sight.scale)
         self.watch.begin(data, self._sight.of(self.watch.excess).gauge)
         (detected, rival), jump, matched = self._searched(data)
         solver = self._model.solver
@@ -131,10 +131,18 @@ class SpotFinder:
         self._unrest = self._motion(detected.fit.spots)
         self._before, self._deficit = detected.fit.spots, detected.fit.deficit
         self._expected = self._going_on(detected)
-        if frames := self._policy.pace.fading_frames:
-            self._residual = self._residual.after(self._before, self._model.changes, frames)
         self._change = detected.fit.change + detected.fit.deficit.change
         return self._detections(joined(detected))
+
+    def learn(self, *, touched: bool) -> None:
+        """Whether something touches in the newest frame: its touches leave something behind, or
+        what it holds of touches, others have left."""
+        if not (self._policy.pace.speed and self._policy.pace.interval):
+            return
+        if touched:
+            self._residual.after(self._shown, self._model.shapes)
+        else:
+            self._residual.idle(self._data)
 
     def others(self) -> FloatArray:
         """(k, n_meas) V of the model: for each touch of the newest frame what all others change."""
@@ -148,7 +156,7 @@ class SpotFinder:
         common mode has jumped."""
         seen, matched, _, jumps = self._sight.of(self.watch.excess).louder(times)
         whitened, rest = seen.whitened(data)
-        left = self._left.of(seen.matrix, self._residual.feet)
+        left = self._residual.directions(seen.matrix)
         problem = Problem(
             response=self._model.response,
             reduced=self._model.reduced,

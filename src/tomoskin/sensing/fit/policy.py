@@ -156,14 +156,12 @@ class Pace:
     restart
         Whether a frame that does not go on as it was is looked at without what was there too.
     speed
-        Of touches along each axis, standard deviation, m/s; 0 where they are taken to stand still.
-    fading
-        Seconds for which residual responses of touches count as noise; 0 where frames do
-        not follow each other.
+        Of touches along each axis, standard deviation, m/s; 0 where frames do not follow each
+        other.
     scan_time
         Seconds that a scan takes: in it touches move and grow. 0 where rows are read all at once.
     interval
-        Seconds between two frames: how many of them a residual response lasts.
+        Seconds between two frames.
     """
 
     warm: int = 4
@@ -180,7 +178,6 @@ class Pace:
     joint: int = 0
     restart: bool = False
     speed: float = 0.1
-    fading: float = 8.0
     scan_time: float = 0.0
     interval: float = 0.0
 
@@ -188,11 +185,6 @@ class Pace:
     def reach(self) -> float:
         """How far a touch goes within a scan along each axis, standard deviation, m."""
         return self.speed * self.scan_time
-
-    @property
-    def fading_frames(self) -> int:
-        """Frames without a touch after which a residual response is none any more."""
-        return math.ceil(self.fading / self.interval) if self.interval else 0
 
 
 LIVE = Pace()
@@ -214,7 +206,6 @@ EXHAUSTIVE = Pace(
     joint=10,
     restart=True,
     speed=0.0,
-    fading=0.0,
 )
 """Each frame as if it were the only one, of touches that stand still."""
 
@@ -371,7 +362,8 @@ def leaves_much(policy: DetectionPolicy, fit: Fit) -> bool:
 def rises_beside(policy: DetectionPolicy, fit: Fit, both: Fit, ratio: FloatArray) -> bool:
     """Whether touches of ``both`` signs explain what those of a ``fit`` leave: some clearly are
     not of the skin's sign, and little remains then. Where much does, more touches come."""
-    clear = bool((ratio[policy.is_wrong(both.spots[:, CONTENT])] > _CLEAR * policy.least).any())
+    wrong = ratio[policy.is_wrong(both.spots[:, CONTENT])]
+    clear = bool((wrong > _CLEAR * policy.threshold(fit)).any())
     return clear and both.beyond < _HALF * fit.beyond
 
 

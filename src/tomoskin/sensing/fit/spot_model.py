@@ -19,7 +19,7 @@ from tomoskin.sensing.fit.native import NativeSolver
 from tomoskin.sensing.fit.prior import SpotPrior
 from tomoskin.sensing.fit.problem import Solver
 from tomoskin.sensing.fit.solver import NumpySolver, SheetDomain
-from tomoskin.sensing.fit.spot import Footprints, Response
+from tomoskin.sensing.fit.spot import CONTENT, Footprints, Response
 from tomoskin.sensing.fit.table import ResponseTable
 from tomoskin.sensing.fit.tabulate import Tabulation, kept_tabulation
 from tomoskin.sensing.fit.uneven_sheet import fields_of, fitting_sheet
@@ -101,6 +101,11 @@ class SpotModel:
     def changes(self, spots: FloatArray) -> FloatArray:
         """(k, n_meas) V that each of ``spots`` (k, 4) alone adds to the reference, by the table."""
         return np.asarray(self.solver.expanded(spots)[:, 0] @ self.solver.table.basis)
+
+    def shapes(self, spot: FloatArray) -> FloatArray:
+        """(4, n_meas) V: what a ``spot`` (4,) changes, and its slopes by place and radius."""
+        own = self.solver.expanded(spot[None])[0, : 1 + CONTENT]
+        return np.asarray(own @ self.solver.table.basis)
 
     def fitting(
         self, reference: FloatArray, deviation: FloatArray | float = 0.0

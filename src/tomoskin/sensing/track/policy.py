@@ -105,8 +105,8 @@ class ResidualModel:
     lasts
         Seconds for which a touch must look like it to be it.
     gone
-        Seconds without any detection after which there is none: a finder loses what is faint for a
-        few frames.
+        Seconds without any detection after which there is none where it is below the noise: a
+        finder loses what is faint for a few frames.
     """
 
     part: float = 0.25

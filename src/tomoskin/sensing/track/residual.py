@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -23,24 +24,18 @@ _MOST = 64
 
 @dataclass(slots=True, eq=False)
 class Residual:
-    """What is left at a ``foot`` of a touch of this sign and ``radius``, and its ``level``.
-
-    ``unseen``: there was nothing above the noise since it was last looked for.
-    """
+    """What is left at a ``foot`` of a touch of this sign and ``radius``, and its ``level``."""
 
     foot: Footprint
     sign: float
     radius: float
     level: float
     time: float
-    unseen: bool = False
 
-    def explains(self, detection: Detection, time: float, least_snr: float) -> bool:
+    def explains(self, detection: Detection, time: float) -> bool:
         """Whether the detection has not grown; follow its level."""
         size = size_of(detection)
         noise = size / detection.snr if detection.snr > 0 else 0.0
-        if self.unseen:
-            self.level, self.unseen = min(self.level, least_snr * noise), False
         grown = RESIDUAL.has_grown(size, self.level, noise)
         if not grown:
             creeps = -np.expm1((self.time - time) / _CREEP)
@@ -50,22 +45,15 @@ class Residual:
 
 
 class ResidualResponses:
-    """Memory of where touches were.
+    """Memory of where touches were."""
 
-    Parameters
-    ----------
-    least_snr
-        Signal-to-noise ratio below which there is no detection.
-    """
-
-    def __init__(self, least_snr: float) -> None:
-        self._least_snr = least_snr
+    def __init__(self) -> None:
         self.forget()
 
     def forget(self) -> None:
-        """Forget all, as with a new reference."""
+        """Forget all: nothing of them shows in detections any more."""
         self._residuals: list[Residual] = []
-        self._quiet_since: float | None = None
+        self._shown = -math.inf
 
     def leave(self, trace: Trace, time: float) -> None:
         """Remember where a touch was that has ended."""
@@ -80,13 +68,9 @@ class ResidualResponses:
         """Follow whether frames are ``quiet``, without any detection: where they stay so, the
         residual responses are below the noise."""
         if not quiet:
-            self._quiet_since = None
-            return
-        if self._quiet_since is None:
-            self._quiet_since = time
-        if time - self._quiet_since >= RESIDUAL.gone:
-            for residual in self._residuals:
-                residual.unseen = True
+            self._shown = time
+        elif time - self._shown >= RESIDUAL.gone:
+            self._residuals.clear()
 
     def explain(self, detection: Detection, time: float, traces: Iterable[Trace]) -> bool:
         """Whether the detection is the residual response of an earlier touch.
@@ -100,7 +84,7 @@ class ResidualResponses:
             ):
                 return True
         answers = [
-            residual.explains(detection, time, self._least_snr)
+            residual.explains(detection, time)
             for residual in self._residuals
             if _is_under(detection, residual.foot, residual.sign, residual.radius)
         ]

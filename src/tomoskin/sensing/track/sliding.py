@@ -80,20 +80,20 @@ class FingerTracker:
     """A tracker whose touches are where the fingers are; what is held still is not moved."""
 
     def __init__(self, tracker: Tracker, lag: float) -> None:
-        self._tracker, self._slides = tracker, SlideCorrection(lag)
+        self.tracker, self._slides = tracker, SlideCorrection(lag)
 
     @property
     def events(self) -> tuple[TouchEvent, ...]:
         """What happened in the newest frame."""
         finger = self._slides.of_finger
-        return tuple(replace(e, touch=finger(e.touch)) for e in self._tracker.events)
+        return tuple(replace(e, touch=finger(e.touch)) for e in self.tracker.events)
 
     def update(
         self, detections: Sequence[Detection], time: float, host_time: float
     ) -> tuple[Touch, ...]:
         """Touches of the next frame; see :meth:`Tracker.update`."""
-        tracked = self._tracker.update(detections, time, host_time)
-        if not self._tracker.settings.still:
+        tracked = self.tracker.update(detections, time, host_time)
+        if not self.tracker.settings.still:
             self._slides = self._slides.after(tracked, time)
         return tuple(map(self._slides.of_finger, tracked))
 

@@ -34,16 +34,20 @@ class Tracker:
     ----------
     events
         What happened in the newest frame.
+    traces
+        Touches, and what may become one.
+    residuals
+        Where touches were, of which something may still show.
     """
 
     def __init__(self, settings: TrackSettings | None = None) -> None:
         self.settings = settings or TrackSettings()
         self.events: tuple[TouchEvent, ...] = ()
-        self._residuals = ResidualResponses(self.settings.least_snr)
+        self.traces: list[Trace] = []
+        self.residuals = ResidualResponses()
         self._clock = TrackClock()
         self._happened: list[TouchEvent] = []
         self._keys = 0
-        self._traces: list[Trace] = []
         self._ledger = IdentityLedger()
 
     @property
@@ -66,10 +70,10 @@ class Tracker:
         self._clock = self._clock.at(time, host_time)
         if self.settings.still:  # what stood there before says nothing of this frame
             detections = [detection for detection in detections if not detection.weak]
-            self._residuals.forget()
-        if detections or self._traces:
+            self.residuals.forget()
+        if detections or self.traces:
             self._follow(FrameOfTouches.of(detections, self._clock, self.settings))
-        self._residuals.note(self._clock.now, quiet=not detections)
+        self.residuals.note(self._clock.now, quiet=not detections)
         touches = self._touches()
         self.events, self._happened = tuple(self._happened), []
         return touches
@@ -80,17 +84,17 @@ class Tracker:
         The next frame tells that they were released. Time starts again at zero: what follows is
         to the bit what a new tracker would make of it.
         """
-        for trace in [trace for trace in self._traces if trace.reported]:
+        for trace in [trace for trace in self.traces if trace.reported]:
             self._end(trace)
-        self._traces = []
+        self.traces = []
         self._ledger.forget()
-        self._residuals.forget()
+        self.residuals.forget()
         self.events = ()
         self._clock = TrackClock()
 
     def _follow(self, frame: FrameOfTouches) -> None:
         """One frame: who is where, who has begun, ended, met and parted."""
-        traces, now = list(self._traces), self._clock.now
+        traces, now = list(self.traces), self._clock.now
         found = associate(traces, frame)
         fresh = len(found.pairs) < len(frame.observed)
         beside = {m.key: t.alone(now) for t in traces if fresh and t.reported for m in t.members}
@@ -100,7 +104,7 @@ class Tracker:
             detection = observed.detection
             if index in found.pairs or not policy.may_begin(detection, self.settings.snr):
                 continue
-            if not self._residuals.explain(detection, now, self._traces):
+            if not self.residuals.explain(detection, now, self.traces):
                 self._begin(observed, frame, beside)
         for i, k, odds in found.exchanges:  # while both were seen
             one, other = traces[i], traces[k]
@@ -110,29 +114,29 @@ class Tracker:
                         trace.change(now)
                 self._ledger.exchange(one.key, other.key, odds)
         self._settle()
-        self._ledger.judge(self._traces)
+        self._ledger.judge(self.traces)
 
     def _begin(
         self, observed: ObservedDetection, frame: FrameOfTouches, beside: dict[int, Alone]
     ) -> None:
         self._keys += 1
         detection = observed.detection
-        others = any(trace.reported and trace.missing is None for trace in self._traces)
+        others = any(trace.reported and trace.missing is None for trace in self.traces)
         odds = policy.initiated(detection, self.settings.snr, frame.strongest if others else 0.0)
         state = begin(observed.position, self.settings)
         clock = self._clock
         trace = Trace(detection, state, clock.now, clock.host, odds, [MergedFinger(self._keys)])
         trace.beside = beside
-        sibling = sibling_of(trace, self._traces)
+        sibling = sibling_of(trace, self.traces)
         if sibling is not None:  # its strength has not faded: some of it was the newcomer's
             sibling.change(clock.now)
-        self._traces.append(trace)
+        self.traces.append(trace)
 
     def _settle(self) -> None:
         """Report what is there, end what is gone."""
-        for trace in [t for t in self._traces if not t.reported]:
+        for trace in [t for t in self.traces if not t.reported]:
             self._consider(trace)
-        for trace in [t for t in self._traces if t.reported]:
+        for trace in [t for t in self.traces if t.reported]:
             if trace.missing is not None:
                 self._lose(trace)
             elif is_residual(trace, self._clock.now):
@@ -144,19 +148,19 @@ class Tracker:
             self._report_onset(trace)
             return
         if trace.missing is not None or policy.is_forgotten(trace.detection, self.settings.snr):
-            self._traces.remove(trace)
+            self.traces.remove(trace)
             return
         seconds = self._clock.now - trace.since
         if not policy.is_reported(trace.odds, trace.detection, seconds):
             return
-        if self._residuals.explain(trace.detection, self._clock.now, self._traces):
-            self._traces.remove(trace)
+        if self.residuals.explain(trace.detection, self._clock.now, self.traces):
+            self.traces.remove(trace)
             return
-        origin = origin_of(trace, self._traces)
+        origin = origin_of(trace, self.traces)
         if origin is None:
             self._report_onset(trace)
         elif origin.missing is not None:  # its region is gone, and this is one of those it was
-            self._traces.remove(trace)
+            self.traces.remove(trace)
             origin.become(trace)
         else:
             self._split(origin, trace)
@@ -178,24 +182,24 @@ class Tracker:
 
     def _lose(self, trace: Trace) -> None:
         """Of one that is missing: it has met another, or has been lifted, or is waited for."""
-        odds, carrier = met_by(trace, self._traces)
+        odds, carrier = met_by(trace, self.traces)
         over = self.settings.still or policy.is_deleted(trace.odds)
         if carrier is not None and policy.has_met(odds, deleted=over):
-            self._traces.remove(trace)
+            self.traces.remove(trace)
             merge(carrier, trace, self._clock.now)
             self._report("merge", carrier)
         elif over:
             self._end(trace)
 
     def _end(self, trace: Trace) -> None:
-        self._traces.remove(trace)
-        self._residuals.leave(trace, self._clock.now)
+        self.traces.remove(trace)
+        self.residuals.leave(trace, self._clock.now)
         for touch in self._ledger.end(trace):
             self._happened.append(TouchEvent("release", touch, self._clock.host))
 
     def _touches(self) -> tuple[Touch, ...]:
-        shown = [trace for trace in self._traces if trace.reported]
-        touches = self._ledger.touches(shown, self._traces)
+        shown = [trace for trace in self.traces if trace.reported]
+        touches = self._ledger.touches(shown, self.traces)
         pairs = sorted(zip(touches, shown, strict=True), key=lambda pair: pair[0].id)
         for touch, trace in pairs:
             if self._ledger.moved(touch, trace.held.wavers):
@@ -204,6 +208,6 @@ class Tracker:
         return tuple([touch for touch, _ in pairs])
 
     def _report(self, kind: Happening, trace: Trace) -> None:
-        (touch,) = self._ledger.touches([trace], self._traces)
+        (touch,) = self._ledger.touches([trace], self.traces)
         self._ledger.place(touch)
         self._happened.append(TouchEvent(kind, touch, self._clock.host))

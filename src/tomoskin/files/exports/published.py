@@ -1,4 +1,5 @@
-"""The sheet in space, touches and series as Rerun shows them; a session as a file of Rerun."""
+"""What a session would have had sinks publish: as a bag of ROS 2, which is an MCAP file, and as a
+file of Rerun, the sheet in space, touches and series."""
 
 from __future__ import annotations
 
@@ -8,13 +9,65 @@ from uuid import uuid4
 
 import numpy as np
 
+from tomoskin import __version__
 from tomoskin.core import CHANGE, Event, Image, SinkError, StrPath, needed, written
-from tomoskin.files.exports.bag import recorded_items, recorded_stream
-from tomoskin.files.messages import Contacts, Item, Stream, time_of, touch_colour, touch_width
-from tomoskin.files.session import as_recorded
+from tomoskin.files.exports.export import Export
+from tomoskin.files.messages import (
+    TOPICS,
+    Contacts,
+    Item,
+    Naming,
+    RosMessage,
+    Stream,
+    definition,
+    encode_cdr,
+    ros_messages,
+    time_of,
+    touch_colour,
+    touch_width,
+    type_hash,
+)
 
 if TYPE_CHECKING:
-    from tomoskin.files.exports.session_export import Export
+    from mcap.writer import Writer
+
+
+_BETWEEN = "\n" + 80 * "=" + "\n"
+
+
+def write_bag(job: Export, path: StrPath) -> None:
+    """Write the messages that the sink ``ros2`` would have sent; an image every ``job.every`` s.
+
+    Raises
+    ------
+    DataError, OutputError
+        When the session cannot be replayed, or the file not be written.
+    """
+    path = Path(path)
+    from mcap.writer import CompressionType, Writer
+
+    with written(path, overwrite=job.overwrite) as part, part.open("wb") as file:
+        bag = Writer(file, compression=CompressionType.NONE)
+        bag.start(profile="ros2", library=f"tomoskin {__version__}")
+        channels = {topic: _register(bag, job.stream.naming, topic) for topic in TOPICS}
+        for item in job.items():
+            for message in ros_messages(job.stream, item):
+                _put(bag, channels[message.topic], message)
+        bag.finish()  # type: ignore[no-untyped-call]
+
+
+def _register(bag: Writer, naming: Naming, topic: str) -> int:
+    kind = TOPICS[topic]
+    text = _BETWEEN.join(definition(kind))
+    schema = bag.register_schema(kind, "ros2msg", text.encode())
+    about = {"offered_qos_profiles": "", "topic_type_hash": type_hash(kind)}
+    return bag.register_channel(f"/{naming.topic(topic)}", "cdr", schema, about)
+
+
+def _put(bag: Writer, channel: int, message: RosMessage) -> None:
+    data = encode_cdr(TOPICS[message.topic], message.value)
+    bag.add_message(channel, message.stamp, data, message.stamp)
+
 
 _WHERE = "rerun"
 _ARROW = 0.02
@@ -106,13 +159,12 @@ def write_rerun(job: Export, path: StrPath) -> None:
         When Rerun is not installed.
     """
     path = Path(path)
-    rerun, prepared = needed("rerun", "rerun", _WHERE, SinkError), as_recorded(job.session)
-    stream = recorded_stream(job, prepared)
+    rerun, stream = needed("rerun", "rerun", _WHERE, SinkError), job.stream
     with written(path, overwrite=job.overwrite) as part:
         recording = rerun_recording(rerun, stream)
         recording.save(str(part))
         view = RerunView(rerun, recording, stream)
-        for item in recorded_items(job, prepared, stream):
+        for item in job.items():
             view.log(item)
         recording.flush()
         recording.disconnect()

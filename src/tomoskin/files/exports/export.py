@@ -1,0 +1,82 @@
+"""A session as it is exported: replayed once more, with what was recorded beside the frames."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import chain
+
+from tomoskin.core import DataError
+from tomoskin.files.exports.picture import Panel
+from tomoskin.files.messages import Every, Item, Reporter, Stream
+from tomoskin.files.session import (
+    Advance,
+    SessionReader,
+    as_recorded,
+    indexed_frames,
+    no_report,
+    replayed,
+)
+from tomoskin.pipeline import FrameResult, Prepared
+
+
+@dataclass(frozen=True)
+class Export:
+    """A session to be exported.
+
+    ``every`` s between two images; ``advance`` is called with how far it is. Files that are
+    there are written over with ``overwrite`` only.
+    """
+
+    session: SessionReader
+    every: float = 0.1
+    advance: Advance = no_report
+    overwrite: bool = False
+
+    @cached_property
+    def prepared(self) -> Prepared:
+        """The skin and its calibrations as they are in the recording."""
+        return as_recorded(self.session)
+
+    @cached_property
+    def stream(self) -> Stream:
+        """What the run of the recording would have published."""
+        stream = Stream.of(self.prepared, str(self.session.path), self.session.epoch)
+        return replace(stream, replayed=False)  # here events are those of the recording too
+
+    def results(self) -> Iterator[FrameResult]:
+        """What a replay makes of each frame; ``advance`` is called as it goes."""
+        total = indexed_frames(self.session)
+        for done, result in enumerate(replayed(self.prepared, self.session)):
+            self.advance(done, max(done + 1, total))
+            yield result
+
+    def items(self) -> Iterator[Item]:
+        """What was recorded beside the frames, then each frame's contacts."""
+        events = (event for event in self.session.events() if not event.kind.startswith("touch-"))
+        yield from chain(events, self.session.notes())
+        reporter = Reporter(self.stream, image_period=self.every)
+        for result in self.results():
+            yield reporter.of(result)
+
+    def images(self) -> Iterator[FrameResult]:
+        """A result every so often; those before the reference stands are left out."""
+        is_due, shown = Every(self.every), False
+        for result in self.results():
+            if result.ready and is_due(result.host_time):
+                shown = True
+                yield result
+        if not shown:
+            raise DataError(
+                "holds too few frames for a reference, so there are no images",
+                where=str(self.session.path),
+            )
+
+    def panels(self) -> Iterator[Panel]:
+        """The images with their touches, and the time since the first."""
+        first: float | None = None
+        for result in self.images():
+            first = result.host_time if first is None else first
+            title = f"{result.host_time - first:.1f} s"
+            yield Panel(title, result.image.values, result.touches)
