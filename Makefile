@@ -1,7 +1,7 @@
 # Each target does its own set-up, once; arguments pass through: make live ARGS="--port 9000"
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: set-up together checks programs style types page-check page-test engine-check help soak live test test-all suite firmware-test fuzz bench bench-docs docs board gallery lint lock native wheel release clean page dev
+.PHONY: set-up together checks programs style types page-check page-test engine-check help soak live test test-all suite firmware-test fuzz bench bench-docs docs board claims gallery lint lock native wheel release clean page dev
 
 VENV := .venv
 PY := $(VENV)/bin/python
@@ -61,8 +61,11 @@ board: dev  ## the circuit boards: rules, then netlists, bills, Gerbers, picture
 	@$(PIP) install --no-deps --require-hashes --upgrade --target build/board/tools --requirement requirements/board.txt
 	@$(PY) hardware/fabricate.py $(ARGS)
 
-gallery: native  ## run the examples again into docs/gallery.md; two minutes
-	@$(PY) docs/make_gallery.py
+claims: native  ## run what the published figures come from; fails where one no longer holds (PART=gallery: ten minutes)
+	@$(PY) docs/claims.py $(PART) $(ARGS)
+
+gallery: native  ## run the examples again into docs/gallery.md; ten minutes
+	@$(PY) docs/claims.py gallery --accept
 
 lint: style types page-check engine-check  ## ruff, mypy, the page's types, and the native engine's where Rust is installed
 

@@ -12,6 +12,8 @@ The colours are a smooth change, the same at each depth; the cross is the ball t
 Thesis saw: nothing of the kind; its tanks are those of others.
 Checked: the ball within 16 mm of where it was put, three times; in the film the ball explains more
 than half of the change in half of the frames.
+Assumed: that the ball insulates and lies in the electrodes' plane; the tank's size and the
+places are those of the recording. The film has no truth to be compared with.
 """
 
 from __future__ import annotations

@@ -8,6 +8,7 @@ Thesis saw: the largest negative changes in the pairs that contain that electrod
 drive itself).
 Checked: of the rows that the electrode does not drive, the 6 most negative all contain it; every
 pair that contains it falls, and on average the others do not.
+Assumed: a gauge factor of 10; 1.2 to 2.4 are published for knits. Figure 5.7 has what 2.4 changes.
 """
 
 from __future__ import annotations

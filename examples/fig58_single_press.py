@@ -8,17 +8,20 @@ the centre that was found.
 Thesis saw: each press localised; its shape poorer near the rim.
 Checked: one region each, its centre within 10 mm of the probe's; near the rim the region is longer
 than wide by at least 1.2 times, at the centre by less. The thesis's four metrics are reported.
+Assumed: the force, 5 N, and the place at the rim, neither of which the thesis gives; a gauge factor
+of 10. With 2.4, which is published for a knit, each press is still found, but the change is a fifth
+as large (below), and at the centre the noise shifts it: by 2 to 9 mm with seeds 1 to 6.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 import figures
 from imaging import NOSER, Imager, named_metrics
-from lab import Lab, open_lab, report
+from lab import PUBLISHED, Lab, open_lab, report
 from tomoskin.core import Detection, Image
 from tomoskin.model.mesh import Mesh
 from tomoskin.twin import Circle, Probe
@@ -34,16 +37,31 @@ def main(arguments: Sequence[str] | None = None) -> dict[str, float]:
     with open_lab("fig58_single_press", arguments, __doc__, NOSER) as lab:
         imager = Imager(lab.skin)
         shown = []
-        for name, (x, y) in zip(PLACES, places(lab), strict=True):
-            idle = lab.measure(f"nothing touches the skin (before {name})")
-            loaded = lab.measure(f"18 mm probe, 5 N, {name}", Probe(Circle(RADIUS), x, y, FORCE))
-            image = imager.picture(idle, loaded)
-            regions = imager.regions(image, PART)
-            found |= check(name, imager.mesh, regions, (x, y))
-            found |= named_metrics(name, imager.metrics(image, (x, y)))
-            shown.append((name, image, regions[0], (x, y)))
+        for name, place, image, regions in pressed(lab, imager):
+            found |= check(name, imager.mesh, regions, place)
+            found |= named_metrics(name, imager.metrics(image, place))
+            shown.append((name, image, regions[0], place))
         draw(lab, imager.mesh, shown)
+        if lab.seed is not None:
+            with lab.otherwise(material=PUBLISHED) as other:
+                for name, place, image, regions in pressed(other, imager):
+                    miss = min(
+                        1e3 * float(np.hypot(r.x - place[0], r.y - place[1])) for r in regions
+                    )
+                    found[f"gauge factor 2.4: {name}: miss, mm"] = miss
+                    found[f"gauge factor 2.4: {name}: maximum, S"] = float(image.values.min())
     return found
+
+
+def pressed(
+    lab: Lab, imager: Imager
+) -> Iterator[tuple[str, tuple[float, float], Image, list[Detection]]]:
+    """Name, place, picture and regions of each press."""
+    for name, (x, y) in zip(PLACES, places(lab), strict=True):
+        idle = lab.measure(f"nothing touches the skin (before {name})")
+        loaded = lab.measure(f"18 mm probe, 5 N, {name}", Probe(Circle(RADIUS), x, y, FORCE))
+        image = imager.picture(idle, loaded)
+        yield name, (x, y), image, imager.regions(image, PART)
 
 
 def places(lab: Lab) -> list[tuple[float, float]]:

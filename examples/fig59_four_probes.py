@@ -8,6 +8,9 @@ Thesis saw: the maximum shows the size; round and square cannot be distinguished
 Checked: the maximum grows from 15 to 18 to 25 mm, each time by more than 3 standard deviations
 of its noise; the picture of the square has the shape of the circles' (correlation over 0.97, and
 RES50 within the circles' range ± 5 %). The thesis's four metrics are reported.
+Assumed: means of 40 frames (the thesis: 10), and one press before all others that is not counted,
+since the knit remembers its first load. The thesis names neither. With 10 frames, or without that
+press, the step from 15 to 18 mm is too small for its noise (below), and the check fails.
 """
 
 from __future__ import annotations
@@ -41,18 +44,34 @@ def main(arguments: Sequence[str] | None = None) -> dict[str, float]:
     found: dict[str, float] = {}
     with open_lab("fig59_four_probes", arguments, __doc__, NOSER) as lab:
         imager = Imager(lab.skin)
-        images, deviations = {}, []
-        lab.measure("circle, r 25 mm, 3 N, at the centre, once before all", *FIRST, n=1)
-        for name, shape in PROBES.items():
-            idle = lab.measure(f"nothing touches the skin (before {name})", n=FRAMES)
-            probe = Probe(shape, 0.0, 0.0, FORCE)
-            loaded = lab.measure(f"{name}, 3 N, at the centre", probe, n=FRAMES)
-            images[name] = imager.picture(idle, loaded)
-            deviations.append(noise_of_maximum(imager, images[name], idle))
-            found |= named_metrics(name, imager.metrics(images[name], (0.0, 0.0)))
+        images, deviations = pressed(lab, imager)
+        for name, image in images.items():
+            found |= named_metrics(name, imager.metrics(image, (0.0, 0.0)))
         found |= check(imager, list(images.values()), deviations)
         draw(lab, imager.mesh, images)
+        if lab.seed is not None:
+            for name, first, frames in (("10 frames", FIRST, 10), ("no press before", (), FRAMES)):
+                with lab.otherwise() as other:
+                    others, noise = pressed(other, imager, first, frames)
+                steps = growth(list(others.values()), noise)
+                found |= {f"{name}: growth {k + 1}, deviations": s for k, s in enumerate(steps)}
     return found
+
+
+def pressed(
+    lab: Lab, imager: Imager, first: Sequence[Probe] = FIRST, frames: int = FRAMES
+) -> tuple[dict[str, Image], list[float]]:
+    """Pictures of the probes by name, and the noise of the greatest value of each, S."""
+    images, deviations = {}, []
+    if first:
+        lab.measure("circle, r 25 mm, 3 N, at the centre, once before all", *first, n=1)
+    for name, shape in PROBES.items():
+        idle = lab.measure(f"nothing touches the skin (before {name})", n=frames)
+        probe = Probe(shape, 0.0, 0.0, FORCE)
+        loaded = lab.measure(f"{name}, 3 N, at the centre", probe, n=frames)
+        images[name] = imager.picture(idle, loaded)
+        deviations.append(noise_of_maximum(imager, images[name], idle))
+    return images, deviations
 
 
 def noise_of_maximum(imager: Imager, image: Image, idle: FloatArray) -> float:
@@ -65,15 +84,21 @@ def noise_of_maximum(imager: Imager, image: Image, idle: FloatArray) -> float:
 def check(imager: Imager, images: Sequence[Image], deviations: Sequence[float]) -> dict[str, float]:
     """Pictures of the three circles, then of the square."""
     circles, square = images[:3], images[3]
-    maxima = [float(np.abs(image.values).max()) for image in circles]
-    steps = np.diff(maxima) / np.hypot(deviations[:2], deviations[1:3])
-    assert (steps > 3).all(), f"the maximum does not grow with size: {maxima} S, {steps} deviations"
+    steps = growth(images, deviations)
+    assert min(steps) > 3, f"the maximum does not grow with size: by {steps} deviations"
     alike = [float(np.corrcoef(square.values, image.values)[0, 1]) for image in circles]
     assert max(alike) > 0.97, f"the square's picture differs: correlations {alike}"
     res = [imager.metrics(image).res50 for image in images]
     assert 0.95 * min(res[:3]) < res[3] < 1.05 * max(res[:3]), f"RES50 tells the square: {res}"
-    growth = {f"growth {k + 1}, deviations": float(step) for k, step in enumerate(steps)}
-    return growth | {"square like circle, correlation": max(alike)}
+    grown = {f"growth {k + 1}, deviations": step for k, step in enumerate(steps)}
+    return grown | {"square like circle, correlation": max(alike)}
+
+
+def growth(images: Sequence[Image], deviations: Sequence[float]) -> list[float]:
+    """By how many standard deviations the maximum grows from circle to circle."""
+    maxima = [float(np.abs(image.values).max()) for image in images[:3]]
+    steps = np.diff(maxima) / np.hypot(deviations[:2], deviations[1:3])
+    return [float(step) for step in steps]
 
 
 def draw(lab: Lab, mesh: Mesh, images: dict[str, Image]) -> None:

@@ -9,18 +9,24 @@ are asked.
 With direct current, an electrode that has just driven stays polarised, otherwise in every scan:
 2 mV are assumed on each reading. At 50 kHz that is not seen, and tissue answers with two numbers.
 
-Shown: pictures of the six expressions, with the true movement of each electrode and the one that
-was found.
+Shown: pictures of the six expressions of one run, with the noise of that run, with the true
+movement of each electrode and the one that was found.
 Thesis saw: with direct current, only "A" and the smile are recognised.
 Checked: with complex data at least 5 of 6 are right in 90 % of the runs, and in more than with
 direct current. Of a picture with movement, the electrode that is said to have moved most is one
-of the three that did, for at least 5 of 6 expressions.
+of the three that did in 3 of 4 pictures at least, over all runs of a session.
+Assumed: the face, how its expressions move it, and the noise of direct current. With 2 mV most
+expressions are still recognised, with 8 mV few. But then it is not "A" and the smile that remain,
+as in the thesis (below): why those two stood out is not explained by the model. Which electrodes
+moved is read with the noise of the read-out; with 2 mV of polarisation (below) the right one is
+named little more often than by chance, which is 3 of 8.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -47,6 +53,9 @@ LEARNT, ASKED, RUNS = 2, 4, 8
 PLACED, TISSUE, STRENGTH = 2.0, 0.1, 0.15
 WAVER, ASTRAY = 0.15, 0.3e-3
 """From run to run each electrode goes elsewhere by that part of its way, and by so many m."""
+
+STRONG = 8e-3
+"""V, where few expressions are left."""
 
 READ = 20e-6
 """V, standard deviation of a row by the read-out, of each part of a complex one."""
@@ -124,8 +133,11 @@ def electrodes(one: Face) -> FloatArray:
     )
 
 
-def frames_of(one: Session, random: np.random.Generator, *, direct: bool) -> Frames:
+def frames_of(
+    one: Session, random: np.random.Generator, *, direct: bool, polarised: float | None = None
+) -> Frames:
     """``RUNS`` runs through all expressions, measured with direct or with alternating current."""
+    polarised = POLARISED if polarised is None else polarised
     rows, label = [], []
     size = np.abs(one.relaxed)
     for _ in range(RUNS):
@@ -136,7 +148,7 @@ def frames_of(one: Session, random: np.random.Generator, *, direct: bool) -> Fra
             change = strength * one.changes[number] + noise[0] + 1j * noise[1]
             change += np.einsum("med,de->m", one.slope, astray)
             if direct:
-                change = change.real + POLARISED * np.sqrt(2) * random.standard_normal(len(size))
+                change = change.real + polarised * np.sqrt(2) * random.standard_normal(len(size))
             rows.append(change / size)
             label.append(name)
     return Frames(np.array(rows), np.array(label))
@@ -153,10 +165,12 @@ def features(dv: ComplexArray) -> FloatArray:
     return np.hstack([dv.real, dv.imag]) if np.iscomplexobj(dv) else dv
 
 
-def told(sessions: Sequence[Session], seed: int, *, direct: bool) -> NDArray[np.bool_]:
+def told(
+    sessions: Sequence[Session], seed: int, *, direct: bool, polarised: float | None = None
+) -> NDArray[np.bool_]:
     """(runs, 6) whether each expression of each asked run was told right."""
     random = np.random.default_rng([seed, int(direct)])
-    taken = [frames_of(one, random, direct=direct) for one in sessions]
+    taken = [frames_of(one, random, direct=direct, polarised=polarised) for one in sessions]
     first, *more = taken[:LEARNT]
     known = Classifier.fit(features(first.dv), first.label)
     for one in more:
@@ -201,9 +215,13 @@ def whole_runs(right: NDArray[np.bool_]) -> float:
     return float((right.sum(axis=1) >= len(NAMES) - 1).mean())
 
 
+@cache
 def sessions_of(seed: int, count: int = LEARNT + ASKED) -> list[Session]:
     """So many, each with chance of its own."""
     return [session(np.random.default_rng([seed, number])) for number in range(count)]
+
+
+Picture = tuple[FloatArray, FloatArray]
 
 
 def main(arguments: Sequence[str] | None = None) -> dict[str, float]:
@@ -219,20 +237,33 @@ def main(arguments: Sequence[str] | None = None) -> dict[str, float]:
     }
     assert found["complex: runs with 5 of 6"] >= 0.9, f"complex data: {found}"
     assert whole_runs(both) > whole_runs(direct), f"direct current is as good: {found}"
+    strong = told(sessions, options.seed, direct=True, polarised=STRONG).mean(axis=0)
+    found |= {
+        f"direct, 8 mV: {name} right": float(p) for name, p in zip(NAMES, strong, strict=True)
+    }
     moving = Moving()
-    first = sessions[0]
-    pictures = [moving(change / np.abs(first.relaxed)) for change in first.changes]
-    named = most_moved(pictures, first.moved)
-    assert named.sum() >= 5, f"the electrode that moved most is named for {named.sum()} of 6"
+    pictures, named = moved_pictures(moving, sessions[0], options.seed, direct=False)
+    assert named >= 0.75, f"the electrode that moved most is named in {100 * named:.0f} %"
     options.figure.save(draw(moving.face, pictures))
-    return found | {"expressions whose moving electrode is named": float(named.sum())}
+    blurred = moved_pictures(moving, sessions[0], options.seed, direct=True)[1]
+    return found | {
+        "moving electrode named": named,
+        "moving electrode named, direct current": blurred,
+    }
 
 
-Picture = tuple[FloatArray, FloatArray]
+def moved_pictures(
+    moving: Moving, one: Session, seed: int, *, direct: bool
+) -> tuple[list[Picture], float]:
+    """Pictures of the first run of a session, and the part of all with a right electrode."""
+    taken = frames_of(one, np.random.default_rng([seed, 2, int(direct)]), direct=direct)
+    pictures = [moving(dv) for dv in taken.dv]
+    named = most_moved(pictures, np.tile(one.moved, (RUNS, 1)))
+    return pictures[: len(NAMES)], float(named.mean())
 
 
 def most_moved(pictures: Sequence[Picture], moved: FloatArray) -> NDArray[np.bool_]:
-    """(6,) whether the electrode said to have moved most is among the three that did."""
+    """(n,) whether the electrode said to have moved most is among the three that did."""
     said = [np.linalg.norm(places, axis=1).argmax() for _, places in pictures]
     return np.array([
         one in np.argsort(-way)[:3] for one, way in zip(said, moved, strict=True)

@@ -38,6 +38,7 @@ def parser_of(title: str | None) -> argparse.ArgumentParser:
     )
     parser.add_argument("--out", type=Path, default=Path("figures"), help="folder of the figure")
     parser.add_argument("--force", action="store_true", help="write over a figure that is there")
+    parser.add_argument("--json", action="store_true", help="print the numbers as JSON")
     return parser
 
 

@@ -10,10 +10,12 @@ from __future__ import annotations
 import argparse
 import contextlib
 import itertools
+import json
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -33,6 +35,9 @@ FRAMES = 10
 
 REST = 1.0
 """Seconds from a change of the load to the first frame of its stage."""
+
+PUBLISHED = {"gauge": 2.4, "gauge_across": 1.2}
+"""The largest gauge factor that we found published for a knit; the twin's is 10."""
 
 Changes = dict[str, dict[str, Any]]
 """Keys of the skin file that an experiment sets, section by section."""
@@ -104,6 +109,8 @@ class Lab:
     bench: Bench
     figure: FigureFile
     writer: SessionWriter | None = None
+    seed: int | None = None
+    """Of the twin; None before a board and with a recording."""
 
     def __post_init__(self) -> None:
         """Prepare what turns counts into volts."""
@@ -113,6 +120,17 @@ class Lab:
         """Bend the twin from here on; before a board the stage says it, a recording holds it."""
         if isinstance(self.bench, LiveBench):
             self.bench.bend(pose)
+
+    @contextlib.contextmanager
+    def otherwise(self, gain: float | None = None, **settings: Mapping[str, Any]) -> Iterator[Lab]:
+        """A fresh twin of the same seed with other ``settings``: ``contact={"lock": inf}``.
+
+        It says what an experiment would see without what is assumed; only a twin can.
+        """
+        assert self.seed is not None
+        skin = self.skin.altered({"readout": {"gain": gain}} if gain else {})
+        with _twin(skin, self.seed, settings) as bench:
+            yield Lab(skin, bench, self.figure)
 
     def measure(self, stage: str, *probes: Probe, n: int = FRAMES) -> FloatArray:
         """(n, n_meas) V while ``probes`` press, in the order of the skin's pattern.
@@ -171,16 +189,23 @@ def open_lab(
     """
     options = options_of(name, arguments, title)
     skin = Skin.load(options.skin).altered(changes or {})
+    if options.gain:
+        skin = skin.altered({"readout": {"gain": options.gain}})
     with contextlib.ExitStack() as stack:
         bench = stack.enter_context(_bench(options, skin))
         writer = (
             stack.enter_context(SessionWriter(options.record, skin)) if options.record else None
         )
-        yield Lab(skin, bench, options.figure, writer)
+        print(f"amplifier gain {skin.readout.gain:g} ([readout] gain)", file=sys.stderr)
+        seed = options.seed if options.source == "twin" else None
+        yield Lab(skin, bench, options.figure, writer, seed)
 
 
 def report(found: Mapping[str, float]) -> None:
-    """Print the numbers of an experiment."""
+    """Print the numbers of an experiment, as JSON where the command line asks for it."""
+    if "--json" in sys.argv:
+        print(json.dumps({name: float(value) for name, value in found.items()}))
+        return
     for name, value in found.items():
         print(f"{name:<40} {value:10.4g}")
 
@@ -194,13 +219,21 @@ def _bench(options: argparse.Namespace, skin: Skin) -> Iterator[Bench]:
                 raise DataError("was recorded with another scan than this experiment's", where=path)
             yield RecordedBench(session)
     elif kind == "twin":
-        clock = VirtualClock()
-        twin = make_twin(skin, TwinSettings.preset(skin.twin.preset, options.seed), clock)
-        with _link(twin, skin, clock.now) as link:
-            yield LiveBench(link, lambda _, probes: _pressed(twin, probes), twin.set_pose)
+        with _twin(skin, options.seed, {}) as bench:
+            yield bench
     else:
         with _link(open_source(options.source, skin), skin, time.monotonic) as link:
             yield LiveBench(link, lambda stage, _: _asked(stage))
+
+
+@contextlib.contextmanager
+def _twin(skin: Skin, seed: int, settings: Mapping[str, Mapping[str, Any]]) -> Iterator[Bench]:
+    """The twin of ``skin``; ``settings`` differ from those of its preset, part by part."""
+    preset, clock = TwinSettings.preset(skin.twin.preset, seed), VirtualClock()
+    changed = {part: replace(getattr(preset, part), **some) for part, some in settings.items()}
+    twin = make_twin(skin, replace(preset, **changed), clock)
+    with _link(twin, skin, clock.now) as link:
+        yield LiveBench(link, lambda _, probes: _pressed(twin, probes), twin.set_pose)
 
 
 def _link(transport: Transport, skin: Skin, now: Callable[[], float]) -> Link:
@@ -233,6 +266,7 @@ def options_of(name: str, arguments: Sequence[str] | None, title: str | None) ->
     parser = parser_of(title)
     parser.add_argument("--source", default="twin", help="twin, serial:PORT or replay:FILE")
     parser.add_argument("--skin", default="textile-disc-8", help="built-in name or path")
+    parser.add_argument("--gain", type=float, help="of the amplifier, instead of the skin file's")
     parser.add_argument("--record", type=Path, help="also keep the frames in this session file")
     parser.add_argument("--seed", type=int, default=1, help="of the twin")
     return chosen(parser, arguments, name)

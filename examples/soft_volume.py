@@ -9,6 +9,9 @@ untouched block gives the place of the touch.
 Shown: level and upright cuts through each picture; dashed is the truth, the cross what was found.
 Thesis saw: nothing of the kind; it hopes for soft bodies that sense by themselves (chapter 8).
 Checked: the ball within 8 mm in space, the touch within 6 mm on the surface.
+Assumed: a silicone of 1 S/m that keeps its conductivity when it is deformed, the same noise on each
+row, and a dent of a known shape. A filled silicone changes by itself when it is stretched: then the
+touch would be seen better or worse, and the place has not been tried.
 """
 
 from __future__ import annotations

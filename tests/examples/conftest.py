@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-import json
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -13,7 +12,8 @@ from types import ModuleType
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[2]
+from claims import ROOT, Claim, claims
+
 FOLDER = ROOT / "examples"
 
 
@@ -28,11 +28,9 @@ class Run:
 
 
 @pytest.fixture(scope="session")
-def gallery() -> dict[str, dict[str, float]]:
-    """Numbers of each example that the gallery shows."""
-    file = ROOT / "docs" / "images" / "gallery" / "numbers.json"
-    shown: dict[str, dict[str, float]] = json.loads(file.read_text(encoding="utf-8"))
-    return shown
+def published() -> dict[str, Claim]:
+    """What the gallery shows of each example, by its name."""
+    return {claim.name: claim for claim in claims() if claim.part == "gallery"}
 
 
 @pytest.fixture(scope="session")

@@ -25,27 +25,17 @@ MEASURED = [
 ]
 
 
-LONG = {"fig59_four_probes", "patterns_and_priors"}
-"""What they measure, others measure more quickly."""
-
-
-@pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(name, marks=[pytest.mark.slow] * (name in LONG))
-        for name in [*MEASURED, "fig31_mesh"]
-    ],
-)
-def test_the_figure_is_made_and_the_numbers_hold(ran, gallery, name):
+@pytest.mark.parametrize("name", [*MEASURED, "fig31_mesh"])
+def test_the_figure_is_made_and_the_numbers_are_those_of_the_gallery(ran, published, name):
     run = ran(name)
-    assert run.found.keys() == gallery[name].keys()
+    assert run.found.keys() == published[name].values.keys()
+    assert published[name].broken(run.found) == []
     assert all(math.isfinite(value) for value in run.found.values())
     data = run.figure.read_bytes()
     assert data.startswith(b"\x89PNG")
     width, height = struct.unpack(">II", data[16:24])
     assert width > 400
     assert height > 250
-    assert all(part in run.module.__doc__ for part in ("Shown:", "Thesis saw:", "Checked:"))
 
 
 @pytest.mark.slow
@@ -72,7 +62,8 @@ def test_a_potential_beyond_the_converter_is_no_measurement(imported, tmp_path):
 def test_a_recording_gives_the_same_numbers(ran, name, tmp_path):
     run = ran(name)
     again = run.module.main(["--source", f"replay:{run.recording}", "--out", str(tmp_path)])
-    assert again == run.found
+    assert len(again) > 1
+    assert again.items() <= run.found.items()  # a recording holds nothing of other twins
 
 
 @pytest.mark.slow
@@ -105,6 +96,15 @@ def test_the_checks_fail_where_nothing_is_pressed(ran, imported, name, monkeypat
 def test_the_mesh_check_fails_on_another_mesh(imported, tmp_path):
     with pytest.raises(AssertionError, match="triangles"):
         imported("fig31_mesh").main(["--skin", "textile-disc-16", "--out", str(tmp_path)])
+
+
+def test_the_gain_is_printed_and_may_be_another(imported, tmp_path, capsys):
+    example = imported("fig55_indentation")
+    example.main(["--out", str(tmp_path)])
+    usual = capsys.readouterr().err
+    example.main(["--out", str(tmp_path), "--force", "--gain", "30"])
+    assert "amplifier gain 35" in usual
+    assert "amplifier gain 30" in capsys.readouterr().err
 
 
 def test_a_person_at_a_board_is_told_what_to_do(imported, monkeypatch, tmp_path):

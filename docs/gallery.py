@@ -1,0 +1,109 @@
+"""The gallery's page: what stands at the head of each example, its picture and its numbers."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+from PIL import Image, ImageSequence
+
+ROOT = Path(__file__).resolve().parent.parent
+EXAMPLES = ROOT / "examples"
+IMAGES = ROOT / "docs" / "images" / "gallery"
+PAGE = ROOT / "docs" / "gallery.md"
+QUALITIES, OF_FILM, LARGEST = (85, 70, 55, 40), 70, 60_000
+"""Of WebP: at 85 a line of a pixel stays sharp; a figure has at most so many bytes."""
+
+MARK = "<!-- made by make gallery: what follows is not written by hand -->"
+
+FEW = 7
+"""Up to so many numbers are shown unasked."""
+
+Numbers = Mapping[str, Mapping[str, float]]
+
+
+def documented() -> dict[str, str]:
+    """Docstring of each example with a figure, by name, in the order of their figures."""
+    found = {}
+    for file in sorted(EXAMPLES.glob("*.py"), key=_place):
+        text = ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) or ""
+        if "Shown:" in text:
+            found[file.stem] = text
+    return found
+
+
+def _place(file: Path) -> tuple[bool, str, int, str]:
+    """Figures by chapter and number, the rest behind them by name."""
+    numbered = re.match(r"fig(\d)(\d+)_", file.name)
+    chapter, number = numbered.groups() if numbered else ("", "0")
+    return numbered is None, chapter, int(number), file.name
+
+
+def written_gallery(numbers: Numbers) -> tuple[Path, str]:
+    """The page, and its text: above its mark as it stands."""
+    head, mark, _ = PAGE.read_text(encoding="utf-8").partition(MARK)
+    entries = [_entry(name, text, numbers[name]) for name, text in documented().items()]
+    return PAGE, "\n".join([f"{head}{mark}\n", *entries])
+
+
+def _entry(name: str, text: str, numbers: Mapping[str, float]) -> str:
+    """One example: what stands at its head, its figure and its numbers."""
+    title, _, rest = text.replace("``", "`").partition("\n")
+    parts = re.split(r"^(?:Shown|Thesis saw|Checked|Assumed): ", rest, flags=re.M)
+    body, shown, saw, checked, assumed = parts
+    rows = [f"| {key} | {value:.3g} |" for key, value in numbers.items()]
+    table = "\n".join(["| number | value |", "|---|---:|", *rows])
+    heading = title.strip().rstrip(".")
+    details = "<details open>" if len(rows) <= FEW else "<details>"
+    return f"""## {heading}
+
+![{heading}](images/gallery/{name}.webp)
+
+*{_capital(_joined(shown))}*
+
+{body.strip()}
+
+**The thesis saw** {_joined(saw)}
+
+**Checked:** {_joined(checked)}
+
+**Assumed:** {_joined(assumed)}
+
+{details}<summary>{len(rows)} numbers of this run</summary>
+
+{table}
+
+</details>
+
+```
+python examples/{name}.py --out figures --force
+```
+"""
+
+
+def _joined(text: str) -> str:
+    return " ".join(text.split())
+
+
+def _capital(text: str) -> str:
+    return text[0].upper() + text[1:]
+
+
+def save_picture(drawn: Path) -> None:
+    """Keep a figure, or a film where it has several pictures, as WebP."""
+    shown = IMAGES / f"{drawn.stem}.webp"
+    with Image.open(drawn) as figure:
+        pictures = [picture.convert("RGB") for picture in ImageSequence.Iterator(figure)]
+        pause = figure.info.get("duration", 0)
+    first, *rest = pictures
+    if not rest:
+        for quality in QUALITIES:
+            first.save(shown, quality=quality, method=6)
+            if shown.stat().st_size < LARGEST:
+                return
+        return
+    first.save(
+        shown, save_all=True, append_images=rest, duration=pause, loop=0, quality=OF_FILM, method=6
+    )
