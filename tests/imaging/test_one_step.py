@@ -218,10 +218,22 @@ def test_complex_data_through_a_real_operator_are_two_images() -> None:
         assert mismatch(image(real + 1j * imaginary).values, expected) < 1e-6
 
 
-@pytest.mark.parametrize("shape", [(39,), (41,), (1, 40), ()])
+@pytest.mark.parametrize("shape", [(39,), (41,), (1, 41), (1, 1, 40), ()])
 def test_data_of_another_length(shape: tuple[int, ...]) -> None:
     with pytest.raises(DataError, match=r"difference data of shape \(40,\), got"):
         OneStep(model(), alpha=ALPHA)(np.zeros(shape))
+
+
+def test_many_frames_are_imaged_at_once() -> None:
+    operator = OneStep(model(), alpha=ALPHA)
+    dv = np.random.default_rng(2).standard_normal((5, 40))
+    images = operator(dv)
+    assert images.values.shape == (5, len(model().mesh.cells))
+    for one, values in zip(dv, images.values, strict=True):
+        assert mismatch(values, operator(one).values) < 1e-12
+    dv[3, 7] = np.nan
+    with pytest.raises(DataError, match=r"rows \[7\] are not"):
+        operator(dv)
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])

@@ -36,7 +36,6 @@ if TYPE_CHECKING:
 
     from tomoskin.core import Touch
     from tomoskin.files.exports import Display
-    from tomoskin.model.pattern import Pattern
     from tomoskin.model.skin import Skin
     from tomoskin.pipeline import Prepared, Reconstruction, Unresolved
     from tomoskin.sensing.signal import Recording
@@ -204,7 +203,7 @@ def image(
     if results.out is not None:
         write = WRITERS[results.out.suffix.lower()]
         write(results.out, prepared, result, display, overwrite=force)
-    _warn(recorded, result, prepared.pattern)
+    _warn(recorded, result)
     if located_alone(prepared, result.model_agreement):
         remark(f"{recording}: the calibration alone locates touches, one at a time")
     since = (result.time - first_time(recorded)).tolist()
@@ -243,17 +242,13 @@ def _lines(result: Reconstruction, spans: tuple[Span, ...], prepared: Prepared) 
     return lines
 
 
-def _warn(recorded: Recording, result: Reconstruction, pattern: Pattern) -> None:
+def _warn(recorded: Recording, result: Reconstruction) -> None:
     """Say on stderr what was left out, and what looks wrong."""
     from tomoskin.files.imports import is_session
 
     source = Path(recorded.source)
-    if len(result.rows_left_out):
-        rows = result.rows_left_out.tolist()
-        remark(
-            f"{source}: {len(rows)} rows hold no finite values and were left out: "
-            + "; ".join(map(pattern.row_text, rows))
-        )
+    for note in result.notes:
+        remark(f"{source}: {note}")
     if is_session(source):  # there, what is missing is said as live: by electrode
         counted: list[tuple[int, int]] = []
     else:

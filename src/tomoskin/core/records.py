@@ -142,7 +142,8 @@ class PixelMap:
 class Image:
     """A change of conductivity per cell.
 
-    ``values`` is (n_cells,) in ``unit``: "S" (sheet), "S/m" (volume) or "relative" (Δσ/σ₀).
+    ``values`` is (n_cells,) in ``unit``: "S" (sheet), "S/m" (volume) or "relative" (Δσ/σ₀);
+    (n, n_cells) where many frames were imaged at once.
     ``mesh_id`` names the mesh that the values live on (``Mesh.identity``). Images of complex
     data are complex: conductivity, and ω times permittivity.
     """

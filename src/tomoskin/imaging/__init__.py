@@ -1,7 +1,7 @@
 """From a change of voltages to a change of conductivity."""
 
 from tomoskin.imaging.choice.alpha_choice import AlphaChoice, Curve, Evidence
-from tomoskin.imaging.choice.criteria import RULES, choose
+from tomoskin.imaging.choice.criteria import RULES, choose, for_recording
 from tomoskin.imaging.choice.light_touch import LightTouch
 from tomoskin.imaging.iterative.absolute import Absolute, AbsoluteImaging, homogeneous
 from tomoskin.imaging.iterative.observation import Observation
@@ -76,6 +76,7 @@ __all__ = [
     "along",
     "choose",
     "figures",
+    "for_recording",
     "homogeneous",
     "noise_figure",
     "picard",

@@ -14,6 +14,7 @@ from tomoskin.core import DataError, FloatArray, Image, IntArray, Touch, Voltage
 from tomoskin.imaging import AlphaChoice
 from tomoskin.learning import BENDS, CLASSES, BendReading, ClassReading
 from tomoskin.pipeline.following import Setting
+from tomoskin.pipeline.foreign import tuned_by_file
 from tomoskin.pipeline.frame_result import FrameResult, ModelAgreement
 from tomoskin.pipeline.pipeline import Pipeline
 from tomoskin.pipeline.prepare import Prepared
@@ -59,7 +60,9 @@ class Reconstruction:
     choice
         The alpha of the images, and what chose it.
     rows_left_out
-        (r,) rows of the pattern that hold no finite values, left out of every image.
+        (r,) rows of the pattern that are left out of every image.
+    notes
+        Why they are, in sentences.
     readings
         What the skin's calibrations read, by the name of their kind: one a frame, None where too
         little was left of it.
@@ -80,6 +83,7 @@ class Reconstruction:
     readings: Mapping[str, tuple[Any, ...]] = field(default_factory=dict)
     problems: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
     unseen: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    notes: tuple[str, ...] = ()
 
     @classmethod
     def of(
@@ -166,7 +170,8 @@ def reconstruct(
         The frames that are wanted; those before ``start`` run through the pipeline all the same.
     rule
         Chooses alpha from this recording, by a name of :data:`tomoskin.imaging.RULES`; without
-        it the skin's alpha holds, and "auto" follows the noise of the idle frames as it does live.
+        it the skin's alpha holds, and "auto" follows the noise of the idle frames as it does live,
+        or :func:`tuned_by_file` where another board recorded it.
     setting
         How frames are followed: as they are live, or :data:`ALONE`, which holds where frames have
         no times.
@@ -189,6 +194,8 @@ def reconstruct(
     setting = setting or (Setting() if recording.timed else ALONE)
     if rule is not None:
         prepared = tuned_by_rule(prepared, rule, recorded.evidence())
+    elif not recording.board_known:
+        prepared = tuned_by_file(prepared, recorded.reference, recorded.differences)
     pipeline = Pipeline(
         prepared,
         reference_frames=len(recorded.idle),
@@ -204,6 +211,7 @@ def reconstruct(
         rows_missing=recorded.missing[wanted].sum(axis=1),
         model_agreement=recorded.agreement,
         rows_left_out=recorded.rows_left_out,
+        notes=recorded.notes,
     )
 
 

@@ -12,6 +12,7 @@ from tomoskin.core import DataError, FloatArray, Image, IntArray
 from tomoskin.imaging import MOST_EXCLUDED, Evidence
 from tomoskin.model.pattern import Pattern
 from tomoskin.pipeline.conditioning import MOST_NUISANCE
+from tomoskin.pipeline.foreign import open_electrodes
 from tomoskin.pipeline.frame_result import NO_AGREEMENT, REFUSED, ModelAgreement
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.sensing.signal import Consecutive, Recording, Reference, difference, in_phase
@@ -43,7 +44,9 @@ class RecordedFrames:
     recording
         Where they are from.
     rows_left_out
-        (r,) measurements of the skin's pattern that are excluded: dead in the whole recording.
+        (r,) measurements of the skin's pattern that are excluded from the whole recording.
+    notes
+        Why they are, in sentences.
     values
         (n, n_meas) V, or difference data where there is no reference; NaN where they are not
         known in the frame, or in the one that it is held against.
@@ -63,6 +66,7 @@ class RecordedFrames:
     recording: Recording
     rows_left_out: IntArray
     values: NDArray[Any]
+    notes: tuple[str, ...] = ()
     first: int = 0
     reference: Reference | None = None
     agreement: ModelAgreement = NO_AGREEMENT
@@ -152,9 +156,9 @@ def recorded_frames(prepared: Prepared, recording: Recording, idle: Idle) -> Rec
     if isinstance(idle, range):
         idle = recording.voltages[own]
     rest = None if isinstance(idle, str) else idle
-    dead = dead_rows(recording.voltages, rest, pattern, recording.source)
+    dead, notes = _excluded(prepared, recording, rest)
     living = np.delete(recording.voltages, dead, axis=1)
-    frames = RecordedFrames(prepared.without(dead), recording, dead, living)
+    frames = RecordedFrames(prepared.without(dead), recording, dead, living, notes)
     if (frames.missing.mean(axis=1) > MOST_NUISANCE).all():
         raise DataError("no frame has finite values in enough rows", where=recording.source)
     if idle is None:
@@ -172,6 +176,38 @@ def recorded_frames(prepared: Prepared, recording: Recording, idle: Idle) -> Rec
         idle=quiet,
         idle_frames=own[complete] if len(own) else np.full(len(quiet), -1),
     )
+
+
+def _excluded(
+    prepared: Prepared, recording: Recording, idle: NDArray[Any] | None
+) -> tuple[IntArray, tuple[str, ...]]:
+    """(r,) rows of the whole recording that say nothing, and why, in sentences."""
+    pattern, notes = prepared.pattern, []
+    dead = dead_rows(recording.voltages, idle, pattern, recording.source)
+    reasons = [(dead, "hold no finite values and were left out")]
+    if idle is not None and prepared.operator.difference == "normalised":
+        zero = np.flatnonzero(~idle.any(axis=0))
+        reasons.append((zero, "are zero in the reference, by which none can be divided: left out"))
+    for rows, text in reasons:
+        if len(rows):
+            listed = "; ".join(map(pattern.row_text, rows.tolist()))
+            notes.append(f"{len(rows)} rows {text}: {listed}")
+    excluded = np.concatenate([rows for rows, _ in reasons])
+    if idle is not None and not recording.board_known:
+        measured = np.full(pattern.n_meas, np.nan, idle.dtype)
+        kept = np.setdiff1d(np.arange(pattern.n_meas), excluded)
+        finite = np.isfinite(idle[:, kept])
+        measured[kept] = np.where(finite, idle[:, kept], 0.0).sum(axis=0) / finite.sum(axis=0)
+        lost = open_electrodes(pattern, measured, prepared.problem.reference)
+        if lost:
+            own = np.unique(np.concatenate([pattern.rows_of(e) for e in lost]))
+            names = ", ".join(f"E{e + 1}" for e in lost)
+            notes.append(
+                f"{names} read as if they were open, far off from what the skin's model expects: "
+                f"their {len(own)} of {pattern.n_meas} rows were left out"
+            )
+            excluded = np.concatenate([excluded, own])
+    return np.unique(excluded), tuple(notes)
 
 
 def _complete(idle: NDArray[Any], source: str) -> NDArray[np.bool_]:

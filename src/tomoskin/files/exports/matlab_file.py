@@ -55,6 +55,8 @@ def write_matlab(
         "time_s": recording.time[:, None],
         "idle": recording.idle,
     }
+    if recording.board_known:
+        variables["board_known"] = True
     if recording.reference is not None:
         variables["vh"] = recording.reference[order][:, None]
     if recording.labels is not None:

@@ -2,7 +2,8 @@
 
 Columns ``v_SOURCE_SINK_PLUS_MINUS`` (V) or ``dv_…``, electrodes from 0; optional ``time_s``,
 ``idle`` (1 in the first frames, of the untouched skin, then 0), and ``x_m`` and ``y_m`` for the
-true position of a single touch. Comma between columns, decimal point.
+true position of a single touch. Comma between columns, decimal point; voltages may be complex,
+``1.5-0.2j`` or ``1.5-0.2i``.
 """
 
 from __future__ import annotations
@@ -12,8 +13,10 @@ import re
 from array import array
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tomoskin.core import DataError, FloatArray, IntArray, check_fits, most_bytes
 from tomoskin.files.imports.tables import voltages_of
@@ -21,7 +24,10 @@ from tomoskin.sensing.signal import Recording
 
 _COLUMN = re.compile(r"(dv|v)_(\d+)_(\d+)_(\d+)_(\d+)")
 _KNOWN = ("time_s", "idle", "x_m", "y_m")
-_IGNORED = ("frame", "sequence", "ticks", "mark")
+OWN = "ticks"
+"""Column of the board's own clock: the table is the export of a session."""
+
+_IGNORED = ("frame", "sequence", OWN, "mark")
 """Columns that an export has beside them; not needed here."""
 
 
@@ -60,10 +66,12 @@ def parse(lines: Iterable[str], source: str) -> Recording:
             f"expected columns of v or of dv, got {' and '.join(sorted(kinds)) or 'neither'}",
             where=f"{source}, line 1",
         )
-    table = np.asarray(_values(rows, header, source)).reshape(-1, len(header))
+    table = _values(rows, header, source).reshape(-1, len(header))
     used = [number for number, match in enumerate(matches) if match]
     electrodes = np.array([[int(part) for part in m.groups()[1:]] for m in matches if m])
-    by_name = {name: table[:, number] for number, name in enumerate(header)}
+    by_name = {
+        name: _real(table[:, n], name, source) for n, name in enumerate(header) if n not in used
+    }
     has_place = "x_m" in by_name and "y_m" in by_name
     recording = voltages_of(
         source,
@@ -74,7 +82,7 @@ def parse(lines: Iterable[str], source: str) -> Recording:
         is_change=kinds == {"dv"},
     )
     idle = _idle(by_name["idle"], source) if "idle" in by_name else 1
-    return replace(recording, idle=idle)
+    return replace(recording, idle=idle, board_known=OWN in by_name)
 
 
 def column_names(drive: IntArray, measure: IntArray, kind: str = "v") -> list[str]:
@@ -113,9 +121,16 @@ def _rows(lines: Iterable[str], source: str) -> Iterator[list[str]]:
         ) from error
 
 
-def _values(rows: Iterator[list[str]], header: list[str], source: str) -> array[float]:
-    """The numbers of all lines, one after another."""
-    values, most = array("d"), most_bytes()
+def _real(values: NDArray[Any], name: str, source: str) -> FloatArray:
+    """A column that is no voltage."""
+    if np.iscomplexobj(values) and values.imag.any():
+        raise DataError(f"expected real numbers in {name}, got complex", where=source)
+    return values.real
+
+
+def _values(rows: Iterator[list[str]], header: list[str], source: str) -> NDArray[Any]:
+    """The numbers of all lines, one after another: complex where one of them is."""
+    values, imaginary, most = array("d"), array("d"), most_bytes()
     for number, row in enumerate(rows, start=2):
         if not row:
             continue
@@ -126,16 +141,25 @@ def _values(rows: Iterator[list[str]], header: list[str], source: str) -> array[
                 hint="a decimal comma splits a field in two",
             )
         where = f"{source}, line {number}"
-        values.extend(_number(text, name, where) for text, name in zip(row, header, strict=True))
+        line = [_number(text, name, where) for text, name in zip(row, header, strict=True)]
+        if not imaginary and any(isinstance(value, complex) for value in line):
+            imaginary.frombytes(bytes(values.itemsize * len(values)))
+        if imaginary or any(isinstance(value, complex) for value in line):
+            imaginary.extend(value.imag for value in line)
+        values.extend(value.real for value in line)
         if values.itemsize * len(values) > most:
             check_fits(values.itemsize * len(values), source)
-    return values
+    return np.asarray(values) + 1j * np.asarray(imaginary) if imaginary else np.asarray(values)
 
 
-def _number(text: str, name: str, where: str) -> float:
+def _number(text: str, name: str, where: str) -> float | complex:
     if not text.strip():
         return float("nan")
     try:
         return float(text)
+    except ValueError:
+        pass
+    try:
+        return complex(text.replace(" ", "").replace("i", "j"))
     except ValueError:
         raise DataError(f'expected a number in {name}, got "{text}"', where=where) from None

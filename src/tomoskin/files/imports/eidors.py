@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from scipy.sparse import issparse
 
 from tomoskin.core import DataError, FloatArray, IntArray
+from tomoskin.files.imports.interchange import OWN
 from tomoskin.files.imports.tables import pairs_of, voltages_of
 from tomoskin.sensing.signal import Recording
 
@@ -67,6 +68,7 @@ def parse(variables: Mapping[str, Any], source: str) -> Recording:
         reference=None if reference is None else reference[0],
         labels=_numbers(variables, "xy_m", (len(voltages), 2)),
     )
+    recording = replace(recording, board_known=OWN in variables)
     return replace(recording, idle=int(idle)) if is_count and idle is not None else recording
 
 

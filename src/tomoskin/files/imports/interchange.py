@@ -2,7 +2,8 @@
 
 Keys: ``voltages`` (n_frames, n_meas) V, or ``dv``; ``drive`` (n_meas, 2) source, sink;
 ``measure`` (n_meas, 2) plus, minus; optional ``time_s`` (n_frames,), ``reference`` (n_meas,),
-``xy_m`` (n_frames, 2), ``idle`` frames at the beginning that show the untouched skin.
+``xy_m`` (n_frames, 2), ``idle`` frames at the beginning that show the untouched skin;
+``board_known`` where the skin's own read-out recorded the frames.
 """
 
 from __future__ import annotations
@@ -25,6 +26,9 @@ from tomoskin.core import (
 )
 from tomoskin.files.imports.tables import voltages_of
 from tomoskin.sensing.signal import Recording
+
+OWN = "board_known"
+"""Key of a file whose noise the skin's own read-out predicts: the export of a session."""
 
 REQUIRED = frozenset({"drive", "measure"})
 
@@ -56,7 +60,7 @@ def parse(arrays: Arrays, source: str) -> Recording:
         is_change=key == "dv",
     )
     idle = whole_number(arrays, "idle", source) if "idle" in arrays else 1
-    return replace(recording, idle=idle)
+    return replace(recording, idle=idle, board_known=OWN in arrays)
 
 
 def write_interchange(path: StrPath, recording: Recording, *, overwrite: bool = False) -> None:
@@ -73,4 +77,6 @@ def write_interchange(path: StrPath, recording: Recording, *, overwrite: bool = 
         arrays["reference"] = recording.reference
     if recording.labels is not None:
         arrays["xy_m"] = recording.labels
+    if recording.board_known:
+        arrays[OWN] = np.array(True)
     save_arrays(path, arrays, overwrite=overwrite)

@@ -1,9 +1,11 @@
-"""Kuopio Tomography Challenge 2023: current patterns and measuring pairs as matrices.
+"""Tanks of Kuopio: current patterns and measuring pairs as matrices.
 
-The challenge's own .mat files hold ``Inj`` (n_el, n_inj), ``Mpat`` (n_el, n_pairs) and ``Uel``;
-collected sets hold ``inj``, ``mpat``, ``U`` (n, n_inj · n_pairs) and ``U_ref``. Values run
-injection by injection. Electrode 1 is at the top and they are counted counter-clockwise
-(fitted, not from the authors); the recording counts them clockwise, as built-in skins do.
+The 2023 challenge's own .mat files hold ``Inj`` (n_el, n_inj), ``Mpat`` (n_el, n_pairs), ``Uel``;
+collected sets hold ``inj``, ``mpat``, ``U`` (n, n_inj · n_pairs) and ``U_ref``. The older KIT4
+tank's hold ``CurrentPattern``, ``MeasPattern``, ``Uel`` (n_pairs, n_inj), one or several, and
+``water``. Values run injection by injection. Electrode 1 is at the top; the challenge counts
+counter-clockwise, KIT4 clockwise (both fitted to the targets, not from the authors). The recording
+counts clockwise, as built-in skins do.
 The injected currents differ by some per cent; the voltages are left as they are.
 """
 
@@ -11,11 +13,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from tomoskin.core import Arrays, DataError, real_numbers
-from tomoskin.files.imports.tables import clockwise, pairs_of, voltages_of, without_repeats
+from tomoskin.core import Arrays, DataError, FloatArray, real_numbers
+from tomoskin.files.imports.tables import clockwise, pairs_of, voltages_of
 from tomoskin.sensing.signal import Recording
 
-_NAMES = (("inj", "mpat", "U", "U_ref"), ("Inj", "Mpat", "Uel", "Uelref"))
+_NAMES = (
+    ("inj", "mpat", "U", "U_ref"),
+    ("Inj", "Mpat", "Uel", "Uelref"),
+    ("CurrentPattern", "MeasPattern", "Uel", "water"),
+)
 
 
 def detects(arrays: Arrays) -> bool:
@@ -36,7 +42,7 @@ def parse(arrays: Arrays, source: str) -> Recording:
     pairs = pairs_of(real_numbers(arrays, mpat, source).T, "measuring pair", source)
     n_electrodes = arrays[inj].shape[0]
     n_rows = len(injections) * len(pairs)
-    values = real_numbers(arrays, voltages, source).reshape(-1)
+    values = _flat(real_numbers(arrays, voltages, source), len(injections), len(pairs))
     if not values.size or values.size % n_rows:
         raise DataError(
             f"expected {voltages} of (n, {n_rows}), got {arrays[voltages].shape}", where=source
@@ -44,9 +50,17 @@ def parse(arrays: Arrays, source: str) -> Recording:
     frames = values.reshape(-1, n_rows)
     water = None
     if reference in arrays:
-        water = real_numbers(arrays, reference, source).reshape(-1)
+        water = _flat(real_numbers(arrays, reference, source), len(injections), len(pairs))
         if len(water) != n_rows:
             raise DataError(f"expected {reference} ({n_rows},), got {len(water)}", where=source)
-    drive = clockwise(np.repeat(injections, len(pairs), axis=0), n_electrodes)
-    measure = clockwise(np.tile(pairs, (len(injections), 1)), n_electrodes)
-    return without_repeats(voltages_of(source, frames, (drive, measure), reference=water))
+    rows = np.repeat(injections, len(pairs), axis=0), np.tile(pairs, (len(injections), 1))
+    if inj != "CurrentPattern":
+        rows = clockwise(rows[0], n_electrodes), clockwise(rows[1], n_electrodes)
+    return voltages_of(source, frames, rows, reference=water).without_repeats()
+
+
+def _flat(values: FloatArray, n_injections: int, n_pairs: int) -> FloatArray:
+    """Values one after another, injection by injection."""
+    if values.ndim > 1 and values.shape[-2:] == (n_pairs, n_injections) and n_pairs > 1:
+        values = np.swapaxes(values, -2, -1)
+    return values.reshape(-1)

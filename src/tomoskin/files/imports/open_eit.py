@@ -3,6 +3,7 @@
 The number of values tells electrodes and drive: pyEIT's scan order with the drive spread as the
 firmware sets it, or every pair of 8 electrodes by two terminals. The instrument gives sizes of
 impedances without signs; each measuring pair is turned so that a uniform disc reads above zero.
+Opposite drives come from both ends; their mean counts, as the instrument favours one end.
 Lines carry no time: frames are numbered.
 """
 
@@ -14,12 +15,7 @@ from itertools import combinations
 import numpy as np
 
 from tomoskin.core import DataError, IntArray
-from tomoskin.files.imports.tables import (
-    for_magnitudes,
-    touches_drive,
-    voltages_of,
-    without_repeats,
-)
+from tomoskin.files.imports.tables import for_magnitudes, touches_drive, voltages_of
 from tomoskin.files.imports.text_log import Skipped, numbers_in
 from tomoskin.sensing.signal import Recording
 
@@ -64,8 +60,9 @@ def parse(lines: Iterable[str], source: str) -> Recording:
             where=source,
             hint="numbers must have a decimal point, not a comma",
         )
-    rows = _rows(len(frames[0]))
-    return without_repeats(voltages_of(source, np.array(frames), rows, notes=skipped.notes()))
+    rows = rows_of(len(frames[0]))
+    recording = voltages_of(source, np.array(frames), rows, notes=skipped.notes())
+    return recording.without_repeats()
 
 
 def _expected(frames: list[list[float]], count: int) -> bool:
@@ -74,7 +71,8 @@ def _expected(frames: list[list[float]], count: int) -> bool:
     return count == _TWO_TERMINAL or count in _SCANS
 
 
-def _rows(count: int) -> tuple[IntArray, IntArray]:
+def rows_of(count: int) -> tuple[IntArray, IntArray]:
+    """Drive and measure (count, 2) of a frame of so many values."""
     if count == _TWO_TERMINAL:
         pairs = np.array(list(combinations(range(8), 2)), dtype=np.int64)
         return pairs, pairs

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.io.matlab import MatlabObject, MatlabOpaque
 
 from tomoskin.core import EMPTY, MAGIC, Arrays, DataError, StrPath, load_arrays, open_input
 from tomoskin.files.imports import (
@@ -19,6 +20,7 @@ from tomoskin.files.imports import (
     ktc,
     open_eit,
     pyeit_arrays,
+    sciospec,
     serial_log,
     sixteen,
 )
@@ -46,6 +48,7 @@ TEXT_FORMATS: tuple[
     (csv_table.detects, csv_table.parse),
     (open_eit.detects, open_eit.parse),
     (eit_kit.detects, eit_kit.parse),
+    (sciospec.detects, sciospec.parse),
     (serial_log.detects, serial_log.parse),
 )
 """The same for text, by its first lines."""
@@ -101,6 +104,12 @@ def _from_arrays(arrays: Arrays, path: Path) -> Recording:
 def _from_matlab(variables: dict[str, Any], path: Path) -> Recording:
     if eidors.detects(variables):
         return eidors.parse(variables, str(path))
+    if objects := [k for k, v in variables.items() if isinstance(v, MatlabObject | MatlabOpaque)]:
+        raise DataError(
+            f"holds MATLAB objects ({', '.join(objects)}), which only MATLAB can read",
+            where=str(path),
+            hint='in MATLAB: s = struct(object); save("plain.mat", "-struct", "s", "-v7")',
+        )
     arrays = {
         key: value
         for key, value in variables.items()

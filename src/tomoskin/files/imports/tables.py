@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -40,6 +39,7 @@ def voltages_of(
         source=source,
         notes=tuple(notes),
         timed=time is not None,
+        board_known=False,
     )
 
 
@@ -79,28 +79,6 @@ def adjacent_scan(n: int, step: int = 1) -> tuple[IntArray, IntArray]:
 def touches_drive(drive: IntArray, measure: IntArray) -> NDArray[np.bool_]:
     """(n,) whether a row's measuring pair touches its drive."""
     return np.asarray((drive[:, :, None] == measure[:, None, :]).any(axis=(1, 2)))
-
-
-def without_repeats(recording: Recording) -> Recording:
-    """The recording with each measurement once: the first of those that differ in sign alone.
-
-    Instruments that drive every pair from both ends measure each voltage twice.
-    """
-    rows = np.hstack([np.sort(recording.drive, axis=1), np.sort(recording.measure, axis=1)])
-    first = np.sort(np.unique(rows, axis=0, return_index=True)[1])
-    repeats = len(rows) - len(first)
-    if not repeats:
-        return recording
-    note = f"{repeats} of {len(rows)} rows repeat a measurement and are left out"
-    reference = recording.reference
-    return replace(
-        recording,
-        voltages=recording.voltages[:, first],
-        drive=recording.drive[first],
-        measure=recording.measure[first],
-        reference=None if reference is None else reference[first],
-        notes=(*recording.notes, note),
-    )
 
 
 def for_magnitudes(drive: IntArray, measure: IntArray, n: int) -> IntArray:

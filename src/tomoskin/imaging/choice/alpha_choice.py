@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.optimize import brentq, minimize_scalar
+from scipy.optimize import brentq
 
 from tomoskin.core import DataError, FloatArray, ModelError
 from tomoskin.imaging.linear.spectrum import Spectrum
@@ -161,18 +161,6 @@ class Level:
     value: float
     way: Literal["falling", "rising"]
     hints: tuple[str, str]
-
-
-def least(spectrum: Spectrum, quantity: Quantity, why: Explanation) -> AlphaChoice:
-    """Where ``quantity`` is least: on the grid first, as there may be several, then between."""
-    alphas = spectrum.alphas
-    values = np.array([quantity(float(a)) for a in alphas])
-    at = int(values.argmin())
-    low, high = np.log(alphas[[max(at - 1, 0), min(at + 1, len(alphas) - 1)]])
-    minimum = minimize_scalar(lambda t: quantity(float(np.exp(t))), bounds=(low, high))
-    end = ", at the end of the range" if at in (0, len(alphas) - 1) else ""
-    curve = Curve(alphas, values, "alpha", why.quantity, at)
-    return AlphaChoice(float(np.exp(minimum.x)), why.rule, why.reason + end, curve)
 
 
 def crossing(spectrum: Spectrum, quantity: Quantity, level: Level, why: Explanation) -> AlphaChoice:

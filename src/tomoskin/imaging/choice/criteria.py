@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,7 +16,6 @@ from tomoskin.imaging.choice.alpha_choice import (
     Level,
     Locate,
     crossing,
-    least,
 )
 from tomoskin.imaging.choice.light_touch import light_touch
 from tomoskin.imaging.linear.spectrum import Spectrum
@@ -29,6 +29,13 @@ TARGET = 1.0
 
 WIDTH = 0.1
 """Radius of the contrast in the middle, in parts of the mesh's largest extent."""
+
+ERROR = 0.01
+"""What a model gets wrong in a measurement, as a part of the change of the whole frame: a tank's
+shape, electrodes and contacts are never quite those of its model."""
+
+_GREATER = 0.9
+"""Quantile of the frames' energy that stands for a frame which shows something."""
 
 FOLDS = 5
 
@@ -64,7 +71,7 @@ def corner(t: FloatArray, x: FloatArray, y: FloatArray) -> int:
         raise ModelError(
             "the L-curve has no corner",
             where="rule l-curve",
-            hint="choose another rule, such as gcv or light-touch",
+            hint="choose another rule, such as model-error or light-touch",
         )
     return int(max(bends, key=lambda i: curvature[i]))
 
@@ -94,40 +101,49 @@ def l_curve(spectrum: Spectrum, evidence: Evidence) -> AlphaChoice:
     return AlphaChoice(float(alphas[at]), "l-curve", reason, curve)
 
 
-def gcv(spectrum: Spectrum, evidence: Evidence) -> AlphaChoice:
-    """Least generalised cross-validation error, ‖r‖²_W/(1 − f/m)² (Golub, Heath & Wahba 1979).
+def model_error(spectrum: Spectrum, evidence: Evidence) -> AlphaChoice:
+    """Each measurement errs by :data:`ERROR` of the change that the prior expects of a frame.
 
-    f are the degrees of freedom. Needs frames, not the size of their noise.
+    Needs nothing. The energy of such changes, tr(W^½JQ⁻¹JᴴW^½), does not depend on the mesh, and
+    rows that only repeat others leave the image as it is. The part was chosen on recordings of
+    tanks, and holds on others that were not looked at for it.
     """
-    frames = evidence.touched(len(spectrum.values))
-    m = len(spectrum.values)
+    del evidence
+    energy = float(spectrum.values[np.isfinite(spectrum.values)].sum())
+    alpha = ERROR * energy**0.5
+    alphas = spectrum.alphas
+    nearest = int(np.abs(np.log(alphas / alpha)).argmin())
+    label = "error of a measurement, part of a frame's change"
+    return AlphaChoice(
+        alpha,
+        "model-error",
+        f"measurements are trusted to {100 * ERROR:g} % of a frame's change",
+        Curve(alphas, alphas / energy**0.5, "alpha", label, nearest),
+    )
 
-    def error(alpha: float) -> float:
-        unused = 1.0 - spectrum.freedom(alpha) / m
-        return float(np.mean(spectrum.residual(alpha, frames) ** 2)) / (m * unused**2)
 
-    reason = f"{_frames(frames)} predict each row best from the others here"
-    return least(spectrum, error, Explanation("gcv", reason, "mean square error of prediction"))
+def for_recording(spectrum: Spectrum, evidence: Evidence) -> AlphaChoice:
+    """Alpha of a recording of a board that is not known, by what the file says.
 
-
-def likelihood(spectrum: Spectrum, evidence: Evidence) -> AlphaChoice:
-    """Most likely alpha, if images come from the prior: N(0, τ²Q⁻¹) under noise N(0, ν²W⁻¹).
-
-    alpha is ν/τ, and the data's coefficients are N(0, τ²(λ + α²)); τ is each frame's own
-    (empirical Bayes; Rasmussen & Williams 2006, section 5.4). Needs frames.
+    As :func:`model_error`, to which the noise of idle frames is added where the evidence has it:
+    as a part of the change of its own frames, by the weights of the problem. Of many frames the
+    greater changes count, as some may show nothing.
     """
-    frames = evidence.touched(len(spectrum.values))
-    weighed = np.isfinite(spectrum.values)
-    values, m = spectrum.values[weighed], int(weighed.sum())
-    energy = np.abs(spectrum.coefficients(frames)[:, weighed]) ** 2
-
-    def unlikely(alpha: float) -> float:
-        variance = values + alpha**2
-        own = np.log(np.mean(energy / variance, axis=1))
-        return float(np.mean(own)) + float(np.log(variance).mean())
-
-    reason = f"{_frames(frames)} of {m} coefficients are likeliest here"
-    return least(spectrum, unlikely, Explanation("likelihood", reason, "−2 log likelihood per row"))
+    least = model_error(spectrum, evidence)
+    if evidence.noise is None or not np.any(evidence.noise):
+        return replace(least, reason=f"{least.reason}, as no idle frames tell its noise")
+    weights = spectrum.problem.weights
+    noise = evidence.known_noise(len(weights)) ** 2 * weights
+    frames = evidence.touched(len(weights))
+    change = float(np.quantile((frames**2 * weights).sum(axis=1), _GREATER)) - noise.sum()
+    part = float(np.sqrt(noise.mean() / max(change, noise.sum())))
+    error = float(np.hypot(ERROR, part))
+    reason = f"{least.reason}, and the noise of its idle frames is {100 * part:.2g} %"
+    alpha = least.alpha * error / ERROR
+    curve = least.curve
+    if curve is not None:
+        curve = replace(curve, chosen=int(np.abs(np.log(curve.x / alpha)).argmin()))
+    return AlphaChoice(alpha, "model-error", reason, curve)
 
 
 def discrepancy(spectrum: Spectrum, evidence: Evidence) -> AlphaChoice:
@@ -252,16 +268,15 @@ def _folded(errors: FloatArray) -> tuple[IntArray, float]:
 
 RULES: dict[str, Criterion] = {
     "light-touch": light_touch,
+    "model-error": model_error,
     "noise-figure": by_noise_figure,
     "l-curve": l_curve,
-    "gcv": gcv,
-    "likelihood": likelihood,
     "discrepancy": discrepancy,
     "labelled": labelled,
 }
 """Parameter-choice criteria by name.
 
-The first needs nothing but the noise; ``alpha = "auto"`` is decided by it.
+``alpha = "auto"`` is decided by the first where the noise is known, else by the second.
 """
 
 

@@ -110,6 +110,15 @@ class LinearProblem:
             reference=self.reference[kept],
         )
 
+    def weighed(self, prior: PriorLike, weights: FloatArray) -> Self:
+        """The problem of other weights, (n_meas,) above 0.
+
+        The prior goes with them: one that weighs cells by their sensitivity sees W^½J.
+        """
+        weight = _weights(weights, len(self.jacobian))
+        penalty = penalty_of(prior, self.model.mesh, np.sqrt(weight)[:, None] * self.jacobian)
+        return replace(self, weights=weight, prior=penalty)
+
     def operator(self, alpha: float) -> Operator:
         """Minimiser of the problem as a matrix, made in the space of the measurements.
 

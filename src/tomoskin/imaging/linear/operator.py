@@ -129,12 +129,14 @@ class Operator:
     def __call__(self, dv: NDArray[Any]) -> Image:
         """Image of the difference data ``dv``, (n_meas,), real or complex.
 
+        Of (n, n_meas) all images at once: its values are (n, n_cells).
+
         Raises
         ------
         DataError
             When there are more or fewer values than rows, or one that counts is not finite.
         """
-        return self._image(self.matrix @ self.check(dv))
+        return self._image((self.matrix @ self.check(dv).T).T)
 
     def deferred(self, dv: NDArray[Any]) -> Image:
         """The image, checked at once and computed when it is asked for, for the frame flow.
@@ -154,12 +156,12 @@ class Operator:
     def check(self, dv: NDArray[Any]) -> NDArray[Any]:
         """``dv`` with zeros in excluded rows; see :meth:`__call__` for what is refused."""
         n = self.matrix.shape[1]
-        if dv.shape != (n,):
+        if dv.ndim not in (1, 2) or dv.shape[-1] != n:
             raise DataError(f"expected difference data of shape ({n},), got {dv.shape}")
         counted = np.where(self.left_out, 0.0, dv) if self._leaves_out else dv
         finite = np.isfinite(counted)
         if not finite.all():
-            bad = np.flatnonzero(~finite).tolist()
+            bad = np.unique(np.nonzero(~finite)[-1]).tolist()
             raise DataError(f"expected finite difference data, but rows {bad} are not finite")
         return counted
 

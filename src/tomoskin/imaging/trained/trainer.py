@@ -60,7 +60,7 @@ def desired_images(mesh: Mesh, positions: FloatArray) -> csr_array:
 class Trainer:
     """What is the same for every weight of the noise.
 
-    ``data`` (n_meas, n) and ``noise`` (n_meas,) are scaled to equal mean power; ``desired`` are
+    ``data`` (n_meas, n) are, in units of the ``noise`` (n_meas,), of mean power 1; ``desired`` are
     the images (n_cells, n), ``middle`` (n_meas,) the data of the target nearest to the centre.
     """
 
@@ -80,7 +80,7 @@ class Trainer:
         sd = np.broadcast_to(sd, (len(data),))
         if not (np.isfinite(sd).all() and (sd > 0).all()):
             raise ModelError(f"expected finite noise above 0, got {sd.min():g} to {sd.max():g}")
-        scaled = sd * np.sqrt((data**2).sum() / (sd**2).sum())
+        scaled = sd * np.sqrt(((data / sd[:, None]) ** 2).sum() / len(sd))
         centre = int(np.linalg.norm(training.places - centre_of(mesh), axis=1).argmin())
         return cls(mesh, data, scaled, desired_images(mesh, training.places), data[:, centre])
 
@@ -190,6 +190,17 @@ class Greit(Operator):
             precision=precision,
             reference=model.at(conductivity).voltages,
             difference=difference,
+        )
+
+    def weighed(self, noise: ArrayLike, weight: float) -> Operator:
+        """The operator trained on the same targets for another noise and its weight μ."""
+        matrix, precision = Trainer.of(self.model.mesh, self.training, noise).matrix(weight)
+        return Operator(
+            self.model,
+            matrix,
+            precision=precision,
+            reference=self.reference,
+            difference=self.difference,
         )
 
 

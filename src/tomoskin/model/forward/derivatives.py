@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from tomoskin.core import FloatArray, IntArray, ModelError
 from tomoskin.model.forward.assembly import electrode_forms
@@ -19,6 +19,49 @@ def by_conductivity(solution: Solution) -> NDArray[Any]:
         return _by_tensor(solution)
     model = solution.model
     return model.engine.jacobian(solution.gradient, model.pattern, model.current)
+
+
+def along(solution: Solution, change: ArrayLike) -> NDArray[Any]:
+    """See :meth:`State.jvp`: −∫ δσ ∇u_i · ∇u_j of all pairs of electrodes, then the voltages."""
+    moved = _checked(change, len(solution.model.mesh.cells), "change")
+    if solution.conductivity.ndim > 1:
+        raise ModelError("expected one conductivity per cell, got tensors", hint=_BY_MATRIX)
+    field = solution.gradient.reshape(len(solution.gradient), -1)
+    points = solution.gradient.shape[1]
+    flat = moved.reshape(-1, moved.shape[-1])
+    parts = [(field * np.tile(one, points)) @ field.T for one in flat]
+    return solution.model.voltages(-np.array(parts)).reshape(*moved.shape[:-1], -1)
+
+
+def against(solution: Solution, weights: ArrayLike) -> NDArray[Any]:
+    """See :meth:`State.vjp`: the fields of the weighted measurements, times those of the drives."""
+    model, pattern = solution.model, solution.model.pattern
+    weight = _checked(weights, pattern.n_meas, "weights")
+    if solution.conductivity.ndim > 1:
+        raise ModelError("expected one conductivity per cell, got tensors", hint=_BY_MATRIX)
+    field, out = solution.gradient, []
+    (source, sink), (plus, minus) = pattern.drive.T, pattern.measure.T
+    for one in weight.reshape(-1, pattern.n_meas) * model.current[pattern.drive_index]:
+        pairs = np.zeros((len(field), len(field)), one.dtype)
+        for driven, read, sign in (
+            (source, plus, 1), (source, minus, -1), (sink, plus, -1), (sink, minus, 1)
+        ):  # fmt: skip
+            np.add.at(pairs, (driven, read), sign * one)
+        out.append(-np.einsum("eqc,eqc->c", field, np.tensordot(pairs, field, 1)))
+    return np.array(out).reshape(*weight.shape[:-1], field.shape[2])
+
+
+_BY_MATRIX = "take the product with the state's jacobian"
+
+
+def _checked(values: ArrayLike, count: int, name: str) -> NDArray[Any]:
+    """(…, ``count``) numbers. Raises ModelError for another shape, or what is not finite."""
+    array = np.asarray(values)
+    if array.ndim < 1 or array.shape[-1] != count:
+        raise ModelError(f"expected {name} of shape (…, {count}), got {array.shape}")
+    if not np.isfinite(array).all():
+        raise ModelError(f"expected finite {name}, got others")
+    return array
 
 
 def _by_tensor(solution: Solution) -> NDArray[Any]:

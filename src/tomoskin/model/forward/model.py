@@ -62,6 +62,14 @@ class ForwardModel(System):
         """(n_meas, n_cells) dV/dσ, V/S; see :meth:`at`."""
         return self.at(conductivity).jacobian
 
+    def jvp(self, conductivity: ArrayLike, change: ArrayLike) -> NDArray[Any]:
+        """(…, n_meas) V: how the voltages change along ``change``; see :meth:`State.jvp`."""
+        return self.at(conductivity).jvp(change)
+
+    def vjp(self, conductivity: ArrayLike, weights: ArrayLike) -> NDArray[Any]:
+        """(…, n_cells): the gradient of weighted voltages; see :meth:`State.vjp`."""
+        return self.at(conductivity).vjp(weights)
+
     def transfer_resistance(self, conductivity: ArrayLike) -> NDArray[Any]:
         """(n_electrodes, n_electrodes) Ω; see :class:`State`."""
         return self.at(conductivity).transfer_resistance
@@ -133,6 +141,21 @@ class State:
         1 A through the driven and the measured pair.
         """
         return derivatives.by_conductivity(self.solution)
+
+    def jvp(self, change: ArrayLike) -> NDArray[Any]:
+        """(…, n_meas) V: the jacobian times changes of conductivity (…, n_cells), S or S/m.
+
+        Without the jacobian, by the fields of the solution. Raises ModelError for tensors.
+        """
+        return derivatives.along(self.solution, change)
+
+    def vjp(self, weights: ArrayLike) -> NDArray[Any]:
+        """(…, n_cells): weights (…, n_meas) of the measurements times the jacobian.
+
+        It is the gradient of Σ weights · voltages. Nothing is conjugated: for a real misfit of
+        complex voltages give the conjugate of the residual. Raises ModelError for tensors.
+        """
+        return derivatives.against(self.solution, weights)
 
     @cached_property
     def contact_jacobian(self) -> NDArray[Any]:

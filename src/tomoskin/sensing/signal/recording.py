@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from tomoskin.core import DataError, FloatArray, IntArray, PatternError
 from tomoskin.model.pattern import Pattern, match_rows
+from tomoskin.sensing.signal.repeats import RepeatedRows
 
 _MOST = 1e12
 """No instrument has a unit in which a voltage is a larger number."""
@@ -55,6 +56,8 @@ class Recording:
     timed
         Whether the times were measured. Else the frames are only numbered, and none follows from
         the one before.
+    board_known
+        Whether the skin's read-out recorded it, so that its noise can be predicted.
     """
 
     voltages: NDArray[Any]
@@ -68,6 +71,7 @@ class Recording:
     notes: tuple[str, ...] = ()
     idle: int = 1
     timed: bool = True
+    board_known: bool = True
 
     def __post_init__(self) -> None:
         """Check that the shapes belong together and that there is a frame."""
@@ -144,8 +148,24 @@ class Recording:
         median = float(np.quantile(tops[tops > 0], 0.5, method="lower"))
         return min(_MOST, _MOST_OF_MEDIAN * median)
 
+    def without_repeats(self, pattern: Pattern | None = None) -> Recording:
+        """The recording with each measurement once: see :class:`RepeatedRows`; a note says so."""
+        repeats = RepeatedRows.of(self.drive, self.measure, self.voltages, pattern)
+        if repeats is None:
+            return self
+        return replace(
+            self,
+            voltages=repeats.merged(self.voltages),
+            drive=self.drive[repeats.first],
+            measure=self.measure[repeats.first],
+            reference=None if self.reference is None else repeats.merged(self.reference),
+            notes=(*self.notes, repeats.note),
+        )
+
     def in_order_of(self, pattern: Pattern) -> Recording:
         """Return the recording with exactly the pattern's rows, in its order and signs.
+
+        Rows that measure the same are merged into their mean first.
 
         Raises
         ------
@@ -162,17 +182,19 @@ class Recording:
                 where=self.source,
                 hint="choose the skin that it was recorded with: --skin",
             )
+        once = self.without_repeats(pattern)
         try:
-            match = match_rows(pattern, self.drive, self.measure)
+            match = match_rows(pattern, once.drive, once.measure)
         except PatternError as error:
             where = f"{self.source}, {error.where}" if error.where else self.source
             raise PatternError(error.message, where=where, hint=error.hint) from error
+        reference = once.reference
         return replace(
-            self,
-            voltages=match.apply(self.voltages),
+            once,
+            voltages=match.apply(once.voltages),
             drive=pattern.drive,
             measure=pattern.measure,
-            reference=None if self.reference is None else match.apply(self.reference),
+            reference=None if reference is None else match.apply(reference),
         )
 
 

@@ -1,0 +1,109 @@
+"""Files of tanks and instruments of others: KIT4, Sciospec, complex voltages as text."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+from scipy.io.matlab import MatlabOpaque
+
+from tomoskin.core import DataError
+from tomoskin.files.imports import read_recording, reader
+from tomoskin.model.forward import ForwardModel
+from tomoskin.model.pattern import Pattern
+from tomoskin.model.skin import Skin
+
+
+def kit4(factor=1.0):
+    """A file of that tank: adjacent injections, then those of the first reversed."""
+    n = 16
+    pairs = (np.eye(n) - np.roll(np.eye(n), 1, axis=0)).astype(int)
+    pattern = Pattern.skip(n, 0, include_driven=True)
+    water = (
+        ForwardModel(Skin.load("tank-16").mesh(), pattern, 0.5, 1e-3)
+        .solve(1.0)
+        .voltages.reshape(n, n)
+        .T
+    )
+    water = -water  # current enters at the first of the pair, as columns of the pattern say
+    both = np.hstack([water, -factor * water])
+    return {
+        "CurrentPattern": 1.4 * np.hstack([pairs, -pairs]),
+        "MeasPattern": pairs,
+        "Uel": np.stack([both, 1.1 * both]),
+        "water": both,
+    }
+
+
+def test_kit4_counts_clockwise_and_means_what_was_injected_twice(tmp_path):
+    path = tmp_path / "kit4.npz"
+    np.savez(path, **kit4(1.02))
+    got = read_recording(path)
+    assert got.voltages.shape == (2, 256)
+    assert any("256 of 512 rows repeat another's measurement" in note for note in got.notes)
+    skin = Skin.load("tank-16")
+    ordered = got.in_order_of(skin.pattern())
+    expected = ForwardModel(skin.mesh(), skin.pattern(), 0.5, 1e-3).solve(1.0).voltages
+    assert ordered.reference == pytest.approx(1.01 * expected)
+    assert ordered.voltages[1] == pytest.approx(1.1 * ordered.reference)
+
+
+def sciospec(channels, every, injections):
+    """A file of potentials: 1 V at the first channel of an injection, falling along the ring."""
+    lines = ["18", "2", "setup", *15 * ["1"]]
+    lines[16] = "MeasurementChannels: " + ",".join(map(str, channels))
+    lines[17] = "MeasurementChannelsIndependentFromInjectionPattern: " + ",".join(map(str, every))
+    for first, second in injections:
+        potentials = [0.0 if c not in channels else (c - first) % 16 for c in every]
+        lines += [f"{first} {second}", "\t".join(f"{p}\t{-0.5 * p}" for p in potentials)]
+    return "\n".join(lines) + "\n"
+
+
+@pytest.mark.parametrize("every", [range(1, 17), range(1, 33)])
+def test_sciospec_files_hold_potentials(tmp_path, every):
+    path = tmp_path / "setup_00001.eit"
+    path.write_text(sciospec(range(1, 17), every, [(k, k % 16 + 1) for k in range(1, 17)]))
+    got = read_recording(path)
+    assert got.voltages.shape == (1, 208)
+    assert got.drive[0].tolist() == [0, 1]
+    assert got.measure[0].tolist() == [2, 3]
+    assert got.voltages[0, 0] == -1.0 + 0.5j  # one channel further on is one higher
+    ordered = got.in_order_of(Pattern.adjacent(16))
+    assert ordered.voltages.shape == (1, 208)
+
+
+def test_sciospec_files_that_are_not_one_frame(tmp_path):
+    path = tmp_path / "setup_00001.eit"
+    text = sciospec(range(1, 17), range(1, 17), [(1, 2), (2, 3)])
+    for wrong, message in (
+        (text.replace("\n2 3\n", "\n2 17\n"), 'got "2 17"'),
+        (text.replace("\n2 3\n", "\n0.5\t0.5\n"), "one frame of one frequency"),
+        (text[: text.index("\n1 2\n") + 1], "holds no injection"),
+        (text.replace("\n1 2\n", "\n1 2\n1.0\t"), "32 or 32 numbers for an injection, got 33"),
+    ):
+        path.write_text(wrong)
+        with pytest.raises(DataError, match=message):
+            read_recording(path)
+
+
+def test_complex_voltages_as_text(tmp_path):
+    path = tmp_path / "complex.csv"
+    path.write_text("time_s,v_1_0_2_3,v_1_0_3_4\n0,1.5,2\n1,1.5-0.2j,2+1e-1i\n2, ,-1j\n")
+    got = read_recording(path)
+    assert got.voltages[:2].tolist() == [[1.5, 2.0], [1.5 - 0.2j, 2 + 0.1j]]
+    assert np.isnan(got.voltages[2, 0])
+    assert got.voltages[2, 1] == -1j
+    assert got.time.tolist() == [0.0, 1.0, 2.0]
+    path.write_text("time_s,v_1_0_2_3\n1j,1.5\n")
+    with pytest.raises(DataError, match="real numbers in time_s"):
+        read_recording(path)
+
+
+def test_matlab_objects_are_refused_with_what_to_do(tmp_path, monkeypatch):
+    """Written by MATLAB alone, so what scipy makes of one stands for it."""
+    path = tmp_path / "class.mat"
+    savemat(path, {"a": 1.0})
+    thing = MatlabOpaque(np.zeros(1, dtype=[("s0", "O"), ("s1", "O"), ("s2", "O"), ("arr", "O")]))
+    monkeypatch.setattr(reader, "load_matlab", lambda _: {"eit": thing, "n": np.ones(2)})
+    with pytest.raises(DataError, match=r"objects \(eit\), which only MATLAB.*struct\(object\)"):
+        read_recording(path)
