@@ -234,3 +234,12 @@ def test_a_new_press_where_one_was_is_found() -> None:
     ours, _, left = after_a_slide(LIVE)
     frames = [left, left, 0.6 * data(STANDING), 0.6 * data(STANDING)]
     assert [rested(ours, dv, 1, 10 + k) for k, dv in enumerate(frames)] == [0, 0, 1, 1]
+
+
+def test_a_press_on_what_is_left_is_told_against_the_untouched_skin() -> None:
+    ours, _, left = after_a_slide(LIVE)
+    rested(ours, left, 8, 9)
+    (again,) = ours.push(data(STANDING) + noise(16, 1, 10)[0], NOTHING)
+    (fresh,) = finder().push(data(STANDING) + noise(16, 1, 10)[0], NOTHING)
+    content = [np.log1p(d.peak / skin().conductivity) * d.area for d in (again, fresh)]
+    assert content[0] == pytest.approx(content[1], rel=0.01)

@@ -245,6 +245,8 @@ class SpotFinder:
     def _detection(self, detected: SpotDetections, k: int, spot: list[float]) -> Detection:
         x, y, log_radius, content = spot
         radius = math.exp(log_radius)
+        # a touch is told against the untouched skin
+        content += self._residual.beneath(x, y, radius)
         spread = detected.covariance[4 * k : 4 * k + 2, 4 * k : 4 * k + 2]
         (xx, xy), (_, yy) = (spread + self._rim.doubt(x, y, radius)).tolist()
         return Detection(
