@@ -80,7 +80,7 @@ def test_links_are_drawn_by_what_is_seen_else_by_what_may_collide(tmp_path):
 def test_what_cannot_be_drawn_is_said_without_a_folder(tmp_path):
     (solid,) = solids_of(tmp_path, LINKS[LINKS.index('<link name="c"') :]).values()
     (problem,) = solid.problems
-    assert problem.startswith("package://arm/meshes/c.stl: cannot be read")
+    assert problem.startswith("package://arm/meshes/c.stl: there is no such file")
     assert str(tmp_path) not in problem
     assert solid.triangles.shape == (0, 3, 3)
 

@@ -79,7 +79,7 @@ def test_a_file_that_went_away_is_named(file: Path, tmp_path: Path) -> None:
     path = tmp_path / "cap.toml"
     path.write_text(lay(file, electrodes(), like=LIKE, source=str(path)).to_toml())
     file.unlink()
-    with pytest.raises(SkinError, match=r"cap.toml: \[surface\], .*cap.stl: cannot be read"):
+    with pytest.raises(SkinError, match=r"cap.toml: \[surface\], .*cap.stl: there is no such file"):
         Skin.load(path)
 
 
