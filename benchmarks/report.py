@@ -61,9 +61,9 @@ class Report:
 
 
 def table(title: str, rows: Iterable[Row], *notes: str) -> Report:
-    """A report whose columns are the names in its rows; a row may lack the last ones."""
+    """A report whose columns are the names in its rows, as they come; a row may lack some."""
     every = tuple(rows)
-    columns = tuple(max(every, key=len))
+    columns = tuple(dict.fromkeys(name for row in every for name in row))
     return Report(
         title, columns, tuple(tuple(row.get(name, "–") for name in columns) for row in every), notes
     )
