@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from bench_rig import Rig, evenly, gap, nearest
 from report import Floats, Report, available, mm, rms, table
-from tomoskin.model.pattern import Pattern
+from tomoskin.model.pattern import Pattern, undirected
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Pipeline, Prepared, prepare
 from tomoskin.sensing.signal import Baseline, Monitor, NuisanceSubspace, Reference
@@ -177,7 +177,7 @@ def _read(folder: Path, name: str, key: str) -> tuple[Pattern, Floats]:
         drive, measure = file["inj"][:n].astype(int), file["meas"][:n].astype(int)
         good = file["valid"][:n] if "valid" in file.files else np.ones(n, bool)
     good = good & np.isfinite(values).all(axis=0) & (np.ptp(values, axis=0) > 0)
-    ends = np.hstack([np.sort(drive, axis=1), np.sort(measure, axis=1)])
+    ends = undirected(drive, measure)
     good &= np.array([len(set(row)) == 4 for row in ends.tolist()])
     _, first = np.unique(ends[good], axis=0, return_index=True)
     kept: NDArray[Any] = np.flatnonzero(good)[np.sort(first)]

@@ -18,7 +18,7 @@ from tomoskin import Skin
 from tomoskin.core import FloatArray
 from tomoskin.files.imports import read_recording
 from tomoskin.files.imports.open_eit import rows_of
-from tomoskin.files.imports.tables import voltages_of
+from tomoskin.files.imports.tables import touches_drive, voltages_of
 from tomoskin.model.mesh import Mesh
 from tomoskin.pipeline import prepare, reconstruct
 from tomoskin.sensing.signal import Recording
@@ -105,7 +105,7 @@ def _kuopio(path: Path) -> Rig:
     recording = read_recording(path)
     with np.load(path) as arrays:
         truth = arrays["truth"]
-    kept = ~_touching(recording)
+    kept = ~touches_drive(recording.drive, recording.measure)
     return Rig(
         "Kuopio 2023", _rows(recording, kept), 12.5 / 115, tuple(map(_middles, truth)), chosen=True
     )
@@ -135,12 +135,7 @@ def _skips(recording: Recording, count: int) -> Recording:
     """Rows whose pair is not driven, of the first ``count`` ways of skipping electrodes."""
     apart = np.abs(np.subtract(*recording.drive.T))
     kept = np.minimum(apart, 16 - apart) <= count
-    return _rows(recording, kept & ~_touching(recording))
-
-
-def _touching(recording: Recording) -> NDArray[np.bool_]:
-    same = recording.drive[:, :, None] == recording.measure[:, None, :]
-    return np.asarray(same.any(axis=(1, 2)))
+    return _rows(recording, kept & ~touches_drive(recording.drive, recording.measure))
 
 
 def _rows(recording: Recording, kept: NDArray[np.bool_]) -> Recording:

@@ -24,6 +24,7 @@ import sys
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -132,6 +133,7 @@ def read(document: Any, key: str) -> float | None:
     return None
 
 
+@cache
 def code() -> str:
     """Says which code this is, changes that are not committed included."""
     git = ["git", "-C", str(ROOT)]

@@ -194,20 +194,29 @@ def _excluded(
             notes.append(f"{len(rows)} rows {text}: {listed}")
     excluded = np.concatenate([rows for rows, _ in reasons])
     if idle is not None and not recording.board_known:
-        measured = np.full(pattern.n_meas, np.nan, idle.dtype)
-        kept = np.setdiff1d(np.arange(pattern.n_meas), excluded)
-        finite = np.isfinite(idle[:, kept])
-        measured[kept] = np.where(finite, idle[:, kept], 0.0).sum(axis=0) / finite.sum(axis=0)
-        lost = open_electrodes(pattern, measured, prepared.problem.reference)
-        if lost:
-            own = np.unique(np.concatenate([pattern.rows_of(e) for e in lost]))
-            names = ", ".join(f"E{e + 1}" for e in lost)
+        own, names = _of_open_electrodes(prepared, idle, excluded)
+        if names:
             notes.append(
                 f"{names} read as if they were open, far off from what the skin's model expects: "
                 f"their {len(own)} of {pattern.n_meas} rows were left out"
             )
             excluded = np.concatenate([excluded, own])
     return np.unique(excluded), tuple(notes)
+
+
+def _of_open_electrodes(
+    prepared: Prepared, idle: NDArray[Any], excluded: IntArray
+) -> tuple[IntArray, str]:
+    """(r,) rows of electrodes without contact, and their names, by rows that are not excluded."""
+    pattern = prepared.pattern
+    measured = np.full(pattern.n_meas, np.nan, idle.dtype)
+    kept = np.setdiff1d(np.arange(pattern.n_meas), excluded)
+    finite = np.isfinite(idle[:, kept])
+    measured[kept] = np.where(finite, idle[:, kept], 0.0).sum(axis=0) / finite.sum(axis=0)
+    lost = open_electrodes(pattern, measured, prepared.problem.reference)
+    own = [pattern.rows_of(electrode) for electrode in lost]
+    rows = np.unique(np.concatenate([np.zeros(0, np.int64), *own]))
+    return rows, ", ".join(f"E{electrode + 1}" for electrode in lost)
 
 
 def _complete(idle: NDArray[Any], source: str) -> NDArray[np.bool_]:

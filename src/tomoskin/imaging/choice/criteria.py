@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
@@ -109,17 +108,7 @@ def model_error(spectrum: Spectrum, evidence: Evidence) -> AlphaChoice:
     tanks, and holds on others that were not looked at for it.
     """
     del evidence
-    energy = float(spectrum.values[np.isfinite(spectrum.values)].sum())
-    alpha = ERROR * energy**0.5
-    alphas = spectrum.alphas
-    nearest = int(np.abs(np.log(alphas / alpha)).argmin())
-    label = "error of a measurement, part of a frame's change"
-    return AlphaChoice(
-        alpha,
-        "model-error",
-        f"measurements are trusted to {100 * ERROR:g} % of a frame's change",
-        Curve(alphas, alphas / energy**0.5, "alpha", label, nearest),
-    )
+    return _trusted(spectrum, ERROR, "")
 
 
 def for_recording(spectrum: Spectrum, evidence: Evidence) -> AlphaChoice:
@@ -129,20 +118,25 @@ def for_recording(spectrum: Spectrum, evidence: Evidence) -> AlphaChoice:
     as a part of the change of its own frames, by the weights of the problem. Of many frames the
     greater changes count, as some may show nothing.
     """
-    least = model_error(spectrum, evidence)
     if evidence.noise is None or not np.any(evidence.noise):
-        return replace(least, reason=f"{least.reason}, as no idle frames tell its noise")
+        return _trusted(spectrum, ERROR, ", as no idle frames tell its noise")
     weights = spectrum.problem.weights
     noise = evidence.known_noise(len(weights)) ** 2 * weights
     frames = evidence.touched(len(weights))
     change = float(np.quantile((frames**2 * weights).sum(axis=1), _GREATER)) - noise.sum()
     part = float(np.sqrt(noise.mean() / max(change, noise.sum())))
-    error = float(np.hypot(ERROR, part))
-    reason = f"{least.reason}, and the noise of its idle frames is {100 * part:.2g} %"
-    alpha = least.alpha * error / ERROR
-    curve = least.curve
-    if curve is not None:
-        curve = replace(curve, chosen=int(np.abs(np.log(curve.x / alpha)).argmin()))
+    why = f", and the noise of its idle frames is {100 * part:.2g} %"
+    return _trusted(spectrum, float(np.hypot(ERROR, part)), why)
+
+
+def _trusted(spectrum: Spectrum, error: float, why: str) -> AlphaChoice:
+    """Alpha where each measurement errs by that part of the change of a frame."""
+    change = float(spectrum.values[np.isfinite(spectrum.values)].sum()) ** 0.5
+    alpha, alphas = error * change, spectrum.alphas
+    nearest = int(np.abs(np.log(alphas / alpha)).argmin())
+    label = "error of a measurement, part of a frame's change"
+    reason = f"measurements are trusted to {100 * ERROR:g} % of a frame's change{why}"
+    curve = Curve(alphas, alphas / change, "alpha", label, nearest)
     return AlphaChoice(alpha, "model-error", reason, curve)
 
 

@@ -23,9 +23,7 @@ def by_conductivity(solution: Solution) -> NDArray[Any]:
 
 def along(solution: Solution, change: ArrayLike) -> NDArray[Any]:
     """See :meth:`State.jvp`: −∫ δσ ∇u_i · ∇u_j of all pairs of electrodes, then the voltages."""
-    moved = _checked(change, len(solution.model.mesh.cells), "change")
-    if solution.conductivity.ndim > 1:
-        raise ModelError("expected one conductivity per cell, got tensors", hint=_BY_MATRIX)
+    moved = _checked(solution, change, len(solution.model.mesh.cells), "change")
     field = solution.gradient.reshape(len(solution.gradient), -1)
     points = solution.gradient.shape[1]
     flat = moved.reshape(-1, moved.shape[-1])
@@ -36,9 +34,7 @@ def along(solution: Solution, change: ArrayLike) -> NDArray[Any]:
 def against(solution: Solution, weights: ArrayLike) -> NDArray[Any]:
     """See :meth:`State.vjp`: the fields of the weighted measurements, times those of the drives."""
     model, pattern = solution.model, solution.model.pattern
-    weight = _checked(weights, pattern.n_meas, "weights")
-    if solution.conductivity.ndim > 1:
-        raise ModelError("expected one conductivity per cell, got tensors", hint=_BY_MATRIX)
+    weight = _checked(solution, weights, pattern.n_meas, "weights")
     field, out = solution.gradient, []
     (source, sink), (plus, minus) = pattern.drive.T, pattern.measure.T
     for one in weight.reshape(-1, pattern.n_meas) * model.current[pattern.drive_index]:
@@ -51,16 +47,19 @@ def against(solution: Solution, weights: ArrayLike) -> NDArray[Any]:
     return np.array(out).reshape(*weight.shape[:-1], field.shape[2])
 
 
-_BY_MATRIX = "take the product with the state's jacobian"
-
-
-def _checked(values: ArrayLike, count: int, name: str) -> NDArray[Any]:
-    """(…, ``count``) numbers. Raises ModelError for another shape, or what is not finite."""
+def _checked(solution: Solution, values: ArrayLike, count: int, name: str) -> NDArray[Any]:
+    """(…, ``count``) numbers to multiply. Raises ModelError for another shape, what is not finite,
+    or a sheet of tensors."""
     array = np.asarray(values)
     if array.ndim < 1 or array.shape[-1] != count:
         raise ModelError(f"expected {name} of shape (…, {count}), got {array.shape}")
     if not np.isfinite(array).all():
         raise ModelError(f"expected finite {name}, got others")
+    if solution.conductivity.ndim > 1:
+        raise ModelError(
+            "expected one conductivity per cell, got tensors",
+            hint="take the product with the state's jacobian",
+        )
     return array
 
 

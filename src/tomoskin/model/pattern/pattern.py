@@ -166,7 +166,7 @@ class Pattern:
         """
         drive = np.vstack([self.drive, other.drive])
         measure = np.vstack([self.measure, other.measure])
-        _, first = np.unique(_undirected(drive, measure), axis=0, return_index=True)
+        _, first = np.unique(undirected(drive, measure), axis=0, return_index=True)
         keep = np.sort(first)
         count = max(self.n_electrodes, other.n_electrodes)
         return type(self).from_tables(drive[keep], measure[keep], count)
@@ -246,7 +246,8 @@ def _check_pairs(pairs: IntArray, n: int, kind: str, ends: tuple[str, str]) -> N
         )
 
 
-def _undirected(drive: IntArray, measure: IntArray) -> IntArray:
+def undirected(drive: IntArray, measure: IntArray) -> IntArray:
+    """(n, 4) of the tables (n, 2): the same for rows that differ by a pair reversed."""
     return np.hstack([np.sort(drive, axis=1), np.sort(measure, axis=1)])
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, IntArray
-from tomoskin.model.pattern import Pattern
+from tomoskin.model.pattern import Pattern, undirected
 
 _AGREE = 0.5
 """Least correlation of rows that measure the same; others are no copies of each other."""
@@ -88,19 +88,15 @@ def _direction(drive: IntArray, measure: IntArray) -> FloatArray:
     return np.where((drive[:, 0] < drive[:, 1]) == (measure[:, 0] < measure[:, 1]), 1.0, -1.0)
 
 
-def _undirected(drive: IntArray, measure: IntArray) -> IntArray:
-    return np.hstack([np.sort(drive, axis=1), np.sort(measure, axis=1)])
-
-
 def _two_ways(pattern: Pattern) -> IntArray:
     """Undirected rows that the pattern drives from both ends."""
-    rows, count = np.unique(_undirected(pattern.drive, pattern.measure), axis=0, return_counts=True)
+    rows, count = np.unique(undirected(pattern.drive, pattern.measure), axis=0, return_counts=True)
     return np.asarray(rows[count > 1])
 
 
 def _keys(drive: IntArray, measure: IntArray, two_ways: IntArray | None) -> IntArray:
     """(n, 5): rows with the same key measure the same."""
-    rows = _undirected(drive, measure)
+    rows = undirected(drive, measure)
     way = np.zeros(len(rows), np.int64)
     if two_ways is not None and len(two_ways):
         both = (rows[:, None] == two_ways).all(axis=2).any(axis=1)
