@@ -16,7 +16,6 @@ from tomoskin.model.skin import Skin
 from tomoskin.twin import (
     PRESETS,
     Circle,
-    Contact,
     Finger,
     Probe,
     Square,
@@ -33,7 +32,7 @@ SEEDS = (101, 102, 103)
 BRITTLE = {"breakdown": (1.4, 0.3), "breakdown_times": (0.2, 3.0), "wear": 3e-4}
 
 
-def scene(random: np.random.Generator, reach: float) -> tuple[Contact, ...]:
+def scene(random: np.random.Generator, reach: float) -> tuple[Probe, ...]:
     """Up to four probes of any face, some of them turned and dragging."""
     probes = []
     for _ in range(random.integers(0, 5)):

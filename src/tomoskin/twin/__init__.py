@@ -9,7 +9,7 @@ from tomoskin.twin.held_scanning import Board, HeldScanning
 from tomoskin.twin.labelled import COMMON_PRESSES, Population, SetPlan, make_shard
 from tomoskin.twin.material import MaterialSettings
 from tomoskin.twin.presets import PRESETS, TwinSettings
-from tomoskin.twin.probe import FACES, Circle, Contact, Face, Finger, Press, Probe, Shape, Square
+from tomoskin.twin.probe import FACES, Circle, Face, Finger, Press, Probe, Shape, Square
 from tomoskin.twin.scanning import (
     SampleTable,
     ScanClock,
@@ -37,7 +37,6 @@ __all__ = [
     "Bent",
     "Board",
     "Circle",
-    "Contact",
     "ContactSettings",
     "Deformation",
     "Disturbance",

@@ -16,7 +16,7 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 from tomoskin.core import FloatArray
 from tomoskin.model.forward import choose_engine
 from tomoskin.twin.contact import ContactSettings, Grid, solve_contact
-from tomoskin.twin.probe import Contact, Probe, Shape
+from tomoskin.twin.probe import Probe, Shape
 
 _NODES = 128
 _ROUND = ((0, 0), (_NODES // 2, _NODES // 2), (_NODES // 2, _NODES // 2))
@@ -112,7 +112,7 @@ def solved_dent(shape: Shape, settings: ContactSettings, force: float, blur: flo
 
 
 def indent(
-    probes: Sequence[Contact], settings: ContactSettings, points: FloatArray, blur: float = 0.0
+    probes: Sequence[Probe], settings: ContactSettings, points: FloatArray, blur: float = 0.0
 ) -> Load:
     """What ``probes`` do to the sheet at ``points`` (n, 2) m.
 
@@ -159,7 +159,7 @@ class _Placed(NamedTuple):
     place: tuple[float, float, float, float]
 
 
-def _placed(probe: Contact, settings: ContactSettings, blur: float) -> _Placed:
+def _placed(probe: Probe, settings: ContactSettings, blur: float) -> _Placed:
     c, s = math.cos(probe.angle), math.sin(probe.angle)
     dx, dy = probe.drag
     along = (c * dx + s * dy, c * dy - s * dx)

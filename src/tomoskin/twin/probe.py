@@ -259,8 +259,16 @@ class Probe:
 
     def __post_init__(self) -> None:
         """Check the place, force, angle and drag."""
-        _check_place(self.x, self.y)
-        _check_force(self.force)
+        if not (math.isfinite(self.x) and math.isfinite(self.y)):
+            raise GeometryError(
+                f"expected a finite position, got ({self.x}, {self.y})", where="press"
+            )
+        if not 0 <= self.force < math.inf:
+            raise ModelError(
+                f"expected a force of 0 N or more, got {self.force}",
+                where="press",
+                hint="a probe can only push",
+            )
         if not math.isfinite(self.angle):
             raise GeometryError(f"expected a finite angle, got {self.angle}", where="press")
         if not all(map(math.isfinite, self.drag)):
@@ -269,6 +277,8 @@ class Probe:
     @property
     def radius(self) -> float:
         """Radius of the circle with the area of the face, m."""
+        if isinstance(self.shape, Circle):
+            return self.shape.radius
         return math.sqrt(self.shape.area / math.pi)
 
     def moving(self, vx: float, vy: float, friction: float) -> Self:
@@ -282,77 +292,27 @@ class Probe:
         return replace(self, drag=(drag * vx, drag * vy))
 
 
-@dataclass(frozen=True, slots=True)
-class Press:
-    """A flat round probe, as a page sends it.
+class Press(Probe):
+    """A flat round probe of ``radius`` m, as a page sends it."""
 
-    ``x``, ``y`` and ``radius`` in m, ``force`` in N (0: it only rests there).
+    __slots__ = ()
 
-    Raises
-    ------
-    GeometryError
-        When a place is not finite, or the radius no size of a face.
-    ModelError
-        When the force is negative or not finite.
-    """
-
-    x: float
-    y: float
-    force: float
-    radius: float
-
-    def __post_init__(self) -> None:
-        """Check the place, radius and force."""
-        _check_place(self.x, self.y)
-        _circle(self.radius)
-        _check_force(self.force)
-
-    @property
-    def shape(self) -> Circle:
-        """The face of the tip, which is a circle."""
-        return _circle(self.radius)
-
-    @property
-    def angle(self) -> float:
-        """The angle is zero, for the tip is round."""
-        return 0.0
-
-    @property
-    def drag(self) -> tuple[float, float]:
-        """The drag is zero, for the tip does not slide."""
-        return 0.0, 0.0
+    def __init__(self, x: float, y: float, force: float, radius: float) -> None:
+        super().__init__(_circle(radius), x, y, force)
 
 
 _circle = lru_cache(maxsize=64)(Circle)
 """The same for the same radius, since a press that moves is another at each step."""
 
 
-Contact = Press | Probe
-"""What may press on a twin."""
-
-
-def check_on_skin(contacts: Sequence[Contact], outline: Outline) -> None:
+def check_on_skin(probes: Sequence[Probe], outline: Outline) -> None:
     """Raise GeometryError that names the first press whose centre is off the skin."""
-    if not contacts:
+    if not probes:
         return
-    inside = outline.contains(np.array([(c.x, c.y) for c in contacts]))
+    inside = outline.contains(np.array([(p.x, p.y) for p in probes]))
     if not all(inside.tolist()):
         number = int(np.argmin(inside))
-        x, y = contacts[number].x * 1e3, contacts[number].y * 1e3
+        x, y = probes[number].x * 1e3, probes[number].y * 1e3
         raise GeometryError(
             f"its centre ({x:.1f} mm, {y:.1f} mm) is off the skin", where=f"press {number}"
-        )
-
-
-def _check_place(x: float, y: float) -> None:
-    if not (math.isfinite(x) and math.isfinite(y)):
-        raise GeometryError(f"expected a finite position, got ({x}, {y})", where="press")
-
-
-def _check_force(force: float) -> None:
-    if not 0 <= force < math.inf:
-        raise ModelError(
-            f"expected a force of 0 N or more, got {force}",
-            where="press",
-            hint="a probe can only push",
         )

@@ -17,7 +17,7 @@ from tomoskin.twin.bend import Pose, depth_of, strain_of
 from tomoskin.twin.dent import Load, indent
 from tomoskin.twin.material import MaterialState
 from tomoskin.twin.presets import TwinSettings
-from tomoskin.twin.probe import Contact, check_on_skin
+from tomoskin.twin.probe import Probe, check_on_skin
 
 _MESH_SEED = 7919
 """Seed of the twin's mesh; the reconstruction's is another, so no mesh is ever shared."""
@@ -33,7 +33,7 @@ _FIRST = 64
 """One cell of so many is compared first."""
 
 
-_Under = tuple[tuple[Contact, ...], Pose]
+_Under = tuple[tuple[Probe, ...], Pose]
 """What presses on the sheet, and how it is bent."""
 
 
@@ -48,11 +48,11 @@ class _Loading:
         self._rest, self._height = rest, given.bend.height
         nothing = Load.none(len(points))
         self.now: _Under = ((), ())
-        self._dented: tuple[tuple[Contact, ...], Load] = ((), nothing)
+        self._dented: tuple[tuple[Probe, ...], Load] = ((), nothing)
         self._posed: tuple[Pose, FloatArray] = ((), nothing.strain)
         self._felt: tuple[_Under, Load] = (self.now, nothing)
 
-    def press(self, presses: tuple[Contact, ...]) -> None:
+    def press(self, presses: tuple[Probe, ...]) -> None:
         """Replace all presses; GeometryError when one is off the skin or its face cannot press."""
         check_on_skin(presses, self._outline)
         if presses != self.now[0]:
@@ -172,7 +172,7 @@ class TwinSkin:
         return self._network.solves
 
     @property
-    def presses(self) -> tuple[Contact, ...]:
+    def presses(self) -> tuple[Probe, ...]:
         """What presses on the sheet now."""
         return self._loading.now[0]
 
@@ -186,7 +186,7 @@ class TwinSkin:
         """What the cells feel under the present presses, in the present pose."""
         return self._loading.load
 
-    def set_presses(self, presses: tuple[Contact, ...]) -> None:
+    def set_presses(self, presses: tuple[Probe, ...]) -> None:
         """Replace all presses at once, from any thread; they are solved here.
 
         Raises

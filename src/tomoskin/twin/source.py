@@ -18,7 +18,7 @@ from tomoskin.twin.electronics import TwinElectronics
 from tomoskin.twin.faults import Faults, Line, LineSettings
 from tomoskin.twin.held_scanning import Board
 from tomoskin.twin.presets import PRESETS, TwinSettings
-from tomoskin.twin.probe import Contact
+from tomoskin.twin.probe import Probe
 from tomoskin.twin.scanning import table_of
 from tomoskin.twin.sheet import TwinSkin
 
@@ -60,11 +60,11 @@ class TwinTransport:
         return self.electronics.sheet
 
     @property
-    def presses(self) -> tuple[Contact, ...]:
+    def presses(self) -> tuple[Probe, ...]:
         """What presses on the twin now."""
         return self.sheet.presses
 
-    def set_presses(self, presses: tuple[Contact, ...]) -> None:
+    def set_presses(self, presses: tuple[Probe, ...]) -> None:
         """Replace all presses; they show from the next frame on.
 
         Raises

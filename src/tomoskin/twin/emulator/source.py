@@ -21,8 +21,8 @@ from tomoskin.board.source import (
 )
 from tomoskin.core import FloatArray, SourceError
 from tomoskin.twin import (
-    Contact,
     Pose,
+    Probe,
     ThermalVoltages,
     TwinSettings,
     TwinSkin,
@@ -79,11 +79,11 @@ class EmulatorTransport:
             self._stack = stack.pop_all()
 
     @property
-    def presses(self) -> tuple[Contact, ...]:
+    def presses(self) -> tuple[Probe, ...]:
         """What presses on the sheet now."""
         return self.sheet.presses
 
-    def set_presses(self, presses: tuple[Contact, ...]) -> None:
+    def set_presses(self, presses: tuple[Probe, ...]) -> None:
         """Replace all presses; GeometryError when one is off the skin."""
         self.sheet.set_presses(presses)
 
