@@ -129,7 +129,9 @@ def test_either_way_of_solving_is_exact(sheet, radius):
 
 def test_few_changed_cells_are_solved_by_the_local_update(skin, monkeypatch):
     """In the tank no tension moves what lies beside the probe."""
-    sheet = TwinSkin.of(skin, replace(TwinSettings.preset("ideal"), contact=PRESETS["tank"][0]))
+    sheet = TwinSkin.of(
+        skin, replace(TwinSettings.preset("ideal"), contact=PRESETS["tank"].contact)
+    )
     sheet.material = replace(sheet.material, compression=-1.0, gauge=0.0)
     rest = sheet.conductivity()
     exact = sheet.resistance()

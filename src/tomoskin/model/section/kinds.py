@@ -159,30 +159,21 @@ class Quantity(ValueKind[float]):
 
 @dataclass(frozen=True)
 class OneOrMore(ValueKind[tuple[Any, ...]]):
-    """One value, or a list; comes back as a tuple."""
+    """One value, or a list; comes back as a tuple. ``note``: what more is said of the list."""
 
     inner: ValueKind[Any]
+    note: str = ""
 
     @property
     def expected(self) -> str:
         """What a value must be, for messages."""
-        return f"{self.inner.expected}, or a list of these"
+        return f"{self.inner.expected}, or a list of these{self.note}"
 
     def accept(self, value: object) -> tuple[Any, ...]:
         """A tuple, of one for one value."""
         if not isinstance(value, list):
             return (self.inner.read(value),)
         return tuple(_entry(f"entry {i}", self.inner, item) for i, item in enumerate(value))
-
-
-@dataclass(frozen=True)
-class OneOrEach(OneOrMore):
-    """One value for all electrodes, or a list with one for each; comes back as a tuple."""
-
-    @property
-    def expected(self) -> str:
-        """What a value must be, for messages."""
-        return f"{super().expected}, one per electrode"
 
 
 @dataclass(frozen=True)
