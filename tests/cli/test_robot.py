@@ -145,7 +145,7 @@ def test_a_robot_file_says_all(tomoskin, arm):
         ("--skin left=textile-disc-8 --skin textile-disc-8", "expected NAME=SKIN"),
         ("--skin textile-disc-8 --skin textile-disc-8", "expected NAME=SKIN"),
         ("--skin a=textile-disc-8 --skin a=textile-disc-8", "two skins have the same name a"),
-        ("--skin Left=textile-disc-8", 'skin 1 "Left": expected a name of small letters'),
+        ("--skin Left=textile-disc-8", '[[skin]] 1 "Left": expected a name of small letters'),
         ("--skin a=textile-disc-8 --skin b=textile-disc-8 --source twin", "one for each --skin: 2"),
         ("--source twin --source twin", "one for each --skin: 1; got 2"),
         ("--skin a=textile-disc-8 --calibration {c}", "does not say to which skin it belongs"),
