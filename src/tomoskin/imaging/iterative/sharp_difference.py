@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from tomoskin.core import FloatArray, Image, ModelError
 from tomoskin.imaging.iterative.absolute import STEPS, TOLERANCE, Sharp
-from tomoskin.imaging.iterative.newton import Descent, Goal, Iteration, descend, table
+from tomoskin.imaging.iterative.newton import Descent, Goal, descend
 from tomoskin.imaging.iterative.observation import Observation
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.prior import Diagonal, SharpPrior
@@ -17,16 +17,14 @@ from tomoskin.model.prior import Diagonal, SharpPrior
 
 @dataclass(frozen=True, eq=False)
 class SharpImage:
-    """An image, and how it was found; see :class:`Absolute` for the fields."""
+    """An image, and how it was found, as of :class:`Absolute`."""
 
     image: Image
-    steps: tuple[Iteration, ...] = field(repr=False)
-    reason: str
-    converged: bool
+    descent: Descent = field(repr=False)
 
     def __str__(self) -> str:
         """The iterations, and why they ended."""
-        return f"{table(self.steps)}\nstopped: {self.reason}"
+        return str(self.descent)
 
 
 class SharpDifference:
@@ -98,7 +96,7 @@ class SharpDifference:
         )
         unit = "S" if mesh.dimension == 2 else "S/m"
         image = Image(descent.unknowns * self.conductivity, unit, mesh.identity)
-        return SharpImage(image, descent.steps, descent.reason, descent.converged)
+        return SharpImage(image, descent)
 
 
 @dataclass(frozen=True, eq=False)

@@ -162,7 +162,7 @@ class OneStep(Operator):
     model
         The forward model to linearise.
     prior
-        A name from :data:`tomoskin.imaging.PRIORS`, a prior such as ``Noser(exponent=1.0)``, or
+        A name from :data:`tomoskin.model.prior.PRIORS`, a prior such as ``Noser(exponent=1.0)``, or
         a symmetric (n_cells, n_cells) matrix Q, dense or sparse, or its diagonal.
     alpha
         Hyper-parameter; it enters squared.

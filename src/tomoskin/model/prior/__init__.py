@@ -14,7 +14,6 @@ from tomoskin.model.prior.priors import (
     Prior,
     PriorLike,
     penalty_of,
-    prior_matrix,
 )
 from tomoskin.model.prior.sharp import SharpPrior, Sparse, TotalVariation
 from tomoskin.model.prior.smooth import (
@@ -44,6 +43,5 @@ __all__ = [
     "dense_penalty",
     "matern_correlation",
     "penalty_of",
-    "prior_matrix",
     "sparse_penalty",
 ]

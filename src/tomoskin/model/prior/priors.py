@@ -91,11 +91,6 @@ def penalty_of(prior: PriorLike, mesh: Mesh, jacobian: NDArray[Any]) -> Penalty:
     return _of_matrix(prior, len(mesh.cells))
 
 
-def prior_matrix(prior: PriorLike, mesh: Mesh, jacobian: NDArray[Any]) -> FloatArray:
-    """Q: (n_cells,) where it is diagonal, else dense (n_cells, n_cells); see `penalty_of`."""
-    return penalty_of(prior, mesh, jacobian).matrix
-
-
 def _of_matrix(given: Any, n: int) -> Penalty:
     value: Any = given  # which issparse would narrow to a class without members
     if issparse(given):
