@@ -19,7 +19,7 @@ from tomoskin.model.forward.engine import (
     Patches,
     singular,
 )
-from tomoskin.model.forward.touches import Touches, stack_change, stacks
+from tomoskin.model.forward.touches import Touches, patch_change
 from tomoskin.model.pattern import Pattern
 
 
@@ -143,12 +143,13 @@ class PlainPatches:
         kind = np.result_type(base.fields, conductivity)
         grounded, lost = np.empty(shape, kind), np.zeros(shape, kind)
         grounded[:] = base.grounded
-        missing: list[IntArray] = []
-        for stack in stacks(base.cells, touches):
-            slots = self._slot[stack.nodes]
-            missing.append(stack.nodes[slots < 0])
-            if not len(missing[-1]):
-                between = self._columns[slots[:, :, None], stack.nodes[:, None]]
-                less, lost[stack.numbers] = stack_change(base, between, stack, touches)
-                grounded[stack.numbers] -= less
-        return grounded, lost, np.unique(np.concatenate([starts[:0], *missing]))
+        missing = [starts[:0]]
+        for number in range(len(touches)):
+            nodes, place = np.unique(base.cells[touches[number][0]], return_inverse=True)
+            slots = self._slot[nodes]
+            missing.append(nodes[slots < 0])
+            if len(nodes) and not len(missing[-1]):
+                between = self._columns[slots[:, None], nodes]
+                less, lost[number] = patch_change(base, between, nodes, place, touches[number])
+                grounded[number] -= less
+        return grounded, lost, np.unique(np.concatenate(missing))
