@@ -153,7 +153,7 @@ def _factor_and_solve(state: State) -> dict[str, Callable[[], object]]:
         return calls
     faer = reference(n, ready.indptr, ready.indices, n - n_points)
     columns = np.eye(n - n_points, n, n_points)
-    _agree(faer.solve(ready.values, columns).T, state.basis, "faer")
+    _agree(faer.solve(ready.values, columns).T, state.solution.basis, "faer")
     return {**calls, "faer": lambda: faer.solve(ready.values, columns)}
 
 

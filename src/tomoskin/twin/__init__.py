@@ -21,6 +21,7 @@ from tomoskin.twin.script import Script
 from tomoskin.twin.script_check import check_script, check_settling
 from tomoskin.twin.sheet import TwinSkin
 from tomoskin.twin.source import (
+    SheetTransport,
     TwinTransport,
     make_electronics,
     make_twin,
@@ -58,6 +59,7 @@ __all__ = [
     "Script",
     "SetPlan",
     "Shape",
+    "SheetTransport",
     "Square",
     "SteppedSkin",
     "Stretched",

@@ -29,39 +29,15 @@ _CHANNELS = (8, 16, 32)
 """Sizes of the simulated board."""
 
 
-class TwinTransport:
-    """Bytes of a twin, in real time.
+class SheetTransport:
+    """A source before the sheet of a twin, which can be pressed and bent from any thread."""
 
-    One thread reads; everything else may come from any.
-    """
-
-    def __init__(
-        self,
-        electronics: TwinElectronics,
-        device: TwinDevice,
-        clock: Clock,
-        line: Line | None = None,
-    ) -> None:
-        """``device`` must have been powered on by the same ``clock``, on the ``electronics``."""
-        self._line = line or Line(LineSettings(), 0)
-        self.name = "twin"
-        self.device = device
-        self.electronics = electronics
-        self._noise: float | None = None
-        self._clock = clock
-        self._condition = threading.Condition()
-        self._inbox = bytearray()
-        self._closed = False
-        self._reboot = False
-
-    @property
-    def sheet(self) -> TwinSkin:
-        """The twin's sheet, which answers the scans."""
-        return self.electronics.sheet
+    def __init__(self, sheet: TwinSkin) -> None:
+        self.sheet = sheet
 
     @property
     def presses(self) -> tuple[Probe, ...]:
-        """What presses on the twin now."""
+        """What presses on the sheet now."""
         return self.sheet.presses
 
     def set_presses(self, presses: tuple[Probe, ...]) -> None:
@@ -75,7 +51,7 @@ class TwinTransport:
         self.sheet.set_presses(presses)
 
     def set_pose(self, pose: Pose) -> None:
-        """Bend and stretch the twin's sheet; it shows from the next frame on.
+        """Bend and stretch the sheet; it shows from the next frame on.
 
         Raises
         ------
@@ -83,6 +59,33 @@ class TwinTransport:
             When the sheet cannot take that shape; then nothing is changed.
         """
         self.sheet.set_pose(pose)
+
+
+class TwinTransport(SheetTransport):
+    """Bytes of a twin, in real time.
+
+    One thread reads; everything else may come from any.
+    """
+
+    def __init__(
+        self,
+        electronics: TwinElectronics,
+        device: TwinDevice,
+        clock: Clock,
+        line: Line | None = None,
+    ) -> None:
+        """``device`` must have been powered on by the same ``clock``, on the ``electronics``."""
+        super().__init__(electronics.sheet)
+        self._line = line or Line(LineSettings(), 0)
+        self.name = "twin"
+        self.device = device
+        self.electronics = electronics
+        self._noise: float | None = None
+        self._clock = clock
+        self._condition = threading.Condition()
+        self._inbox = bytearray()
+        self._closed = False
+        self._reboot = False
 
     def set_faults(self, faults: Faults) -> None:
         """Break and mend; it shows from the next frame on.

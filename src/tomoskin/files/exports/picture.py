@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import shutil
 import subprocess
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -273,16 +273,7 @@ def write_mp4(path: StrPath, pictures: Pictures, fps: float, *, overwrite: bool 
             raise DataError(f"cannot be written: {reason}", where=str(path))
 
 
-class Film(Protocol):
-    """What writes pictures (h, w, 3) as a film."""
-
-    def __call__(
-        self, path: StrPath, pictures: Pictures, fps: float, *, overwrite: bool = False
-    ) -> None:
-        """Write the film. Raises DataError."""
-
-
-FILMS: dict[str, Film] = {".gif": write_gif, ".mp4": write_mp4}
+FILMS: dict[str, Callable[..., None]] = {".gif": write_gif, ".mp4": write_mp4}
 """What writes a film, by the ending of its name."""
 
 

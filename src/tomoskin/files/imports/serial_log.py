@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tomoskin.core import Arrays, DataError
-from tomoskin.files.imports.tables import adjacent_scan, touches_drive, voltages_of
+from tomoskin.files.imports.tables import adjacent_scan, voltages_of
 from tomoskin.files.imports.text_log import Skipped, bytes_lines, numbers_in
 from tomoskin.sensing.signal import Recording
 
@@ -87,13 +87,12 @@ def parse(lines: Iterable[str], source: str) -> Recording:
 
 
 def _recording(frames: list[list[_Row]], skipped: Skipped, source: str) -> Recording:
-    drive, measure = adjacent_scan(_N)
-    used = ~touches_drive(drive, measure)
+    rows, used = adjacent_scan(_N)
     values = np.array([[value for row in frame for value in row.values] for frame in frames])
     return voltages_of(
         source,
         _MILLI * values[:, used],
-        (drive[used], measure[used]),
+        rows,
         time=np.array([frame[0].pc_time for frame in frames]),
         notes=skipped.notes(),
     )

@@ -21,8 +21,7 @@ from tomoskin.board.source import (
 )
 from tomoskin.core import FloatArray, SourceError
 from tomoskin.twin import (
-    Pose,
-    Probe,
+    SheetTransport,
     ThermalVoltages,
     TwinSettings,
     TwinSkin,
@@ -46,7 +45,7 @@ _STEP = 0.01
 """Between two looks at the sheet, s."""
 
 
-class EmulatorTransport:
+class EmulatorTransport(SheetTransport):
     """Bytes of a board that is simulated down to its processor."""
 
     def __init__(
@@ -63,8 +62,8 @@ class EmulatorTransport:
 
         ``own``: without it, none; ``thermal`` takes the place of its potentials.
         """
+        super().__init__(sheet)
         self.name = "emulator"
-        self.sheet = sheet
         self._clock = clock
         self._stood = clock()
         self._closed = False
@@ -77,19 +76,6 @@ class EmulatorTransport:
                 self._memory.write_potentials(thermal.volts)
             self._serial = stack.enter_context(closing(SerialTransport(self._board.port)))
             self._stack = stack.pop_all()
-
-    @property
-    def presses(self) -> tuple[Probe, ...]:
-        """What presses on the sheet now."""
-        return self.sheet.presses
-
-    def set_presses(self, presses: tuple[Probe, ...]) -> None:
-        """Replace all presses; GeometryError when one is off the skin."""
-        self.sheet.set_presses(presses)
-
-    def set_pose(self, pose: Pose) -> None:
-        """Bend and stretch the sheet; GeometryError for a shape that it cannot take."""
-        self.sheet.set_pose(pose)
 
     def read(self, timeout: float) -> bytes:
         """What has come, waiting at most ``timeout`` s for the first byte."""
