@@ -14,7 +14,7 @@ from tomoskin.model.mesh.boundary import AT_ELECTRODE, MIN_FACETS
 from tomoskin.model.mesh.mesh import Mesh
 from tomoskin.model.mesh.outline import Outline, check_size
 from tomoskin.model.mesh.patch import FacePatch, Patch, WallPatch, check_patches, footprint
-from tomoskin.model.mesh.sizing import SizeField
+from tomoskin.model.mesh.sizing import SizeField, running
 from tomoskin.model.mesh.triangles import boundary_facets
 from tomoskin.model.mesh.triangulate import triangulate
 
@@ -78,8 +78,7 @@ def _running(stops: FloatArray, i: int, coarse: float) -> tuple[FloatArray, Floa
     z = np.linspace(stops[i], stops[i + 1], _SAMPLES)
     field = _field(stops, coarse)
     density = np.full(len(z), 1 / coarse) if field is None else 1 / field(z[:, None])
-    steps = np.diff(z) * (density[1:] + density[:-1]) / 2
-    return z, np.concatenate([[0.0], np.cumsum(steps)])
+    return z, running(density, z)
 
 
 def _steps(stops: FloatArray, coarse: float) -> list[float]:

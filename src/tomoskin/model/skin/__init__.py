@@ -19,9 +19,7 @@ from tomoskin.model.skin.hysteresis import (
 from tomoskin.model.skin.lay import lay
 from tomoskin.model.skin.processing import (
     InverseSettings,
-    SignalSettings,
     TouchSettings,
-    TwinChoice,
 )
 from tomoskin.model.skin.skin import Skin
 
@@ -33,10 +31,8 @@ __all__ = [
     "MemoryState",
     "Metric",
     "ReadoutSettings",
-    "SignalSettings",
     "Skin",
     "TouchSettings",
-    "TwinChoice",
     "advanced",
     "broken_down",
     "check_step",
