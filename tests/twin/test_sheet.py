@@ -210,7 +210,7 @@ def test_the_seed_decides_on_spread_and_temperature(skin):
 def test_asking_for_the_load_first_changes_nothing(sheet):
     rest = sheet.conductivity()
     sheet.set_presses((Press(0.01, 0.02, 2.0, 0.01),))
-    assert sheet.load.depth.max() > 0
+    assert sheet.load[3].max() > 0
     assert sheet.conductivity().min() < 0.95 * rest.min()
 
 

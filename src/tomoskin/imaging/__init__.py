@@ -13,6 +13,7 @@ from tomoskin.imaging.linear.spectrum import Assembly, Spectrum
 from tomoskin.imaging.linear.temporal import Modes, Temporal
 from tomoskin.imaging.resolution import (
     Picard,
+    disc_means,
     picard,
     unresolved,
 )
@@ -49,6 +50,7 @@ __all__ = [
     "ThesisMetrics",
     "along",
     "choose",
+    "disc_means",
     "figures",
     "for_recording",
     "homogeneous",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from tomoskin.board.wire import (
     SCHEMA,
@@ -13,11 +13,6 @@ from tomoskin.board.wire import (
     FaultCode,
     Format,
     FrameFlag,
-    GetBoard,
-    GetInfo,
-    GetMode,
-    GetPattern,
-    GetScan,
     Hello,
     Result,
     SafeOff,
@@ -35,7 +30,7 @@ from tomoskin.board.wire import (
     is_command,
 )
 from tomoskin.core import Frame
-from tomoskin.twin.held_scanning import OK, Board, HeldScanning, Verdict
+from tomoskin.twin.held_scanning import OK, Board, HeldScanning, Question, Verdict
 from tomoskin.twin.scanning import Analogue, SampleTable, ScanClock, chopped_table, sample_table
 
 _HELLO_INTERVAL = 0.5
@@ -155,11 +150,7 @@ class TwinDevice:
     def _obey(self, command: Command, payload: bytes, now: float) -> None:
         self._heard, self._next_hello = now, None
         identity = (command.request, crc16(payload))
-        if isinstance(command, GetInfo):
-            self._last_reply = encode(self._board.info(command.request))
-        elif isinstance(command, GetBoard):
-            self._last_reply = encode(replace(self._board.limits, request=command.request))
-        elif isinstance(command, GetScan | GetPattern | GetMode):
+        if isinstance(command, Question):
             self._last_reply = encode(self._held.answer(command))
         elif identity != self._last:
             result, detail = self._run(command, now)

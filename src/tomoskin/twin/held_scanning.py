@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, replace
 from typing import Self
 
 from tomoskin.board.source import (
@@ -22,6 +22,8 @@ from tomoskin.board.wire import (
     Drive,
     DriveMode,
     Format,
+    GetBoard,
+    GetInfo,
     GetMode,
     GetPattern,
     GetScan,
@@ -42,6 +44,9 @@ from tomoskin.twin.scanning import LIMITS
 
 Verdict = tuple[Result, int]
 """Result and detail of an ACK."""
+
+Question = GetInfo | GetBoard | GetScan | GetPattern | GetMode
+"""What a host may ask at any time."""
 
 OK: Verdict = (Result.OK, 0)
 _MAX_SETTLING = 100_000
@@ -210,9 +215,12 @@ class HeldScanning:
                     self.mode = command if command.mode is DriveMode.CHOPPED else None
         return verdict
 
-    def answer(self, command: GetScan | GetPattern | GetMode) -> Message:
-        """What is held, for a host that reads it back."""
+    def answer(self, command: Question) -> Message:
+        """What the board is, or what is held, for a host that reads it back."""
         scan, request = self.scan, command.request
+        if isinstance(command, GetInfo | GetBoard):
+            limits = replace(self._board.limits, request=request)
+            return limits if isinstance(command, GetBoard) else self._board.info(request)
         if scan is None:
             return Ack(request, type_byte(type(command)), Result.WRONG_CONFIGURATION, 0)
         if isinstance(command, GetScan):

@@ -43,8 +43,6 @@ class SharpDifference:
         Hyper-parameter; it enters squared.
     conductivity
         Where to linearise: (n_cells,) or one number, S or S/m.
-    steps, tolerance
-        It stops after so many steps, or when one gains less than this part of the objective.
 
     Raises
     ------
@@ -59,8 +57,6 @@ class SharpDifference:
         *,
         alpha: float,
         conductivity: ArrayLike = 1.0,
-        steps: int = STEPS,
-        tolerance: float = TOLERANCE,
     ) -> None:
         if not (np.isfinite(alpha) and alpha > 0):
             raise ModelError(f"expected alpha above 0, got {alpha}")
@@ -72,8 +68,6 @@ class SharpDifference:
         self.model = model
         self.prior = prior
         self.alpha = alpha
-        self.steps = steps
-        self.tolerance = tolerance
         self.conductivity = state.conductivity
         self.jacobian = state.jacobian * state.conductivity
 
@@ -91,8 +85,8 @@ class SharpDifference:
                 cost.energy,
             ),
             Descent.begin(len(mesh.cells)),
-            most=self.steps,
-            tolerance=self.tolerance,
+            most=STEPS,
+            tolerance=TOLERANCE,
         )
         unit = "S" if mesh.dimension == 2 else "S/m"
         image = Image(descent.unknowns * self.conductivity, unit, mesh.identity)

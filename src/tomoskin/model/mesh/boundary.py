@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from tomoskin.core import FloatArray, GeometryError, IntArray
 from tomoskin.model.mesh.outline import Outline
-from tomoskin.model.mesh.polygon import inside
+from tomoskin.model.mesh.polygon import inside, off_segment
 from tomoskin.model.mesh.sizing import SizeField, running
 
 MIN_GAP = 0.01
@@ -256,11 +256,8 @@ def rim_distance(rim: Boundary, xy: FloatArray) -> FloatArray:
     count = len(rim.points)
     _, node = cKDTree(rim.points).query(xy, k=3)
     edge = np.concatenate([node, (node - 1) % count], axis=1)
-    step = np.roll(rim.points, -1, axis=0) - rim.points
-    offset = xy[:, None] - rim.points[edge]
-    along = (offset * step[edge]).sum(axis=2) / (step[edge] ** 2).sum(axis=2)
-    foot = offset - np.clip(along, 0, 1)[:, :, None] * step[edge]
-    return np.asarray(np.linalg.norm(foot, axis=2).min(axis=1))
+    ends = np.roll(rim.points, -1, axis=0)[edge]
+    return np.asarray(off_segment(xy[:, None], rim.points[edge], ends).min(axis=1))
 
 
 def keeps_clear(rim: Boundary, xy: FloatArray) -> NDArray[np.bool_]:
