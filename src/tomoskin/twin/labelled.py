@@ -17,6 +17,7 @@ from tomoskin.core import FloatArray, ScriptError
 from tomoskin.model.mesh import Outline
 from tomoskin.model.section import toml_tables
 from tomoskin.model.skin import Skin
+from tomoskin.pipeline import REFERENCE_FRAMES
 from tomoskin.sensing.signal import Readout
 from tomoskin.twin.presets import TwinSettings
 from tomoskin.twin.probe import FACES, Probe
@@ -114,9 +115,6 @@ COMMON_PRESSES = Population(
 )
 """What is drawn from where nothing is said: one round probe of a finger's to a palm's size."""
 
-
-REFERENCE_FRAMES = 20
-"""Idle frames whose mean is the reference of a set."""
 
 SHARD_FRAMES = 500
 """Frames of a shard: what is drawn from one seed, and written as one file."""

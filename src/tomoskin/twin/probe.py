@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache
 from typing import Self
 
@@ -21,7 +21,16 @@ LEAST_SIZE = 1e-6
 
 
 class Shape(ABC):
-    """The face of a rigid probe in coordinates of its own, m; equal faces are solved once."""
+    """The face of a rigid probe in coordinates of its own, m; equal faces are solved once.
+
+    Raises GeometryError for a length that is no size.
+    """
+
+    def __post_init__(self) -> None:
+        """Check every length; only a crown may be without end."""
+        for one in fields(self):  # type: ignore[arg-type]
+            if one.type == "float":
+                _check(one.name, getattr(self, one.name), curved=one.name == "crown")
 
     @property
     @abstractmethod
@@ -78,11 +87,6 @@ class Circle(_Crowned):
     radius: float
     crown: float = math.inf
 
-    def __post_init__(self) -> None:
-        """Check the radius and the crown."""
-        _check("radius", self.radius)
-        _check("crown", self.crown, curved=True)
-
     @property
     def extent(self) -> float:
         """The radius of the face, in m."""
@@ -104,11 +108,6 @@ class Square(_Crowned):
 
     side: float
     crown: float = math.inf
-
-    def __post_init__(self) -> None:
-        """Check the side and the crown."""
-        _check("side", self.side)
-        _check("crown", self.crown, curved=True)
 
     @property
     def extent(self) -> float:
@@ -142,11 +141,6 @@ class Finger(Shape):
     width: float = 16e-3
     along: float = 12e-3
     across: float = 8e-3
-
-    def __post_init__(self) -> None:
-        """Check that every length is a size."""
-        for name in ("length", "width", "along", "across"):
-            _check(name, getattr(self, name))
 
     @property
     def extent(self) -> float:
@@ -182,7 +176,7 @@ class Face(_Crowned):
 
     def __post_init__(self) -> None:
         """Check the crown and the vertices."""
-        _check("crown", self.crown, curved=True)
+        super().__post_init__()
         _ = self._polygon
 
     @cached_property

@@ -80,7 +80,7 @@ class TwinTransport(SheetTransport):
         self.name = "twin"
         self.device = device
         self.electronics = electronics
-        self._noise: float | None = None
+        self._noise = electronics.settings.noise
         self._clock = clock
         self._condition = threading.Condition()
         self._inbox = bytearray()
@@ -99,11 +99,8 @@ class TwinTransport(SheetTransport):
 
     def set_noise(self, noise: float | None) -> None:
         """Noise of one conversion, LSB, from the next frame on; None: that of its settings."""
-        electronics = self.electronics
-        if self._noise is None:
-            self._noise = electronics.settings.noise
         value = self._noise if noise is None else noise
-        electronics.settings = replace(electronics.settings, noise=value)
+        self.electronics.settings = replace(self.electronics.settings, noise=value)
 
     def reboot(self) -> None:
         """Cut the board's power for a moment: it forgets everything and says HELLO."""

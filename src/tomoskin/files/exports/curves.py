@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tomoskin.core import AMOUNT, FloatArray, StrPath, written
-from tomoskin.files.exports.picture import dress, new_figure, save_figure
+from tomoskin.files.exports.picture import dress, new_figure, panel_axes, save_figure
 from tomoskin.imaging import AlphaChoice, Curve, Merit, Picard
 from tomoskin.model.skin import Skin
 from tomoskin.sensing.fit import ResolutionBounds
@@ -46,13 +46,11 @@ def write_choices(
     rows = max(-(-count // columns), 1)
     figure = new_figure(path, 4.4 * columns, 3.4 * rows + 0.4)
     figure.suptitle(title, fontsize=11)
-    axes = np.atleast_1d(figure.subplots(rows, columns)).ravel()
+    axes = panel_axes(figure, count, columns)
     for ax, (choice, curve) in zip(axes, drawn, strict=False):
         _draw(ax, choice, curve)
     if picard is not None:
         _draw_picard(axes[len(drawn)], picard)
-    for ax in axes[count:]:
-        ax.set_visible(False)
     save_figure(path, figure, overwrite=overwrite)
 
 

@@ -39,6 +39,14 @@ def new_figure(path: StrPath, width: float, height: float) -> Figure:
     return figure
 
 
+def panel_axes(figure: Figure, count: int, columns: int) -> list[Axes]:
+    """So many axes in rows of that many ``columns``."""
+    axes = np.atleast_1d(figure.subplots(-(-count // columns), columns)).ravel().tolist()
+    for ax in axes[count:]:
+        ax.set_visible(False)
+    return axes[:count]
+
+
 def dress(ax: Any, title: str, x: str, y: str) -> None:
     """Give a plot of curves its title, the names of its axes, small numbers and a pale grid."""
     ax.set_title(title, fontsize=10)
@@ -188,12 +196,10 @@ class _Sheet:
         columns = min(len(panels), 4)
         rows = -(-len(panels) // columns)
         figure = new_figure(self.name, 3.2 * columns + 1.1, 3.3 * rows)
-        axes = np.atleast_1d(figure.subplots(rows, columns)).ravel()
-        for ax, panel in zip(axes, panels, strict=False):
+        axes = panel_axes(figure, len(panels), columns)
+        for ax, panel in zip(axes, panels, strict=True):
             drawn = self.draw(ax, panel)
-        for ax in axes[len(panels) :]:
-            ax.set_visible(False)
-        figure.colorbar(drawn, ax=list(axes), **self.bar)
+        figure.colorbar(drawn, ax=figure.axes, **self.bar)
         return figure
 
     def draw(self, ax: Axes, panel: Panel) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -290,18 +291,12 @@ def show(value: object) -> str:
 
 
 def literal(value: object) -> str:
-    """The ``value`` as TOML writes it."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        return f'"{"".join(_ESCAPES.get(c, c) for c in value)}"'
+    """The ``value`` as TOML writes it; its texts are those of JSON but for one character."""
+    if isinstance(value, bool | str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007F")
     if isinstance(value, Sequence):
         return f"[{', '.join(literal(item) for item in value)}]"
     return str(value)
-
-
-_ESCAPES = {chr(code): f"\\u{code:04X}" for code in [*range(32), 127]}
-_ESCAPES |= {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\t": "\\t"}
 
 
 class _EntryError(ValueError):
