@@ -29,7 +29,6 @@ from tomoskin.twin import (
     read_settings,
 )
 from tomoskin.twin.emulator.board_process import (
-    BoardFaults,
     BoardProcess,
     BoardPrograms,
     Front,
@@ -155,12 +154,12 @@ def powered(
     resistance: FloatArray,
     *,
     own: OwnVoltages | None = None,
-    faults: BoardFaults | None = None,
+    faults: bytes = b"",
 ) -> Iterator[tuple[BoardProcess, SkinMemory]]:
     """A board on a sheet of (n, n) Ω transfer ``resistance``, and the memory that holds that."""
     with (
         tempfile.TemporaryDirectory(prefix="tomoskin-") as folder,
-        closing(SkinMemory(Path(folder) / "skin", front, resistance, faults, own)) as memory,
+        closing(SkinMemory(Path(folder) / "skin", front, resistance, own, faults)) as memory,
         closing(BoardProcess(programs, memory.path, front.current)) as process,
     ):
         yield process, memory
@@ -181,12 +180,12 @@ def emulate_load(
     resistance: FloatArray,
     current: float,
     board: str = DEFAULT_BOARD,
-    faults: BoardFaults | None = None,
+    faults: bytes = b"",
 ) -> Iterator[Transport]:
     """A board on a network of resistors, of (n, n) Ω transfer resistance; SourceError.
 
-    ``current`` A; ``faults`` of a Mega's board: without it, none. The converter is as noisy as the
-    decks say, and has the scale of the board's record.
+    ``current`` A; ``faults`` of a Mega's board, as of :class:`SkinMemory`. The converter is as
+    noisy as the decks say, and has the scale of the board's record.
     """
     record = BOARDS[board]
     levels, figures = float(1 << record.adc_bits), record.electronics
