@@ -145,12 +145,13 @@ class LinearProblem:
             response = self.jacobian @ free
             precision, fitted = _fitted(precision, response)
             matrix += (free - matrix @ response) @ fitted
+        return self.operator_of(matrix, precision)
+
+    def operator_of(self, matrix: NDArray[Any], precision: NDArray[Any]) -> Operator:
+        """The operator of that matrix (n_cells, n_meas) and precision (n_meas, n_meas)."""
+        reference, difference = self.reference, self.difference
         return Operator(
-            self.model,
-            matrix,
-            precision=precision,
-            reference=self.reference,
-            difference=self.difference,
+            self.model, matrix, precision=precision, reference=reference, difference=difference
         )
 
 

@@ -165,10 +165,7 @@ def _operator(spectrum: Spectrum, alpha: float, matrix: NDArray[Any]) -> Operato
     """The operator of ``alpha``, given its ``matrix``."""
     weighed = np.isfinite(spectrum.values)
     precision = spectrum.analysis[weighed].conj().T @ _filtered(spectrum, alpha)[weighed]
-    p = spectrum.problem
-    return Operator(
-        p.model, matrix, precision=precision, reference=p.reference, difference=p.difference
-    )
+    return spectrum.problem.operator_of(matrix, precision)
 
 
 def _eigen(system: NDArray[Any]) -> tuple[FloatArray, NDArray[Any]]:

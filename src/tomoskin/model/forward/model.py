@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tomoskin.core import FloatArray
 from tomoskin.model.forward import derivatives
-from tomoskin.model.forward.conductivity import checked_conductivity
+from tomoskin.model.forward.arguments import checked_conductivity
 from tomoskin.model.forward.engine import Compressed, Factor, singular
 from tomoskin.model.forward.solution import (
     Solution,

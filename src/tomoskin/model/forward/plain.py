@@ -11,6 +11,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.linalg import SuperLU, splu
 
 from tomoskin.core import FloatArray, IntArray
+from tomoskin.model.forward.arguments import Touches
 from tomoskin.model.forward.engine import (
     BaseState,
     Compressed,
@@ -19,7 +20,6 @@ from tomoskin.model.forward.engine import (
     Patches,
     singular,
 )
-from tomoskin.model.forward.touches import Touches, patch_change
 from tomoskin.model.pattern import Pattern
 
 
@@ -153,3 +153,31 @@ class PlainPatches:
                 less, lost[number] = patch_change(base, between, nodes, place, touches[number])
                 grounded[number] -= less
         return grounded, lost, np.unique(np.concatenate(missing))
+
+
+def patch_change(
+    base: BaseState,
+    between: NDArray[Any],
+    nodes: IntArray,
+    place: IntArray,
+    touch: tuple[IntArray, NDArray[Any]],
+) -> tuple[NDArray[Any], NDArray[Any]]:
+    """(e, e) Uᵀ (I + A C)⁻¹ A U of one touch, and what rounding may cost it.
+
+    ``between`` (n, n): the inverse of the base system, between the ``nodes`` of the patch;
+    ``place``: which of them each corner of its cells is.
+    """
+    (index, sigma), place = touch, place.reshape(-1, base.cells.shape[1])
+    moved = base.local[index] * (sigma - base.conductivity[index])[:, None, None]
+    change = np.zeros(between.shape, moved.dtype)
+    np.add.at(change, (place[:, :, None], place[:, None, :]), moved)
+    between = between[1:] - between[:1]
+    between = between[:, 1:] - between[:, :1]
+    fields = base.fields[nodes[1:]] - base.fields[nodes[:1]]
+    leak, change = change[1:].sum(axis=1, keepdims=True), change[1:, 1:]
+    system = change @ between
+    system[np.diag_indices_from(system)] += 1.0
+    current = np.linalg.solve(system, change @ fields)
+    changed = fields - between @ current
+    residual = change @ changed - current + leak * changed
+    return fields.T @ current, changed.T @ residual

@@ -13,9 +13,11 @@ from tomoskin.model.prior.priors import (
     Noser,
     Prior,
     PriorLike,
+    SharpPrior,
+    Sparse,
+    TotalVariation,
     penalty_of,
 )
-from tomoskin.model.prior.sharp import SharpPrior, Sparse, TotalVariation
 from tomoskin.model.prior.smooth import (
     GaussianHighPass,
     Laplace,

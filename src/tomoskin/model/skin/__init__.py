@@ -4,7 +4,6 @@ from tomoskin.model.skin.body import ReadoutSettings
 from tomoskin.model.skin.build import SECTIONS
 from tomoskin.model.skin.find import read_text
 from tomoskin.model.skin.hysteresis import (
-    SCALAR,
     MaterialMemory,
     MemoryState,
     Metric,
@@ -13,7 +12,6 @@ from tomoskin.model.skin.hysteresis import (
     check_step,
     followed,
     load_of,
-    response,
     responses,
 )
 from tomoskin.model.skin.lay import lay
@@ -24,7 +22,6 @@ from tomoskin.model.skin.processing import (
 from tomoskin.model.skin.skin import Skin
 
 __all__ = [
-    "SCALAR",
     "SECTIONS",
     "InverseSettings",
     "MaterialMemory",
@@ -40,6 +37,5 @@ __all__ = [
     "lay",
     "load_of",
     "read_text",
-    "response",
     "responses",
 ]
