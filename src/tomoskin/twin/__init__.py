@@ -5,7 +5,7 @@ from tomoskin.twin.circuit import ElectronicsSettings, ThermalVoltages
 from tomoskin.twin.contact import ContactSettings, Grid, solve_contact
 from tomoskin.twin.course import Disturbance, bent, bent_truth, disturbed, pressed, reboots
 from tomoskin.twin.faults import Faults, Line, LineSettings
-from tomoskin.twin.held_scanning import Board, HeldScanning, Question
+from tomoskin.twin.held_scanning import Board, HeldScanning, Question, Setting
 from tomoskin.twin.labelled import COMMON_PRESSES, Population, SetPlan, make_shard
 from tomoskin.twin.material import MaterialSettings
 from tomoskin.twin.presets import PRESETS, TwinSettings
@@ -59,6 +59,7 @@ __all__ = [
     "ScanClock",
     "Script",
     "SetPlan",
+    "Setting",
     "Shape",
     "SheetTransport",
     "Square",

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from tomoskin.board import wire
 from tomoskin.files.session.session_reader import stated_rate
-from tomoskin.twin import Board, HeldScanning, Question
+from tomoskin.twin import Board, HeldScanning, Question, Setting
 
 if TYPE_CHECKING:
     from tomoskin.model.skin import Skin
@@ -45,11 +45,10 @@ class ReplayBoard:
     def _answer(self, command: wire.Command) -> wire.Message:
         if isinstance(command, Question):
             return self._held.answer(command)
-        match command:
-            case wire.SetScan() | wire.SetPattern() | wire.SetFormat() | wire.SetMode():
-                self._held.set(command)
-            case wire.Start() | wire.Stop():
-                self.scanning = isinstance(command, wire.Start)
+        if isinstance(command, Setting):
+            self._held.set(command)
+        elif isinstance(command, wire.Start | wire.Stop):
+            self.scanning = isinstance(command, wire.Start)
         return wire.Ack(command.request, wire.type_byte(type(command)), wire.Result.OK, 0)
 
 
