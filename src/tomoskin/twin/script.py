@@ -10,7 +10,7 @@ from typing import Self
 
 from tomoskin.core import GeometryError, ScriptError, SkinError
 from tomoskin.model.section import toml_tables
-from tomoskin.twin.course import Rows, Scripted, ScriptedBend, ScriptedPress, ramp
+from tomoskin.twin.course import Scripted, ScriptedBend, ScriptedPress, after, there_and_back
 from tomoskin.twin.probe import Circle, Face, Finger, Shape, Square
 from tomoskin.twin.script_schema import (
     FORMAT,
@@ -102,17 +102,8 @@ def of_script() -> Iterator[None]:
 
 
 def _press(given: PressSection, where: str) -> ScriptedPress:
-    if given.force is not None and given.hold is not None:
-        force = ramp(given.force, given.rise, given.hold, given.fall)
-    else:
-        force = _course((0.0, 0.0), given.profile, f"{where} profile")
-        if force[-1][1] != 0.0:
-            raise ScriptError(
-                f"expected 0 N in the last row, got {force[-1][1]:g} N",
-                where=f"{where} profile",
-                hint="add a row with the time at which the probe has left the sheet",
-            )
-    path = _course((0.0, *given.at), given.path, f"{where} path")
+    force = there_and_back(given, given.force, where)
+    path = after((0.0, *given.at), given.path, f"{where} path")
     return ScriptedPress(given, where, _shape(given, where), force, path)
 
 
@@ -145,10 +136,3 @@ def _fault(given: FaultSection, where: str) -> Scripted[FaultSection]:
             hint="an electrode is always connected to itself",
         )
     return Scripted(given, where)
-
-
-def _course(first: tuple[float, ...], rows: Rows | None, where: str) -> Rows:
-    """``rows`` after the ``first`` one, which stands at time 0."""
-    if rows and not rows[0][0] > 0:
-        raise ScriptError("row 0: expected a time above 0 s, got 0 s", where=where)
-    return (first, *(rows or ()))
