@@ -66,11 +66,6 @@ class ScriptedPress(Scripted[PressSection]):
         return self.given.start
 
     @property
-    def force_key(self) -> str:
-        """The key of the script that the force is from."""
-        return "profile" if self.given.profile else "hold"
-
-    @property
     def end(self) -> float:
         """The time when the force is gone, in s."""
         return self.start + self.force[-1][0]
@@ -87,7 +82,8 @@ class ScriptedPress(Scripted[PressSection]):
 
     def stages(self) -> Iterator[tuple[str, float]]:
         """Key and length in s of each piece of the courses."""
-        for key, rows in ((self.force_key, self.force), ("path", self.path)):
+        force = "profile" if self.given.profile else "hold"
+        for key, rows in ((force, self.force), ("path", self.path)):
             for length in np.diff([row[0] for row in rows]).tolist():
                 yield key, length
 

@@ -12,7 +12,6 @@ from tomoskin.model.section.kinds import (
     Text,
     ValueKind,
     Whole,
-    Words,
     literal,
     show,
 )
@@ -41,7 +40,6 @@ __all__ = [
     "Text",
     "ValueKind",
     "Whole",
-    "Words",
     "check_names",
     "key",
     "literal",

@@ -160,21 +160,27 @@ class Quantity(ValueKind[float]):
 
 @dataclass(frozen=True)
 class OneOrMore(ValueKind[tuple[Any, ...]]):
-    """One value, or a list; comes back as a tuple. ``note``: what more is said of the list."""
+    """One value, or a list; comes back as a tuple.
+
+    ``note``: what more is said of the list. ``different``: it holds one at least, and none twice.
+    """
 
     inner: ValueKind[Any]
     note: str = ""
+    different: bool = False
 
     @property
     def expected(self) -> str:
         """What a value must be, for messages."""
-        return f"{self.inner.expected}, or a list of these{self.note}"
+        these = "different ones" if self.different else "these"
+        return f"{self.inner.expected}, or a list of {these}{self.note}"
 
-    def accept(self, value: object) -> tuple[Any, ...]:
-        """A tuple, of one for one value."""
+    def accept(self, value: object) -> tuple[Any, ...] | None:
+        """A tuple, of one for one value; None where there are not as many as there should be."""
         if not isinstance(value, list):
             return (self.inner.read(value),)
-        return tuple(_entry(f"entry {i}", self.inner, item) for i, item in enumerate(value))
+        values = tuple(_entry(f"entry {i}", self.inner, item) for i, item in enumerate(value))
+        return None if self.different and not 0 < len(set(values)) == len(values) else values
 
 
 @dataclass(frozen=True)
@@ -197,25 +203,6 @@ class OneOrSpan(ValueKind[tuple[Any, Any]]):
         if low > high:
             raise ValueError(f"expected low before high, got {show(value)}")
         return low, high
-
-
-@dataclass(frozen=True)
-class Words(ValueKind[tuple[str, ...]]):
-    """One word out of a few, or a list of different ones; comes back as a tuple."""
-
-    words: Choice
-
-    @property
-    def expected(self) -> str:
-        """What a value must be, for messages."""
-        return f"{self.words.expected}, or a list of different ones"
-
-    def accept(self, value: object) -> tuple[str, ...] | None:
-        """The words, or None where the value is no list of them."""
-        given = value if isinstance(value, list) else [value]
-        accepted = [word for item in given if (word := self.words.accept(item))]
-        different = len(set(accepted)) == len(given) > 0
-        return tuple(accepted) if different else None
 
 
 @dataclass(frozen=True)
