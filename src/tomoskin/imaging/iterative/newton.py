@@ -23,12 +23,10 @@ class Point(Protocol):
     @property
     def predicted(self) -> FloatArray:
         """Predicted values (m,) of unit noise."""
-        ...
 
     @property
     def jacobian(self) -> FloatArray:
         """(m, n) their derivative by the unknowns."""
-        ...
 
 
 @dataclass(frozen=True)

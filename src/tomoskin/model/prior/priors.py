@@ -26,7 +26,6 @@ class Prior(Protocol):
 
     def penalty(self, mesh: Mesh, jacobian: NDArray[Any]) -> Penalty:
         """Return Q on ``mesh``; ``jacobian`` (n_meas, n_cells) is that of the difference data."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -64,15 +63,12 @@ class SharpPrior(Protocol):
 
     def penalty(self, mesh: Mesh, jacobian: NDArray[Any]) -> Penalty:
         """The quadratic at an image of nothing, with which an iteration begins."""
-        ...
 
     def touching(self, mesh: Mesh, image: FloatArray) -> Penalty:
         """The quadratic that touches the cost at ``image`` (n_cells,)."""
-        ...
 
     def energy(self, mesh: Mesh, image: FloatArray) -> float:
         """The cost of ``image``, in the units of xᵀQx."""
-        ...
 
 
 @dataclass(frozen=True)
