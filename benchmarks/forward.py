@@ -23,8 +23,9 @@ from forward_measure import (
 )
 from forward_others import peer_name
 from report import Report, cell, clock, medians, table
-from tomoskin.imaging import PRIORS, OneStep
+from tomoskin.imaging import OneStep
 from tomoskin.model.forward import ForwardModel
+from tomoskin.model.prior import PRIORS
 
 
 def run() -> Iterator[Report]:

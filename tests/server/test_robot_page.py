@@ -14,7 +14,7 @@ from run.test_robot_run import Watch
 from server.serving import PATIENCE, Site
 from server.watching import Watched
 from tomoskin.core import WallClock
-from tomoskin.files.session.repair import split_names
+from tomoskin.files.session import split_targets
 from tomoskin.model.robot import Robot
 from tomoskin.pipeline import colour_limit
 from tomoskin.run import Member, RobotRun
@@ -156,7 +156,7 @@ def test_all_are_recorded_to_one_file_from_the_page(site, run, folder):
         while "one skin" not in str(page.recv(PATIENCE)):
             pass
     assert path.parent == folder
-    assert split_names(path) == ("left", "right")
+    assert tuple(split_targets(path)) == ("left", "right")
 
 
 @pytest.mark.page

@@ -32,7 +32,7 @@ from tomoskin.learning import BendReading
 from tomoskin.pipeline import FrameResult
 from tomoskin.run import Runner, Snapshot
 from tomoskin.sensing.track import force_values
-from tomoskin.twin import Contact
+from tomoskin.twin import Probe
 
 MAGIC = b"TSK1"
 
@@ -107,7 +107,7 @@ class NewestFrame:
             self._runner.latency.add_published(time.monotonic() - self._made[0].ready)
 
 
-def encode_result(result: FrameResult, truth: Sequence[Contact], latency: float) -> bytes:
+def encode_result(result: FrameResult, truth: Sequence[Probe], latency: float) -> bytes:
     """Message of one result.
 
     Parameters

@@ -31,7 +31,7 @@ from tomoskin.server.page_messages import (
     UnresolvedMap,
 )
 from tomoskin.server.requests import AskUnresolved, Painted, SetRecording
-from tomoskin.twin import Contact
+from tomoskin.twin import Probe
 
 FILE_NAME = "tomoskin-%Y%m%d-%H%M%S.mcap"
 """Of a recording that is asked for on a page, for ``time.strftime``."""
@@ -90,7 +90,7 @@ async def _record(runner: Runner, folder: Path, *, on: bool) -> None:
         runner.say("recording-stopped", f"the recording did not start: {error}")
 
 
-def _on_skin(request: SetPresses, skin: Skin) -> tuple[Contact, ...]:
+def _on_skin(request: SetPresses, skin: Skin) -> tuple[Probe, ...]:
     """A finger that has slid off the sheet presses nothing; WireError for no face at all."""
     asked = request.presses
     if not asked:
