@@ -14,7 +14,7 @@ from platformdirs import user_cache_path
 
 from tomoskin.core.archive import Arrays, load_arrays
 from tomoskin.core.errors import DataError
-from tomoskin.core.written import written
+from tomoskin.core.outputs import written
 
 VARIABLE = "TOMOSKIN_CACHE"
 """Environment variable that names the folder; "off": nothing is kept."""

@@ -13,10 +13,9 @@ from tomoskin.core import Event, Frame, Mark, MarkedFrame, TomoskinError
 from tomoskin.files.session import BoardInfo, RawRead, Truth
 from tomoskin.pipeline import FrameResult, Pipeline, Prepared, ReferenceState
 from tomoskin.run.board_memory import Recall
-from tomoskin.run.counters import CostMeter, Latency
 from tomoskin.run.intake import Intake, Marker, replay_status
 from tomoskin.run.publisher import Audience, Publisher
-from tomoskin.run.status import Status
+from tomoskin.run.status import CostMeter, Latency, Status
 from tomoskin.run.twin_control import TwinControl, described
 from tomoskin.twin import Contact
 

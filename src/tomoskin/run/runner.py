@@ -22,13 +22,12 @@ from tomoskin.run.commands import (
     SetPose,
     SetTwin,
 )
-from tomoskin.run.counters import Latency
 from tomoskin.run.flow import Flow, Snapshot
 from tomoskin.run.intake import play
 from tomoskin.run.loop import Loop
 from tomoskin.run.publisher import Audience, Turns
 from tomoskin.run.sinks import Sink
-from tomoskin.run.status import Status
+from tomoskin.run.status import Latency, Status
 from tomoskin.run.twin_control import TwinControl
 from tomoskin.sensing.signal import Reference
 

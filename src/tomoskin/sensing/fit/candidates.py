@@ -10,9 +10,9 @@ from typing import Self
 import numpy as np
 
 from tomoskin.core import FloatArray, IntArray
-from tomoskin.sensing.fit.prior import SpotPrior
 from tomoskin.sensing.fit.problem import Matched, WhitenedTable
 from tomoskin.sensing.fit.spot import CONTENT, FILLING, LOG_RADIUS, Footprints, Response, spots_of
+from tomoskin.sensing.fit.spot_fit import SpotPrior
 
 _SPACING = 0.7
 """Between candidates, in median radii."""

@@ -15,9 +15,8 @@ from tomoskin.sensing.fit.certificate import Reduced
 from tomoskin.sensing.fit.expectation import Expectation, Known
 from tomoskin.sensing.fit.noise import Whitener
 from tomoskin.sensing.fit.policy import FAINTEST, USEFUL, DetectionPolicy, Pace
-from tomoskin.sensing.fit.prior import SpotPrior
 from tomoskin.sensing.fit.spot import CONTENT, N_PARAMETERS, Response
-from tomoskin.sensing.fit.spot_fit import Deficit, Fit
+from tomoskin.sensing.fit.spot_fit import Deficit, Fit, SpotPrior
 from tomoskin.sensing.fit.table import ABREAST, ResponseTable
 
 _CERTAIN = 10.0

@@ -9,6 +9,7 @@ from tomoskin.sensing.signal.board_diagnosis import (
 )
 from tomoskin.sensing.signal.difference import (
     Consecutive,
+    NuisanceSubspace,
     difference,
     difference_noise,
     in_phase,
@@ -20,7 +21,6 @@ from tomoskin.sensing.signal.health import ElectrodeHealth, Health, nuisance_dir
 from tomoskin.sensing.signal.idle import Idle
 from tomoskin.sensing.signal.load_ring import LoadRing
 from tomoskin.sensing.signal.monitor import Monitor
-from tomoskin.sensing.signal.nuisance import NuisanceSubspace
 from tomoskin.sensing.signal.readout import FIGURES, Readout, directions
 from tomoskin.sensing.signal.recording import Recording, frame_times
 from tomoskin.sensing.signal.reference import Reference, Scatter

@@ -1,6 +1,5 @@
 """Detections of successive frames → touches that keep their identity, and what happens to them."""
 
-from tomoskin.sensing.track.event import TouchEvent
 from tomoskin.sensing.track.motion import STILL, TrackSettings
 from tomoskin.sensing.track.policy import HELD, RESIDUAL
 from tomoskin.sensing.track.sliding import FingerTracker, SlideCorrection
@@ -15,6 +14,7 @@ from tomoskin.sensing.track.touch_table import (
     touch_rows,
     touch_spans,
 )
+from tomoskin.sensing.track.trace import TouchEvent
 from tomoskin.sensing.track.tracker import Tracker
 
 __all__ = [

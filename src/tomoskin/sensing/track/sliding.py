@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from typing import Self
 
 from tomoskin.core import Detection, Touch
-from tomoskin.sensing.track.event import TouchEvent
+from tomoskin.sensing.track.trace import TouchEvent
 from tomoskin.sensing.track.tracker import Tracker
 
 # Chosen on the twin's seeds 1 to 3 (docs/theory/tracking.md).

@@ -12,7 +12,6 @@ from tomoskin.sensing.track.association import (
     associate,
     follow,
 )
-from tomoskin.sensing.track.event import Happening, TouchEvent, TrackClock
 from tomoskin.sensing.track.identity import IdentityLedger
 from tomoskin.sensing.track.merging import (
     divide,
@@ -24,7 +23,14 @@ from tomoskin.sensing.track.merging import (
 )
 from tomoskin.sensing.track.motion import TrackSettings, begin
 from tomoskin.sensing.track.residual import ResidualResponses, is_residual
-from tomoskin.sensing.track.trace import Alone, MergedFinger, Trace
+from tomoskin.sensing.track.trace import (
+    Alone,
+    Happening,
+    MergedFinger,
+    TouchEvent,
+    Trace,
+    TrackClock,
+)
 
 
 class Tracker:
