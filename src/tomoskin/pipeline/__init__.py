@@ -8,7 +8,7 @@ from tomoskin.pipeline.offline import ALONE, Gathered, Reconstruction, reconstru
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES, Pipeline
 from tomoskin.pipeline.prepare import Prepared, colour_limit, prepare
 from tomoskin.pipeline.recorded import Idle, RecordedFrames, recorded_frames
-from tomoskin.pipeline.tune import tuned, tuned_by_rule, tuned_image, with_choice
+from tomoskin.pipeline.rest import tuned, tuned_by_rule, tuned_image, with_choice
 
 __all__ = [
     "ALONE",

@@ -125,7 +125,6 @@ class FrameResult:
         measured: Voltages,
         image: Image,
         reference: FloatArray,
-        events: tuple[TouchEvent, ...],
         baseline: BaselineState | None = None,
     ) -> Self:
         """Of a frame that the reference is collected from; ``baseline`` once that stands."""
@@ -139,7 +138,6 @@ class FrameResult:
             reference=reference,
             touches=(),
             left_out=int(np.count_nonzero(measured.excluded)),
-            events=events,
             baseline=baseline,
             scanned=measured.scanned,
             scan_time=measured.scan_time,

@@ -126,7 +126,7 @@ class Flow:
         if link.info is not self.board:
             self._note_board(link.info, link.board.text if link.board else "")
         if items:
-            for event in intake.worth_saying(items[-1].host_time, items):
+            for event in intake.repeats.push(items[-1].host_time, items):
                 out.put(event)
         late = intake.late(len(frames))
         for number, frame in enumerate(frames):
@@ -216,7 +216,7 @@ class Flow:
         except TomoskinError as error:  # of this frame: the source is well
             intake.skipped += 1
             refused = Event(frame.host_time, "refused", f"a frame was left out: {error}")
-            for event in intake.worth_saying(frame.host_time, [refused]):
+            for event in intake.repeats.push(frame.host_time, [refused]):
                 self.out.put(event)
             return
         if result is None:

@@ -191,7 +191,7 @@ def test_touches_that_have_gone_are_forgotten() -> None:
     for number in range(200):
         run([[detection(0.03 * (number % 3))]] * 3 + [[]] * 20)
         sizes.append(len(pickle.dumps(run.tracker)))
-    assert run.tracker.numbered == 200
+    assert run.tracker.ledger.numbered == 200
     assert max(sizes[150:]) <= max(sizes[80:120]) + 16  # numbers become longer
 
 

@@ -1,8 +1,7 @@
 """Detections of successive frames → touches that keep their identity, and what happens to them."""
 
-from tomoskin.sensing.track.motion import STILL, TrackSettings
+from tomoskin.sensing.track.motion import STILL, SlideCorrection, TrackSettings
 from tomoskin.sensing.track.policy import HELD, RESIDUAL
-from tomoskin.sensing.track.sliding import FingerTracker, SlideCorrection
 from tomoskin.sensing.track.touch_table import (
     ELAPSED,
     Span,
@@ -22,7 +21,6 @@ __all__ = [
     "HELD",
     "RESIDUAL",
     "STILL",
-    "FingerTracker",
     "SlideCorrection",
     "Span",
     "TouchEvent",
