@@ -124,8 +124,7 @@ def check_board(
     yield _noise(np.vstack([first.sd, second.sd]))
     early = _measure(transport, onward, replace(settings, settling=_EARLY), frames, _AT_ONCE)
     yield _settling(early, first)
-    for name, problem, text in check_safe_off(transport, onward, settings):
-        yield CheckFinding(name, not problem, problem or text)
+    yield from check_safe_off(transport, onward, settings)
 
 
 def _measure(
@@ -217,11 +216,10 @@ _ANSWER, _TRIES = 0.3, 5
 _HEARTBEAT, _USUAL = 300, 2000
 """ms of silence that the board tolerates: while this is tried, and after reset."""
 
-Look = tuple[str, str, str]
-"""What was looked at; what is wrong with it, or nothing; what is to be said when it is right."""
 
-
-def check_safe_off(transport: Transport, scan: Scan, settings: ScanSettings) -> Iterator[Look]:
+def check_safe_off(
+    transport: Transport, scan: Scan, settings: ScanSettings
+) -> Iterator[CheckFinding]:
     """STOP, a silent host, SAFE_OFF: frames end, and nothing starts again by itself.
 
     Frames stand for the current here, since only a drive is sampled; whether a switch really opens
@@ -241,24 +239,21 @@ def check_safe_off(transport: Transport, scan: Scan, settings: ScanSettings) -> 
     _accepted(_asked(board, start), start, transport)
     _asked(board, Stop(0))
     late = any(isinstance(m, Frame) for m in board.listen(4 * configuration.scan_time))
-    yield "stop", "frames continue after STOP" if late else "", "no frame after STOP"
+    text = "frames continue after STOP" if late else "no frame after STOP"
+    yield CheckFinding("stop", not late, text)
     _accepted(_asked(board, start), start, transport)
     heard = board.listen(5e-3 * _HEARTBEAT)
     silent = any(isinstance(m, Fault) and m.code is FaultCode.HOST_SILENT for m in heard)
-    yield (
-        "silence",
-        "" if silent else f"frames continue {_HEARTBEAT} ms after the last message of the host",
-        f"no frame {_HEARTBEAT} ms after the last message of the host",
-    )
+    since = f"{_HEARTBEAT} ms after the last message of the host"
+    text = f"no frame {since}" if silent else f"frames continue {since}"
+    yield CheckFinding("silence", silent, text)
     _asked(board, SetHeartbeat(0, _USUAL))
     _asked(board, SafeOff(0))
     forgotten = _asked(board, start).result is Result.WRONG_CONFIGURATION
     _asked(board, Stop(0))
-    yield (
-        "safe off",
-        "" if forgotten else "START is accepted after SAFE_OFF",
-        "nothing starts after SAFE_OFF until the board is set up again",
-    )
+    text = "nothing starts after SAFE_OFF until the board is set up again"
+    text = text if forgotten else "START is accepted after SAFE_OFF"
+    yield CheckFinding("safe off", forgotten, text)
 
 
 def _asked(board: Exchange, command: Command) -> Ack:

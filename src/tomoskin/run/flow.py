@@ -128,7 +128,7 @@ class Flow:
         if items:
             for event in intake.repeats.push(items[-1].host_time, items):
                 out.put(event)
-        late = intake.late(len(frames))
+        late = intake.backlog.late(len(frames), intake.waited) if frames else 0
         for number, frame in enumerate(frames):
             mark = self.marker.mark(frame, late=number < late)
             if mark is not None:

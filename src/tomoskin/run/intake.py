@@ -206,8 +206,8 @@ class Intake:
         Why no frame comes until the board is well again, or None.
     skipped
         Frames that this host has left out.
-    repeats
-        Of its events.
+    backlog, repeats
+        How many frames of a read are left out; events that come again and again.
     """
 
     def __init__(self) -> None:
@@ -216,7 +216,7 @@ class Intake:
         self.skipped = 0
         self._link: Link | None = None
         self._drops, self._earlier = 0, Losses()
-        self._backlog, self.repeats = Backlog(), Repeats()
+        self.backlog, self.repeats = Backlog(), Repeats()
 
     def open(self) -> None:
         """A protocol session is to begin."""
@@ -243,7 +243,3 @@ class Intake:
             elif item.kind in _STANDSTILL:
                 self.standstill = item.text
         return frames
-
-    def late(self, frames: int) -> int:
-        """How many of ``frames`` of the newest read, the oldest, are left out."""
-        return self._backlog.late(frames, self.waited) if frames else 0

@@ -18,7 +18,6 @@ from tomoskin.run.commands import (
     DirectCommand,
     Note,
     Opener,
-    ReplayCommand,
     SetPose,
     SetTwin,
 )
@@ -48,28 +47,20 @@ def do(flow: Flow, command: DirectCommand) -> None:
             host_time = newest.result.host_time if newest else flow.now()
             flow.out.put(Event(host_time, "note", command.text))
         case SetTwin():
-            _break(flow, command)
+            if not flow.twin.breakable:
+                raise WireError(f"{flow.source} cannot simulate faults")
+            try:
+                flow.twin.set_harm(command)
+            except ModelError as error:
+                raise WireError(str(error)) from None
         case SetPose():
             if not flow.twin.bendable:
                 raise WireError(f"{flow.source} cannot be bent on the page")
             flow.twin.set_pose(command, flow.prepared.skin.surface)
         case _:
-            _play(flow, command)
-
-
-def _break(flow: Flow, command: SetTwin) -> None:
-    if not flow.twin.breakable:
-        raise WireError(f"{flow.source} cannot simulate faults")
-    try:
-        flow.twin.set_harm(command)
-    except ModelError as error:
-        raise WireError(str(error)) from None
-
-
-def _play(flow: Flow, command: ReplayCommand) -> None:
-    if flow.marker.replay is None:
-        raise WireError(f"{flow.source} is not a replay")
-    play(flow.marker.replay, command)
+            if flow.marker.replay is None:
+                raise WireError(f"{flow.source} is not a replay")
+            play(flow.marker.replay, command)
 
 
 class Runner:

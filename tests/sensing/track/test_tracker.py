@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 
 from sensing.track.detections import AREA, Run, detection
 from tomoskin.core import Detection
-from tomoskin.sensing.track import STILL, Tracker
+from tomoskin.sensing.track import Tracker, TrackSettings
 
+STILL = TrackSettings(still=True)
 FAINT = {"snr": 6.0}
 
 

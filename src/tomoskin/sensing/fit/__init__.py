@@ -11,7 +11,7 @@ from tomoskin.sensing.fit.covariance import common_mode_variance, idle_covarianc
 from tomoskin.sensing.fit.finder import SpotFinder
 from tomoskin.sensing.fit.noise import Whitener, measured_covariance, row_covariance
 from tomoskin.sensing.fit.policy import EXHAUSTIVE, LIVE, Pace
-from tomoskin.sensing.fit.spot import Response, Spots, depth_of, spots_of
+from tomoskin.sensing.fit.spot import Response, Spots, spots_of
 from tomoskin.sensing.fit.spot_fit import SpotPrior
 from tomoskin.sensing.fit.spot_model import SpotModel
 
@@ -28,7 +28,6 @@ __all__ = [
     "Spots",
     "Whitener",
     "common_mode_variance",
-    "depth_of",
     "idle_covariance",
     "measured_covariance",
     "position_bound",

@@ -17,7 +17,6 @@ from functools import cached_property
 import numpy as np
 
 from tomoskin.core import FloatArray
-from tomoskin.sensing.fit.detections import SpotDetections, judged
 from tomoskin.sensing.fit.expectation import Expectation, newcomers
 from tomoskin.sensing.fit.policy import (
     ELSEWHERE,
@@ -31,7 +30,7 @@ from tomoskin.sensing.fit.policy import (
     may_have_jumped,
 )
 from tomoskin.sensing.fit.problem import Problem
-from tomoskin.sensing.fit.selection import ForwardSelection
+from tomoskin.sensing.fit.selection import ForwardSelection, SpotDetections, judged
 from tomoskin.sensing.fit.spot_fit import Fit
 
 GoingOn = Callable[[SpotDetections], Expectation]

@@ -8,20 +8,17 @@ from tomoskin.sensing.signal.board_diagnosis import (
     meter_steps,
 )
 from tomoskin.sensing.signal.difference import (
-    Consecutive,
     NuisanceSubspace,
     difference,
     difference_noise,
     in_phase,
-    undone,
 )
 from tomoskin.sensing.signal.evidence import Reciprocity
 from tomoskin.sensing.signal.headroom import Headroom
 from tomoskin.sensing.signal.health import ElectrodeHealth, Health, nuisance_directions
-from tomoskin.sensing.signal.idle import Idle
 from tomoskin.sensing.signal.load_ring import LoadRing
 from tomoskin.sensing.signal.monitor import Monitor
-from tomoskin.sensing.signal.readout import FIGURES, Readout, directions
+from tomoskin.sensing.signal.readout import FIGURES, Readout
 from tomoskin.sensing.signal.recording import Recording, frame_times
 from tomoskin.sensing.signal.reference import Reference, Scatter
 
@@ -30,12 +27,10 @@ __all__ = [
     "STAGES",
     "Baseline",
     "BaselineState",
-    "Consecutive",
     "CountScale",
     "ElectrodeHealth",
     "Headroom",
     "Health",
-    "Idle",
     "LoadRing",
     "Monitor",
     "NuisanceSubspace",
@@ -47,10 +42,8 @@ __all__ = [
     "diagnose",
     "difference",
     "difference_noise",
-    "directions",
     "frame_times",
     "in_phase",
     "meter_steps",
     "nuisance_directions",
-    "undone",
 ]

@@ -48,47 +48,12 @@ def difference(values: FloatArray, reference: FloatArray, kind: str) -> FloatArr
     return np.asarray(change / np.abs(reference))
 
 
-def undone(change: FloatArray, reference: FloatArray, kind: str) -> FloatArray:
-    """(…, n_meas) V: the voltages of which ``change`` is the :func:`difference`."""
-    return np.asarray(reference + (change if kind == "plain" else change * np.abs(reference)))
-
-
 def difference_noise(noise: FloatArray, reference: FloatArray, kind: str) -> FloatArray:
     """Standard deviation of difference data, (n_meas,), where that of the voltages is ``noise``.
 
     ``noise`` and ``reference`` are (n_meas,) V; the result is V, or a ratio when normalised.
     """
     return noise if kind == "plain" else np.asarray(noise / np.abs(reference))
-
-
-class Consecutive:
-    """Differences between consecutive frames, for fast changes; no reference is needed.
-
-    ``kind`` is "plain" or "normalised" (by the frame before). Raises DataError for another one.
-    """
-
-    def __init__(self, kind: str = "plain") -> None:
-        if kind not in DIFFERENCES:
-            raise DataError(f'expected a difference among {", ".join(DIFFERENCES)}, got "{kind}"')
-        self.kind = kind
-        self._last: FloatArray | None = None
-
-    def push(self, values: FloatArray) -> FloatArray | None:
-        """(n_meas,) change since the last frame of ``values`` (n_meas,) V; None for the first.
-
-        Raises
-        ------
-        DataError
-            As :func:`difference`, or when a value is not finite; the last frame then stays.
-        """
-        finite = np.isfinite(values)
-        if not finite.all():
-            raise DataError(
-                f"expected finite voltages, but rows {np.flatnonzero(~finite)} are not finite"
-            )
-        change = None if self._last is None else difference(values, self._last, self.kind)
-        self._last = np.array(values)
-        return change
 
 
 def in_phase(

@@ -1,6 +1,6 @@
 """Detections of successive frames → touches that keep their identity, and what happens to them."""
 
-from tomoskin.sensing.track.motion import STILL, SlideCorrection, TrackSettings
+from tomoskin.sensing.track.motion import SlideCorrection, TrackSettings
 from tomoskin.sensing.track.policy import HELD, RESIDUAL
 from tomoskin.sensing.track.touch_table import (
     ELAPSED,
@@ -20,7 +20,6 @@ __all__ = [
     "ELAPSED",
     "HELD",
     "RESIDUAL",
-    "STILL",
     "SlideCorrection",
     "Span",
     "TouchEvent",

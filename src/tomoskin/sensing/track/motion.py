@@ -46,10 +46,6 @@ class TrackSettings:
         return HELD * self.snr
 
 
-STILL = TrackSettings(still=True)
-"""For frames that do not follow each other in time: each shows what it holds."""
-
-
 _UNKNOWN = 0.004
 """Deviation of a detection whose noise is unknown, m."""
 
