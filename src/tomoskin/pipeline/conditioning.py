@@ -189,7 +189,7 @@ class BaselineDifferences:
         n_excluded = int(np.count_nonzero(self._excluded))
         if n_excluded:
             values = np.where(health.lost, mean, values)
-        if subspace.nuisance.count > MOST_NUISANCE * len(values):
+        if subspace.nuisance.directions.shape[1] > MOST_NUISANCE * len(values):
             return Conditioned(None, n_excluded, health)
         if self._levels.mean is not mean or self._levels.excluded is not self._excluded:
             self._levels = _Levels.of(mean, self._excluded)

@@ -188,7 +188,7 @@ class Recordings:
     def put(self, message: RunMessage) -> None:
         """Have it recorded, and remember what a new recording needs; events from any thread."""
         match message:
-            case RawRead():
+            case RawRead() if self._awaiting is not None:
                 self._head()
             case MarkedFrame():
                 number = self._numbered() if message.mark & Mark.REFERENCE else 0

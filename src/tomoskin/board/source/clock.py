@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from dataclasses import dataclass, field
 
 from tomoskin.core import Event, Frame
@@ -85,7 +86,10 @@ class ClockFitter:
         corners = run.corners  # of the lower convex hull (Andrew 1979), in O(1) on average
         if corners and x <= corners[-1][0]:
             return  # the same tick again
-        while len(corners) > 1 and _above(corners[-2], corners[-1], (x, y)):
+        while len(corners) > 1:
+            (x0, y0), (x1, y1) = corners[-2:]
+            if (y1 - y0) * (x - x0) < (y - y0) * (x1 - x0):  # the last one is below
+                break
             corners.pop()
         corners.append((x, y))
         if len(corners) > _MOST_CORNERS:
@@ -98,7 +102,7 @@ class ClockFitter:
         if run is None or run.n < _FEWEST or len(run.corners) < 2:
             return None
         mean = run.x / run.n
-        right = next(n for n, (x, _) in enumerate(run.corners) if n and x >= mean)
+        right = bisect_left(run.corners, (mean,), 1)
         (x0, y0), (x1, y1) = run.corners[right - 1], run.corners[right]
         b = (y1 - y0) / (x1 - x0)
         a = y0 - b * x0
@@ -161,8 +165,3 @@ class ClockWatch:
             "by this computer: times and speeds of touches are wrong by as much"
         )
         return Event(frame.host_time, "clock", text)
-
-
-def _above(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> bool:
-    """Whether b is on or above the line from a to c."""
-    return (b[1] - a[1]) * (c[0] - a[0]) >= (c[1] - a[1]) * (b[0] - a[0])

@@ -207,7 +207,7 @@ class SpotFinder:
             if not favours(problem.gain(pressed.fit, detected.fit)):
                 detected = pressed
         rival: Rival | None = None
-        if self._reach and sign != "both":
+        if self._reach and sign != "both" and len(detected.fit.spots):
             reach("one touch more")
             detected, rival = challenged(selection, detected, self._rival, self._going_on)
         if self.watch.puzzled(problem, detected.fit):
@@ -245,7 +245,7 @@ class SpotFinder:
     def _detections(self, detected: SpotDetections) -> list[Detection]:
         """The touches as detections, strongest first."""
         spots = detected.fit.spots
-        shown = np.flatnonzero(~self.watch.wrong(spots))
+        shown = np.flatnonzero(~self._policy.is_wrong(spots[:, CONTENT]))
         found = [self._detection(detected, k, spots[k].tolist()) for k in shown.tolist()]
         order = sorted(range(len(found)), key=lambda k: -abs(found[k].peak))
         self._shown = spots[shown[order]]

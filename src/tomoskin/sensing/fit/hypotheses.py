@@ -110,8 +110,8 @@ def _proposed(selection: ForwardSelection, found: Fit) -> tuple[Fit | None, floa
 def _beside_expected(selection: ForwardSelection, found: Fit) -> Fit | None:
     """One spot beside those that are expected, where these may have left their places in vain."""
     expected = selection.problem.expected
-    away = expected.away(found.spots, found.known)
-    if len(found.spots) != len(expected.spots) or away < ELSEWHERE:
+    goes_on = len(found.spots) == len(expected.spots)
+    if not goes_on or expected.away(found.spots, found.known) < ELSEWHERE:
         return None
     known = tuple(range(len(expected.spots)))
     return selection.proposed(

@@ -3,7 +3,7 @@ sure each of them is."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -20,6 +20,9 @@ from tomoskin.sensing.fit.spot_fit import Deficit, Fit
 Start = tuple[FloatArray, Known]
 """Spots (k, 4), and who they are."""
 
+Ratios = tuple[FloatArray, FloatArray]
+"""Likelihood ratios (n,) and contents (n,) of candidates."""
+
 
 @dataclass(frozen=True, eq=False)
 class Openings:
@@ -34,6 +37,10 @@ class Openings:
     problem: Problem
     matched: Matched
     policy: DetectionPolicy
+    _candidates: list[tuple[FloatArray, tuple[FloatArray, FloatArray]]] = field(
+        default_factory=list, init=False
+    )
+    """What candidates are to the residuals that have been looked at, the newest last."""
 
     def starts(self, fit: Fit) -> list[Start]:
         """One spot more beside those of ``fit``, where a candidate stands out."""
@@ -57,21 +64,15 @@ class Openings:
         problem = self.problem
         return JointStarts.of(self.matched, problem.data, problem.prior, problem.sign)
 
-    def candidates(self, fit: Fit) -> tuple[FloatArray, FloatArray]:
-        """Likelihood ratios (n,) and contents (n,) of the candidates beside a ``fit``. The last
-        look is kept, since it takes long."""
+    def candidates(self, fit: Fit) -> Ratios:
+        """Of the candidates beside a ``fit``. The last look is kept, since it takes long."""
         if not self._candidates or self._candidates[-1][0] is not fit.residual:
             self.remember(fit, self.matched.ratios(self.problem.solver, fit, self.problem.sign))
         return self._candidates[-1][1]
 
-    def remember(self, fit: Fit, ratios: tuple[FloatArray, FloatArray]) -> None:
+    def remember(self, fit: Fit, ratios: Ratios) -> None:
         """Keep what :meth:`candidates` would compute of ``fit``."""
         self._candidates.append((fit.residual, ratios))
-
-    @cached_property
-    def _candidates(self) -> list[tuple[FloatArray, tuple[FloatArray, FloatArray]]]:
-        """What candidates are to the residuals that have been looked at, the newest last."""
-        return []
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +97,8 @@ class ForwardSelection:
     matched: Matched
     policy: DetectionPolicy
     deficit: Deficit
+    _turned_down: list[tuple[Fit, Fit]] = field(default_factory=list, init=False)
+    """Fits, and one spot more beside each that was not worth it, the newest last."""
 
     def explained(self, before: FloatArray) -> Fit:
         """The most likely touches, confirmed by the exact model; ``before`` (k, 4) are those of the
@@ -199,11 +202,6 @@ class ForwardSelection:
             return self._turned_down[-1][1]
         starts = self.openings.starts(fit)
         return self._best(starts, fit.deficit, []) if starts else None
-
-    @cached_property
-    def _turned_down(self) -> list[tuple[Fit, Fit]]:
-        """Fits, and one spot more beside each that was not worth it, the newest last."""
-        return []
 
     def _best(self, starts: list[Start], deficit: Deficit, sets: list[FloatArray]) -> Fit:
         """The most evident of those that come out best after a glance."""

@@ -133,11 +133,6 @@ class NuisanceSubspace:
             np.hstack([self.directions, seen]), np.concatenate([self.weights, weights])
         )
 
-    @property
-    def count(self) -> int:
-        """How many directions there are."""
-        return int(self.directions.shape[1])
-
     def __call__(self, dv: FloatArray) -> FloatArray:
         """(n_meas,) ``dv`` with its part along the directions as the rest leads one to expect."""
         return np.asarray(dv - self.directions @ (self.weights @ dv))

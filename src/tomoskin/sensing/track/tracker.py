@@ -76,7 +76,8 @@ class Tracker:
         if detections or self.traces:
             self._follow(FrameOfTouches.of(detections, self._clock, self.settings))
         self.residuals.note(self._clock.now, quiet=not detections)
-        touches, happened, self._happened = self._touches(), self._happened, []
+        touches = self._touches() if self.traces else ()
+        happened, self._happened = self._happened, []
         if not self.settings.still:
             self.slides = self.slides.after(touches, time)
         finger = self.slides.of_finger
