@@ -34,7 +34,9 @@ if TYPE_CHECKING:
     from tomoskin.core.archive import (
         MOST_ELECTRODES,
         Arrays,
+        cache_folder,
         electrode_table,
+        kept,
         load_arrays,
         numbers,
         pack_arrays,
@@ -43,7 +45,6 @@ if TYPE_CHECKING:
         unpack_arrays,
         whole_number,
     )
-    from tomoskin.core.cache import cache_folder, kept
     from tomoskin.core.clocks import Clock, VirtualClock, WallClock, clock_ahead
     from tomoskin.core.colours import AMOUNT, CHANGE, CHANGE_ON_DARK
     from tomoskin.core.extras import install_hint, needed
@@ -66,7 +67,7 @@ if TYPE_CHECKING:
     )
     from tomoskin.core.worker import Capacity, Consumer, Say, Worker, stop_workers
 
-_LATER = ("records", "worker", "clocks", "json_bytes", "extras", "colours", "archive", "cache")
+_LATER = ("records", "worker", "clocks", "json_bytes", "extras", "colours", "archive")
 """Modules that need more, numpy for one, and are loaded when one of their names is first asked for:
 the command line needs errors only until a command runs."""
 

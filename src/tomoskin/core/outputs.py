@@ -7,7 +7,7 @@ import os
 import secrets
 import stat
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -93,13 +93,15 @@ def is_same_file(one: Path, other: Path) -> bool:
 
     Neither needs to be there.
     """
-    try:
+    with suppress(OSError):  # one of them is not there
         if one.samefile(other):
             return True
-    except OSError:
-        pass  # one of them is not there
-    (folder, name), (its_folder, its_name) = (_parts(path) for path in (one, other))
-    return name == its_name and (folder == its_folder or _is_one_folder(folder, its_folder))
+    one, other = real_path(one), real_path(other)
+    if one.name.casefold() != other.name.casefold():
+        return False
+    with suppress(OSError):
+        return one.parent == other.parent or one.parent.samefile(other.parent)
+    return False
 
 
 def real_path(path: Path) -> Path:
@@ -174,19 +176,6 @@ def _is_recording(path: Path) -> bool:
         return True
     with path.open("rb") as file:
         return file.read(len(MAGIC)) == MAGIC
-
-
-def _parts(path: Path) -> tuple[Path, str]:
-    """Folder and name, without links and relative steps; the name without its case."""
-    real = real_path(path)
-    return real.parent, real.name.casefold()
-
-
-def _is_one_folder(one: Path, other: Path) -> bool:
-    try:
-        return one.samefile(other)
-    except OSError:
-        return False
 
 
 @contextmanager

@@ -119,11 +119,8 @@ class Pipeline:
     @property
     def choice(self) -> AlphaChoice:
         """The alpha of the images, and what chose it."""
-        return self._prepared.choice
-
-    @property
-    def _prepared(self) -> Prepared:
-        return self._state.prepared if isinstance(self._state, Following) else self._given
+        state = self._state
+        return (state.prepared if isinstance(state, Following) else self._given).choice
 
     def push(self, frame: Frame, mark: Mark = Mark.NONE) -> FrameResult | None:
         """Take one frame as its ``mark`` says; None where it is left out or not of this scan."""

@@ -70,18 +70,13 @@ class Collecting:
         self._excluded = np.zeros(self._values.shape, dtype=bool)
         self.taken = 0
 
-    @property
-    def needed(self) -> int:
-        """Frames that make a reference."""
-        return len(self._values)
-
     def push(self, measured: Voltages) -> Rest | None:
         """Take one frame; the untouched skin once there are enough."""
         self._values[self.taken] = np.where(measured.excluded, self._model, measured.values)
         self._times[self.taken] = measured.time
         self._excluded[self.taken] = measured.excluded
         self.taken += 1
-        if self.taken < self.needed:
+        if self.taken < len(self._values):
             return None
         lost = self._excluded.mean(axis=1) > _MOST_EXCLUDED
         counts = ~lost if lost.mean() <= _MOST_LOST else np.ones_like(lost)
@@ -89,7 +84,7 @@ class Collecting:
         excluded = self._excluded[counts].any(axis=0) | ~values.any(axis=0)
         values[:, excluded] = self._model[excluded]
         reference = Reference.of(values, self._least)
-        interval = float(np.median(np.diff(self._times))) if self.needed > 1 else np.nan
+        interval = float(np.median(np.diff(self._times))) if self.taken > 1 else np.nan
         agreement = ModelAgreement.of(reference.mean[~excluded], self._model[~excluded])
         return Rest(reference, excluded, interval, measured.host_time, agreement)
 

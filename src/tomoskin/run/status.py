@@ -317,18 +317,10 @@ class Status:
             taken, needed = self.reference.frames, self.reference.needed
             return f"{self.source}: taking the reference, {taken} of {needed} frames; do not touch"
         drift = self.reference.baseline.drift if self.reference.baseline else 0.0
-        return (
+        text = (
             f"{self.source}: {self.fps:.0f} frames/s, {self.dropped} dropped, "
             f"p99 {1e3 * self.p99:.1f} ms, drift {100 * drift:.1f} %"
-            f"{self._bend_text}{self._state_text}"
         )
-
-    @property
-    def _bend_text(self) -> str:
-        if self.bend is None:
-            return ""
-        return f", bend {math.degrees(self.bend.angle):.0f}° ({self.bend.state})"
-
-    @property
-    def _state_text(self) -> str:
-        return "" if self.class_reading is None else f", {self.class_reading.text}"
+        if self.bend is not None:
+            text += f", bend {math.degrees(self.bend.angle):.0f}° ({self.bend.state})"
+        return text if self.class_reading is None else f"{text}, {self.class_reading.text}"

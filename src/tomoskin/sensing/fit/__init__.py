@@ -7,9 +7,14 @@ from tomoskin.sensing.fit.bounds import (
     resolution_bounds,
     variants,
 )
-from tomoskin.sensing.fit.covariance import common_mode_variance, idle_covariance
 from tomoskin.sensing.fit.finder import SpotFinder
-from tomoskin.sensing.fit.noise import Whitener, measured_covariance, row_covariance
+from tomoskin.sensing.fit.noise import (
+    Whitener,
+    common_mode_variance,
+    idle_covariance,
+    measured_covariance,
+    row_covariance,
+)
 from tomoskin.sensing.fit.policy import EXHAUSTIVE, LIVE, Pace
 from tomoskin.sensing.fit.spot import Response, Spots, spots_of
 from tomoskin.sensing.fit.spot_fit import SpotPrior

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -142,6 +142,10 @@ class Jumps:
 
     rows: FloatArray
     left: FloatArray
+    _walked: dict[int | None, FloatArray] = field(default_factory=dict, init=False)
+    """What :meth:`wandered` has said, by steps of the root of two."""
+    _kept: list[Jumps] = field(default_factory=list, init=False)
+    """The jumps that :meth:`beside` gave last."""
 
     def beside(self, left: FloatArray) -> Jumps:
         """The same where these residual responses (k, c) are. The last is kept: they stay, as a
@@ -180,16 +184,6 @@ class Jumps:
     @cached_property
     def _size(self) -> float:
         return float(np.linalg.norm(self.rows[0]))
-
-    @cached_property
-    def _walked(self) -> dict[int | None, FloatArray]:
-        """What :meth:`wandered` has said, by steps of the root of two."""
-        return {}
-
-    @cached_property
-    def _kept(self) -> list[Jumps]:
-        """The jumps that :meth:`beside` gave last."""
-        return []
 
     @cached_property
     def _weighed(self) -> FloatArray:

@@ -117,6 +117,11 @@ def spots_of(
     return np.column_stack([places, np.log(radius), content])
 
 
+def bounds_of(sign: str, most: float) -> tuple[float, float]:
+    """Least and largest change by a touch of that ``sign``, as a skin has it, up to ``most``."""
+    return 0.0 if sign == "increase" else -most, 0.0 if sign == "decrease" else most
+
+
 def depth_of(spots: FloatArray) -> FloatArray:
     """(…,) log(σ/σ₀) at the centre of ``spots`` (…, 4)."""
     return np.asarray(spots[..., CONTENT] / (FILLING * np.exp(2 * spots[..., LOG_RADIUS])))

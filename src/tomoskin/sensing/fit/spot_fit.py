@@ -13,7 +13,7 @@ import numpy as np
 from tomoskin.core import FloatArray
 from tomoskin.model.mesh import Mesh
 from tomoskin.sensing.fit.expectation import Expectation, Known
-from tomoskin.sensing.fit.spot import CONTENT, FILLING, LOG_RADIUS, N_PARAMETERS
+from tomoskin.sensing.fit.spot import CONTENT, FILLING, LOG_RADIUS, N_PARAMETERS, bounds_of
 
 _RADIUS = 0.11
 """Median radius where touches are as large as the sheet lets them be, in parts of its breadth: that
@@ -125,10 +125,7 @@ class SpotPrior:
     @staticmethod
     def depths(sign: str) -> tuple[float, float]:
         """Least and largest log(σ/σ₀) at the centre: ``sign`` as in a skin's ``[touch]``."""
-        return (
-            0.0 if sign == "increase" else -_MOST_DEPTH,
-            0.0 if sign == "decrease" else _MOST_DEPTH,
-        )
+        return bounds_of(sign, _MOST_DEPTH)
 
 
 @dataclass(frozen=True, eq=False)
