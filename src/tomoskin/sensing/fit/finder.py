@@ -164,7 +164,8 @@ class SpotFinder:
     ) -> tuple[Explained, CommonModeJump, Matched]:
         """Touches of ``data`` (n_meas,) in so many times the noise that is known; and whether the
         common mode has jumped."""
-        seen, matched, _, jumps = self._sight.of(self.watch.excess).louder(times)
+        sight = self._sight.of(self.watch.excess)
+        seen, matched, _, jumps = sight if times == 1.0 else sight.louder(times)
         whitened, rest = seen.whitened(data)
         left = self._residual.directions(seen.matrix)
         problem = Problem(

@@ -82,7 +82,7 @@ class Tracker:
             self.slides = self.slides.after(touches, time)
         finger = self.slides.of_finger
         self.events = tuple([replace(event, touch=finger(event.touch)) for event in happened])
-        return tuple([finger(touch) for touch in touches])
+        return tuple(map(finger, touches))
 
     def reset(self) -> None:
         """Release every touch and forget all else; identities go on counting.
