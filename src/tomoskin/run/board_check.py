@@ -196,8 +196,8 @@ def _differences(readings: _Readings) -> Iterator[CheckFinding]:
 def _noise(sd: FloatArray) -> CheckFinding:
     by_channel = np.sqrt(np.mean(sd**2, axis=0))
     worst = int(by_channel.argmax())
-    text = f"{np.median(by_channel):.2f} counts a conversion, most on E{worst + 1} ({{:.2f}})"
-    text = text.format(by_channel[worst])
+    text = f"{np.median(by_channel):.2f} counts a conversion, "
+    text += f"most on E{worst + 1} ({by_channel[worst]:.2f})"
     ok = bool(by_channel[worst] < _NOISE)
     look = f"; expected less than {_NOISE:g}: C{100 * (worst + 1) + 3}, its supply, a long cable"
     return CheckFinding("noise", ok, text if ok else text + look)

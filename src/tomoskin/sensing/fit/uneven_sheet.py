@@ -121,15 +121,6 @@ _STEPS = 4
 
 
 @dataclass(frozen=True, eq=False)
-class _Measured:
-    """A reference (n_meas,) V, its standard deviation (n_meas,) V, and (n,) rows that count."""
-
-    values: FloatArray
-    deviation: FloatArray
-    rows: NDArray[np.intp]
-
-
-@dataclass(frozen=True, eq=False)
 class _Linear:
     """The rows that count, linear about a sheet.
 
@@ -145,17 +136,18 @@ class _Linear:
     size: FloatArray
 
     @classmethod
-    def about(cls, now: State, measured: _Measured) -> Generator[None, None, Self]:
+    def about(
+        cls, now: State, values: FloatArray, deviation: FloatArray, rows: NDArray[np.intp]
+    ) -> Generator[None, None, Self]:
         """About a sheet, a piece between two yields."""
-        rows = measured.rows
-        size, values = now.voltages[rows], measured.values[rows]
+        size = now.voltages[rows]
         factor = float(values @ size) / float(size @ size)
         yield
         by_cell = (now.jacobian * now.conductivity)[rows]
         yield
         channels = channel_errors(now)[rows]
         yield
-        noise = np.diag((measured.deviation[rows] / factor) ** 2)
+        noise = np.diag((deviation / factor) ** 2)
         return cls(
             residual=values / factor - size,
             by_cell=by_cell,
@@ -216,10 +208,11 @@ def fitting_sheet(
         return state
     mesh = state.model.mesh
     fields = fields_of(mesh)
-    measured = _Measured(reference, np.broadcast_to(deviation, reference.shape), finite)
+    values = reference[finite]
+    deviation = np.broadcast_to(deviation, reference.shape)[finite]
     uneven, anisotropy, now = np.zeros(len(mesh.cells)), np.zeros(2), state
     for _ in range(_STEPS):
-        linear = yield from _Linear.about(now, measured)
+        linear = yield from _Linear.about(now, values, deviation, finite)
         yield
         data = linear.residual + linear.by_cell @ uneven + linear.along @ anisotropy
         likeliest = yield from _likeliest(fields, linear, data)
