@@ -1,6 +1,6 @@
 """Counts → voltages → differences: an idle skin's noise and drift, and its electrodes' health."""
 
-from tomoskin.sensing.signal.baseline import Baseline, BaselineState
+from tomoskin.sensing.signal.baseline import Baseline, BaselineState, Reference, Scatter
 from tomoskin.sensing.signal.board_diagnosis import (
     STAGES,
     CountScale,
@@ -20,7 +20,6 @@ from tomoskin.sensing.signal.load_ring import LoadRing
 from tomoskin.sensing.signal.monitor import Monitor
 from tomoskin.sensing.signal.readout import FIGURES, Readout
 from tomoskin.sensing.signal.recording import Recording, frame_times
-from tomoskin.sensing.signal.reference import Reference, Scatter
 
 __all__ = [
     "FIGURES",

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, IntArray
 from tomoskin.model.pattern import Pattern, Scan
+from tomoskin.sensing.signal.baseline import Reference
 from tomoskin.sensing.signal.evidence import (
     EqualReadings,
     Groups,
@@ -17,7 +18,6 @@ from tomoskin.sensing.signal.evidence import (
     sign_limit,
 )
 from tomoskin.sensing.signal.health import ElectrodeHealth, Health, Mask, Roles
-from tomoskin.sensing.signal.reference import Reference
 
 ENTER = 2
 """Frames in a row that must blame an electrode before it is called sick."""
