@@ -1,5 +1,5 @@
-"""The reference: what an untouched skin reads, and how much it wavers; and the baseline, which begins
-there, follows the untouched skin, and holds under a touch."""
+"""The reference: what an untouched skin reads, and how much it wavers; and the baseline, which
+begins there, follows the untouched skin, and holds under a touch."""
 
 from __future__ import annotations
 
