@@ -21,7 +21,7 @@ from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, prepare
 from tomoskin.pipeline.finding import Finder, finder_of
 from tomoskin.pipeline.frame_subspace import JUMP
-from tomoskin.pipeline.tune import tuned, tuned_sheet
+from tomoskin.pipeline.rest import tuned, tuned_sheet
 from tomoskin.sensing.fit import Whitener, row_covariance
 from tomoskin.sensing.signal import FIGURES, NuisanceSubspace, Readout, Reference
 from tomoskin.sensing.signal.health import Roles
