@@ -22,7 +22,7 @@ from tomoskin.board.source import Configuration, ScanSettings
 from tomoskin.core import Detection, Frame, Touch
 from tomoskin.files.imports import read_recording
 from tomoskin.model.pattern import Scan
-from tomoskin.pipeline import FrameResult, Pipeline, Prepared, colour_limit, prepare
+from tomoskin.pipeline import FrameResult, Pipeline, Prepared, prepare
 from tomoskin.run import Runner, in_this_process, make_set
 from tomoskin.server import AccessPolicy, Hub, Server, application, listen
 from tomoskin.server.settings_handlers import SettingsHandlers
@@ -172,7 +172,7 @@ def labelled_presses(skin: Skin, seed: int, count: int) -> tuple[Floats, Floats]
 @contextmanager
 def served(runner: Runner) -> Iterator[AccessPolicy]:
     """Serve the page of ``runner`` on a free port; who may read it, with the port."""
-    hub = Hub(runner, limit=colour_limit(runner.prepared))
+    hub = Hub(runner)
     SettingsHandlers(hub)
     with listen("127.0.0.1", 0) as listener:
         policy = AccessPolicy(listener.getsockname()[1])

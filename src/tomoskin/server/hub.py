@@ -18,9 +18,9 @@ from tomoskin.core import DataError, GeometryError, TomoskinError, WireError
 from tomoskin.files.session import read_timeline
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, Unresolved, colour_limit
-from tomoskin.run import Runner, SetPresses, StrictRequest, commands
+from tomoskin.run import Runner, SetPresses, Snapshot, StrictRequest, commands
 from tomoskin.server import views
-from tomoskin.server.frames import NewestFrame
+from tomoskin.server.frames import encode_result
 from tomoskin.server.page_connection import Handler, Handlers, Host, Listener, Tasks, during
 from tomoskin.server.page_messages import (
     EventNote,
@@ -114,8 +114,6 @@ class Hub(Host):
     ----------
     runner
         Where results come from.
-    limit
-        End of the colour scale, in the image's unit.
     folder
         Where a page's recordings go, under names of their own.
 
@@ -123,18 +121,16 @@ class Hub(Host):
     ----------
     opener
         Opens the source of the moment for a skin; None: it cannot follow another skin.
-    frame
-        The newest result as a page takes it.
     tasks
         What pages have asked for and is under way.
     """
 
-    def __init__(self, runner: Runner, *, limit: float, folder: Path | None = None) -> None:
+    def __init__(self, runner: Runner, folder: Path | None = None) -> None:
         super().__init__()
         self.runner = runner
         self.folder = folder or Path()
         self.opener: Callable[[Skin], Transport] | None = None
-        self.frame, self.tasks = NewestFrame(runner), Tasks()
+        self.tasks = Tasks()
         self._handlers: dict[type, Handler] = {}
         self._greetings: list[Callable[[], Sequence[Message]]] = []
         self._farewells: list[Callable[[Listener], None]] = []
@@ -142,8 +138,9 @@ class Hub(Host):
         self._next_event = 0
         self._timeline: PlayedTimeline | None = None
         self._past: deque[EventNote] = deque(maxlen=_FIRST_EVENTS)
-        self._limit = limit
+        self._limit = colour_limit(runner.prepared)
         self._scene: Scene | None = None
+        self._made: tuple[Snapshot, bytes] | None = None
         self.serve(run_handlers(runner, self.folder, self.tasks))
 
     def serve(
@@ -180,6 +177,20 @@ class Hub(Host):
         """Scene and state, what happened, and what the handlers greet with."""
         timeline = [self._timeline] if self._timeline else []
         return [*self._now(), *timeline, *self._greeting(), *self._past]
+
+    def newest(self) -> bytes | None:
+        """The newest result as a message, made once for all pages; None before the first."""
+        shown = self.runner.newest
+        if shown is None:
+            return None
+        if self._made is None or self._made[0] is not shown:
+            self._made = shown, encode_result(shown.result, shown.truth, shown.latency)
+        return self._made[1]
+
+    def note_sent(self, frame: bytes) -> None:
+        """Note how long it took until a page's connection had ``frame``."""
+        if self._made is not None and self._made[1] is frame:
+            self.runner.latency.add_published(time.monotonic() - self._made[0].ready)
 
     def leave(self, page: Listener, why: str = "") -> None:
         """Serve ``page`` no longer, and lift what it pressed."""

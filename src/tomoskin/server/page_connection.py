@@ -88,16 +88,6 @@ _OUTBOX = 64
 _TRY_AGAIN_LATER = 1013
 
 
-class NewestMessage(Protocol):
-    """What a page is sent again and again, the newest only."""
-
-    def __call__(self) -> bytes | None:
-        """The message; None before the first."""
-
-    def note_sent(self, message: bytes) -> None:
-        """Note that a page has the message."""
-
-
 class Host(ABC):
     """Whom pages' connections are of; each message is encoded once for all pages.
 
@@ -107,15 +97,20 @@ class Host(ABC):
         The pages that are served.
     """
 
-    frame: NewestMessage
-    """The newest message for a page."""
-
     def __init__(self) -> None:
         self.pages: set[Listener] = set()
 
     @abstractmethod
     def first(self) -> Iterable[Message]:
         """The messages that a new page is sent first."""
+
+    @abstractmethod
+    def newest(self) -> bytes | None:
+        """The newest frame as a page takes it, the same object until there is another; None before
+        the first."""
+
+    def note_sent(self, frame: bytes) -> None:  # noqa: B027
+        """Note that a page has the frame."""
 
     @abstractmethod
     def obey(self, page: Listener, request: StrictRequest) -> None:
@@ -215,11 +210,11 @@ class Page:
         while self._outbox:
             await self._socket.send_text(self._outbox.popleft())
             await asyncio.sleep(0)  # that the page is gone is said in the loop's next turn
-        frame = self._host.frame()
+        frame = self._host.newest()
         if frame is not None and frame is not self._sent:
             await self._socket.send_bytes(frame)
             self._sent = frame
-            self._host.frame.note_sent(frame)
+            self._host.note_sent(frame)
 
 
 def _reason(done: set[asyncio.Task[None]]) -> str:

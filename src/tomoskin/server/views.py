@@ -35,7 +35,7 @@ def scene(prepared: Prepared, source: str, *, limit: float, pressable: bool) -> 
         cells=flat(mesh.cells),
         outline=flat(skin.outline.polyline(skin.outline.length / _OUTLINE_POINTS)),
         electrodes=[
-            to_page.Electrode(x=x, y=y, label=f"E{number}", points=chain(facets))
+            to_page.Electrode(x=x, y=y, label=f"E{number}", points=arc(facets))
             for number, ((x, y), facets) in enumerate(
                 zip(skin.electrode_centres.tolist(), mesh.electrodes, strict=True), 1
             )
@@ -100,24 +100,9 @@ def timeline(line: Timeline) -> to_page.PlayedTimeline:
     )
 
 
-def chain(facets: IntArray) -> list[int]:
-    """Points along an open chain of edges, from one end to the other.
-
-    ``facets`` is (n, 2); where the edges do not form a single open chain, their points in
-    ascending order.
-    """
-    neighbours: dict[int, list[int]] = {}
-    for a, b in facets.tolist():
-        neighbours.setdefault(a, []).append(b)
-        neighbours.setdefault(b, []).append(a)
-    ends = [point for point, others in neighbours.items() if len(others) == 1]
-    if len(ends) != 2 or max(map(len, neighbours.values())) > 2:
-        return sorted(neighbours)
-    walk, before = [ends[0]], -1
-    while len(onward := [p for p in neighbours[walk[-1]] if p != before]) == 1:
-        before = walk[-1]
-        walk.append(onward[0])
-    return walk
+def arc(facets: IntArray) -> list[int]:
+    """Points along an electrode, whose edges the mesher lays one after the other."""
+    return [*facets[:, 0].tolist(), int(facets[-1, 1])]
 
 
 def flat(table: FloatArray | IntArray) -> list[Any]:
