@@ -696,15 +696,10 @@ export interface ShowFlow {
   readonly on: boolean;
 }
 
-/** The page takes the last press back. */
-export interface UndoPress {
-  readonly type: "flow_undo";
-}
-
-/** Take one press back, by its number from 0 on. */
+/** Take one press back, by its number from 0 on; null: the last one. */
 export interface DeletePress {
   readonly type: "flow_delete";
-  readonly number: number;
+  readonly number?: number | null;
 }
 
 /** What lies on the skin, or comes next; ``sure``: an unusual weight is meant as it is said. */
@@ -826,7 +821,6 @@ export type PageRequest =
   | Connect
   | BeginFlow
   | ShowFlow
-  | UndoPress
   | DeletePress
   | SetWeight
   | AskPoint

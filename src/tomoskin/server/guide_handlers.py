@@ -29,19 +29,15 @@ from tomoskin.server.requests import (
     SetWeight,
     ShowFlow,
     StopLearning,
-    UndoPress,
 )
 from tomoskin.server.rub_flow import RubFlow
 from tomoskin.server.weigh_flow import WeighFlow
 
-_OF_FLOWS = (UndoPress, DeletePress, SetWeight, AskPoint, LearnFlow, StopLearning)
+_OF_FLOWS = (DeletePress, SetWeight, AskPoint, LearnFlow, StopLearning)
 """Requests that the flow of the moment answers."""
 
 _FLOWS: dict[FlowKind, Callable[[Prepared], GuidedFlow]] = {
-    "touch": TouchFlow,
-    "mapping": MappingFlow,
-    "force": WeighFlow,
-    "rub": RubFlow,
+    flow.kind: flow for flow in (TouchFlow, MappingFlow, WeighFlow, RubFlow)
 }
 _LOOKS = 0.3
 """Seconds after which pages are told how far an estimate is."""
