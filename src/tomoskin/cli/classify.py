@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tomoskin.cli.named_files import TABLE, ForceFlag, Reads, Writes
-from tomoskin.cli.named_parts import changes, say_notes
+from tomoskin.cli.named_parts import Recorded
 from tomoskin.cli.options import RecordingArgument, ReferenceOption, SameSkinOption
 from tomoskin.cli.output import Bar, JsonFlag, emit
 
@@ -42,19 +42,13 @@ def classify(
     json: JsonFlag = False,
 ) -> None:
     """Tell the class of each frame, or that it is none of those that were learnt."""
-    from tomoskin.cli.choices import skin_if_any
-    from tomoskin.files.imports import read_recording
     from tomoskin.learning import CLASSES
 
     with Bar("learning"):
         loaded = CLASSES.read(calibration)
     classifier = loaded.model
-    data = read_recording(recording)
-    say_notes(data)
-    if (chosen := skin_if_any(skin, recording)) is not None:
-        loaded.check_skin(chosen)
-    data = data.in_order_of(loaded.pattern)
-    dv = changes(data, reference, loaded.pattern)
+    given = Recorded.of(recording, skin, reference).onto(loaded)
+    data, dv = given.data, given.dv
     with Bar("classifying"):
         answers = classifier.predict(dv)
     asked = _spread(min(ask, len(dv)), len(dv))
