@@ -105,7 +105,7 @@ def test_sick_electrodes_and_the_drift_of_the_reference_are_told():
     }
     assert "30 s" in state["baseline"]["stale"]
     assert state["sick"] == [
-        {"electrode": 4, "state": "open", "reason": "no current", "since_s": 3.5}
+        {"electrode": 4, "state": "open", "reason": "no current", "since": 3.5}
     ]
     assert "drift 1.2 %" in status.text
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any, get_args
@@ -161,14 +162,11 @@ class SettingsHandlers:
 
     def _set(self, page: Listener, request: SetSettings) -> None:
         keys = sorted((s, k) for s, keys in request.changes.items() for k in keys)
-        try:
+        with _refusals_to(page):
             skin = altered(self._present(), request.changes)
             self._check(skin)
-        except TomoskinError as error:
-            page.post(refusal(error).json)
-            return
-        self._history.add(self._present(), keys, time.monotonic())
-        self._go(page, skin)
+            self._history.add(self._present(), keys, time.monotonic())
+            self._go(page, skin)
 
     def _step(self, page: Listener, step: Callable[[Skin], Skin | None]) -> None:
         """Go on with what a ``step`` through the history gives, where there is one."""
@@ -177,30 +175,22 @@ class SettingsHandlers:
 
     def _load(self, page: Listener, request: LoadSkin) -> None:
         path = self._hub.folder / f"{request.name}.toml"
-        try:
+        with _refusals_to(page):
             skin = Skin.load(path if path.is_file() else request.name)
             self._check(skin)
-        except TomoskinError as error:
-            page.post(refusal(error).json)
-            return
-        self._history.add(self._present())
-        self._go(page, skin)
+            self._history.add(self._present())
+            self._go(page, skin)
 
     def _save(self, page: Listener, request: SaveSkin) -> None:
         name = f"{request.name}.toml"
-        try:
+        with _refusals_to(page, where=name):  # the page is told names, never paths
             _save(self._hub.folder / name, self._present(), replace=request.replace)
-        except TomoskinError as error:  # the page is told names, never paths
-            page.post(refusal(type(error)(error.message, where=name, hint=error.hint)).json)
-            return
-        self._hub.runner.say("saved", f"settings saved as {name}")
-        self._hub.tell(self._message())
+            self._hub.runner.say("saved", f"settings saved as {name}")
+            self._hub.tell(self._message())
 
     def _pattern(self, page: Listener, request: AskPattern) -> None:
-        try:
+        with _refusals_to(page):
             page.post(table_of(request.name, self._present().n_electrodes).json)
-        except TomoskinError as error:
-            page.post(refusal(error).json)
 
     def _present(self) -> Skin:
         """The settings as they are, or will be when what is being prepared is ready."""
@@ -301,6 +291,16 @@ class SettingsHandlers:
             files=Folder(self._hub.folder).skins(),
             builtin=Skin.names(),
         )
+
+
+@contextlib.contextmanager
+def _refusals_to(page: Listener, where: str = "") -> Iterator[None]:
+    """Send what the block refuses to a page; as said of ``where``, if that is given."""
+    try:
+        yield
+    except TomoskinError as error:
+        named = type(error)(error.message, where=where, hint=error.hint) if where else error
+        page.post(refusal(named).json)
 
 
 def _progress(stage: Any) -> Progress:

@@ -71,7 +71,7 @@ def state(status: Status) -> to_page.RunState:
         reference=to_page.ReferenceNow.of(reference, age_s=status.reference_age),
         baseline=baseline
         and to_page.BaselineNow.of(baseline, held_s=baseline.held, noise_v=baseline.noise),
-        sick=[to_page.Sick.of(one, since_s=one.since) for one in status.electrodes],
+        sick=status.electrodes,
         noise_v=reference.noise,
         alpha=status.choice.alpha,
         rule=status.choice.rule,
@@ -92,11 +92,9 @@ def timeline(line: Timeline) -> to_page.PlayedTimeline:
     """What happened in a recording."""
     return to_page.PlayedTimeline(
         end_s=line.end,
-        notes=[to_page.Tick.of(note, time_s=time) for time, note in line.notes],
-        events=[to_page.TimedEvent.of(one, time_s=time) for time, one in line.events],
-        touches=[
-            to_page.TouchSpan.of(span, begin_s=span.begin, end_s=span.end) for span in line.touches
-        ],
+        notes=[to_page.EventNote.of(note, time_s=time) for time, note in line.notes],
+        events=[to_page.EventNote.of(one, time_s=time) for time, one in line.events],
+        touches=line.touches,
     )
 
 
