@@ -74,12 +74,12 @@ def _kind(
             json: bool,
             **own: Any,
         ) -> None:
-            found = learn(Recorded.of(recording, skin, reference, needs_skin=needs_skin), **own)
-            if found.write is not None:
-                found.write(out, overwrite=force)
-            tell(found.facts, found.lines, json=json)
-            if found.problem is not None:
-                raise found.problem
+            outcome = learn(Recorded.of(recording, skin, reference, needs_skin=needs_skin), **own)
+            if outcome.write is not None:
+                outcome.write(out, overwrite=force)
+            tell(outcome.facts, outcome.lines, json=json)
+            if outcome.problem is not None:
+                raise outcome.problem
 
         needs_skin = skin is SkinOption
         hints, needed = get_type_hints(learn, include_extras=True), inspect.Parameter.empty

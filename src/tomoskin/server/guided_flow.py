@@ -63,7 +63,7 @@ class Estimate:
 
 
 def counted(count: int, one: str, many: str) -> str:
-    """So many things in words."""
+    """A number of things in words."""
     return f"{count} {one if count == 1 else many}"
 
 

@@ -53,7 +53,7 @@ def run_handlers(runner: Runner, folder: Path, tasks: Tasks) -> Handlers:
         tasks.keep(_record(runner, folder, on=request.on))
 
     def map_out(page: Listener, _: AskUnresolved) -> None:
-        tasks.run(page, partial(_unresolved, runner), lambda found: page.post(found.json))
+        tasks.run(page, partial(_unresolved, runner), lambda map_: page.post(map_.json))
 
     def play(page: Listener, request: commands.ReplayCommand) -> None:
         tasks.run(page, partial(runner.ask, request), lambda _: None)  # a seek may read a file
@@ -76,10 +76,10 @@ def _unresolved(runner: Runner) -> UnresolvedMap:
     health = newest.result.health if newest else None
     lost = np.zeros(prepared.pattern.n_meas, bool) if health is None else health.lost
     try:
-        found = Unresolved.of(prepared, runner.status().choice.alpha, np.flatnonzero(lost))
+        part = Unresolved.of(prepared, runner.status().choice.alpha, np.flatnonzero(lost))
     except TomoskinError as error:
         return UnresolvedMap(values=None, radius_m=0.0, problem=error.message)
-    return UnresolvedMap(values=found.values.round(3).tolist(), radius_m=found.radius, problem="")
+    return UnresolvedMap(values=part.values.round(3).tolist(), radius_m=part.radius, problem="")
 
 
 async def _record(runner: Runner, folder: Path, *, on: bool) -> None:
@@ -166,7 +166,11 @@ class Hub(Host):
         def announce() -> None:
             if not self._wake_is_due:
                 self._wake_is_due = True
-                loop.call_soon_threadsafe(self._wake)
+                loop.call_soon_threadsafe(wake)
+
+        def wake() -> None:
+            self._wake_is_due = False
+            self.wake()
 
         async with during(self._tick()):
             self._read_timeline()
@@ -246,10 +250,6 @@ class Hub(Host):
             return
         self._timeline = views.timeline(timeline)
         self.tell(self._timeline)
-
-    def _wake(self) -> None:
-        self._wake_is_due = False
-        self.wake()
 
     async def _tick(self) -> None:
         while True:

@@ -190,7 +190,7 @@ class WeighFlow(GuidedFlow):
 
     @property
     def hint(self) -> str:
-        """Why nothing is recorded."""
+        """Why no placement is recorded."""
         return self._taker.hint
 
     def estimate_from(self, examples: tuple[Weighed, ...]) -> Estimate:
