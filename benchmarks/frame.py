@@ -13,7 +13,6 @@ import numpy as np
 
 from bench_rig import Rig
 from report import Report, clock, progress, table
-from tomoskin.board.source import Link, ScanSettings
 from tomoskin.board.wire import Decoder, encode
 from tomoskin.core import FloatArray, Frame
 from tomoskin.model.pattern import Pattern, Scan
@@ -22,7 +21,6 @@ from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Pipeline, Prepared, prepare
 from tomoskin.run.sinks import Contacts, Stream
 from tomoskin.twin import Press
-from tomoskin.twin.source import open_twin
 
 SKINS, CELLS, TIME_CONSTANTS = ("textile-disc-8", "textile-disc-16"), (660, 3000), ("0 s", "0.2 s")
 BY_FIT = (1, 2, 3)
@@ -129,23 +127,14 @@ def _growth(decoder: Decoder, pipeline: Pipeline, chunks: list[bytes]) -> float:
 
 def _chunks(prepared: Prepared, presses: int) -> tuple[list[bytes], list[bytes]]:
     """Encoded frames of an idle twin, then of one with so many presses that circle."""
-    transport = open_twin(f"fast,seed={SEED}", prepared.skin)
-    with Link(transport, prepared.scan, ScanSettings.of(prepared.skin)) as link:
-        idle = _take(link, IDLE)
-        pressed = []
-        for step in range(PRESSED):
-            turns = step / PRESSED + np.arange(presses) / presses
-            places = (0.05 * np.exp(2j * np.pi * turns)).tolist()
-            transport.set_presses(tuple(Press(p.real, p.imag, 4.0, 0.012) for p in places))
-            pressed += _take(link, 2)[1:]
+    rig, pressed = Rig(prepared.skin, "textile", SEED), []
+    idle = [encode(rig.frame()) for _ in range(IDLE)]
+    for step in range(PRESSED):
+        places = (
+            0.05 * np.exp(2j * np.pi * (step / PRESSED + np.arange(presses) / presses))
+        ).tolist()
+        pressed.append(encode(rig.frame(Press(p.real, p.imag, 4.0, 0.012) for p in places)))
     return idle, pressed
-
-
-def _take(link: Link, count: int) -> list[bytes]:
-    frames: list[Frame] = []
-    while len(frames) < count:
-        frames += [item for item in link.poll(1.0) if isinstance(item, Frame)]
-    return [encode(frame) for frame in frames[:count]]
 
 
 def run_several() -> Iterator[Report]:

@@ -20,7 +20,6 @@ from report import Report, recordings, table
 from tomoskin.core import FloatArray
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Disc, ElectrodeArc, triangulate
-from tomoskin.model.pattern import Pattern
 
 RADIUS, PIXELS, CELLS = 0.115, 256, 9000
 WIDTHS = (0.0115, 0.0125, 0.0135)
@@ -41,23 +40,23 @@ class Tank:
     u_ref: FloatArray
 
 
-def simulated(seed: int, inj: FloatArray, mpat: FloatArray) -> Tank:
+def simulated(example: Any, seed: int, inj: FloatArray, mpat: FloatArray) -> Tank:
     """A tank with one to four targets, its own contacts, channels and change of the water."""
     rng = np.random.default_rng(seed)
     truth = targets(rng)
-    model = _model(float(rng.choice(WIDTHS)), inj, mpat)
+    model = _model(example, float(rng.choice(WIDTHS)))
     model = ForwardModel(
         model.mesh, model.pattern, np.exp(rng.normal(np.log(3e-4), 0.9, 32)), model.current
     )
-    leak = np.asarray(rng.normal(0.0, 0.012, mpat.shape[1]))
+    readout = example.Readout(inj, mpat, np.ones(inj.shape[1] * mpat.shape[1], bool))
+    rows = readout.rows(rng.normal(0.0, 0.012, mpat.shape[1]))
     water = 0.73
     drifted, plastic = water * np.exp(rng.normal(0.0, 0.03)), 0.004
     metal = np.exp(rng.uniform(np.log(8.0), np.log(300.0)))
     sigma = _mixed(model, truth, np.array([drifted, plastic, metal]))
-    u_ref, change = _read(model, water, inj, mpat, leak), _read(model, sigma, inj, mpat, leak)
-    change -= u_ref
-    touched = ((inj != 0).T @ (mpat != 0)).ravel()
-    n = len(change)
+    u_ref = rows @ model.solve(water).voltages
+    change = rows @ model.solve(sigma).voltages - u_ref
+    n, touched = len(change), readout.touched
     u_ref += rng.normal(0.0, 0.004, n) + touched * rng.normal(0.0, 0.02, n)
     change *= 1.0 + 0.025 * rng.standard_normal(n)
     change += 3e-4 * rng.standard_normal(n) + touched * rng.normal(0.0, 0.01, n)
@@ -121,20 +120,12 @@ def _pixels() -> FloatArray:
     return np.column_stack([x.ravel(), y.ravel()])
 
 
-_MODELS: dict[float, ForwardModel] = {}
-
-
-def _model(width: float, inj: FloatArray, mpat: FloatArray) -> ForwardModel:
-    if width not in _MODELS:
-        rim = Disc(RADIUS)
-        arcs = [ElectrodeArc.around((0.25 + k / 32) * rim.length, width) for k in range(32)]
-        drives = np.column_stack([inj.argmax(axis=0), inj.argmin(axis=0)])
-        pairs = np.column_stack([mpat.argmax(axis=0), mpat.argmin(axis=0)])
-        unique = np.unique(np.sort(drives, axis=1), axis=0)
-        pattern = Pattern.from_pairs(32, unique, pairs, include_driven=True)
-        mesh = triangulate(rim, arcs, CELLS, seed=5)
-        _MODELS[width] = ForwardModel(mesh, pattern, 1e-4)
-    return _MODELS[width]
+@cache
+def _model(example: Any, width: float) -> ForwardModel:
+    """On a mesh of its own, of 1 A, as the example's is."""
+    rim = Disc(RADIUS)
+    arcs = [ElectrodeArc.around((0.25 + k / 32) * rim.length, width) for k in range(32)]
+    return ForwardModel(triangulate(rim, arcs, CELLS, seed=5), example.resistances(), 1e-4)
 
 
 def _mixed(model: ForwardModel, truth: NDArray[np.uint8], values: FloatArray) -> FloatArray:
@@ -147,19 +138,6 @@ def _mixed(model: ForwardModel, truth: NDArray[np.uint8], values: FloatArray) ->
     water = values[0]
     reflection = ((found - water) / (found + water)).mean(axis=1)
     return np.asarray(water * (1 + reflection) / (1 - reflection))
-
-
-def _read(
-    model: ForwardModel,
-    sigma: float | FloatArray,
-    inj: FloatArray,
-    mpat: FloatArray,
-    leak: FloatArray,
-) -> FloatArray:
-    """(rows,) V: differences of potentials, and a part of the common voltage over the sink's."""
-    at = inj.T @ model.transfer_resistance(sigma)
-    sink = np.take_along_axis(at, inj.argmin(axis=0)[:, None], axis=1)
-    return np.asarray((at @ mpat + leak * (at @ (np.abs(mpat) / 2) - sink)).ravel())
 
 
 LEVELS = range(1, 8)
@@ -225,7 +203,7 @@ def run(data: Path | None) -> Iterator[Report]:
 
 def _simulated(example: Any, level: int, inj: FloatArray, mpat: FloatArray) -> list[Judged]:
     seeds = range(6000 + 100 * level, 6000 + 100 * level + TANKS)
-    tanks = ((seed, simulated(seed, inj, mpat)) for seed in seeds)
+    tanks = ((seed, simulated(example, seed, inj, mpat)) for seed in seeds)
     return [
         judged(example, example.Sample(str(seed), t.u, t.u_ref, inj, mpat, t.truth), level)
         for seed, t in tanks
