@@ -155,21 +155,16 @@ def run_fingers(data: Path | None) -> Iterator[Report]:
         truth, numbers = kept["separation_mm"].tolist(), kept["row"].tolist()
     rows = []
     for far, number, readings in zip(truth, numbers, several(pairs), strict=True):
-        two, ends = len(readings) == 2, [(r.x, r.y) for r in readings]
-        one = "too close" if readings[0].close else "one"
-        rows.append(
-            {
-                "truly apart, mm": far,
-                "row": number,
-                "says": "two" if two else one,
-                "places, mm": "; ".join(f"{1e3 * x:.0f}, {1e3 * y:.0f}" for x, y in ends),
-                "found apart, mm": round(1e3 * float(np.hypot(*np.subtract(*ends))))
-                if two
-                else "–",
-            }
-        )
-    other = several(Set.of(folder / "round16_single500_ohmc.npz").dv[:200])
-    wrong = sum(len(readings) == 2 for readings in other)
+        row = {"truly apart, mm": far, "row": number, "says": "one", "found apart, mm": "–"}
+        if len(readings) == 2:
+            one, other = readings
+            apart = float(np.hypot(one.x - other.x, one.y - other.y))
+            row |= {"says": "two", "found apart, mm": round(1e3 * apart)}
+        elif readings[0].close:
+            row["says"] = "too close"
+        rows.append(row)
+    singles = several(Set.of(folder / "round16_single500_ohmc.npz").dv[:200])
+    wrong = sum(len(readings) == 2 for readings in singles)
     yield table(
         "two fingers on a hydrogel skin, learnt from single presses",
         rows,
