@@ -142,9 +142,7 @@ def run_several() -> Iterator[Report]:
     prepared = prepare(Skin.load(SEVERAL))
     prepared.warm_up()
     progress("processor time")
-    parts = processor_times(prepared, frames_of(prepared))
-    costs = parts.sum(axis=1)
-    yield table("processor time of a frame, ms", _costs(parts))
+    costs = processor_times(prepared, frames_of(prepared))
     yield table(
         f"{BOARDS} skins of 16 electrodes on one core that does nothing else",
         ({"frames/s a board": f"{rate:g}"} | queued(costs, rate) for rate in RATES),
@@ -152,22 +150,6 @@ def run_several() -> Iterator[Report]:
         f"measured, and the wait for the frames of the others in a queue; promised: {PROMISED} "
         "ms",
     )
-
-
-def _costs(parts: FloatArray) -> Iterator[dict[str, Any]]:
-    """What a frame costs with none, one and two presses, and what of it is not the pipeline."""
-    ends = np.cumsum(CYCLE)
-    spans = zip(("none", "one", "two", "none again"), ends - CYCLE, ends, strict=True)
-    for presses, first, last in spans:
-        whole = 1e3 * parts[first:last].sum(axis=1)
-        around = 1e3 * (parts[first:last, 0] + parts[first:last, 2])
-        yield {
-            "presses": presses,
-            "median": f"{np.median(whole):.2f}",
-            "mean": f"{whole.mean():.2f}",
-            "99 of 100": f"{np.percentile(whole, 99):.2f}",
-            "of it decoding and contacts": f"{np.median(around):.2f}",
-        }
 
 
 def frames_of(prepared: Prepared) -> list[Frame]:
@@ -180,7 +162,7 @@ def frames_of(prepared: Prepared) -> list[Frame]:
 
 
 def processor_times(prepared: Prepared, frames: Sequence[Frame]) -> FloatArray:
-    """(n, 3) s for each frame to be decoded, to become touches, and these contacts.
+    """(n,) s for each frame to be decoded, to become touches, and these contacts.
 
     In a second cycle, when the sheet and the alpha are found.
     """
@@ -189,16 +171,13 @@ def processor_times(prepared: Prepared, frames: Sequence[Frame]) -> FloatArray:
     for number in range(2 * len(frames)):
         ticks = round(number / RATE * prepared.skin.readout.tick_rate)
         data = encode(replace(frames[number % len(frames)], sequence=number, ticks=ticks))
-        marks = [time.thread_time()]
+        began = time.thread_time()
         (frame,) = decoder.feed(data, number / RATE)
         assert isinstance(frame, Frame)
-        marks.append(time.thread_time())
         result = pipeline.push(frame)
-        marks.append(time.thread_time())
         if result is not None:
             _ = Contacts.of(stream, result).touches
-        marks.append(time.thread_time())
-        times.append(np.diff(marks))
+        times.append(time.thread_time() - began)
     return np.array(times[len(frames) :])
 
 

@@ -174,15 +174,16 @@ def run_fingers(data: Path | None) -> Iterator[Report]:
     )
 
 
-def _disc() -> Skin:
+def disc(**electrodes: str) -> Skin:
+    """The five skins' outline, and where their electrodes are, as far as that is given."""
     return Skin.load("textile-disc-16").altered(
-        {"outline": {"diameter": DIAMETER}, "electrodes": {"width": "3 mm"}}
+        {"outline": {"diameter": DIAMETER}, "electrodes": {"width": "3 mm"} | electrodes}
     )
 
 
 def _five_skins(folder: Path) -> Iterator[Report]:
-    disc = _disc()
-    sets = {name: Set.of(folder / f"{name}.npz", disc) for name in SKINS}
+    skin = disc()
+    sets = {name: Set.of(folder / f"{name}.npz", skin) for name in SKINS}
     rows, skins = [], []
     for count, repeats in COUNTS.items():
         scores = {
@@ -250,7 +251,7 @@ def _another_session(folder: Path) -> Iterator[dict[str, Any]]:
 def _aligned(data: Path) -> Iterator[dict[str, Any]]:
     """A calibration on other sessions and skins: as learnt, aligned without labels and with ten."""
     ways = ("as learnt", "aligned, no labels", "with ten")
-    for (before, today), skin in (*((pair, None) for pair in PAIRS), (OUTLINE, _disc())):
+    for (before, today), skin in (*((pair, None) for pair in PAIRS), (OUTLINE, disc())):
         old, new = (Set.of(data / f"{name}.npz", skin) for name in (before, today))
         scores = np.array([_transferred(old, new, seed) for seed in DRAWS])
         means = scores[:, 1:].mean(axis=0).reshape(-1, 2)
