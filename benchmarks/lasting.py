@@ -14,7 +14,7 @@ from report import Floats, Report, progress, table
 from tomoskin.core import Touch
 from tomoskin.learning import FORCE
 from tomoskin.model.skin import Skin
-from tomoskin.pipeline import FrameResult, Pipeline, Prepared, prepare
+from tomoskin.pipeline import Pipeline, Prepared, prepare
 from tomoskin.run.board_memory import Trial
 from tomoskin.twin import Press
 
@@ -149,32 +149,23 @@ def run_restarted() -> Iterator[Report]:
 def _again(
     prepared: Prepared, pause: float, warmer: float, force: float, seed: int
 ) -> tuple[str, int, float]:
-    """Verdict, touches in the last frame, and mm from the press to the nearest of them."""
+    """Verdict, touches in the last frame, and mm from the press to the nearest of them, of a second
+    run, which begins with the last frames of the first."""
     x, y = np.random.default_rng(seed).uniform(-SPREAD, SPREAD, 2).tolist()
-    press = (Press(x, y, force=force, radius=RADIUS),) if force else ()
     trial, verdict, last = Trial(0.0), None, None
-    for last in _restarted(prepared, pause, warmer, press, seed):
-        verdict = trial.push(last) if verdict is None else verdict
-    assert last is not None
-    near = nearest(last.touches, (x, y)) if force else None
-    error = np.nan if near is None else 1e3 * gap(near, (x, y))
-    return VERDICTS[verdict], len(last.touches), error
-
-
-def _restarted(
-    prepared: Prepared, pause: float, warmer: float, presses: tuple[Press, ...], seed: int
-) -> Iterator[FrameResult]:
-    """Results of the second run, which begins with the last frames of the first."""
-    rig = Rig(prepared.skin, "textile", seed)
+    rig, pipeline = Rig(prepared.skin, "textile", seed), Pipeline(prepared)
     begun, rate = KEPT * rig.interval + pause, prepared.skin.readout.tick_rate
     kept = [rig.frame() for _ in range(KEPT)]
     rig.board.sheet.warm(warmer)
-    rig.board.sheet.set_presses(presses)
-    pipeline = Pipeline(prepared)
+    rig.board.sheet.set_presses((Press(x, y, force=force, radius=RADIUS),) if force else ())
     for number, frame in enumerate(kept):
         pipeline.push(replace(frame, host_time=begun - 1e-3 * (KEPT - number)))
     for number in range(FRAMES):
         since = number * rig.interval
         frame = replace(rig.at(begun + since), sequence=number, ticks=round(since * rate))
         if (result := pipeline.push(frame)) is not None:
-            yield result
+            verdict, last = trial.push(result) if verdict is None else verdict, result
+    assert last is not None
+    near = nearest(last.touches, (x, y)) if force else None
+    error = np.nan if near is None else 1e3 * gap(near, (x, y))
+    return VERDICTS[verdict], len(last.touches), error

@@ -149,31 +149,14 @@ COARSE = 64
 """Pixels a side where certainty is judged."""
 
 
-@dataclass(frozen=True, eq=False)
-class Judged:
-    """One tank at one level.
+CERTAINTY = ("wrong", "ranked", "loss", "constant")
+"""Part of the pixels with a wrong label; how often a wrong pixel is less sure than a right one; the
+mean of −log₂ of the probability that the true label was given, in bits; and what that were if each
+label counted as wrong as often as labels are."""
 
-    Attributes
-    ----------
-    scores
-        (3,) in the order of METHODS.
-    seconds
-        Of processor time, of one segmentation.
-    wrong
-        Part of the pixels with a wrong label.
-    ranked
-        How often a wrong pixel is less sure than a right one; 0.5 is chance.
-    loss, constant
-        Mean of −log₂ of the probability that the true label was given, in bits, and what it were
-        if each label counted as wrong as often as labels are.
-    """
-
-    scores: FloatArray
-    seconds: float
-    wrong: float
-    ranked: float
-    loss: float
-    constant: float
+Judged = dict[str, float]
+"""Of one tank at one level: the score of each of METHODS, ``seconds`` of processor time of one
+segmentation, and CERTAINTY."""
 
 
 def run(data: Path | None) -> Iterator[Report]:
@@ -219,15 +202,16 @@ def judged(example: Any, tank: Any, level: int) -> Judged:
     seconds = time.process_time() - begun
     linear = example.linear(tank.u, tank.u_ref, tank.inj, tank.mpat, keep)
     pictures = (labels, linear, np.zeros_like(labels))
-    scores = np.array([example.score(picture, tank.truth) for picture in pictures])
+    scores = (example.score(picture, tank.truth) for picture in pictures)
     points, inside = example.pixels(COARSE)
     step = example.PIXELS // COARSE
     truth = np.asarray(tank.truth)[step // 2 :: step, step // 2 :: step][inside]
-    return Judged(scores, seconds, *certainty(found, points, truth))
+    about = zip(CERTAINTY, certainty(found, points, truth), strict=True)
+    return {**dict(zip(METHODS, scores, strict=True)), "seconds": seconds, **dict(about)}
 
 
 def certainty(found: Any, points: FloatArray, truth: Any) -> tuple[float, float, float, float]:
-    """Part of the ``points`` that is wrong, and the three numbers of :class:`Judged` about it."""
+    """What CERTAINTY names, at ``points``."""
     wrong = found.at(points) != truth
     rank, n = rankdata(found.entropy(points)), int(wrong.sum())
     above = rank[wrong].sum() - n * (n + 1) / 2
@@ -240,20 +224,20 @@ def certainty(found: Any, points: FloatArray, truth: Any) -> tuple[float, float,
 
 def _scores(name: str, group: Sequence[Sequence[Judged]]) -> Iterator[dict[str, Any]]:
     """Mean and its standard error at each level, and over all."""
-    for k, method in enumerate(METHODS):
-        scores = np.array([[tank.scores[k] for tank in tanks] for tanks in group])
+    for method in METHODS:
+        scores = np.array([[tank[method] for tank in tanks] for tanks in group])
         error = scores.std(axis=1, ddof=1) / np.sqrt(scores.shape[1])
         means = [*scores.mean(axis=1), scores.mean()]
         errors = [*error, np.sqrt((error**2).sum()) / len(error)]
         values = [f"{m:.3f} ± {e:.3f}" for m, e in zip(means, errors, strict=True)]
         yield _by_level(name, method, values) | {"times 21": f"{21 * scores.mean():.2f}"}
-    taken = np.array([np.mean([tank.seconds for tank in tanks]) for tanks in group])
+    taken = np.array([np.mean([tank["seconds"] for tank in tanks]) for tanks in group])
     yield _by_level(name, "seconds", [f"{s:.1f}" for s in (*taken, taken.mean())])
 
 
 def _certainty(name: str, group: Sequence[Sequence[Judged]]) -> Iterator[dict[str, Any]]:
-    for what in ("wrong", "ranked", "loss", "constant"):
-        means = np.array([np.mean([getattr(tank, what) for tank in tanks]) for tanks in group])
+    for what in CERTAINTY:
+        means = np.array([np.mean([tank[what] for tank in tanks]) for tanks in group])
         yield _by_level(name, what, [f"{m:.3f}" for m in (*means, means.mean())])
 
 
