@@ -58,15 +58,9 @@ def disc(name: str, cells: int) -> Case:
 def tank(name: str, cells: int, layers: int) -> Case:
     """Tetrahedra of a cylinder with a ring of electrodes."""
     mesh = cylinder(
-        RADIUS,
-        RADIUS,
-        count=ELECTRODES,
-        width=0.02,
-        bottom=0.04,
-        top=0.06,
-        cells=cells,
+        RADIUS, RADIUS, count=ELECTRODES, width=0.02, bottom=0.04, top=0.06, cells=cells,
         layers=layers,
-    )
+    )  # fmt: skip
     return Case(name, mesh)
 
 

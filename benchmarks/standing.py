@@ -162,8 +162,7 @@ def _trials(prepared: Prepared, seed: int, heavy: float, light: float) -> list[t
     twin, trials = SteppedSkin(prepared, TwinSettings.preset("textile", seed)), []
     for number in range(TRIALS):
         random = np.random.default_rng((seed, number))
-        reach, turn = 0.07 * np.sqrt(random.uniform()), random.uniform(0, 2 * np.pi)
-        x, y = float(reach * np.cos(turn)), float(reach * np.sin(turn))
+        ((x, y),) = evenly(random, 1, 0.07).tolist()
         twin.reset(seed)
         first = _is_found(twin, Press(x, y, heavy, 10e-3), FIRST)
         between = _is_shown(twin, random.uniform(*BETWEEN))

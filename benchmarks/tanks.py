@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -31,17 +30,8 @@ GAP, RIM, SMALLEST = 6, 0.108, 400
 Inside = Callable[[FloatArray], NDArray[np.bool_]]
 
 
-@dataclass(frozen=True, eq=False)
-class Tank:
-    """What was in it, (256, 256), and what was measured, (rows,) V."""
-
-    truth: NDArray[np.uint8]
-    u: FloatArray
-    u_ref: FloatArray
-
-
-def simulated(example: Any, seed: int, inj: FloatArray, mpat: FloatArray) -> Tank:
-    """A tank with one to four targets, its own contacts, channels and change of the water."""
+def simulated(example: Any, seed: int, inj: FloatArray, mpat: FloatArray) -> Any:
+    """A sample with one to four targets, its own contacts, channels and change of the water."""
     rng = np.random.default_rng(seed)
     truth = targets(rng)
     model = _model(example, float(rng.choice(WIDTHS)))
@@ -64,7 +54,7 @@ def simulated(example: Any, seed: int, inj: FloatArray, mpat: FloatArray) -> Tan
     gain = (1 + 0.01 * rng.standard_normal((shape[0], 1))) * (
         1 + 0.01 * rng.standard_normal(shape[1])
     )
-    return Tank(truth, u_ref + change * gain.ravel(), u_ref)
+    return example.Sample(str(seed), u_ref + change * gain.ravel(), u_ref, inj, mpat, truth)
 
 
 def targets(rng: np.random.Generator) -> NDArray[np.uint8]:
@@ -186,11 +176,7 @@ def run(data: Path | None) -> Iterator[Report]:
 
 def _simulated(example: Any, level: int, inj: FloatArray, mpat: FloatArray) -> list[Judged]:
     seeds = range(6000 + 100 * level, 6000 + 100 * level + TANKS)
-    tanks = ((seed, simulated(example, seed, inj, mpat)) for seed in seeds)
-    return [
-        judged(example, example.Sample(str(seed), t.u, t.u_ref, inj, mpat, t.truth), level)
-        for seed, t in tanks
-    ]
+    return [judged(example, simulated(example, seed, inj, mpat), level) for seed in seeds]
 
 
 def judged(example: Any, tank: Any, level: int) -> Judged:
