@@ -21,7 +21,7 @@ from tomoskin.pipeline import Prepared, Unresolved, colour_limit
 from tomoskin.run import Runner, SetPresses, Snapshot, StrictRequest, commands
 from tomoskin.server import views
 from tomoskin.server.frames import encode_result
-from tomoskin.server.page_connection import Handler, Handlers, Host, Listener, Tasks, during
+from tomoskin.server.page_connection import Handler, Handlers, Host, Page, Tasks, during
 from tomoskin.server.page_messages import (
     EventNote,
     Message,
@@ -40,22 +40,22 @@ FILE_NAME = "tomoskin-%Y%m%d-%H%M%S.mcap"
 def run_handlers(runner: Runner, folder: Path, tasks: Tasks) -> Handlers:
     """Handlers of a run whose recordings go to ``folder``, under names of their own."""
 
-    def submit(_: Listener, request: commands.Command) -> None:
+    def submit(_: Page, request: commands.Command) -> None:
         runner.submit(request)
 
-    def press(page: Listener, request: SetPresses) -> None:
+    def press(page: Page, request: SetPresses) -> None:
         runner.submit(commands.HoldPresses(page, _on_skin(request, runner.prepared.skin)))
 
-    def paint(page: Listener, request: Painted) -> None:
+    def paint(page: Page, request: Painted) -> None:
         runner.latency.set_paint(page, request.p50_s, request.p99_s)
 
-    def record(_: Listener, request: SetRecording) -> None:
+    def record(_: Page, request: SetRecording) -> None:
         tasks.keep(_record(runner, folder, on=request.on))
 
-    def map_out(page: Listener, _: AskUnresolved) -> None:
+    def map_out(page: Page, _: AskUnresolved) -> None:
         tasks.run(page, partial(_unresolved, runner), lambda map_: page.post(map_.json))
 
-    def play(page: Listener, request: commands.ReplayCommand) -> None:
+    def play(page: Page, request: commands.ReplayCommand) -> None:
         tasks.run(page, partial(runner.ask, request), lambda _: None)  # a seek may read a file
 
     return {
@@ -133,7 +133,7 @@ class Hub(Host):
         self.tasks = Tasks()
         self._handlers: dict[type, Handler] = {}
         self._greetings: list[Callable[[], Sequence[Message]]] = []
-        self._farewells: list[Callable[[Listener], None]] = []
+        self._farewells: list[Callable[[Page], None]] = []
         self._wake_is_due = False
         self._next_event = 0
         self._timeline: PlayedTimeline | None = None
@@ -147,7 +147,7 @@ class Hub(Host):
         self,
         handlers: Handlers,
         greeting: Callable[[], Sequence[Message]] = tuple,
-        farewell: Callable[[Listener], None] = lambda _: None,
+        farewell: Callable[[Page], None] = lambda _: None,
     ) -> None:
         """Answer these requests too, before the first page comes.
 
@@ -196,7 +196,7 @@ class Hub(Host):
         if self._made is not None and self._made[1] is frame:
             self.runner.latency.add_published(time.monotonic() - self._made[0].ready)
 
-    def leave(self, page: Listener, why: str = "") -> None:
+    def leave(self, page: Page, why: str = "") -> None:
         """Serve ``page`` no longer, and lift what it pressed."""
         super().leave(page)
         self.runner.submit(commands.HoldPresses(page, ()))
@@ -206,7 +206,7 @@ class Hub(Host):
         if why:
             self.runner.say("page-dropped", why)
 
-    def obey(self, page: Listener, request: StrictRequest) -> None:
+    def obey(self, page: Page, request: StrictRequest) -> None:
         """Do what a page asks. Raises WireError where that cannot be."""
         handler = self._handlers.get(type(request))
         if handler is None:

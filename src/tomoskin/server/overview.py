@@ -17,7 +17,7 @@ from tomoskin.files.messages import Contacts, Stream
 from tomoskin.model.robot import PlacedSkin, Pose, Robot
 from tomoskin.run import RobotRun, Runner, StrictRequest, commands
 from tomoskin.server.hub import FILE_NAME
-from tomoskin.server.page_connection import Host, Listener, Tasks, during
+from tomoskin.server.page_connection import Host, Page, Tasks, during
 from tomoskin.server.page_messages import (
     PlacedShape,
     RobotScene,
@@ -75,14 +75,14 @@ class Overview(Host):
         """The newest touches on all skins, JSON in bytes; None before the first."""
         return self._touches or None
 
-    def leave(self, page: Listener, why: str = "") -> None:
+    def leave(self, page: Page, why: str = "") -> None:
         """Stop serving ``page``, and say why in every run."""
         super().leave(page)
         if why:
             for runner in self.run.runners.values():
                 runner.say("page-dropped", why)
 
-    def obey(self, page: Listener, request: StrictRequest) -> None:
+    def obey(self, page: Page, request: StrictRequest) -> None:
         """Do what a page asks of all skins. Raises WireError where that cannot be."""
         match request:
             case commands.TakeReference():

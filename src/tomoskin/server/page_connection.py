@@ -7,7 +7,7 @@ import contextlib
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import AsyncIterator, Callable, Coroutine, Iterable, Mapping
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
@@ -19,17 +19,7 @@ from tomoskin.server.requests import decode_request
 _T = TypeVar("_T")
 
 
-class Listener(Protocol):
-    """What a handler needs of a page's connection."""
-
-    def wake(self) -> None:
-        """Say that there is a new frame."""
-
-    def post(self, text: str) -> None:
-        """Send ``text`` soon, without waiting for it."""
-
-
-Handler = Callable[[Listener, Any], None]
+Handler = Callable[["Page", Any], None]
 """Does what a page asks; in the event loop, so it returns at once. WireError refuses."""
 
 Handlers = Mapping[type, Handler]
@@ -61,7 +51,7 @@ class Tasks:
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
-    def run(self, page: Listener, work: Callable[[], _T], then: Callable[[_T], None]) -> None:
+    def run(self, page: Page, work: Callable[[], _T], then: Callable[[_T], None]) -> None:
         """Do ``work`` in a thread and ``then`` in the loop; what it raises goes to ``page``."""
 
         async def run() -> None:
@@ -98,7 +88,7 @@ class Host(ABC):
     """
 
     def __init__(self) -> None:
-        self.pages: set[Listener] = set()
+        self.pages: set[Page] = set()
 
     @abstractmethod
     def first(self) -> Iterable[Message]:
@@ -113,10 +103,10 @@ class Host(ABC):
         """Note that a page has the frame."""
 
     @abstractmethod
-    def obey(self, page: Listener, request: StrictRequest) -> None:
+    def obey(self, page: Page, request: StrictRequest) -> None:
         """Do what a page asks. Raises WireError where that cannot be."""
 
-    def join(self, page: Listener) -> bool:
+    def join(self, page: Page) -> bool:
         """Serve ``page`` from now on; False where there are too many."""
         if len(self.pages) >= MAX_PAGES:
             return False
@@ -125,7 +115,7 @@ class Host(ABC):
             page.post(message.json)
         return True
 
-    def leave(self, page: Listener, why: str = "") -> None:  # noqa: ARG002
+    def leave(self, page: Page, why: str = "") -> None:  # noqa: ARG002
         """Stop serving ``page``, whatever the reason."""
         self.pages.discard(page)
 
