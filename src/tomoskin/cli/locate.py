@@ -12,7 +12,7 @@ import typer
 from tomoskin.cli.named_files import ForceFlag, Reads
 from tomoskin.cli.named_parts import Recorded, reconstructed
 from tomoskin.cli.options import RecordingArgument, ReferenceOption, SameSkinOption, TouchesOut
-from tomoskin.cli.output import Bar, JsonFlag, emit, remark
+from tomoskin.cli.output import Bar, JsonFlag, remark, tell
 
 if TYPE_CHECKING:
     from tomoskin.core import FloatArray, Touch
@@ -136,29 +136,29 @@ def _report(
     data: Recording, frames: list[int], touches: list[tuple[Touch, ...]], *, json: bool
 ) -> None:
     rows = [(frame, touch) for frame, some in zip(frames, touches, strict=True) for touch in some]
-    if json:
-        emit(
-            [
-                {
-                    "frame": frame,
-                    "time_s": float(data.time[frame]),
-                    "x_m": touch.detection.x,
-                    "y_m": touch.detection.y,
-                    "sd_x_m": touch.detection.sd_x,
-                    "sd_y_m": touch.detection.sd_y,
-                    "strength": touch.detection.peak,
-                    "kind": touch.said,
-                }
-                for frame, touch in rows
-            ]
-        )
-        return
+    document = [
+        {
+            "frame": frame,
+            "time_s": float(data.time[frame]),
+            "x_m": touch.detection.x,
+            "y_m": touch.detection.y,
+            "sd_x_m": touch.detection.sd_x,
+            "sd_y_m": touch.detection.sd_y,
+            "strength": touch.detection.peak,
+            "kind": touch.said,
+        }
+        for frame, touch in rows
+    ]
+    tell(document, _lines(rows), json=json)
+
+
+def _lines(rows: list[tuple[int, Touch]]) -> Iterator[str]:
     for frame, touch in rows[:_SHOWN]:
         r = touch.detection
         close = "" if touch.said == touch.kind else f"  {touch.said}"
-        typer.echo(
+        yield (
             f"frame {frame:>4}  x {1e3 * r.x:+7.1f} ± {1e3 * r.sd_x:4.1f} mm  "
             f"y {1e3 * r.y:+7.1f} ± {1e3 * r.sd_y:4.1f} mm  strength {r.peak:.2f}{close}"
         )
     if len(rows) > _SHOWN:
-        typer.echo(f"… and {len(rows) - _SHOWN} more touches: --touches writes all")
+        yield f"… and {len(rows) - _SHOWN} more touches: --touches writes all"
