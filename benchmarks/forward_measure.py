@@ -193,13 +193,7 @@ def _agree(other: FloatArray, own: FloatArray, whose: str) -> None:
 
 
 def _against_peer(model: ForwardModel, sigma: FloatArray, which: str) -> dict[str, float]:
-    peer = others.Peer(model.mesh, model.pattern)
-    peer.prepare()
-    calls = {
-        "peer forward": lambda: peer.forward(sigma),
-        "peer jacobian": lambda: peer.jacobian(sigma),
-        "peer set-up": lambda: peer.set_up(ALPHA),
-    }
+    calls = others.Peer(model.mesh, model.pattern).calls(sigma, ALPHA)
     chosen = {name: call for name, call in calls.items() if name.split()[1][0] in which}
     return medians(chosen, SECONDS) if chosen else {}
 
