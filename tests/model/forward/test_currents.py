@@ -76,7 +76,9 @@ def test_what_cannot_be_driven_is_named() -> None:
     assert caught.value.where == "drive row 0"
     with pytest.raises(PatternError, match="not all zero"):
         Pattern.from_pairs(N, 0.0 * CURRENTS, RING, include_driven=True)
-    with pytest.raises(PatternError, match=r"currents \(rows, 9\) into every electrode, got \(40, 8\)"):
+    with pytest.raises(
+        PatternError, match=r"currents \(rows, 9\) into every electrode, got \(40, 8\)"
+    ):
         Pattern.from_tables(SPREAD.drive, SPREAD.measure, 9)
     with pytest.raises(PatternError, match="include_driven=True"):
         Pattern.from_pairs(N, CURRENTS, RING)

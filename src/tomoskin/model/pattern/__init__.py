@@ -8,6 +8,7 @@ from tomoskin.model.pattern.pattern import (
     drive_table,
     electrodes_of,
     named,
+    signed,
     undirected,
 )
 from tomoskin.model.pattern.scan import Scan
@@ -23,6 +24,7 @@ __all__ = [
     "electrodes_of",
     "match_rows",
     "named",
+    "signed",
     "sum_rows",
     "undirected",
 ]
