@@ -72,7 +72,7 @@ def test_a_press_is_found_where_it_was(save, image, tmp_path, reference) -> None
     assert np.hypot(*np.subtract(places(table)[3], PLACE)) < 0.012
 
 
-def test_currents_into_many_electrodes(save, image, tmp_path, frames) -> None:
+def test_currents_into_many_electrodes(save, image, tmp_path) -> None:
     """Cosines of all electrodes: the same press, of files with all they need and with too few."""
     angle, ring = 2.0 * np.pi * np.arange(8) / 8, [[e, (e + 1) % 8] for e in range(8)]
     waves = [f(k * angle + 0.1) for k in range(1, 5) for f in (np.cos, np.sin)][:7]
@@ -84,7 +84,7 @@ def test_currents_into_many_electrodes(save, image, tmp_path, frames) -> None:
     values = np.array([model.solve(SKIN.conductivity).voltages, model.solve(sigma).voltages])
     rows = {"voltages": values, "drive": pattern.drive, "measure": pattern.measure}
     table = tmp_path / "touches.csv"
-    code, out, err = image(save(**rows), "--touches", table)
+    code, _, err = image(save(**rows), "--touches", table)
     assert code == 0
     assert "56 rows with drives of several electrodes were summed to pairs" in err
     assert np.hypot(*np.subtract(places(table)[1], PLACE)) < 0.012

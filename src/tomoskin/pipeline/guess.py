@@ -65,7 +65,9 @@ def guess_skin(recording: Recording) -> str:
         head.append(f"Check the order of the electrodes: {fault}.")
     if agreement.cosine < 0.0:
         drive = [*drive, "# From the untouched frame.", 'polarity = "reversed"']
-    return _text(recording, n, [*certain, *drive], head, resistance, potential)
+    return _text(
+        recording, n, [*certain, *drive], head=head, resistance=resistance, potential=potential
+    )
 
 
 def _drive(recording: Recording, n: int) -> tuple[list[str], list[str]]:
@@ -108,6 +110,7 @@ def _text(
     recording: Recording,
     n: int,
     drive: list[str],
+    *,
     head: list[str] | None = None,
     resistance: float = _RESISTANCE,
     potential: float = 0.06,
@@ -130,7 +133,7 @@ def _text(
         "# Not in the data.",
         f'width = "{width:.3g} mm"', 'contact_impedance = "0.02 ohm*m"', "",
         "[material]",
-        "# Fitted to the untouched frame if that can be in volts; right with the true current only.",
+        "# Fitted to the untouched frame where that can be in volts; right for the true current.",
         f'sheet_resistance = "{resistance:.4g} ohm/sq"', "",
         "[drive]",
         *drive,
