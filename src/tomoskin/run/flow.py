@@ -17,7 +17,7 @@ from tomoskin.run.intake import Intake, Marker, replay_status
 from tomoskin.run.publisher import Audience, Publisher
 from tomoskin.run.status import CostMeter, Latency, Status
 from tomoskin.run.twin_control import TwinControl, described
-from tomoskin.twin import Contact
+from tomoskin.twin import Probe
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,7 +26,7 @@ class Snapshot:
     ready, host monotonic s."""
 
     result: FrameResult
-    truth: tuple[Contact, ...]
+    truth: tuple[Probe, ...]
     latency: float
     ready: float
 
