@@ -41,7 +41,8 @@ def new_figure(path: StrPath, width: float, height: float) -> Figure:
 
 def panel_axes(figure: Figure, count: int, columns: int) -> list[Axes]:
     """So many axes in rows of that many ``columns``."""
-    axes = np.atleast_1d(figure.subplots(-(-count // columns), columns)).ravel().tolist()
+    rows = max(-(-count // columns), 1)
+    axes = np.atleast_1d(figure.subplots(rows, columns)).ravel().tolist()
     for ax in axes[count:]:
         ax.set_visible(False)
     return axes[:count]
