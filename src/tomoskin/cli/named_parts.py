@@ -71,6 +71,12 @@ class Recorded:
             return self.rows
         if self.skin is not None:
             return self.skin.pattern()
+        if self.recording.spread:
+            raise DataError(
+                "has drives of several electrodes",
+                where=str(self.path),
+                hint="give --skin, to whose pattern they are summed",
+            )
         return Pattern.from_tables(self.recording.drive, self.recording.measure)
 
     @property
