@@ -27,7 +27,7 @@ def touch_facts(
     from tomoskin.learning import LeftOut, growth_of_errors
 
     left_out = LeftOut.of(locator)
-    older = len(locator.presses) - len(frames)
+    before = len(locator.presses) - len(frames)
     errors = 1e3 * locator.errors
     return {
         "presses": len(locator.presses),
@@ -42,7 +42,7 @@ def touch_facts(
         "growth": growth_of_errors(locator, older),
         "next_press_mm": (1e3 * locator.next_place()).tolist(),
         "remarks": [
-            {"frame": frames[r.row - older] if r.row >= older else None, "reason": r.reason}
+            {"frame": frames[r.row - before] if r.row >= before else None, "reason": r.reason}
             for r in locator.remarks
         ],
     }
