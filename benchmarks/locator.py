@@ -246,8 +246,14 @@ def _strangers(files: Mapping[str, Path]) -> Iterator[dict[str, Any]]:
             "in 90 % ellipse": percent(own[1]),
             "others, least": round(scores[nearest][0], 2),
             "which": Path(nearest).name,
-            "others in 90 % ellipse": percent(np.nanmin([held for _, held in scores.values()])),
+            "others in 90 % ellipse": _least([held for _, held in scores.values()]),
         }
+
+
+def _least(parts: list[float]) -> str:
+    """The least of the parts that are known."""
+    known = [part for part in parts if np.isfinite(part)]
+    return percent(min(known)) if known else "–"
 
 
 def _disc() -> Skin:
