@@ -196,9 +196,9 @@ def image(
             tables[thorough] = reconstructed(
                 recorded, prepared, reference, frames, bar, rule=rule, setting=ALONE
             )
-    for path, found in tables.items():
+    for path, part in tables.items():
         if path is not None:
-            rows = zip(found.frames.tolist(), found.time.tolist(), found.touches, strict=True)
+            rows = zip(part.frames.tolist(), part.time.tolist(), part.touches, strict=True)
             write_touches(path, rows, surface, forces=forces, overwrite=force)
     if results.out is not None:
         write = WRITERS[results.out.suffix.lower()]

@@ -191,8 +191,8 @@ def place(
     from tomoskin.model.robot import Robot, Urdf, add_skin
     from tomoskin.model.skin import Skin
 
-    found = Urdf.read(urdf)
-    found.check_link(link, "LINK")
+    robot = Urdf.read(urdf)
+    robot.check_link(link, "LINK")
     Skin.load(skin)
     earlier = Robot.load(out).skins if out.exists() else ()
     given: dict[str, Any] = {
@@ -200,7 +200,7 @@ def place(
         "skin": _from(skin, out) if skin.endswith(".toml") else skin,
         "source": source or f"twin:seed={len(earlier) + 1}",
         "link": link,
-    } | _pose(found, link, at, on_mesh=on_mesh)
+    } | _pose(robot, link, at, on_mesh=on_mesh)
     text = add_skin(out, given, _from(str(urdf), out))
     before = out.read_text(encoding="utf-8") if out.exists() else None
     write_text(out, text, overwrite=True)

@@ -2,17 +2,16 @@
 
 from tomoskin.pipeline.finding import located_alone, voltage_covariance
 from tomoskin.pipeline.following import Setting
-from tomoskin.pipeline.frame_result import DOUBTED, FrameResult, ModelAgreement, ReferenceState
+from tomoskin.pipeline.frame_result import FrameResult, ModelAgreement, ReferenceState
 from tomoskin.pipeline.imaging import Unresolved
 from tomoskin.pipeline.offline import ALONE, Gathered, Reconstruction, reconstruct
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES, Pipeline
 from tomoskin.pipeline.prepare import Prepared, colour_limit, prepare
-from tomoskin.pipeline.recorded import Idle, RecordedFrames, recorded_frames
-from tomoskin.pipeline.tune import tuned, tuned_by_rule, tuned_image, with_choice
+from tomoskin.pipeline.recorded import Idle, recorded_frames
+from tomoskin.pipeline.rest import tuned, tuned_by_rule, tuned_image, with_choice
 
 __all__ = [
     "ALONE",
-    "DOUBTED",
     "REFERENCE_FRAMES",
     "FrameResult",
     "Gathered",
@@ -21,7 +20,6 @@ __all__ = [
     "Pipeline",
     "Prepared",
     "Reconstruction",
-    "RecordedFrames",
     "ReferenceState",
     "Setting",
     "Unresolved",

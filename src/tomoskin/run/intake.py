@@ -171,9 +171,12 @@ class Repeats:
         self._said: dict[tuple[str, str], float] = {}
         self._waiting: dict[tuple[str, str], tuple[Event, int]] = {}
 
-    def push(self, now: float, events: Sequence[Event]) -> Iterator[Event]:
-        """What is to be said at ``now``, s: of ``events``, and of those that have waited."""
-        for event in events:
+    def push(self, now: float, items: Sequence[Frame | Event]) -> Iterator[Event]:
+        """What is to be said at ``now``, s: of the events of a read, and of those that have
+        waited."""
+        for event in items:
+            if isinstance(event, Frame):
+                continue
             key = event.kind, event.text
             if event.kind not in COUNTED:
                 yield event
@@ -203,6 +206,8 @@ class Intake:
         Why no frame comes until the board is well again, or None.
     skipped
         Frames that this host has left out.
+    backlog, repeats
+        How many frames of a read are left out; events that come again and again.
     """
 
     def __init__(self) -> None:
@@ -211,7 +216,7 @@ class Intake:
         self.skipped = 0
         self._link: Link | None = None
         self._drops, self._earlier = 0, Losses()
-        self._backlog, self._repeats = Backlog(), Repeats()
+        self.backlog, self.repeats = Backlog(), Repeats()
 
     def open(self) -> None:
         """A protocol session is to begin."""
@@ -238,11 +243,3 @@ class Intake:
             elif item.kind in _STANDSTILL:
                 self.standstill = item.text
         return frames
-
-    def late(self, frames: int) -> int:
-        """How many of ``frames`` of the newest read, the oldest, are left out."""
-        return self._backlog.late(frames, self.waited) if frames else 0
-
-    def worth_saying(self, now: float, items: Sequence[Frame | Event]) -> Iterator[Event]:
-        """The events of a read, and what happens again and again once a second."""
-        return self._repeats.push(now, [item for item in items if isinstance(item, Event)])

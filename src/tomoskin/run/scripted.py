@@ -16,7 +16,6 @@ from tomoskin.model.skin import Skin
 from tomoskin.pipeline import REFERENCE_FRAMES
 from tomoskin.run.twin_control import described
 from tomoskin.twin import (
-    Contact,
     Disturbance,
     Line,
     LineSettings,
@@ -121,7 +120,7 @@ class _Run:
         self._frame_time = Configuration.of(self._scan, self._asked).scan_time
         contact = settings.contact
         self._friction = {"slide": contact.friction, "roll": contact.rolling_friction}
-        self._truth: tuple[tuple[Contact, ...], list[dict[str, float | str]]] = ((), [])
+        self._truth: tuple[tuple[Probe, ...], list[dict[str, float | str]]] = ((), [])
         self._disturbance = Disturbance()
         self._marks = sorted(script.marks, key=lambda mark: mark.given.at)
         self._frames = 0

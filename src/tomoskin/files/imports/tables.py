@@ -65,20 +65,25 @@ def pairs_of(patterns: NDArray[Any], what: str, source: str) -> IntArray:
     return np.column_stack([signs.argmax(axis=1), signs.argmin(axis=1)])
 
 
-def adjacent_scan(n: int, step: int = 1) -> tuple[IntArray, IntArray]:
-    """Drive (n², 2) and measure of a full scan of neighbouring pairs, drive by drive.
-
-    Drive k has one end at k and the other at k + ``step``; the pair read is j, j + 1. The ends
-    are named as in the built-in patterns: sink k, source k + step, plus j, minus j + 1.
-    """
-    k, j = np.divmod(np.arange(n * n), n)
-    drive = np.column_stack([(k + step) % n, k])
-    return drive, np.column_stack([j, (j + 1) % n])
+def neighbours(n: int) -> IntArray:
+    """(n, 2) each electrode and the next."""
+    e = np.arange(n)
+    return np.column_stack([e, (e + 1) % n])
 
 
-def touches_drive(drive: IntArray, measure: IntArray) -> NDArray[np.bool_]:
-    """(n,) whether a row's measuring pair touches its drive."""
-    return np.asarray((drive[:, :, None] == measure[:, None, :]).any(axis=(1, 2)))
+def scan_of(
+    drives: IntArray, pairs: IntArray
+) -> tuple[tuple[IntArray, IntArray], NDArray[np.bool_]]:
+    """Rows of a scan of all ``pairs`` (m, 2) under each of ``drives`` (k, 2) that touch no driven
+    electrode, drive and measure; and (k·m,) which of its values these are."""
+    drive, measure = np.repeat(drives, len(pairs), axis=0), np.tile(pairs, (len(drives), 1))
+    kept = ~(drive[:, :, None] == measure[:, None, :]).any(axis=(1, 2))
+    return (drive[kept], measure[kept]), kept
+
+
+def adjacent_scan(n: int) -> tuple[tuple[IntArray, IntArray], NDArray[np.bool_]]:
+    """The scan of neighbouring pairs as built-in patterns name their ends: sink k, source k + 1."""
+    return scan_of(neighbours(n)[:, ::-1], neighbours(n))
 
 
 def for_magnitudes(drive: IntArray, measure: IntArray, n: int) -> IntArray:

@@ -145,12 +145,13 @@ class LinearProblem:
             response = self.jacobian @ free
             precision, fitted = _fitted(precision, response)
             matrix += (free - matrix @ response) @ fitted
+        return self.operator_of(matrix, precision)
+
+    def operator_of(self, matrix: NDArray[Any], precision: NDArray[Any]) -> Operator:
+        """The operator of that matrix (n_cells, n_meas) and precision (n_meas, n_meas)."""
+        reference, difference = self.reference, self.difference
         return Operator(
-            self.model,
-            matrix,
-            precision=precision,
-            reference=self.reference,
-            difference=self.difference,
+            self.model, matrix, precision=precision, reference=reference, difference=difference
         )
 
 
@@ -162,7 +163,7 @@ class OneStep(Operator):
     model
         The forward model to linearise.
     prior
-        A name from :data:`tomoskin.imaging.PRIORS`, a prior such as ``Noser(exponent=1.0)``, or
+        A name from :data:`tomoskin.model.prior.PRIORS`, a prior such as ``Noser(exponent=1.0)``, or
         a symmetric (n_cells, n_cells) matrix Q, dense or sparse, or its diagonal.
     alpha
         Hyper-parameter; it enters squared.

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tomoskin.core import FloatArray
 from tomoskin.model.forward import derivatives
-from tomoskin.model.forward.conductivity import checked_conductivity
+from tomoskin.model.forward.arguments import checked_conductivity
 from tomoskin.model.forward.engine import Compressed, Factor, singular
 from tomoskin.model.forward.solution import (
     Solution,
@@ -109,11 +109,6 @@ class State:
         return Solution(model, self.conductivity, basis, voltages, largest)
 
     @property
-    def basis(self) -> NDArray[Any]:
-        """(n_unknowns, n_electrodes − 1) V/A: the last electrode is at zero."""
-        return self.solution.basis
-
-    @property
     def voltages(self) -> NDArray[Any]:
         """The voltages (n_meas,) of the pattern, in V."""
         return self.solution.voltages
@@ -127,11 +122,6 @@ class State:
     def gradient(self) -> NDArray[Any]:
         """(n_electrodes, d·q, n_cells): scaled gradient of each basis field, see Element."""
         return self.solution.gradient
-
-    @property
-    def power(self) -> NDArray[Any]:
-        """(n_drive, n_cells) W: power turned to heat in each cell, its real part."""
-        return self.solution.power
 
     @cached_property
     def jacobian(self) -> NDArray[Any]:
@@ -179,7 +169,7 @@ class State:
         return LocalUpdate(
             self.solution,
             columns=self.factor.columns,
-            factorise=lambda changed: State(model, changed).basis,
+            factorise=lambda changed: State(model, changed).solution.basis,
         )
 
 

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array
 
 from tomoskin.core import FloatArray, IntArray, ModelError
+from tomoskin.model.forward.arguments import number_type, numbers
 from tomoskin.model.forward.assembly import SystemAssembly, gradient_operator
-from tomoskin.model.forward.conductivity import number_type, numbers
 from tomoskin.model.forward.element import Element
 from tomoskin.model.forward.engine import Factorise
 from tomoskin.model.forward.engine_choice import choose_engine

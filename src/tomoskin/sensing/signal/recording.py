@@ -118,7 +118,10 @@ class Recording:
         notes = []
         for key, limit in limits.items():
             values = getattr(self, key)
-            if values is None or not (absurd := _beyond(values, limit)).any():
+            if values is None:
+                continue
+            absurd = np.isfinite(values) & (np.abs(values) > limit)  # infinite is not finite
+            if not absurd.any():
                 continue
             changes[key] = np.where(absurd, np.nan, values)
             notes.append(_absurd(key, absurd, limit))
@@ -213,11 +216,6 @@ def time_notes(time: FloatArray) -> list[str]:
         )
         if len(at)
     ]
-
-
-def _beyond(values: NDArray[Any], most: float) -> NDArray[np.bool_]:
-    """Infinite values are excluded as what is not finite."""
-    return np.asarray(np.isfinite(values) & (np.abs(values) > most))
 
 
 def _absurd(key: str, absurd: NDArray[np.bool_], most: float) -> str:
