@@ -54,6 +54,12 @@ class Recorded:
         say_notes(recording)
         chosen = skin_for_file(skin, path) if needs_skin else skin_if_any(skin, path)
         if chosen is None:
+            if recording.spread:
+                raise DataError(
+                    "has drives of several electrodes",
+                    where=str(path),
+                    hint="give --skin, to whose pattern they are summed",
+                )
             pattern = Pattern.from_tables(recording.drive, recording.measure)
         else:
             pattern = chosen.pattern()

@@ -11,7 +11,7 @@ import typer
 from tomoskin.cli.alpha import alpha
 from tomoskin.cli.app import group
 from tomoskin.cli.named_files import SKIN, ForceFlag, Otherwise, Reads, Writes
-from tomoskin.cli.options import DEFAULT_SKIN, NamedSkinOption, SkinArgument
+from tomoskin.cli.options import DEFAULT_SKIN, NamedSkinOption, RecordingArgument, SkinArgument
 from tomoskin.cli.output import JsonFlag, tell
 from tomoskin.cli.skin_merit import merit
 
@@ -70,6 +70,29 @@ def check(file: SkinArgument, json: JsonFlag = False) -> None:
     )
     document = {"ok": True, "mesh": figures, "headroom": headroom.figures()}
     tell(_summary(skin) | document, [line, f"expected: {headroom.text}"], json=json)
+
+
+@app.command()
+def guess(
+    recording: RecordingArgument,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="X.toml", help="File for the skin. Default: it is printed."),
+        Writes(SKIN),
+    ] = None,
+    force: ForceFlag = False,
+) -> None:
+    """Write a skin file for a recording of another board; comments say what is sure in it."""
+    from tomoskin.core import write_text
+    from tomoskin.files.imports import read_recording
+    from tomoskin.pipeline import guess_skin
+
+    text = guess_skin(read_recording(recording))
+    if out is None:
+        typer.echo(text)
+        return
+    write_text(out, text, overwrite=force)
+    typer.echo(f"{out}: check its comments; next: tomoskin image {recording} --skin {out}")
 
 
 @app.command()

@@ -1,8 +1,10 @@
 """The one frame flow, pure: a reference is collected, then frames are followed to touches."""
 
+from tomoskin.pipeline.electrode_order import order_fault
 from tomoskin.pipeline.finding import located_alone, voltage_covariance
 from tomoskin.pipeline.following import Setting
 from tomoskin.pipeline.frame_result import FrameResult, ModelAgreement, ReferenceState
+from tomoskin.pipeline.guess import guess_skin
 from tomoskin.pipeline.imaging import Unresolved
 from tomoskin.pipeline.offline import ALONE, Gathered, Reconstruction, reconstruct
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES, Pipeline
@@ -24,7 +26,9 @@ __all__ = [
     "Setting",
     "Unresolved",
     "colour_limit",
+    "guess_skin",
     "located_alone",
+    "order_fault",
     "prepare",
     "reconstruct",
     "recorded_frames",

@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import Self
+from dataclasses import replace
+from operator import add
+from typing import NamedTuple
 
 from tomoskin.board.source import Link, Transport
 from tomoskin.core import Event, Frame, Mark
@@ -114,8 +115,7 @@ _STANDSTILL = frozenset({"silent", "fault", "reset"})
 """Events after which no frame comes until the board is well again."""
 
 
-@dataclass(frozen=True, slots=True)
-class Losses:
+class Losses(NamedTuple):
     """Counts of what did not arrive.
 
     ``dropped`` frames that the device or this host left out, ``corrupt`` messages damaged on
@@ -125,20 +125,6 @@ class Losses:
     dropped: int = 0
     corrupt: int = 0
     gaps: int = 0
-
-    @classmethod
-    def of(cls, link: Link, device_drops: int) -> Self:
-        """Counts of one link; ``device_drops`` is what its last frame said."""
-        frames = link.frames
-        return cls(device_drops + frames.foreign, link.counters.corrupt, frames.lost)
-
-    def __add__(self, other: Losses) -> Losses:
-        """The losses of both, added count by count."""
-        return Losses(
-            self.dropped + other.dropped,
-            self.corrupt + other.corrupt,
-            self.gaps + other.gaps,
-        )
 
 
 class Backlog:
@@ -230,7 +216,10 @@ class Intake:
     def losses(self) -> Losses:
         """All that did not arrive, but what this host has left out; from any thread."""
         link = self._link
-        return self._earlier if link is None else self._earlier + Losses.of(link, self._drops)
+        if link is None:
+            return self._earlier
+        now = self._drops + link.frames.foreign, link.counters.corrupt, link.frames.lost
+        return Losses(*map(add, self._earlier, now))
 
     def take(self, link: Link, items: Sequence[Frame | Event], now: float) -> list[Frame]:
         """The frames of a read of ``link`` that was made at ``now``, host s."""

@@ -139,9 +139,8 @@ class _Run:
             except BaseException as error:  # Ctrl-C too
                 gone, complete = clock.now(), script.lead_in + script.duration
                 with contextlib.suppress(DataError):  # of a disk that is full, say
-                    self._writer.note(
-                        gone, f"stopped after {gone:.1f} of {complete:g} s: {_why(error)}"
-                    )
+                    why = "interrupted" if isinstance(error, KeyboardInterrupt) else str(error)
+                    self._writer.note(gone, f"stopped after {gone:.1f} of {complete:g} s: {why}")
                 raise
             return Simulated(self._frames, link.frames.lost, script.duration + script.lead_in)
 
@@ -207,10 +206,6 @@ def _idle_frames(script: Script, frame_time: float) -> int:
     starts += [fault.given.start for fault in script.faults]
     quiet = script.lead_in + min(starts, default=script.duration)
     return max(1, min(REFERENCE_FRAMES, int(quiet / frame_time)))
-
-
-def _why(error: BaseException) -> str:
-    return "interrupted" if isinstance(error, KeyboardInterrupt) else str(error)
 
 
 def _described(script: Script, settings: TwinSettings, idle: int) -> dict[str, object]:

@@ -97,7 +97,7 @@ EYE = np.eye(8) - np.roll(np.eye(8), 1, axis=1)
 @pytest.mark.parametrize(
     ("variables", "said"),
     [
-        ({"stim": np.ones((8, 8)), "meas": EYE, "meas_stim": np.ones(8)}, "one electrode against"),
+        ({"stim": np.ones((8, 8)), "meas": EYE, "meas_stim": np.ones(8)}, "got a sum of 8"),
         ({"stim": EYE, "meas": EYE, "meas_stim": np.full(8, 9)}, "drives from 1 to 8"),
         ({"stim": EYE, "meas": EYE, "meas_stim": np.ones(8)}, "expected data of 8 rows"),
         ({"x": np.ones(3)}, "got the keys x"),

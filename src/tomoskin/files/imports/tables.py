@@ -8,14 +8,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import DataError, FloatArray, IntArray
+from tomoskin.core import DataError, FloatArray, IntArray, PatternError
+from tomoskin.model.pattern import check_drives
 from tomoskin.sensing.signal import Recording, frame_times
 
 
 def voltages_of(
     source: str,
     voltages: NDArray[Any],
-    rows: tuple[IntArray, IntArray],
+    rows: tuple[NDArray[Any], IntArray],
     *,
     time: FloatArray | None = None,
     reference: NDArray[Any] | None = None,
@@ -41,6 +42,26 @@ def voltages_of(
         timed=time is not None,
         board_known=False,
     )
+
+
+def drives_of(patterns: NDArray[Any], what: str, source: str) -> NDArray[Any]:
+    """(n, 2) source and sink of (n, n_electrodes) patterns, or these currents as they are.
+
+    Raises DataError for what does not sum to zero.
+    """
+    if ((patterns != 0.0).sum(axis=1) == 2).all() or patterns.shape[1] <= 2:
+        return pairs_of(patterns, what, source)
+    checked_currents(patterns, what, source)
+    return patterns
+
+
+def checked_currents(currents: NDArray[Any], what: str, source: str) -> None:
+    """Raise DataError unless currents (n, n_electrodes) sum to zero and are not all zero."""
+    try:
+        check_drives(currents, currents.shape[1])
+    except PatternError as error:
+        where = (error.where or "").replace("drive row", what)
+        raise DataError(error.message, where=f"{source}, {where}") from error
 
 
 def pairs_of(patterns: NDArray[Any], what: str, source: str) -> IntArray:

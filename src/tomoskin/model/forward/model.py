@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tomoskin.core import FloatArray
+from tomoskin.core import FloatArray, ModelError
 from tomoskin.model.forward import derivatives
 from tomoskin.model.forward.arguments import checked_conductivity
 from tomoskin.model.forward.engine import Compressed, Factor, singular
@@ -58,17 +59,45 @@ class ForwardModel(System):
         """Voltages and potentials; see :meth:`at`."""
         return self.at(conductivity).solution
 
+    def solve_many(self, conductivities: ArrayLike) -> NDArray[Any]:
+        """(…, n_meas) V of many conductivities (…, n_cells), one per cell each; see :meth:`at`."""
+        return self._each(conductivities, lambda state: state.voltages)
+
     def jacobian(self, conductivity: ArrayLike) -> NDArray[Any]:
         """(n_meas, n_cells) dV/dσ, V/S; see :meth:`at`."""
         return self.at(conductivity).jacobian
 
     def jvp(self, conductivity: ArrayLike, change: ArrayLike) -> NDArray[Any]:
-        """(…, n_meas) V: how the voltages change along ``change``; see :meth:`State.jvp`."""
-        return self.at(conductivity).jvp(change)
+        """(…, n_meas) V: how the voltages change along ``change``; see :meth:`State.jvp`.
+
+        Each of many conductivities (…, n_cells) has changes of the same shape of its own.
+        """
+        return self._each(conductivity, State.jvp, change)
 
     def vjp(self, conductivity: ArrayLike, weights: ArrayLike) -> NDArray[Any]:
-        """(…, n_cells): the gradient of weighted voltages; see :meth:`State.vjp`."""
-        return self.at(conductivity).vjp(weights)
+        """(…, n_cells): the gradient of weighted voltages; see :meth:`State.vjp`.
+
+        Each of many conductivities (…, n_cells) has weights (…, n_meas) of its own.
+        """
+        return self._each(conductivity, State.vjp, weights)
+
+    def _each(
+        self, given: ArrayLike, product: Callable[..., NDArray[Any]], *others: ArrayLike
+    ) -> NDArray[Any]:
+        """Products of one state, or of one after the other for many conductivities."""
+        many = np.asarray(given)
+        if many.ndim < 2 or many.shape[-1] != len(self.mesh.cells):
+            return product(self.at(many), *others)
+        rows = [np.asarray(one) for one in others]
+        for row in rows:
+            if row.shape[:-1] != many.shape[:-1]:
+                raise ModelError(
+                    f"expected one vector for each of {many.shape[:-1]} conductivities, got shape "
+                    f"{row.shape}"
+                )
+        flat = [one.reshape(-1, one.shape[-1]) for one in (many, *rows)]
+        found = [product(self.at(sigma), *own) for sigma, *own in zip(*flat, strict=True)]
+        return np.array(found).reshape(*many.shape[:-1], -1)
 
     def transfer_resistance(self, conductivity: ArrayLike) -> NDArray[Any]:
         """(n_electrodes, n_electrodes) Ω; see :class:`State`."""

@@ -241,7 +241,7 @@ class Excess:
         parts = channels.parts[own > 0]
         return np.asarray(self.level * (noise + (parts.T * own[own > 0]) @ parts))
 
-    def text(self, channels: Channels, usual: FloatArray, louder: float) -> str | None:
+    def text(self, channels: Channels, usual: FloatArray, louder: float = 1.0) -> str | None:
         """What someone should see to, or None; ``usual`` (n_channels,) V² without the excess, and
         in the newest frame so many times the noise's variance, ``louder``."""
         if (level := max(self.level, louder)) > _SAID**2:
