@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
 from typing import Any, Self
 
@@ -52,6 +53,23 @@ PAIRS = (
     ("eskin_varsens16/radial", "eskin_varsens16/parallel"),
 )
 
+BOARDS = (
+    (
+        *(f"eskin_varsens16/{name}" for name in SKINS),
+        "eskin_varsens16_more/cam09_04",
+        "eskin_varsens16_more/cam09_05",
+        "eskin_hydrogel_round/round16_single550",
+        "eskin_hydrogel_round/round16_single500_ohmc",
+    ),
+    ("eskin_hydrogel_round/round8_single500_ohmc", "eskin_hydrogel_rect8/rect8_single10k"),
+    ("eskin_fingertip8/A2", "eskin_membrane8_sixpoint/batch1", "eskin_membrane8_sixpoint/batch2"),
+)
+"""Sets of one table of rows: a calibration of one is asked about the others."""
+
+FEW, LATE = (25, 100), 150
+QUIET = slice(2200, 3700)
+"""Presses of rect8 between its jumps."""
+
 Rows = slice | NDArray[np.intp] | NDArray[np.bool_]
 
 
@@ -93,9 +111,9 @@ class Set:
     def of(cls, path: Path, skin: Skin | None = None) -> Self:
         """Every channel as it was recorded, reciprocal ones too: they are no copies here."""
         with np.load(path) as kept:
-            dv = kept["dv"] if "dv" in kept else kept["v_down"].astype(float) - kept["v_up"]
+            dv = _changes(kept)
             pattern = Pattern.from_tables(kept["inj"], kept["meas"])
-            return cls(dv.astype(float), 1e-3 * kept["xy_mm"].astype(float), pattern, skin)
+            return cls(dv, 1e-3 * kept["xy_mm"].astype(float), pattern, skin)
 
     def at(self, rows: Rows) -> Self:
         """Some of the presses."""
@@ -104,6 +122,14 @@ class Set:
     def learnt(self) -> Locator:
         """A locator of all presses."""
         return Locator.fit(self.dv, self.xy, pattern=self.pattern, skin=self.skin)
+
+
+def _changes(kept: Mapping[str, Any]) -> Floats:
+    """(n, n_meas) by whatever names a set has them."""
+    for after, before in (("v_down", "v_up"), ("during", "before"), ("rms_after", "rms_before")):
+        if after in kept:
+            return np.asarray(kept[after].astype(float) - kept[before])
+    return np.asarray(kept["dv"].astype(float))
 
 
 def run(data: Path | None) -> Iterator[Report]:
@@ -172,6 +198,57 @@ def run_fingers(data: Path | None) -> Iterator[Report]:
         "was shaped with these rows in view, and four of the 108 mm file stand twice",
         f"of 200 single presses of another session (single500_ohmc) {wrong} are taken for two",
     )
+
+
+def run_strangers(data: Path | None) -> Iterator[Report]:
+    """A calibration asked about its own later touches, and about other skins."""
+    folder = recordings(data, "eskin_varsens16")
+    yield table(
+        "calibrations on other skins",
+        (row for board in BOARDS for row in _strangers({n: folder / f"{n}.npz" for n in board})),
+        f"learnt from presses of the first three quarters (drawn, seed {SEEDS[0]}); own: the last "
+        f"{LATE}; others: {LATE} of each other set of the same rows",
+        "strangeness: medians of a set; the part in the 90 % ellipses is the least of the others",
+    )
+
+
+def _strangers(files: Mapping[str, Path]) -> Iterator[dict[str, Any]]:
+    draw, sets = np.random.default_rng(SEEDS[0]), {}
+    for name, file in files.items():
+        with np.load(file) as kept:
+            dv = _changes(kept)
+            xy = 1e-3 * kept["xy_mm"] if "xy_mm" in kept else np.full((len(dv), 2), np.nan)
+        part = QUIET if DRIFTING in name else np.isfinite(dv).any(axis=1)
+        sets[name] = dv[part], xy[part]
+    for name, count in product(sets, FEW):
+        dv, xy = sets[name]
+        if np.isnan(xy).all():
+            continue
+        rows = np.sort(draw.permutation(len(dv) * 3 // 4)[:count])
+        locator = Locator.fit(dv[rows], xy[rows])
+        scores = {}
+        for other, (theirs, there) in sets.items():
+            late = other == name
+            some = slice(-LATE, None) if late else draw.permutation(len(theirs))[:LATE]
+            strange = float(np.median(locator.strangeness(theirs[some])))
+            scores[other] = strange, part_held(locator, theirs[some], there[some])
+        own = scores.pop(name)
+        nearest = min(scores, key=lambda other: scores[other][0])
+        yield {
+            "learnt on": Path(name).name,
+            "presses": count,
+            "own": round(own[0], 2),
+            "in 90 % ellipse": percent(own[1]),
+            "others, least": round(scores[nearest][0], 2),
+            "which": Path(nearest).name,
+            "others in 90 % ellipse": _least([held for _, held in scores.values()]),
+        }
+
+
+def _least(parts: list[float]) -> str:
+    """The least of the parts that are known."""
+    known = [part for part in parts if np.isfinite(part)]
+    return percent(min(known)) if known else "–"
 
 
 def disc(**electrodes: str) -> Skin:
@@ -282,10 +359,17 @@ def _transferred(old: Set, new: Set, seed: int) -> tuple[float, ...]:
 
 def held(locator: Locator, asked: Set) -> float:
     """Part of the presses in their 90 % ellipses."""
-    told, covariance = locator.predict(asked.dv)
-    error = told - asked.xy
+    return part_held(locator, asked.dv, asked.xy)
+
+
+def part_held(locator: Locator, dv: Floats, xy: Floats) -> float:
+    """Part of presses ``dv`` (n, n_meas) at ``xy`` (n, 2) m that their 90 % ellipses hold; NaN
+    where it is not known where they are."""
+    told, covariance = locator.predict(dv)
+    error = told - xy
     solved = np.linalg.solve(covariance, error[:, :, None])[:, :, 0]
-    return float(((error * solved).sum(axis=1) < INSIDE_90).mean())
+    inside = np.where(np.isnan(xy).any(axis=1), np.nan, (error * solved).sum(axis=1) < INSIDE_90)
+    return float(inside.mean())
 
 
 def mean_error(locator: Locator, asked: Set) -> float:

@@ -10,7 +10,7 @@ import pytest
 from learning.labelled import RADIUS, ROWS, Floats, held, places, presses
 from tomoskin import Locator, Pattern, Skin
 from tomoskin.core import DataError
-from tomoskin.learning import LeftOut, Presses
+from tomoskin.learning import LeftOut, Presses, growth_of_errors
 from tomoskin.learning.touch.gaussian_process import Basis, Likeness, moments
 from tomoskin.learning.touch.maps import ResponseMaps
 from tomoskin.learning.touch.posterior import GridLikelihood, pooled
@@ -121,6 +121,16 @@ def test_added_presses_are_as_good_as_those_of_the_first_hour() -> None:
     assert after == anew
     assert len(grown.presses) == 110
     np.testing.assert_array_equal(grown.predict(frames)[1], batch.predict(frames)[1])
+
+
+def test_it_is_said_when_more_presses_make_it_worse() -> None:
+    """The newer ones have labels of their neighbours: a cable of the robot was left loose."""
+    dv, xy = presses(80, 0)
+    assert growth_of_errors(Locator.fit(dv, xy)) == 1.0
+    older = Locator.fit(dv[:40], xy[:40])
+    assert growth_of_errors(older.updated(dv[40:], xy[40:]), older) == 1.0
+    shifted = np.vstack([xy[:40], np.roll(xy[40:], 1, axis=0)])
+    assert growth_of_errors(Locator.fit(dv, shifted)) > 1.1
 
 
 def test_contradicting_labels_are_named() -> None:

@@ -147,7 +147,8 @@ def touch(
         with Bar("learning") as bar:
             calibration = old.with_model(old.model.updated(dv, xy, progress=bar))
     added = _added(calibration.model, frames, dv, xy)
-    facts = touch_facts(calibration.model, added)
+    older = old.model if old is not None and not unlabelled else None
+    facts = touch_facts(calibration.model, added, older)
     if facts["is_guess"]:
         remark(
             f"{given.path}: the data hardly depend on the position. Presses left out have a mean "

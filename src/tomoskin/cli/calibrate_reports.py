@@ -11,19 +11,23 @@ if TYPE_CHECKING:
     from tomoskin.learning import Classifier, Locator, MappingAnswer
     from tomoskin.model.skin import Skin
 
-_SHOWN, _DRIFTED = 10, 2.0
-"""Remarks that are listed, and growth of the errors from which the skin has changed."""
+_SHOWN, _DRIFTED, _WORSE = 10, 2.0, 1.1
+"""Remarks that are listed, growth of the errors from which the skin has changed, and from which
+more presses have made it worse."""
 
 _HARDLY = 0.5
 """Part of the labelled frames that are right, below which labels hardly depend on the data."""
 
 
-def touch_facts(locator: Locator, frames: list[int]) -> dict[str, Any]:
-    """Errors of left-out presses; ``frames`` are those of the newest presses."""
-    from tomoskin.learning import LeftOut
+def touch_facts(
+    locator: Locator, frames: list[int], older: Locator | None = None
+) -> dict[str, Any]:
+    """Errors of left-out presses; ``frames`` are those of the newest presses, and ``older`` has
+    learnt from the others."""
+    from tomoskin.learning import LeftOut, growth_of_errors
 
     left_out = LeftOut.of(locator)
-    older = len(locator.presses) - len(frames)
+    before = len(locator.presses) - len(frames)
     errors = 1e3 * locator.errors
     return {
         "presses": len(locator.presses),
@@ -35,9 +39,10 @@ def touch_facts(locator: Locator, frames: list[int]) -> dict[str, Any]:
         "held_by_90_percent_ellipses": locator.held,
         "one_force": left_out.one_force,
         "drift": left_out.drift,
+        "growth": growth_of_errors(locator, older),
         "next_press_mm": (1e3 * locator.next_place()).tolist(),
         "remarks": [
-            {"frame": frames[r.row - older] if r.row >= older else None, "reason": r.reason}
+            {"frame": frames[r.row - before] if r.row >= before else None, "reason": r.reason}
             for r in locator.remarks
         ],
     }
@@ -66,6 +71,12 @@ def touch_lines(facts: dict[str, Any]) -> list[str]:
         lines.append(
             f"the errors of the last presses are {facts['drift']:.1f} times as large as usual: "
             "the skin has changed; press it again"
+        )
+    if facts["growth"] > _WORSE:
+        lines.append(
+            f"since the newer presses were added, the older ones are missed {facts['growth']:.1f} "
+            "times as far: the newer ones do not fit with them. Check their labels and the wiring; "
+            "where the skin has changed, calibrate it again"
         )
     x, y = facts["next_press_mm"]
     return [*lines, f"the next press is most useful at x {x:+.0f} mm, y {y:+.0f} mm"]

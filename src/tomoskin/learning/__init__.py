@@ -25,7 +25,11 @@ from tomoskin.learning.kind import (
 )
 from tomoskin.learning.mapping.mapping import ChannelMapping, ring_of
 from tomoskin.learning.mapping.solve import MappingAnswer, solve_channel_mapping
-from tomoskin.learning.touch.calibration_health import CalibrationHealth, LeftOut
+from tomoskin.learning.touch.calibration_health import (
+    CalibrationHealth,
+    LeftOut,
+    growth_of_errors,
+)
 from tomoskin.learning.touch.located_touch import TOUCH
 from tomoskin.learning.touch.locator import Locator, detection_at
 from tomoskin.learning.touch.presses import Presses
@@ -89,6 +93,7 @@ __all__ = [
     "Weight",
     "against_rest",
     "detection_at",
+    "growth_of_errors",
     "identify",
     "least_known",
     "load_calibration",

@@ -145,6 +145,31 @@ class LeftOut:
         )
 
 
+_ENOUGH_OLDER = 12
+"""Presses of an older locator from which it is told whether more of them make it worse."""
+
+_BY_CHANCE = 2.5
+"""Standard errors of a mean difference that are taken for chance."""
+
+
+def growth_of_errors(locator: Locator, older: Locator | None = None) -> float:
+    """How many times as far the older presses are missed since the others were added.
+
+    The presses of ``older``, by default those of the first half alone, are missed by more or less
+    in ``locator``, each left out. 1 where that may be chance, and of too few presses.
+    """
+    if older is None:
+        presses = locator.presses.first(len(locator.presses) // 2)
+        if len(presses) < _ENOUGH_OLDER:
+            return 1.0
+        older = locator.learn(presses, locator.region, locator.pattern, locator.skin_id)
+    before = older.errors
+    more = locator.errors[: len(before)] - before
+    if len(before) < _ENOUGH_OLDER or more.mean() < _BY_CHANCE * more.std() / len(more) ** 0.5:
+        return 1.0
+    return float(1 + more.mean() / before.mean())
+
+
 _FEWEST_FITTED = 8
 """Presses that were fitted, and part of all, from which something is said of the fit."""
 

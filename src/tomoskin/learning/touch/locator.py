@@ -12,7 +12,7 @@ from threadpoolctl import threadpool_limits
 from tomoskin.core import Detection, FloatArray
 from tomoskin.learning.kind import Progress, silent
 from tomoskin.learning.touch.per_channel import Rotations
-from tomoskin.learning.touch.posterior import Estimates, widening
+from tomoskin.learning.touch.posterior import Estimates, doubt
 from tomoskin.learning.touch.presses import Features, Presses, Strength, frames, mean_about
 from tomoskin.learning.touch.session_alignment import SessionAlignment
 from tomoskin.learning.touch.stacking import (
@@ -39,8 +39,9 @@ _MISSING = 2.0
 the others say little. Chosen on the twin's textile disc without one of 8 electrodes, seeds 1 to 3.
 """
 
-_WIDEST = 1.0
-"""Deviation, in radii of the region, at which nothing is known of a place."""
+_WIDEST = 2.0
+"""Deviation, in radii of the region, at which nothing is known of a place: another skin may be
+larger."""
 
 
 def _bounded(covariance: FloatArray) -> FloatArray:
@@ -205,9 +206,10 @@ class Locator:
         answer = self.stacking.combined(by_expert)
         covariance = self.calibrated(spread, disagreement_of(by_expert, answer))
         present = np.isfinite(given[:, self.features.rows]).mean(axis=1)
-        wider = widening(strangeness) * present**-_MISSING
         wide = _bounded(
-            wider[:, None, None] * covariance + _label_spread(self.presses, self.region, answer)
+            present[:, None, None] ** -_MISSING * covariance
+            + doubt(strangeness)[:, None, None] ** 2 * np.eye(2)
+            + _label_spread(self.presses, self.region, answer)
         )
         return self.region.metres(answer), self.region.unit**2 * wide, strangeness
 

@@ -189,12 +189,12 @@ class OrbitMaps:
         return self.mean + np.sqrt(self.size) * mean, self.size * np.maximum(variance, _FLOOR)
 
 
-_SHARED = 64_000
-"""Rows times presses from which turned copies share nothing: it takes long, and tells most where
-presses are few."""
+_SHARED = 256
+"""Rows above which turned copies share nothing: it takes long, and so many rows tell enough."""
 
-_SHARES = (0.0, 0.3, 0.6, 0.85)
-"""Part of a row's variance that its turned copies have in common, as tried."""
+_SHARES = (0.3, 0.6, 0.85)
+"""Part of a row's variance that its turned copies have in common, as tried beside none with the
+length scale that is likeliest then."""
 
 _FREEDOM = 4.0
 """Degrees of freedom of one row's error: a press may be told wrong by a few rows."""
@@ -223,10 +223,10 @@ class ChannelMaps:
     def of(cls, positions: FloatArray, features: FloatArray, rotations: Rotations) -> Self:
         """Maps for ``features`` (n, k) of presses at ``positions`` (n, 2).
 
-        Of each group of rows the length scale and the share, and the way round of all, are those
+        Of each group of rows the length scale, then the share, and the way round of all, are those
         of the largest marginal likelihood.
         """
-        if features.size > _SHARED:
+        if features.shape[1] > _SHARED:
             rotations = Rotations.none(features.shape[1])
         ways = (rotations, rotations.reversed()) if rotations.any else (rotations,)
         angles = np.concatenate([way.angle for way in ways])
@@ -240,18 +240,15 @@ class ChannelMaps:
         groups = tuple(
             np.flatnonzero(rotations.orbit == orbit) for orbit in np.unique(rotations.orbit)
         )
-        shares = _SHARES if rotations.any else (0.0,)
-        orbits = (
-            max(
-                (
-                    OrbitMaps.of(m, m.alone(features[:, rows]), rotations.angle[rows], share)
-                    for m in modes
-                    for share in shares
-                ),
-                key=lambda maps: maps.evidence,
-            )
-            for rows in groups
-        )
+        orbits = []
+        for rows in groups:
+            angles, some = rotations.angle[rows], features[:, rows]
+            alone = [OrbitMaps.of(m, m.alone(some), angles, 0.0) for m in modes]
+            best = max(alone, key=lambda maps: maps.evidence)
+            for share in _SHARES if rotations.any else ():
+                shared = OrbitMaps.of(best.modes, best.modes.alone(some), angles, share)
+                best = max(best, shared, key=lambda maps: maps.evidence)
+            orbits.append(best)
         return cls(rotations, groups, tuple(orbits))
 
     def again(self, positions: FloatArray, features: FloatArray) -> Self:

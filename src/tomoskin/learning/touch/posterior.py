@@ -23,6 +23,10 @@ POWERS = 1 / np.array([1, 1.5, 2, 3, 4, 6, 9, 14, 20, 30, 45, 70])
 
 _LEAST = 1e-6
 
+_SHAPE, _ALIKE = 0.01, 0.1
+"""Part of the features' squares that presses may always differ by in their shape, and the least
+correlation of two shapes that is told from none."""
+
 
 @dataclass(frozen=True, eq=False)
 class GridLikelihood:
@@ -38,6 +42,7 @@ class GridLikelihood:
     answer: FloatArray
     offset: FloatArray
     volume: FloatArray
+    shapes: FloatArray
 
     @classmethod
     def of(cls, maps: ResponseMaps, positions: FloatArray) -> Self:
@@ -46,9 +51,9 @@ class GridLikelihood:
         answer = mean / variance
         offset = (mean * answer).sum(axis=1)
         volume = np.log(variance).sum(axis=1)
-        return cls(
-            maps, np.ascontiguousarray(1 / variance.T), answer.T.copy(), offset, 0.5 * volume
-        )
+        precision = np.ascontiguousarray(1 / variance.T)
+        shapes = _of_length_one(maps.features_at(positions))
+        return cls(maps, precision, answer.T.copy(), offset, 0.5 * volume, shapes)
 
     def misfit(self, features: FloatArray) -> FloatArray:
         """(n, g) mean square of what frames (n, k) differ by from each place's answer, in units
@@ -57,9 +62,24 @@ class GridLikelihood:
         total = (f * f) @ self.precision - 2 * (f @ self.answer) + self.offset
         return np.asarray(np.maximum(total, 0.0) / f.shape[1])
 
+    def unlike(self, features: FloatArray, misfit: FloatArray) -> FloatArray:
+        """(n, 2) how unlike any press frames (n, k) of this ``misfit`` are.
+
+        The least misfit, and what no answer explains of the features' squares over what one does,
+        however hard the press: weak frames of another skin fit within the noise, but not in their
+        shape.
+        """
+        alike = (_of_length_one(features) @ self.shapes.T).max(axis=1)
+        explained = np.maximum(alike, _ALIKE) ** 2
+        return np.column_stack([misfit.min(axis=1), (1 - explained) / explained])
+
     def of_misfit(self, misfit: FloatArray) -> FloatArray:
         """(n, g) log-likelihood of each place, up to a constant of the frame."""
         return np.asarray(-len(self.precision) * np.log1p(misfit) - self.volume)
+
+
+def _of_length_one(features: FloatArray) -> FloatArray:
+    return np.asarray(features / (np.linalg.norm(features, axis=1, keepdims=True) + _LEAST))
 
 
 def pooled(log_likelihoods: Sequence[FloatArray], powers: FloatArray) -> FloatArray:
@@ -99,9 +119,14 @@ _FOLDS = (8, 5)
 _NEAR = 0.5
 """Mean squared step, in parts of that between any two presses, below which they are in an order."""
 
-_WIDENS = 1.5
-"""Power of a frame's strangeness by which its covariance grows: chosen on the two sessions of
-eskin_hydrogel_round, learnt from 200 presses of one and asked on the other."""
+_LESS = 2
+"""Presses by which left-out ones are less like the maps of the others than presses to come are
+like all: chosen on cam09_05, 25 presses."""
+
+_USUAL, _DOUBTS = 1.25, 1.5
+"""Strangeness from which a frame's position is doubted, and by how much more a deviation of one
+radius is added: chosen on noPattern, radial and cam09_05, learnt from 25, 100 and 400 presses of
+one and asked on the last presses of it and on the others."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +134,7 @@ class Estimates:
     """Posterior mean and covariance of a place.
 
     ``powers`` weigh the log-likelihoods of ``likelihood``, and of ``per_channel`` where that
-    stands. ``usual`` is the least misfit over the grid that half of the left-out presses have.
+    stands. ``usual`` (2,) is how unlike the others half of the left-out presses are.
     ``left_out`` (n, 2) and ``left_out_spread`` (n, 2, 2) are those of the presses themselves,
     each from maps learnt without it and some others.
     """
@@ -118,7 +143,7 @@ class Estimates:
     likelihood: GridLikelihood
     per_channel: ChannelLikelihood | None
     powers: FloatArray
-    usual: float
+    usual: FloatArray
     left_out: FloatArray
     left_out_spread: FloatArray
 
@@ -131,36 +156,40 @@ class Estimates:
         rotations: Rotations,
     ) -> Self:
         """Learn the maps; length scales by evidence, powers by left-out presses."""
-        directions, n = principal(features), len(positions)
-        maps = _likeliest(positions, features, directions)
+        n = len(positions)
+        maps = _likeliest(positions, features, principal(features))
         few = _some(n)
         channels = ChannelMaps.of(positions[few], features[few], rotations)
         misfit, alone, folds = np.empty((n, len(grid))), np.empty((n, len(grid))), []
+        unlike = np.empty((n, 2))
         for out in _folds(positions):
             some, theirs = positions[~out], features[~out]
-            learnt = ResponseMaps.of(maps.basis.likeness, some, theirs, directions)
+            learnt = ResponseMaps.of(maps.basis.likeness, some, theirs, principal(theirs))
             folds.append(GridLikelihood.of(learnt, grid))
             few = _some(len(some))
             single = ChannelLikelihood.of(channels.again(some[few], theirs[few]), grid)
             misfit[out], alone[out] = folds[-1].misfit(features[out]), single(features[out])
+            unlike[out] = folds[-1].unlike(features[out], misfit[out])
         parts = [folds[0].of_misfit(misfit), alone]
         powers = powers_of(parts, grid, positions)
         left_out = moments(pooled(parts, powers), grid)
         per_channel = ChannelLikelihood.of(channels, grid) if powers[1] else None
-        usual = float(np.median(misfit.min(axis=1)))
+        usual = np.maximum(np.median(unlike, axis=0), (_LEAST, _SHAPE))
+        usual *= np.median((unlike / usual).max(axis=1)) * (n - _LESS) / (n + _LESS)
         return cls(grid, GridLikelihood.of(maps, grid), per_channel, powers, usual, *left_out)
 
     def __call__(self, features: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Mean (n, 2), covariance (n, 2, 2) and strangeness (n,) of frames (n, k).
 
-        A frame is strange by its least misfit over the grid, in parts of the usual one.
+        A frame is strange by how unlike the presses it is, in parts of what is usual.
         """
         misfit = self.likelihood.misfit(features)
         parts = [self.likelihood.of_misfit(misfit)]
         if self.per_channel is not None:
             parts.append(self.per_channel(features))
         mean, covariance = moments(pooled(parts, self.powers), self.grid)
-        return mean, covariance, misfit.min(axis=1) / self.usual
+        unlike = self.likelihood.unlike(features, misfit)
+        return mean, covariance, (unlike / self.usual).max(axis=1)
 
     @cached_property
     def least_known(self) -> FloatArray:
@@ -172,12 +201,12 @@ class Estimates:
         return np.asarray(self.grid[int(self.likelihood.volume.argmax())])
 
 
-def widening(strangeness: FloatArray) -> FloatArray:
-    """(n,) by which the covariances of frames grow that fit the maps worse than left-out presses.
+def doubt(strangeness: FloatArray) -> FloatArray:
+    """(n,) deviation, in radii of the region, that strange frames have beyond their covariance.
 
-    Such frames are of a skin that has changed, or of no single touch.
+    Such frames are of a skin that has changed, of another skin, or of no single touch.
     """
-    return np.asarray(np.maximum(strangeness, 1.0) ** _WIDENS)
+    return np.asarray(np.maximum(strangeness - _USUAL, 0.0) / _DOUBTS)
 
 
 def _likeliest(positions: FloatArray, features: FloatArray, directions: FloatArray) -> ResponseMaps:

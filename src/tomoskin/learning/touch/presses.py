@@ -86,6 +86,12 @@ class Presses:
         """The number of labelled presses."""
         return len(self.dv)
 
+    def first(self, count: int) -> Self:
+        """The first ``count`` of these presses."""
+        strength = None if self.strength is None else self.strength[:count]
+        spread = None if self.spread is None else self.spread[:count]
+        return type(self)(self.dv[:count], self.xy[:count], strength, spread)
+
     def within(self, region: Region) -> Self:
         """These presses; DataError, with the rows, where labels lie outside the region."""
         outside = np.flatnonzero(region.beyond(self.xy) > _BESIDE * region.unit)

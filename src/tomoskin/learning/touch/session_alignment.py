@@ -46,6 +46,11 @@ _MOVED = 0.22
 """Mean way, in radii of the region, by which an alignment may move the touches. On the public
 sets sessions of one kind of skin moved by 0.06 to 0.14, other patterns of it by 0.34 to 0.42."""
 
+_LIKE = 4.0
+"""Strangeness that frames may have when each channel's presses are distributed as they are. Of
+noPattern, radial, cam09_05 and round16_single550 (120 presses) sessions of one kind of skin have
+2.3 to 3.3, other skins 5.1 to 7.7."""
+
 _AGREE = 0.35
 """Mean distance, in radii of the region, by which given labels may be missed."""
 
@@ -113,6 +118,9 @@ class SessionAlignment:
         Mean m by which given labels are missed; NaN where none is given.
     strangeness
         How many times worse than the calibration's own presses the frames fit it (medians).
+    unlike
+        The same when each channel's presses are distributed as the frames are; 1 where that was not
+        needed.
     apart
         How far the distributions of the channels' changes are from those of the calibration, in
         parts of what chance makes of the same ones; see :func:`.matching.distance`.
@@ -128,6 +136,7 @@ class SessionAlignment:
     covered: float
     missed: float
     strangeness: float
+    unlike: float
     apart: float
     holds: bool
 
@@ -163,7 +172,7 @@ class SessionAlignment:
             found = session.found(weight if fits else None, touches)
         known = session.known
         missed = _missed(found.positions[known], region.scaled(xy[known]))
-        believed = found.moved < _MOVED and found.covered > _COVERED
+        believed = found.moved < _MOVED and found.covered > _COVERED and found.unlike < _LIKE
         return cls(
             found.presses,
             Presses.of_more(dv[known], xy[known]),
@@ -173,6 +182,7 @@ class SessionAlignment:
             found.covered,
             region.unit * missed,
             strange,
+            found.unlike,
             apart,
             holds=believed if np.isnan(missed) else missed < _AGREE,
         )
@@ -221,6 +231,7 @@ class _Found:
     moved: float
     noise: float
     covered: float
+    unlike: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -248,20 +259,22 @@ class _Session:
         weights = maps.surface.posterior(maps.white(dv))
         start = weights @ self.grid
         covered = float(np.exp(_entropy(weights.mean(axis=0))) / len(self.grid))
+        unlike = np.inf
         if weight is not None or covered > _COVERED:
             even = np.full(len(locator.presses), 1 / len(locator.presses))
             like = matched(locator.presses.dv, dv, even if weight is None else weight)
             presses = replace(locator.presses, dv=like)
             locator = locator.learn(presses, locator.region, locator.pattern, locator.skin_id)
             positions, _, strangeness = locator.posterior(dv)
-            if float(np.median(strangeness)) <= _AS_BEFORE:
+            unlike = float(np.median(strangeness))
+            if unlike <= _AS_BEFORE:
                 given = Presses.of_more(dv[known], self.xy[known])
                 both = presses.and_then(given) if known.any() else presses
                 answers = locator.region.scaled(positions)
                 way = _way(answers, start if weight is None else touches)
-                return _Found(both, answers, way, 1.0, 1.0)
+                return _Found(both, answers, way, 1.0, 1.0, unlike)
             maps = _SessionMaps.of(locator, self.grid)
-        return self._mapped(maps, locator.presses, start, covered)
+        return replace(self._mapped(maps, locator.presses, start, covered), unlike=unlike)
 
     def _mapped(
         self, maps: _SessionMaps, presses: Presses, start: FloatArray, covered: float
