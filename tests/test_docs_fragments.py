@@ -12,7 +12,7 @@ import pytest
 from tomoskin.core import FloatArray
 from tomoskin.imaging import ShapeImaging
 from tomoskin.model.forward import ForwardModel
-from tomoskin.model.pattern import Scan
+from tomoskin.model.pattern import Pattern, Scan
 from tomoskin.model.skin import Skin
 from tomoskin.twin import TwinSettings, TwinSkin
 
@@ -45,7 +45,10 @@ def given() -> dict[str, Any]:
     xy, more_xy = rng.uniform(-0.055, 0.055, (2, 60, 2))
     labels = np.column_stack([xy[:, 0] > 0, xy[:, 1] > 0])
     today = pressed(more_xy)
+    currents = np.array([np.cos(k * np.pi / 4 * np.arange(8) + 0.1 * k) for k in range(1, 5)])
     return {
+        "n": 8, "currents": currents, "potentials": (currents @ state.transfer_resistance)[None],
+        "Pattern": Pattern,
         "skin": skin, "pattern": pattern, "scan": Scan.of(pattern), "model": model, "np": np,
         "v": v, "voltages": v + pressed(xy[:1])[0], "noise": np.full(len(v), NOISE),
         "rubbed": rubbed, "dv": pressed(xy), "xy": xy, "more_dv": today[:10],

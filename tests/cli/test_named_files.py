@@ -79,6 +79,7 @@ CASES = {
     ("design", "out"): Case("design --skin {skin} --out {out}", ".png", ("--electrodes", "")),
     ("skin alpha", "out"): Case("skin alpha {skin} --rule light-touch --out {out}", ".png"),
     ("skin merit", "out"): Case("skin merit {skin} --out {out}", ".csv"),
+    ("skin guess", "out"): Case("skin guess {presses} --out {out}", ".toml"),
     ("skin lay", "out"): Case("skin lay {surface} --electrodes {places} --out {out}", ".toml"),
     ("session export", "out"): Case("session export {session} {out}", ".csv"),
     ("session export", "touches"): Case("session export {session} {other} --touches {out}", ".csv"),

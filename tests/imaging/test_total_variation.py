@@ -93,6 +93,19 @@ def test_total_variation_keeps_the_edge_that_laplace_blurs() -> None:
     assert sharp.image.mesh_id == mesh.identity
 
 
+def test_without_alpha_the_data_are_explained_to_their_noise() -> None:
+    mesh = disc(16, 600)
+    model = ForwardModel(mesh, Pattern.adjacent(16), 0.01)
+    truth = 0.2 * spot(mesh)
+    dv = model.jacobian(1.0) @ truth
+    noise = 3e-3 * np.abs(dv).max()
+    dv += noise * np.random.default_rng(1).standard_normal(len(dv))
+    found = SharpDifference(model, TotalVariation(1e-3))(Observation.of(dv, noise))
+    assert 0.6 * len(dv) < found.descent.steps[-1].misfit <= len(dv)
+    assert 0.1 < found.alpha < 1000.0
+    assert found.image.values[truth > 0].mean() == pytest.approx(0.2, rel=0.2)
+
+
 def test_l1_leaves_most_cells_alone() -> None:
     mesh = disc(16, 600)
     model = ForwardModel(mesh, Pattern.adjacent(16), 0.01)

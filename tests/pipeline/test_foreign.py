@@ -8,7 +8,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tomoskin.core import FloatArray
+from tomoskin.core import DataError, FloatArray
+from tomoskin.files.exports import plot
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, prepare, reconstruct
 from tomoskin.pipeline.foreign import open_electrodes, tuned_by_file
@@ -116,3 +117,13 @@ def test_normalised_rows_that_read_next_to_nothing_do_not_rule_the_image() -> No
     found = reconstruct(made, recording(made, values), values[:1])
     place = made.mesh.centroids[found.images[1].argmin()]
     assert np.linalg.norm(place - [0.03, 0.02]) < 0.02
+
+
+def test_arrays_are_told_what_is_wanted() -> None:
+    made = prepared()
+    values = touched(made)
+    with pytest.raises(DataError, match="expected a Recording, got ndarray") as caught:
+        reconstruct(made, values, values[:1])  # type: ignore[arg-type]
+    assert "read_recording(file).in_order_of(pattern)" in str(caught.value)
+    with pytest.raises(DataError, match="expected an Image and its Mesh, got ndarray and Mesh"):
+        plot(values, made.mesh)  # type: ignore[arg-type]

@@ -19,7 +19,7 @@ from tomoskin.cli.choices import (
     with_recorded_calibrations,
 )
 from tomoskin.cli.named_files import TABLE, ForceFlag, Writes
-from tomoskin.cli.named_parts import first_time, reconstructed, say_notes, span_lines
+from tomoskin.cli.named_parts import first_time, reconstructed, say_notes, sharp, span_lines
 from tomoskin.cli.options import (
     CalibrationsOption,
     FramesOption,
@@ -76,6 +76,14 @@ class Tuned:
         ),
     ] = None
     calibration: CalibrationsOption = None
+    sharp: Annotated[
+        bool,
+        typer.Option(
+            "--sharp",
+            help="Images with edges, by total variation, instead of smooth ones; slower. Touches "
+            "stay as they are.",
+        ),
+    ] = False
 
     def of(self, skin: Skin) -> tuple[Skin, str | None]:
         """The skin with them, and the rule that is to choose alpha, if one was named."""
@@ -186,11 +194,13 @@ def image(
         else:
             prepared = with_recorded_calibrations(prepared, recording)
     recorded = data.in_order_of(prepared.pattern)
+    _say_order(data, prepared)
     say_notes(recorded)
-    if not recorded.board_known:
-        _say_order(data, prepared)
     with Bar("reconstructing") as bar:
         result = reconstructed(recorded, prepared, reference, frames, bar, rule=rule)
+    if tuned.sharp:
+        with Bar("sharpening") as bar:
+            result = sharp(recorded, prepared, reference, result, bar)
     surface, forces = prepared.skin.surface, FORCE.name in prepared.calibrations
     tables = {touches: result}
     if thorough is not None:
@@ -247,9 +257,11 @@ def _lines(result: Reconstruction, spans: tuple[Span, ...], prepared: Prepared) 
 
 
 def _say_order(recording: Recording, prepared: Prepared) -> None:
-    """Say on stderr that the electrodes of a file seem to stand in another order."""
+    """Say on stderr that electrodes of another board's file seem to stand in another order."""
     from tomoskin.pipeline import order_fault
 
+    if recording.board_known:
+        return
     resistance = prepared.model.transfer_resistance(prepared.skin.conductivity)
     if fault := order_fault(recording, resistance):
         remark(

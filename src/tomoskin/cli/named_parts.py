@@ -230,6 +230,20 @@ def reconstructed(
     )  # fmt: skip
 
 
+def sharp(
+    recording: Recording,
+    prepared: Prepared,
+    reference: str | None,
+    result: Reconstruction,
+    advance: Advance,
+) -> Reconstruction:
+    """The same with sharp images."""
+    from tomoskin.pipeline import sharpened
+
+    idle = _idle(recording, reference, prepared.pattern)
+    return sharpened(result, prepared, recording, idle, advance)
+
+
 def first_time(recording: Recording) -> float:
     """When the first frame of a file was scanned, s; those from before a session do not count."""
     from tomoskin.files.imports import is_session

@@ -11,6 +11,7 @@ from tomoskin.pipeline.pipeline import REFERENCE_FRAMES, Pipeline
 from tomoskin.pipeline.prepare import Prepared, colour_limit, prepare
 from tomoskin.pipeline.recorded import Idle, recorded_frames
 from tomoskin.pipeline.rest import tuned, tuned_by_rule, tuned_image, with_choice
+from tomoskin.pipeline.sharp import sharpened
 
 __all__ = [
     "ALONE",
@@ -32,6 +33,7 @@ __all__ = [
     "prepare",
     "reconstruct",
     "recorded_frames",
+    "sharpened",
     "tuned",
     "tuned_by_rule",
     "tuned_image",

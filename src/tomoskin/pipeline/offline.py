@@ -187,6 +187,12 @@ def reconstruct(
     ModelError
         When the rule is not known or finds no alpha.
     """
+    if not isinstance(recording, Recording):
+        raise DataError(
+            f"expected a Recording, got {type(recording).__name__}",
+            hint="write the array with its tables to an .npz file, and give "
+            "read_recording(file).in_order_of(pattern); docs/python.md shows it",
+        )
     recorded = recorded_frames(prepared, recording, idle)
     prepared = recorded.prepared
     if prepared.modes is not None:

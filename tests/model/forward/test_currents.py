@@ -52,7 +52,7 @@ def test_a_drive_is_the_sum_of_pairs(kind: str) -> None:
     if kind == "real":  # the power of a drive is turned to heat in cells and contacts
         heat = np.einsum("ke,ke->k", current[:, None] * CURRENTS, potentials)
         assert (by_current.solution.power.sum(axis=1) < heat).all()
-        assert (by_current.solution.power.sum(axis=1) > 0.5 * heat).all()
+        assert (by_current.solution.power.sum(axis=1) > 0.1 * heat).all()
     if kind != "tensor":
         change, weights = RNG.standard_normal((2, len(sigma))), RNG.standard_normal(len(scale))
         assert by_current.jvp(change) == pytest.approx(change @ by_current.jacobian.T, rel=1e-9)
@@ -62,7 +62,7 @@ def test_a_drive_is_the_sum_of_pairs(kind: str) -> None:
 def test_rows_and_names_of_such_a_pattern() -> None:
     again = Pattern.from_tables(SPREAD.drive, SPREAD.measure)
     assert again.identity == SPREAD.identity != PAIRS.identity
-    assert SPREAD.part(np.arange(N)).n_drive == 1
+    assert Pattern.from_tables(SPREAD.drive[:N], SPREAD.measure[:N]).n_drive == 1
     assert SPREAD.row_text(9) == "row 9: drive 1, plus E2, minus E3"
     few = Pattern.from_pairs(N, [[1.0, -0.5, -0.5, 0, 0, 0, 0, 0]], RING)
     assert few.measure.tolist() == [[3, 4], [4, 5], [5, 6], [6, 7]]

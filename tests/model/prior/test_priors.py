@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.sparse import csr_array
 from scipy.special import gamma, kv
 
 from golden import mismatch
@@ -207,3 +209,13 @@ def test_a_prior_takes_what_the_skin_file_says(keys: dict[str, Any], prior: Prio
 def test_a_prior_that_is_not_known(mesh: Mesh) -> None:
     with pytest.raises(ModelError, match=r'expected a prior among .*, got "tv"'):
         penalty_of("tv", mesh, jacobian(mesh))
+
+
+@pytest.mark.parametrize("make", [np.asarray, csr_array])
+def test_a_matrix_of_ones_own_is_symmetric(mesh: Mesh, make: Callable[[FloatArray], Any]) -> None:
+    matrix = np.eye(len(mesh.cells))
+    penalty_of(make(matrix), mesh, np.empty((0, 0)))
+    matrix[3, 7] = 0.25
+    with pytest.raises(ModelError, match=r"differ by -?0\.25") as caught:
+        penalty_of(make(matrix), mesh, np.empty((0, 0)))
+    assert caught.value.where == "prior, cells 3 and 7"

@@ -140,6 +140,11 @@ def plot(
     DataError
         When matplotlib is not installed, the image is of another mesh, or the mesh is a volume.
     """
+    if not (isinstance(image, Image) and isinstance(mesh, Mesh)):
+        raise DataError(
+            f"expected an Image and its Mesh, got {type(image).__name__} and {type(mesh).__name__}",
+            hint="give what an operator returns, or Image(values, unit, mesh.identity) of an array",
+        )
     how = Display() if display is None else display
     shown = how.shown(image, mesh)
     panel = Panel(title, shown.values, tuple(touches))

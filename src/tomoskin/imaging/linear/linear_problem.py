@@ -13,6 +13,7 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from tomoskin.core import DataError, FloatArray, ModelError
 from tomoskin.imaging.linear.operator import Operator
 from tomoskin.model.forward import ForwardModel
+from tomoskin.model.pattern import Pattern
 from tomoskin.model.prior import Carried, Penalty, PriorLike, penalty_of
 
 _ZERO = 1e-9
@@ -94,7 +95,9 @@ class LinearProblem:
         if not len(kept):
             raise DataError("expected at least one row that is not left out, got none")
         full = self.model
-        pattern = full.pattern.part(kept)
+        pattern = Pattern.from_tables(
+            full.pattern.drive[kept], full.pattern.measure[kept], full.pattern.n_electrodes
+        )
         current = np.empty(pattern.n_drive)
         current[pattern.drive_index] = full.current[full.pattern.drive_index[kept]]
         return replace(

@@ -46,7 +46,7 @@ def against(solution: Solution, weights: ArrayLike) -> NDArray[Any]:
     field, out = solution.gradient, []
     driven = model.drive_currents[pattern.drive_index].T
     for one in weight.reshape(-1, pattern.n_meas):
-        pairs = (driven * one) @ pattern.readers
+        pairs = (driven * one) @ solution.model.readers
         out.append(-np.einsum("eqc,eqc->c", field, np.tensordot(pairs, field, 1)))
     return np.array(out).reshape(*weight.shape[:-1], field.shape[2])
 
@@ -73,7 +73,7 @@ def _by_tensor(solution: Solution) -> NDArray[Any]:
     n_cells, d, _ = solution.conductivity.shape
     gradient = solution.gradient.reshape(pattern.n_electrodes, d, -1, n_cells)
     driven = np.tensordot(-solution.model.drive_currents, gradient, 1)[pattern.drive_index]
-    read = np.tensordot(pattern.readers, gradient, 1)
+    read = np.tensordot(solution.model.readers, gradient, 1)
     product = np.einsum("maqc,mbqc->mcab", driven, read)
     return np.asarray((product + product.swapaxes(-1, -2)) / 2.0)
 

@@ -1,4 +1,4 @@
-"""A forward model as a function that PyTorch or JAX differentiates, by its ``vjp`` and ``jvp``.
+"""A forward model as a function that PyTorch or JAX differentiates, by its ``vjp``.
 
 The conductivity may be one, (n_cells,), or many, (…, n_cells). All is computed in double precision
 on the processor; what is given has the type and device of what was taken.
@@ -36,17 +36,13 @@ def torch_voltages(model: ForwardModel) -> Callable[[Any], Any]:
 
     def forward(context: Any, conductivity: Any) -> Any:
         context.save_for_backward(conductivity)
-        context.save_for_forward(conductivity)
         return computed(model.solve_many, conductivity)
 
     def backward(context: Any, weights: Any) -> Any:
         return computed(model.vjp, *context.saved_tensors, weights)
 
-    def along(context: Any, change: Any) -> Any:
-        return computed(model.jvp, *context.saved_tensors, change)
-
     once = torch.autograd.function.once_differentiable
-    methods = {"forward": forward, "backward": once(backward), "jvp": along}
+    methods = {"forward": forward, "backward": once(backward)}
     statics = {name: staticmethod(method) for name, method in methods.items()}
     function: Any = type("Voltages", (torch.autograd.Function,), statics)
     apply: Callable[[Any], Any] = function.apply

@@ -88,7 +88,7 @@ def _confirm(
     largest = np.zeros(pattern.n_drive)
     np.maximum.at(largest, pattern.drive_index, np.abs(voltages))
     driven = _inner(model, resistance, pattern.currents)[pattern.drive_index]
-    inner = driven * _inner(model, resistance, pattern.readers)
+    inner = driven * _inner(model, resistance, model.readers)
     floor = _FLOOR * np.abs(model.current[pattern.drive_index]) * np.sqrt(inner)
     allowed = np.maximum(MOST_RESIDUAL * largest[pattern.drive_index], floor)
     if (np.abs(model.voltages(padded(lost))) <= allowed).all():

@@ -16,7 +16,7 @@ from tomoskin.model.forward.element import Element
 from tomoskin.model.forward.engine import Factorise
 from tomoskin.model.forward.engine_choice import choose_engine
 from tomoskin.model.mesh import Mesh
-from tomoskin.model.pattern import Pattern
+from tomoskin.model.pattern import Pattern, signed
 
 
 class System:
@@ -84,6 +84,11 @@ class System:
     def drive_currents(self) -> FloatArray:
         """(n_drive, n_electrodes) A into every electrode."""
         return self.current[:, None] * self.pattern.currents
+
+    @cached_property
+    def readers(self) -> FloatArray:
+        """(n_meas, n_electrodes) 1 at plus and −1 at minus of each measurement."""
+        return signed(self.pattern.measure, self.pattern.n_electrodes)
 
     @cached_property
     def _entries(self) -> tuple[IntArray, FloatArray]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Self
 
@@ -38,6 +38,8 @@ class Pattern:
         (n_meas,) the drive that each row belongs to.
     measure
         (n_meas, 2) plus, minus of each row.
+    spread
+        Whether a drive is a current into every electrode, not a pair.
 
     Raises
     ------
@@ -50,13 +52,15 @@ class Pattern:
     drives: NDArray[Any]
     drive_index: IntArray
     measure: IntArray
+    spread: bool = field(init=False)
 
     def __post_init__(self) -> None:
         """Freeze the tables and check every row."""
+        spread = np.ndim(self.drives) > 1 and np.shape(self.drives)[1] > _PAIR
+        object.__setattr__(self, "spread", spread)
         for name in ("drives", "drive_index", "measure"):
-            table = np.array(getattr(self, name))
-            spread = name == "drives" and table.ndim == _PAIR and table.shape[1] > _PAIR
-            table = table.astype(np.float64 if spread else np.int64)
+            kind = np.float64 if spread and name == "drives" else np.int64
+            table = np.array(getattr(self, name), dtype=kind)
             table.flags.writeable = False
             object.__setattr__(self, name, table)
         check_drives(self.drives, self.n_electrodes)
@@ -200,11 +204,6 @@ class Pattern:
         return len(self.drives)
 
     @property
-    def spread(self) -> bool:
-        """Whether a drive is a current into every electrode, not a pair."""
-        return bool(self.drives.shape[1] > _PAIR)
-
-    @property
     def drive(self) -> NDArray[Any]:
         """(n_meas, 2) source, sink of each row; or (n_meas, n_electrodes) currents."""
         return self.drives[self.drive_index]
@@ -215,15 +214,6 @@ class Pattern:
         if self.spread:
             return self.drives
         return signed(self.drives, self.n_electrodes)
-
-    @cached_property
-    def readers(self) -> FloatArray:
-        """(n_meas, n_electrodes) 1 at plus and −1 at minus of each row."""
-        return signed(self.measure, self.n_electrodes)
-
-    def part(self, rows: IntArray) -> Self:
-        """The pattern of these rows alone, on as many electrodes."""
-        return type(self).from_tables(self.drive[rows], self.measure[rows], self.n_electrodes)
 
     def rows_of(self, electrode: int) -> IntArray:
         """(k,) rows that drive or read ``electrode``. Raises PatternError where it is none."""

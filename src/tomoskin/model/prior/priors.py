@@ -175,6 +175,9 @@ PRIORS: dict[str, Prior] = {
 }
 """Priors by the name that a skin file uses; its keys, their bounds and the page's form follow."""
 
+_UNEQUAL = 1e-9
+"""Part of the largest value by which two values of a symmetric matrix may differ."""
+
 
 def penalty_of(prior: PriorLike, mesh: Mesh, jacobian: NDArray[Any]) -> Penalty:
     """Penalty of a prior by name, of a prior, or of a matrix of the caller's own, checked.
@@ -183,7 +186,7 @@ def penalty_of(prior: PriorLike, mesh: Mesh, jacobian: NDArray[Any]) -> Penalty:
     ------
     ModelError
         When the name is not known, the shape does not fit the mesh, a value is not finite, or
-        Q is not positive semi-definite.
+        Q is not symmetric and positive semi-definite.
     """
     if isinstance(prior, str):
         if prior not in PRIORS:
@@ -201,16 +204,29 @@ def _of_matrix(given: Any, n: int) -> Penalty:
         table = coo_array(value)
         _check_shape(table.shape, n)
         _check_finite(table.data, table.row)
+        _check_symmetric(csr_array(table))
         return sparse_penalty(csr_array(table).astype(np.float64))
     matrix = np.asarray(value, dtype=np.float64)
     _check_shape(matrix.shape, n)
     _check_finite(matrix, np.arange(n))
+    if matrix.ndim > 1:
+        _check_symmetric(csr_array(matrix))
     return Diagonal(matrix) if matrix.ndim == 1 else dense_penalty(matrix)
 
 
 def _check_shape(shape: tuple[int, ...], n: int) -> None:
     if shape not in ((n,), (n, n)):
         raise ModelError(f"expected a prior of shape ({n}, {n}), got {shape}")
+
+
+def _check_symmetric(matrix: csr_array) -> None:
+    largest, apart = np.abs(matrix.data).max(initial=0.0), coo_array(matrix - matrix.T)
+    bad = np.flatnonzero(np.abs(apart.data) > _UNEQUAL * largest)
+    if len(bad):
+        raise ModelError(
+            f"expected a symmetric prior, got two values that differ by {apart.data[bad[0]]:.3g}",
+            where=f"prior, cells {apart.row[bad[0]]} and {apart.col[bad[0]]}",
+        )
 
 
 def _check_finite(values: FloatArray, cells: NDArray[Any]) -> None:
