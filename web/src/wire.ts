@@ -18,6 +18,7 @@ export interface Scene {
   readonly pattern: PatternRows;
   readonly source: string;
   readonly pressable: boolean;
+  readonly truth: boolean;
   readonly probe: ProbeSizes;
   readonly version: string;
 }

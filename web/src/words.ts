@@ -85,7 +85,8 @@ function withFlow(word: string, remark: string, flow: FlowNow | null): readonly 
   return [flow.paused ? "Teaching paused" : `Teaching ${name}`, said];
 }
 
-/** What the top line says. `age`: seconds since the last frame, null before the first. */
+/** What the top line says. `age`: seconds since the last frame, null before the first; `opening`:
+ * the recording that is about to be played. */
 export function headline(
   link: LinkState,
   scene: Scene | null,
@@ -93,9 +94,11 @@ export function headline(
   now: number,
   age: number | null,
   flow: FlowNow | null = null,
+  opening: string | null = null,
 ): Headline {
   if (link.phase === "lost") return disconnected(link, now, age);
   if (link.phase === "connecting" || !scene || !status) return calm("Connecting");
+  if (opening !== null) return { ...calm("Opening", opening), warnings: warningsOf(status, age) };
   const [word, remark] = withFlow(...stateOf(status, age !== null && age > OLD), flow);
   return { word, remark, warnings: warningsOf(status, age) };
 }

@@ -24,19 +24,27 @@ _EXAMPLES = {"mqtt": "mqtt://127.0.0.1/tomoskin"}
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing looked at: whether it is as needed, and a sentence."""
+    """One thing looked at: whether it is as needed, and a sentence; ``optional``: it may be absent."""
 
     name: str
     ok: bool
     text: str
+    optional: bool = False
+
+    @property
+    def mark(self) -> str:
+        """What stands before it."""
+        if self.ok:
+            return "ok"
+        return "-" if self.optional else "FAIL"
 
 
 def doctor(json: JsonFlag = False) -> None:
     """Say what was found, and exit with 1 where something is not as needed."""
     findings = [finding for look in _LOOKS for finding in look()]
-    healthy = all(finding.ok for finding in findings)
+    healthy = all(finding.ok or finding.optional for finding in findings)
     document = {"ok": healthy, "version": __version__, "findings": [asdict(f) for f in findings]}
-    lines = (f"{'ok  ' if f.ok else 'FAIL'}  {f.name:<10} {f.text}" for f in findings)
+    lines = (f"{f.mark:<4}  {f.name:<10} {f.text}" for f in findings)
     tell(document, lines, json=json)
     raise typer.Exit(0 if healthy else 1)
 
@@ -76,7 +84,7 @@ def _sinks() -> Iterator[Finding]:
     for name in sink_names():
         spec = _EXAMPLES.get(name, name)
         tried = _tried("sink", partial(make_sink, spec), lambda _: "installed")
-        yield Finding("sink", True, f"{name}: {tried.text}")
+        yield Finding("sink", tried.ok, f"{name}: {tried.text}", optional=True)
 
 
 def _skins() -> Iterator[Finding]:

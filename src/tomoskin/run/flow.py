@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future
+from contextlib import suppress
 from dataclasses import dataclass
+from itertools import chain
+from typing import Any
 
 from tomoskin.board.source import Link, ScanSettings, Transport
 from tomoskin.board.wire import Info
@@ -18,13 +21,13 @@ from tomoskin.run.intake import Intake, Marker, replay_status
 from tomoskin.run.publisher import Audience, Publisher
 from tomoskin.run.status import Status
 from tomoskin.run.twin_control import TwinControl, described
-from tomoskin.twin import Contact
+from tomoskin.twin import Contact, Press
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Snapshot:
-    """A result, the presses on the twin when it was read, its latency in s, and when it was
-    ready, host monotonic s."""
+    """A result, the presses on the twin when it was read (of a replay those that it recorded), its
+    latency in s, and when it was ready, host monotonic s."""
 
     result: FrameResult
     truth: tuple[Contact, ...]
@@ -192,6 +195,13 @@ class Flow:
         if self._recall.is_due(self._clock(), at_end=True):
             self._recall.keep(self.prepared, self.out)
 
+    def _truth(self, frame: Frame) -> tuple[Contact, ...]:
+        """What pressed when the frame was read."""
+        replay = self.marker.replay
+        if replay is None:
+            return self.twin.truth
+        return tuple(chain.from_iterable(map(_recorded, replay.pressed(frame.host_time))))
+
     def _note_board(self, info: Info | None, name: str) -> None:
         self.board, self.board_name = info, name
         if info is None:
@@ -224,9 +234,15 @@ class Flow:
             return
         ready, decode = self._clock(), begun - read + intake.waited
         self.latency.add_result(decode, ready - begun)
-        self.newest = Snapshot(result, self.twin.truth, decode + ready - begun, ready)
+        self.newest = Snapshot(result, self._truth(frame), decode + ready - begun, ready)
         self._recall.see(result, self)
         self.out.put(result)
+
+
+def _recorded(press: Mapping[str, Any]) -> Iterator[Press]:
+    """A press of a recording; nothing where it describes none."""
+    with suppress(KeyError, TypeError, ValueError, TomoskinError):
+        yield Press(*(float(press[name]) for name in ("x", "y", "force", "radius")))
 
 
 def _doubt(prepared: Prepared, reference: ReferenceState) -> str | None:

@@ -60,6 +60,8 @@ class NewestTouches:
 
     def _touches(self, name: str, runner: Runner) -> TouchesOfSkin:
         assert runner.newest is not None
+        if not runner.running:  # what touched last may touch no more
+            return TouchesOfSkin(valid=False, touches=[])
         contacts = Contacts.of(self._streams[name], runner.newest.result)
         pose = self._poses[name]
         touches = [

@@ -84,6 +84,7 @@ class Scene(Message, frozen=True, tag="scene"):
 
     ``limit`` is the end of the fixed symmetric colour scale, in ``unit``; ``solid`` holds the
     points in space, x0, y0, z0, …, of a sheet on a surface; null: the sheet lies flat.
+    ``truth``: what really presses is known, because it can be pressed or was when it was recorded.
     """
 
     skin: SkinName
@@ -97,6 +98,7 @@ class Scene(Message, frozen=True, tag="scene"):
     pattern: PatternRows
     source: str
     pressable: bool
+    truth: bool
     probe: ProbeSizes
     version: str
 

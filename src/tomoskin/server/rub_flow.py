@@ -182,7 +182,7 @@ class RubFlow(GuidedFlow):
             self._touches.push(result)
         else:
             phase = taker.phase
-            dv = taker.push(result.host_time, result.voltages)
+            dv = taker.push(result.host_time, result.voltages, touched=bool(result.touches))
             moved = taker.phase != phase
         if dv is not None and self._dot is not None:
             self.taken.append(GuidedPress(self._dot, dv))

@@ -31,7 +31,6 @@ export function InUse({ of }: { of: Of }) {
   const kept = (files.value?.files ?? []).filter(({ name }) => name.endsWith(".npz"));
   return (
     <>
-      <h3>In use</h3>
       <p data-testid="calibration">
         {known === null
           ? WITHOUT[of]
@@ -40,7 +39,7 @@ export function InUse({ of }: { of: Of }) {
       {of === "touch" && known !== null && <Health />}
       {(kept.length > 0 || known !== null) && (
         <label class="row">
-          <span>Calibration</span>
+          <span>In use</span>
           <select
             value={known ?? ""}
             onChange={({ currentTarget: { value } }) =>

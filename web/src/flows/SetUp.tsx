@@ -172,16 +172,6 @@ function Going({ kind }: { kind: FlowKind }) {
         {taken}
         {thinking ? ", computing…" : ""}
       </p>
-      <p data-testid="flow-text">{text}</p>
-      {kind === "mapping" && figures.probability !== undefined && (
-        <progress value={figures.probability} max={1} aria-label="How sure the answer is" />
-      )}
-      {doubtful.length > 0 && (
-        <p class="wrong">
-          {doubtful.length === 1 ? "Press " : "Presses "}
-          {doubtful.map((row) => row + 1).join(", ")} do not fit the others: the position may be wrong.
-        </p>
-      )}
       <div class="does">
         <button
           type="button"
@@ -194,6 +184,16 @@ function Going({ kind }: { kind: FlowKind }) {
         <Leave />
       </div>
       <Keep kind={kind} />
+      <p data-testid="flow-text">{text}</p>
+      {kind === "mapping" && figures.probability !== undefined && (
+        <progress value={figures.probability} max={1} aria-label="How sure the answer is" />
+      )}
+      {doubtful.length > 0 && (
+        <p class="wrong">
+          {doubtful.length === 1 ? "Press " : "Presses "}
+          {doubtful.map((row) => row + 1).join(", ")} do not fit the others: the position may be wrong.
+        </p>
+      )}
       <ol class="presses" aria-label="Presses recorded">
         {presses.map(([x, y], k) => (
           <li key={k} class={doubtful.includes(k) ? "doubtful" : ""}>
@@ -253,8 +253,8 @@ function View() {
           </button>
         ))}
       </div>
-      {shown === "board" ? <Board /> : <Guided kinds={TEACHING[shown]} />}
       {(shown === "touch" || shown === "force") && going !== shown && <InUse of={shown} />}
+      {shown === "board" ? <Board /> : <Guided kinds={TEACHING[shown]} />}
     </div>
   );
 }

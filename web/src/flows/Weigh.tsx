@@ -163,12 +163,12 @@ export function Weigh() {
       <p data-testid="taken">
         {presses.length} placement{presses.length === 1 ? "" : "s"} recorded{thinking ? ", computing…" : ""}
       </p>
-      <p data-testid="flow-text">{text}</p>
-      <Remarks />
-      <Keep kind="force" />
       <div class="does">
         <Leave />
       </div>
+      <Keep kind="force" />
+      <p data-testid="flow-text">{text}</p>
+      <Remarks />
       <Recorded />
     </>
   );

@@ -5,16 +5,19 @@ from __future__ import annotations
 import math
 import re
 import threading
-from collections.abc import Callable, Iterator
+from bisect import bisect_right
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tomoskin.board.source import Configuration, ScanSettings
 from tomoskin.board.wire import OLDER, SCHEMA
 from tomoskin.core import Clock, DataError, Mark, MarkedFrame, SourceError, WallClock
 from tomoskin.files.session.info import References
+from tomoskin.files.session.layout import Truth
 from tomoskin.files.session.playback import Item, Playhead
 from tomoskin.files.session.replay_board import ReplayBoard
 from tomoskin.files.session.session_reader import (
@@ -60,6 +63,9 @@ class ReplayTransport:
         Whether it stands still.
     touches_before, reference_frames
         The last identity that a touch had before it begins, and the frames that make a reference.
+    truth
+        What pressed on a twin, each time that it changed; nothing where the session has no index,
+        since all of it would have to be read.
 
     Raises
     ------
@@ -87,6 +93,7 @@ class ReplayTransport:
         self._references = References(session.path, session.settings())
         self._head = Playhead(partial(_items, session, self._stamp))
         self._end = end_time(session)
+        self.truth = () if self._end is None else _truth_of(session)
         self._wall = self._clock.now()
         self._steps = 0
         self._closed = self._after_seek = False
@@ -112,6 +119,11 @@ class ReplayTransport:
     def now(self) -> float:
         """The time in the recording, host monotonic s: exactly that of what was read last."""
         return self._head.now
+
+    def pressed(self, host_time: float) -> tuple[Mapping[str, Any], ...]:
+        """What pressed on the twin at ``host_time``, by the fields of each press."""
+        number = bisect_right(self.truth, host_time, key=lambda truth: truth.host_time)
+        return self.truth[number - 1].presses if number else ()
 
     def after_seek(self) -> bool:
         """Whether what was read last does not follow what was read before it."""
@@ -284,6 +296,14 @@ def _stamp_of(
         return MarkedFrame(frame, item.mark)
 
     return stamp
+
+
+def _truth_of(session: SessionReader) -> tuple[Truth, ...]:
+    """As far as it can be read: frames are played without it too."""
+    found: list[Truth] = []
+    with suppress(DataError):
+        found.extend(session.truth())
+    return tuple(sorted(found, key=lambda truth: truth.host_time))
 
 
 def _items(
