@@ -24,7 +24,7 @@ _EXAMPLES = {"mqtt": "mqtt://127.0.0.1/tomoskin"}
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing looked at: whether it is as needed, and a sentence; ``optional``: it may be absent."""
+    """What was looked at: whether it is there, and a sentence; ``optional``: it need not be."""
 
     name: str
     ok: bool

@@ -16,6 +16,7 @@ from tomoskin.core.errors import (
     SourceError,
     TomoskinError,
     WireError,
+    meant,
 )
 from tomoskin.core.inputs import check_is_file, open_input
 from tomoskin.core.outputs import MAGIC, RECORDING, Output, StrPath, check_outputs
@@ -149,6 +150,7 @@ __all__ = [
     "kept",
     "load_arrays",
     "machine_memory",
+    "meant",
     "most_bytes",
     "needed",
     "numbers",

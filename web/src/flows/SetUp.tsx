@@ -153,7 +153,8 @@ const PHASES: Partial<Record<Phase, string>> = {
 };
 
 /** What is to be done now. */
-function lead({ phase, effort, ready }: FlowNow): string | undefined {
+function lead({ phase, effort, ready, paused }: FlowNow): string | undefined {
+  if (paused) return "Paused while a recording is played";
   if (phase !== "press") return PHASES[phase];
   if (effort) return `Press ${effort} where the dot is`;
   return ready ? "Save it, or press where the dot is" : PHASES.press;

@@ -11,7 +11,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tomoskin.core import IntArray, PatternError
+from tomoskin.core import IntArray, PatternError, meant
 
 
 @dataclass(frozen=True, eq=False)
@@ -294,4 +294,5 @@ def _one(name: str, n: int) -> Pattern:
         return Pattern.skip(n, int(k))
     raise PatternError(
         f'expected a pattern among {", ".join(NAMED)}, skip:K, or several joined by +, got "{name}"'
+        f"{meant(name, NAMED)}"
     )
