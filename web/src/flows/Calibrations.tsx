@@ -39,7 +39,7 @@ export function InUse({ of }: { of: Of }) {
       {of === "touch" && known !== null && <Health />}
       {(kept.length > 0 || known !== null) && (
         <label class="row">
-          <span>In use</span>
+          <span>Calibration</span>
           <select
             value={known ?? ""}
             onChange={({ currentTarget: { value } }) =>
