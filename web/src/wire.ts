@@ -768,6 +768,7 @@ export interface SpaceTouch {
   readonly normal: readonly [number, number, number];
   readonly peak: number;
   readonly force: number | null;
+  readonly more_than: number | null;
 }
 
 export type ServerMessage =

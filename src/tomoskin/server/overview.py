@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import math
 import time
 from collections.abc import AsyncIterator, Callable, Mapping
 from pathlib import Path
@@ -12,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from tomoskin import __version__
-from tomoskin.core import FloatArray, WireError, encode_json
+from tomoskin.core import FloatArray, Force, WireError, encode_json
 from tomoskin.files.messages import Contacts, Stream
 from tomoskin.model.robot import PlacedSkin, Pose, Robot
 from tomoskin.run import RobotRun, Runner, StrictRequest, commands
@@ -71,6 +72,7 @@ class NewestTouches:
                 normal=_rounded(pose.rotation @ contact.normal),
                 peak=contact.touch.detection.peak,
                 force=contact.force,
+                more_than=_more_than(contact.touch.detection.force),
             )
             for contact in contacts.touches
         ]
@@ -193,6 +195,10 @@ def states(run: RobotRun) -> RobotState:
     }
     recording = None if run.recording is None else run.recording.name
     return RobotState(skins=skins, recording=recording)
+
+
+def _more_than(force: Force | None) -> float | None:
+    return force.low if force is not None and math.isinf(force.high) else None
 
 
 def _rounded(values: FloatArray) -> Any:

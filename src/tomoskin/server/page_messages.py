@@ -451,13 +451,17 @@ class RobotState(Message, frozen=True, tag="robot-state"):
 
 
 class SpaceTouch(MessagePart, frozen=True):
-    """A touch in the frame of the robot's root; ``force`` N, null where nothing gives it."""
+    """A touch in the frame of the robot's root; ``force`` N, null where nothing gives it.
+
+    ``more_than``: N that it is more than, where it is beyond what was taught; else null.
+    """
 
     id: int
     position: tuple[float, float, float]
     normal: tuple[float, float, float]
     peak: float
     force: float | None
+    more_than: float | None = None
 
 
 class TouchesOfSkin(MessagePart, frozen=True):

@@ -1,8 +1,10 @@
 /** The drawer that sets a skin up: the board, the reference, the wires, the touch, the force. */
 
+import { useEffect } from "preact/hooks";
 import { takeReference } from "../commands";
 import { addDrawer, whileOpened } from "../drawers";
 import { duration, millimetres } from "../format";
+import { narrow } from "../screen";
 import { send, status } from "../state";
 import type { FlowNow } from "../wire";
 import { InUse } from "./Calibrations";
@@ -239,6 +241,12 @@ function Guided({ kinds }: { kinds: readonly Teaching[] }) {
 function View() {
   const shown = step.value;
   const going = flow.value.kind && stepOf(flow.value.kind);
+  useEffect(() => {
+    // What is to be done stands at the top.
+    const drawer = document.getElementById("drawer");
+    drawer?.querySelector(".drawn")?.scrollTo(0, 0);
+    if (narrow.peek()) drawer?.scrollIntoView();
+  }, [shown, going]);
   return (
     <div class="flow">
       <div class="steps" role="group" aria-label="Steps">

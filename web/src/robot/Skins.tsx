@@ -7,9 +7,10 @@ import { states, robot, touches, type SkinTouches } from "./model";
 export function touchLines(found: SkinTouches[string] | undefined): string[] {
   if (!found?.valid) return ["not known"];
   if (found.touches.length === 0) return ["no touch"];
-  return found.touches.map(({ id, position, force }) => {
+  return found.touches.map(({ id, position, force, more_than: least }) => {
     const place = position.map((value) => millimetres(value, 0)).join(", ");
-    return `touch ${id} at ${place} mm${force === null ? "" : `, ${fixed(force, 1)} N`}`;
+    const newtons = least === null ? fixed(force, 1) : `> ${fixed(least, 1)}`;
+    return `touch ${id} at ${place} mm${force === null ? "" : `, ${newtons} N`}`;
   });
 }
 
