@@ -101,7 +101,7 @@ native: dev  ## the native engine, where Rust is installed; live runs without
 wheel: dev page  ## a wheel with the built page, in dist/
 	@$(PY) -m hatchling build -t wheel
 
-release: native page  ## sdist and wheels into dist/, tried in an empty environment; nothing is uploaded
+release: test-all  ## everything tested, then sdist and wheels into dist/, tried in an empty environment; nothing is uploaded
 	@$(PY) scripts/release.py
 
 lock: dev  ## pin the newest packages, with hashes, in requirements/*.txt

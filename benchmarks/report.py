@@ -169,6 +169,7 @@ class Part:
 
     file: Path
     before: str
+    text: str
     after: str
 
     @classmethod
@@ -183,7 +184,8 @@ class Part:
                 hint="the tables are written between these two lines",
             )
         before, rest = text.split(begin)
-        return cls(file, before + begin, end + rest.split(end)[1])
+        now, after = rest.split(end)
+        return cls(file, before + begin, now, end + after)
 
     def write(self, reports: Sequence[Report]) -> None:
         """Put tables, their notes and the machine there."""

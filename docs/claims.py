@@ -8,7 +8,9 @@ pictures. Pages are written from the file each time; ``--check`` only says what 
 A table ``[PART.NAME]`` of the file has a ``command`` that prints JSON, its ``values``, which hold
 ``within`` a part of themselves, and ``pages`` with the texts that show them: ``{KEY|2}`` is a value
 with two decimals. A key of an example is the name of its number; that of a benchmark is
-``TITLE > FIRST / CELLS / OF THE ROW → COLUMN``. ``needs`` names public recordings.
+``TITLE > FIRST / CELLS / OF THE ROW → COLUMN``. ``needs`` names public recordings. The figures of
+a ``[tables.NAME]`` stand on its ``page`` alone, between ``<!-- bench NAME -->`` and its end: every
+number of every table there.
 """
 
 from __future__ import annotations
@@ -31,6 +33,10 @@ from typing import Any
 from gallery import save_picture, written_gallery
 
 ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "benchmarks"))
+
+from report import Part, Report  # noqa: E402 - the benchmarks are no package
+
 FILE, KEPT = ROOT / "docs" / "claims.toml", ROOT / "build" / "claims"
 RECORDINGS = ROOT.parent / "shared" / "data"
 CODE = ("src", "core-native", "examples", "benchmarks")
@@ -49,16 +55,18 @@ class Claim:
     command: str
     date: datetime.date
     commit: str
-    values: Mapping[str, float]
+    values: Mapping[str, float] = field(default_factory=dict)
     within: float = 0.02
     needs: str = ""
+    page: str = ""
     pages: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
     def broken(self, found: Mapping[str, float]) -> list[str]:
         """Values that are not what was found."""
         if not found:
             return [f"{self.name}: {self.command} failed"]
-        return [
+        new = [key for key in found if self.page and key not in self.values]
+        return [f"{self.name}, {key}: is not published" for key in new] + [
             f"{self.name}, {key}: {value:g} is published, {found.get(key)} was found"
             for key, value in self.values.items()
             if key not in found or not abs(found[key] - value) <= self.within * abs(value)
@@ -68,7 +76,8 @@ class Claim:
 def claims() -> list[Claim]:
     """All of the file."""
     parts = tomllib.loads(FILE.read_text(encoding="utf-8"))
-    return [Claim(part, name, **one) for part, some in parts.items() for name, one in some.items()]
+    every = (Claim(part, name, **one) for part, some in parts.items() for name, one in some.items())
+    return [replace(one, values=numbers(on_page(one))) if one.page else one for one in every]
 
 
 def dumped(every: Sequence[Claim]) -> str:
@@ -79,6 +88,9 @@ def dumped(every: Sequence[Claim]) -> str:
         lines += [f'command = "{one.command}"', f"date = {one.date}", f'commit = "{one.commit}"']
         lines += [f"within = {one.within:g}"] * (one.within != Claim.within)
         lines += [f'needs = "{one.needs}"'] * bool(one.needs)
+        if one.page:
+            lines += [f'page = "{one.page}"', ""]
+            continue
         lines += ["", f"[{one.part}.{one.name}.values]"]
         lines += [f"{_quoted(key)} = {float(f'{value:.4g}')}" for key, value in one.values.items()]
         if one.pages:
@@ -93,13 +105,13 @@ def _quoted(text: str) -> str:
     return json.dumps(text, ensure_ascii=False)
 
 
-def measured(claim: Claim) -> dict[str, float] | None:
-    """What its command gives, by key; None where recordings are missing."""
+def measured(claim: Claim) -> Any:
+    """What its command prints; None where recordings are missing, empty where it fails."""
     if claim.needs and not (RECORDINGS / claim.needs).exists():
         return None
-    kept = KEPT / f"{claim.name}.json"
+    kept = KEPT / f"{shlex.split(claim.command)[-1].replace('/', '_')}.json"
     if kept.is_file() and (before := json.loads(kept.read_text()))["code"] == code():
-        return dict(before["values"])
+        return before["document"]
     print(claim.command, file=sys.stderr, flush=True)
     program, *rest = shlex.split(claim.command)
     module = ["-m", "tomoskin"] if program == "tomoskin" else []
@@ -112,10 +124,46 @@ def measured(claim: Claim) -> dict[str, float] | None:
         print(ended.stderr, file=sys.stderr)
         return {}
     document = json.loads(ended.stdout)
-    found = {key: value for key in claim.values if (value := read(document, key)) is not None}
-    found = document if claim.part == "gallery" else found
-    kept.write_text(json.dumps({"code": code(), "values": found}))
+    kept.write_text(json.dumps({"code": code(), "document": document}))
+    return document
+
+
+def figures(claim: Claim, document: Any) -> dict[str, float]:
+    """What a run of its command found, by key."""
+    if claim.page:
+        return numbers(document)
+    if claim.part == "gallery":
+        return dict(document)
+    return {key: value for key in claim.values if (value := read(document, key)) is not None}
+
+
+def on_page(claim: Claim) -> list[dict[str, Any]]:
+    """The reports of a benchmark as they stand on its page."""
+    part = Part.of(ROOT / claim.page, claim.name)
+    reports = []
+    for text in part.text.split("\n### ")[1:]:
+        title, _, rest = text.partition("\n")
+        lines = [line for line in rest.splitlines() if line.startswith("| ")]
+        columns, _, *rows = ([cell.strip() for cell in line[1:-1].split(" | ")] for line in lines)
+        reports.append({"title": title, "columns": columns, "rows": rows})
+    return reports
+
+
+def numbers(reports: Sequence[Mapping[str, Any]]) -> dict[str, float]:
+    """Numbers of the cells by table, row, column and place; the first cell names its row."""
+    found = {}
+    for report in reports:
+        title = report["title"][:1].upper() + report["title"][1:]
+        for line, (first, *cells) in enumerate(report["rows"], 1):
+            for column, cell in zip(report["columns"][1:], cells, strict=True):
+                for place, number in enumerate(_numbers(str(cell)), 1):
+                    found[f"{title} > {first} ({line}) → {column}, {place}"] = number
     return found
+
+
+def _numbers(text: str) -> list[float]:
+    plain = (number.replace(",", "").replace("−", "-") for number in re.findall(_NUMBER, text))
+    return [float(number) for number in plain]
 
 
 def read(document: Any, key: str) -> float | None:
@@ -128,8 +176,7 @@ def read(document: Any, key: str) -> float | None:
     for report in document:
         for row in report["rows"] if title in report["title"] else ():
             if [str(cell) for cell in row[: len(first)]] == first:
-                cell = str(row[report["columns"].index(column)])
-                return float(re.findall(_NUMBER, cell)[0].replace(",", "").replace("−", "-"))
+                return _numbers(str(row[report["columns"].index(column)]))[0]
     return None
 
 
@@ -137,7 +184,7 @@ def read(document: Any, key: str) -> float | None:
 def code() -> str:
     """Says which code this is, changes that are not committed included."""
     git = ["git", "-C", str(ROOT)]
-    head = subprocess.check_output([*git, "rev-parse", "HEAD"])
+    head = subprocess.check_output([*git, "rev-parse", *(f"HEAD:{folder}" for folder in CODE)])
     changes = subprocess.check_output([*git, "diff", "HEAD", "--", *CODE])
     return hashlib.sha256(head + changes).hexdigest()
 
@@ -173,25 +220,27 @@ def run(every: Sequence[Claim], part: str | None, *, accept: bool) -> Iterator[s
     """Run the claims of ``part``, say which do not hold, and write file and pages."""
     KEPT.mkdir(parents=True, exist_ok=True)
     commit = subprocess.check_output(["git", "-C", str(ROOT), "rev-parse", "--short", "HEAD"])
-    after = {one.name: one for one in every}
+    after = {(one.part, one.name): one for one in every}
     for one in every:
-        found = measured(one) if part in {None, one.part} else None
-        if found is None:
+        document = measured(one) if part in {None, one.part} else None
+        if document is None:
             continue
-        whole = found if one.part == "gallery" else one.values.keys() <= found.keys()
-        if not (accept and whole):
+        found = figures(one, document)
+        free = one.page or one.part == "gallery"  # then the run says which figures there are
+        if not (accept and found and (free or one.values.keys() <= found.keys())):
             yield from one.broken(found)
-        else:
-            values = found if one.part == "gallery" else {**one.values, **found}
-            after[one.name] = replace(
-                one,
-                values=values,
-                date=datetime.date.today(),
-                commit=commit.decode().strip(),
-            )
-            if one.part == "gallery":
-                save_picture(KEPT / f"{one.name}.png")
-            FILE.write_text(dumped(list(after.values())), encoding="utf-8")  # for what is cut off
+            continue
+        today = datetime.date.today()
+        values = found if one.part == "gallery" else {**one.values, **found}
+        after[one.part, one.name] = replace(
+            one, values=values, date=today, commit=commit.decode().strip()
+        )
+        if one.part == "gallery":
+            save_picture(KEPT / f"{one.name}.png")
+        if one.page:
+            reports = [Report(**report) for report in document]
+            Part.of(ROOT / one.page, one.name).write(reports)
+        FILE.write_text(dumped(list(after.values())), encoding="utf-8")  # for what is cut off
     for page, text in pages(claims()):
         page.write_text(text, encoding="utf-8")
 

@@ -9,9 +9,9 @@ import numpy as np
 from tomoskin.core import Detection, FloatArray, Image
 from tomoskin.imaging import ThesisMetrics
 from tomoskin.model.skin import Skin
-from tomoskin.pipeline import prepare
+from tomoskin.pipeline import prepare, reconstruct
 from tomoskin.sensing.segment import Segmenter
-from tomoskin.sensing.signal import difference
+from tomoskin.sensing.signal import Recording, difference
 
 NOSER = {"inverse": {"prior": "noser", "difference": "normalised", "alpha": "auto"}}
 """The thesis's inverse: NOSER's prior, one step, normalised differences; alpha by the noise."""
@@ -19,6 +19,9 @@ NOSER = {"inverse": {"prior": "noser", "difference": "normalised", "alpha": "aut
 
 FRAMES = 40
 """Frames of a stage where pictures are compared: four times the thesis's, for half the noise."""
+
+PERIOD = 0.06
+"""s from one frame to the next, about that of a Mega with 8 electrodes."""
 
 
 class Imager:
@@ -38,6 +41,14 @@ class Imager:
         """Regions above ``part`` of the extreme, as the thesis finds them (its figure 4.6)."""
         settings = replace(self.prepared.skin.touch, gamma1=part)
         return Segmenter(self.mesh, settings)(image)
+
+    def touches(self, idle: FloatArray, loaded: FloatArray) -> list[Detection]:
+        """Touches fitted to the voltages, as a live run has them in the last of the frames."""
+        prepared, pattern = prepare(Skin.load(self.prepared.skin.name)), self.prepared.pattern
+        time = PERIOD * np.arange(len(loaded))
+        rows = pattern.drive, pattern.measure, time
+        recording = Recording(loaded, *rows, None, None, is_change=False, source="the stage")
+        return [touch.detection for touch in reconstruct(prepared, recording, idle).touches[-1]]
 
     def metrics(self, image: Image, place: tuple[float, float] | None = None) -> ThesisMetrics:
         """The thesis's four metrics (its section 4.4.1), the true place known or not."""

@@ -11,6 +11,7 @@ import pytest
 import claims
 from claims import Claim, read, written
 from gallery import documented
+from report import Part, Report
 
 REPORTS = [
     {
@@ -61,6 +62,28 @@ def test_a_claim_that_does_not_hold_is_named(claim: Claim) -> None:
     ]
     assert len(claim.broken({"b": 2.0})) == 1
     assert claim.broken({}) == ["one: tomoskin bench one failed"]
+
+
+def test_a_table_on_a_page_is_held_against_a_run_number_by_number(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = tmp_path / "page.md"
+    page.write_text("before\n<!-- bench one -->\n<!-- end one -->\nafter\n", encoding="utf-8")
+    monkeypatch.setattr(claims, "ROOT", tmp_path)
+    table = Claim(
+        "tables", "one", "tomoskin bench one", datetime.date(2026, 1, 2), "abc", page=page.name
+    )
+    run = [{**one, "notes": ["a note"], "machine": {"cores": "1"}} for one in REPORTS]
+    Part.of(page, "one").write([Report(**one) for one in run])
+    published = replace(table, values=claims.numbers(claims.on_page(table)))
+    assert published.broken(claims.numbers(run)) == []
+    assert len(published.values) == 8
+    run[1]["rows"] = [["disc-8", "–2.1"], ["disc-9", 3]]
+    wrong = published.broken(claims.numbers(run))
+    assert wrong == [
+        "one, A plant > disc-9 (2) → median mm, 1: is not published",
+        "one, A plant > disc-8 (1) → median mm, 1: 2 is published, 2.1 was found",
+    ]
 
 
 def test_a_figure_on_a_page_is_replaced_where_its_words_stand(claim: Claim) -> None:

@@ -12,7 +12,7 @@ from tomoskin.cli.board import app
 from tomoskin.run import CheckFinding
 from tomoskin.sensing.signal import meter_steps
 
-GOOD = [f"{(step.low + step.high) / 2:.3f}" for step in meter_steps(0.1)]
+GOOD = [f"{(step.low + step.high) / 2:.3f}" for step in meter_steps(0.1, 8)]
 
 
 @pytest.fixture(autouse=True)
@@ -23,7 +23,7 @@ def board(monkeypatch: pytest.MonkeyPatch) -> None:
     def opened(*_: object) -> Iterator[None]:
         yield None
 
-    def checked(*_: object) -> list[CheckFinding]:
+    def checked(*_: object, **_named: object) -> list[CheckFinding]:
         return [CheckFinding("handshake", True, "a board")]
 
     monkeypatch.setattr("tomoskin.cli.board._opened", opened)
@@ -51,6 +51,14 @@ def test_what_is_no_number_is_asked_for_again_and_enter_leaves_one_out() -> None
     assert done.exit_code == 0
     assert 'expected volts, such as 2.20, got "twelve"' in done.stderr
     assert "a board" in done.stdout
+
+
+def test_what_is_right_follows_from_the_readings_before() -> None:
+    """11.5 V in: 11.4 V are right at SENSE; the nominal 12 V would refuse them."""
+    low = ["11.5", "0", "11.4", "4.8", "-4.5", "2.5", "2.2", "10.28", "0", "0", "0", ""]
+    done = CliRunner().invoke(app, ["check"], input="\n".join(low))
+    assert done.exit_code == 0
+    assert done.stdout.count("ok  ") == len(low)
 
 
 def test_a_current_that_the_parts_cannot_carry_is_refused() -> None:

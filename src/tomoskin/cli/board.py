@@ -23,6 +23,9 @@ app = group("board")
 
 MOST = BOARDS[DEFAULT_BOARD].channels[-1]
 
+FIVE = "+5V"
+"""The point whose reading is the reference of the Mega's converter."""
+
 
 @app.callback()
 def _board() -> None:
@@ -43,6 +46,15 @@ def check(
     meter: Annotated[
         bool, typer.Option(help="Ask for the multimeter's readings first; Enter skips one.")
     ] = True,
+    five_volts: Annotated[
+        float | None,
+        typer.Option(
+            min=4.5,
+            max=5.5,
+            metavar="V",
+            help="Volts that a meter shows at +5V, where --no-meter does not ask for them.",
+        ),
+    ] = None,
     json: JsonFlag = False,
 ) -> None:
     """Check the first power-up: readings of a multimeter, then what the board itself measures.
@@ -54,7 +66,8 @@ def check(
     if not 1e-6 <= amperes <= 0.1:
         raise typer.BadParameter(f"expected 1 µA to 100 mA, got {current}", param_hint="--current")
     findings = []
-    for finding in _findings(source, channels, amperes, meter=meter):
+    read = {} if five_volts is None else {FIVE: five_volts}
+    for finding in _findings(source, channels, amperes, read, meter=meter):
         findings.append(finding)
         if not json:
             mark = "ok  " if finding.ok else "FAIL"
@@ -65,30 +78,33 @@ def check(
     raise typer.Exit(0 if sound else 1)
 
 
-def _findings(source: str, channels: int, current: float, *, meter: bool) -> Iterator[CheckFinding]:
+def _findings(
+    source: str, channels: int, current: float, read: dict[str, float], *, meter: bool
+) -> Iterator[CheckFinding]:
     from tomoskin.run import check_board
     from tomoskin.sensing.signal import LoadRing
 
     if meter:
-        yield from _readings(current)
+        yield from _readings(current, channels, read)
     ring = LoadRing.for_current(channels, current)
     with _opened(source, ring, current) as transport:
-        yield from check_board(transport, ring, current)
+        yield from check_board(transport, ring, current, five_volts=read.get(FIVE))
 
 
-def _readings(current: float) -> Iterator[CheckFinding]:
-    """Ask for what only a multimeter can tell."""
+def _readings(current: float, channels: int, read: dict[str, float]) -> Iterator[CheckFinding]:
+    """Ask for what only a multimeter can tell; it stands in ``read`` afterwards, V by point."""
     from tomoskin.run import CheckFinding
     from tomoskin.sensing.signal import STAGES, meter_steps
 
     stage = ""
-    for step in meter_steps(current):
+    for step in meter_steps(current, channels, read):
         if step.stage != stage:
             stage = step.stage
             typer.echo(f"\n{STAGES[stage]}; black lead on GND.", err=True)
         volts = _asked(f"{step.point}, expected {step.expected}")
         if volts is None:
             continue
+        read[step.point] = volts
         ok = step.accepts(volts)
         text = f"{step.point}: {volts:g} V"
         yield CheckFinding(

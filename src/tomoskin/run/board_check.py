@@ -40,6 +40,9 @@ from tomoskin.sensing.signal import CountScale, LoadRing, diagnose
 BITS = BOARDS[DEFAULT_BOARD].adc_bits
 """Of a count here: the samples of a finer converter are scaled to it."""
 
+USB_VOLTS = 5.0
+"""Reference of a converter that has no other than the 5 V of USB, V."""
+
 _NOISE = 2.0
 """Counts a conversion; the decks give 0.7, and rounding adds 0.3."""
 
@@ -82,11 +85,18 @@ class _Readings:
 
 
 def check_board(
-    transport: Transport, ring: LoadRing, current: float, *, frames: int = 24
+    transport: Transport,
+    ring: LoadRing,
+    current: float,
+    *,
+    five_volts: float | None = None,
+    frames: int = 24,
 ) -> Iterator[CheckFinding]:
     """Look at a board whose terminals hold ``ring``, set to ``current`` A.
 
-    ``frames`` are averaged for each pass. Findings come as they are made.
+    ``frames`` are averaged for each pass. Findings come as they are made. ``five_volts`` is what a
+    meter shows at +5V. It is the reference of a converter that has none of its own; where it is not
+    known, the current is only known as well as USB's 5 V are.
 
     Raises
     ------
@@ -100,7 +110,10 @@ def check_board(
     yield _identity(first, n, current)
     yield from _differences(first)
     second = _measure(transport, back, settings, frames, _AT_ONCE)
-    scale = CountScale.of(first.record.gain, first.record.reference, BITS)
+    record = first.record
+    guessed = record.reference == USB_VOLTS and five_volts is None
+    reference = five_volts if five_volts and record.reference == USB_VOLTS else record.reference
+    scale = CountScale.of(record.gain, reference, BITS, measured=not guessed)
     found = diagnose(
         np.vstack([first.mean, second.mean]),
         ring,
@@ -117,6 +130,7 @@ def check_board(
         )
         yield CheckFinding("channels", True, text)
         text = f"{found.scale * current * 1e3:.4g} mA through resistors of their nominal values"
+        text += ", if +5V is 5.00 V: --five-volts says what a meter shows there" * guessed
         yield CheckFinding("current", True, text)
         ok = found.sink_ohms < _SINK_OHMS
         text = f"{found.sink_ohms * 1e3:.0f} mΩ from a sink to ground"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -111,7 +112,7 @@ def test_readings_of_another_board_are_refused() -> None:
 
 @pytest.mark.parametrize("current", [0.1, 0.01, 0.001])
 def test_a_multimeter_tells_a_source_from_none(current: float) -> None:
-    steps = {(step.stage, step.point): step for step in meter_steps(current)}
+    steps = {(step.stage, step.point): step for step in meter_steps(current, 8)}
     bus = steps["Arduino", "BUS"]
     assert bus.accepts(22 * current)
     assert not bus.accepts(0)
@@ -120,8 +121,36 @@ def test_a_multimeter_tells_a_source_from_none(current: float) -> None:
     assert all(step.low < step.high for step in steps.values())
 
 
+@pytest.mark.parametrize("five", [4.75, 4.8, 4.85, 5.2])
+@pytest.mark.parametrize("twelve", [11.45, 12.0, 12.55])
+def test_a_multimeter_refuses_no_good_board(five: float, twelve: float) -> None:
+    """U1 has 70 to 100 Ω, and an INA118 draws 0.35 mA."""
+    volts = {"+12V": twelve, "+5V": five, "2.5V": 2.5, "BUS": 2.2}
+    for channels, ohms in ((8, 70.0), (16, 100.0)):
+        read: dict[str, float] = {}
+        for step in meter_steps(CURRENT, channels, read):
+            sense = twelve if step.stage == "supply" else twelve - 1.225
+            known = volts | {"-5V": -five + ohms * 0.35e-3 * channels, "SENSE": sense}
+            read[step.point] = known.get(step.point, 0.0)
+            assert step.accepts(read[step.point]), step.point
+
+
+def test_a_reference_that_nobody_has_measured_accuses_no_part() -> None:
+    sound = counts_of(potentials(RING, DRIVES, CURRENT))
+    said = {}
+    for reference in (4.75, 5.0, 5.2, 5.25):
+        counts = np.minimum(sound * 5.0 / reference, SCALE.top)
+        unmeasured = replace(SCALE, measured=False)
+        assert not diagnose(counts, RING, DRIVES, CURRENT, unmeasured).faults
+        measured = CountScale.of(35, reference, 10)
+        found = diagnose(counts, RING, DRIVES, CURRENT, measured)
+        assert not found.faults
+        said[reference] = found.scale
+    assert max(said.values()) - min(said.values()) < 0.01
+
+
 def test_the_documentation_has_the_same_steps() -> None:
     page = (Path(__file__).parents[3] / "docs" / "hardware.md").read_text(encoding="utf-8")
-    for step in meter_steps(CURRENT):
+    for step in meter_steps(CURRENT, 8):
         assert f"| {step.stage} | {step.point} | {step.expected} | {step.otherwise} |\n" in page
     assert f"every single fault, {len(FAULTS)} with 8 channels" in page

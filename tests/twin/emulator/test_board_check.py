@@ -33,10 +33,12 @@ def _built(programs: Programs, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tomoskin.twin.emulator.source.programs_of", lambda _: programs)
 
 
-def findings(faults: BoardFaults | None = None, channels: int = 8) -> list[CheckFinding]:
+def findings(
+    faults: BoardFaults | None = None, channels: int = 8, five_volts: float | None = None
+) -> list[CheckFinding]:
     ring = LoadRing.for_current(channels, CURRENT)
     with emulate_load(ring.resistance, CURRENT, faults=faults) as transport:
-        return list(check_board(transport, ring, CURRENT, frames=4))
+        return list(check_board(transport, ring, CURRENT, five_volts=five_volts, frames=4))
 
 
 def test_a_sound_board_passes() -> None:
@@ -44,6 +46,15 @@ def test_a_sound_board_passes() -> None:
     assert [one.text for one in found if not one.ok] == []
     names = ["handshake", "channels", "current", "sinks", "noise", "settling"]
     assert [one.name for one in found] == [*names, "stop", "silence", "safe off"]
+
+
+def test_the_measured_five_volts_are_the_converters_reference() -> None:
+    """The emulated converter has 5 V; a meter that shows less says that less current flows."""
+    (wrong,) = [one.text for one in findings(five_volts=4.6) if not one.ok]
+    assert "0.92 times" in wrong
+    (current,) = [one.text for one in findings() if one.name == "current"]
+    assert " mA through resistors" in current
+    assert "--five-volts" in current
 
 
 def _one_fault(said: str) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Self
 
@@ -12,8 +12,11 @@ from tomoskin.core import DataError, FloatArray, IntArray
 from tomoskin.sensing.signal.load_ring import BoardFault, LoadRing, potentials, single_faults
 from tomoskin.sensing.signal.readout import FIGURES
 
-_SUPPLY, _REFERENCE, _DUMP = 12.0, 1.225, 22.0
-"""V; V across the sense resistor; Ω from the bus to ground while no source is enabled."""
+_SUPPLY, _FIVE, _REFERENCE, _DUMP = 12.0, 5.0, 1.225, 22.0
+"""V; V; V across the sense resistor; Ω from the bus to ground while no source is enabled."""
+
+_SAG = 0.385e-3 * 120.0
+"""V a channel that −5V sags: an INA118 draws at most 0.385 mA through at most 120 Ω of U1."""
 
 STAGES = {
     "supply": "12 V in, limited to 200 mA, no Arduino, jumpers on 2-3, nothing at the terminals",
@@ -56,30 +59,38 @@ class MeterStep:
         return self.low <= volts <= self.high
 
 
-def meter_steps(current: float) -> tuple[MeterStep, ...]:
-    """The readings in their order, of a board that is set to ``current`` A."""
-    sense, bus = _SUPPLY - _REFERENCE, _DUMP * current
-    return (
-        MeterStep("supply", "+12V", 11.8, 12.2, "0 V: polarity, fuse F1"),
-        MeterStep(
-            "supply",
-            "1 kΩ between E1 and E2, across it",
-            -0.001,
-            0.001,
-            "a gate is not off at rest: Q101 to Q103, Q201 to Q203; the same for other pairs",
-        ),
-        MeterStep(
-            "supply", "SENSE", 11.7, 12.2, "U21, U22: the source has no path for its current"
-        ),
-        MeterStep("Arduino", "+5V", 4.75, 5.25, "USB, header J61"),
-        MeterStep("Arduino", "-5V", -5.05, -4.6, "U1, C2, C3"),
-        MeterStep("Arduino", "2.5V", 2.49, 2.51, "U2, U3"),
-        MeterStep("Arduino", "BUS", 0.95 * bus, 1.05 * bus, "U23, Q22, R27"),
-        MeterStep("Arduino", "SENSE", sense - 0.2, sense + 0.2, "R23, R24, Q21"),
-        MeterStep("Arduino", "MINUS", -0.005, 0.005, "jumper J41 on 2-3"),
-        MeterStep("Arduino", "MIDDLE", -0.005, 0.005, "jumper J42 on 2-3"),
-        MeterStep("ring", "E1, black lead on E2", -0.001, 0.001, "Q101 to Q103, Q201 to Q203"),
+def meter_steps(
+    current: float, channels: int, read: Mapping[str, float] | None = None
+) -> Iterator[MeterStep]:
+    """The readings in their order, of a board that is set to ``current`` A.
+
+    What is right at one point depends on what was ``read`` at others, V by point. So the caller
+    may add each reading there before the next step is made.
+    """
+    read = {} if read is None else read
+    yield MeterStep("supply", "+12V", 11.4, 12.6, "0 V: polarity, fuse F1")
+    yield MeterStep(
+        "supply",
+        "1 kΩ between E1 and E2, across it",
+        -0.001,
+        0.001,
+        "a gate is not off at rest: Q101 to Q103, Q201 to Q203; the same for other pairs",
     )
+    supply = read.get("+12V", _SUPPLY)
+    source = "U21, U22: the source has no path for its current"
+    yield MeterStep("supply", "SENSE", supply - 0.3, supply + 0.2, source)
+    yield MeterStep("Arduino", "+5V", 4.75, 5.25, "USB, header J61")
+    five = read.get("+5V", _FIVE)
+    sag = 0.1 + _SAG * channels
+    yield MeterStep("Arduino", "-5V", -five - 0.05, -five + sag, "U1, C2, C3")
+    yield MeterStep("Arduino", "2.5V", 2.49, 2.51, "U2, U3")
+    bus, sense = _DUMP * current, supply - _REFERENCE
+    yield MeterStep("Arduino", "BUS", 0.95 * bus, 1.05 * bus, "U23, Q22, R27")
+    yield MeterStep("Arduino", "SENSE", sense - 0.2, sense + 0.2, "R23, R24, Q21")
+    yield MeterStep("Arduino", "MINUS", -0.005, 0.005, "jumper J41 on 2-3")
+    yield MeterStep("Arduino", "MIDDLE", -0.005, 0.005, "jumper J42 on 2-3")
+    shorted = "Q101 to Q103, Q201 to Q203"
+    yield MeterStep("ring", "E1, black lead on E2", -0.001, 0.001, shorted)
 
 
 _TOLERANCE = 0.015
@@ -97,6 +108,9 @@ _AS_GOOD = 1.3
 _CURRENT = 0.03
 """Relative error of the current that board and resistors may have."""
 
+_UNMEASURED = 0.05
+"""Relative error of a converter's reference that is USB's 5 V, where nobody has measured them."""
+
 _SCALE = (0.85, 1.15)
 """Of the current, while a fault is looked for."""
 
@@ -105,15 +119,16 @@ _AFFINE_GAIN = 0.05
 
 @dataclass(frozen=True, slots=True)
 class CountScale:
-    """code = volts · ``per_volt``, from 0 to ``top``."""
+    """code = volts · ``per_volt``, from 0 to ``top``; whether the reference was measured."""
 
     per_volt: float
     top: float
+    measured: bool = True
 
     @classmethod
-    def of(cls, gain: float, reference: float, bits: int) -> Self:
+    def of(cls, gain: float, reference: float, bits: int, *, measured: bool = True) -> Self:
         """Of an amplifier and a converter of ``bits`` with ``reference`` V."""
-        return cls(gain * (1 << bits) / reference, (1 << bits) - 1.0)
+        return cls(gain * (1 << bits) / reference, (1 << bits) - 1.0, measured)
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,7 +192,7 @@ def diagnose(
     sink_ohms = FIGURES.switch_resistance + sound.sink_drop / scale.per_volt / current
     figures = (sound.scale, sink_ohms, sound.deviation, sound.largest)
     if sound.deviation <= limit * min(sound.scale, 1) and sound.largest <= _LARGEST * limit:
-        off = abs(sound.scale - 1) > _CURRENT
+        off = abs(sound.scale - 1) > _CURRENT + (0 if scale.measured else _UNMEASURED)
         said = (_wrong_current(sound.scale, current),) if off else ()
         return Diagnosis(*figures, said)
     fits = [_fit(counts, one, scale, _SCALE) for one in single_faults(ring, drives, current)]
