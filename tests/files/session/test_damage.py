@@ -508,8 +508,8 @@ def test_a_repair_says_how_far_it_is_in_long_damage_too(small, tmp_path):
     assert parts == sorted(parts)
     assert max(b - a for a, b in zip([0.0, *parts], parts, strict=False)) < 0.1
     assert parts[-1] == pytest.approx(1.0)
+    torn.write_bytes(bytes(8_000_000))
+    seen = len(parts)
     with pytest.raises(DataError, match="nothing can be recovered"):
-        torn.write_bytes(bytes(8_000_000))
-        seen = len(parts)
         repair(torn, tmp_path / "none.mcap", advance=lambda done, total: parts.append(done / total))
     assert len(parts) > seen + 5
