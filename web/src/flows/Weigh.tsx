@@ -166,13 +166,13 @@ export function Weigh() {
         </p>
       )}
       {heavy && <p class="wrong">{heavy}</p>}
-      <p data-testid="taken">
-        {presses.length} placement{presses.length === 1 ? "" : "s"} recorded{thinking ? ", computing…" : ""}
-      </p>
       <div class="does">
         <Leave />
       </div>
       <Keep kind="force" />
+      <p data-testid="taken">
+        {presses.length} placement{presses.length === 1 ? "" : "s"} recorded{thinking ? ", computing…" : ""}
+      </p>
       <p data-testid="flow-text">{text}</p>
       <Remarks />
       <Recorded />
