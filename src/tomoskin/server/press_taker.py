@@ -130,7 +130,7 @@ class PressTaker:
 
     def __init__(self, least: float, sign: int = 0) -> None:
         self._least, self._sign = least, sign
-        self._last = self._now = -np.inf
+        self._last = self._now = self._since = -np.inf
         self._rest, self._window = _UNKNOWN, 1
         self._frames: deque[FloatArray] = deque(maxlen=_MOST_REST + _LAG + max(_WINDOWS))
         self._pressed: deque[FloatArray] = deque(maxlen=_LONGEST)
