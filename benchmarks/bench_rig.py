@@ -21,21 +21,12 @@ from tomoskin import Skin
 from tomoskin.board.source import Configuration, ScanSettings
 from tomoskin.core import Detection, Frame, Touch
 from tomoskin.files.imports import read_recording
-from tomoskin.model.pattern import Scan
-from tomoskin.pipeline import FrameResult, Pipeline, Prepared, colour_limit, prepare
+from tomoskin.pipeline import FrameResult, Pipeline, Prepared, prepare
 from tomoskin.run import Runner, in_this_process, make_set
 from tomoskin.server import AccessPolicy, Hub, Server, application, listen
 from tomoskin.server.settings_handlers import SettingsHandlers
-from tomoskin.twin import (
-    COMMON_PRESSES,
-    Faults,
-    Press,
-    SetPlan,
-    SteppedSkin,
-    TwinSettings,
-    make_electronics,
-    table_of,
-)
+from tomoskin.twin import COMMON_PRESSES, Faults, Press, SetPlan, SteppedSkin, TwinSettings
+from tomoskin.twin.source import Scans
 
 INSIDE_90 = 4.605
 """Squared Mahalanobis distance within which nine of ten lie in a plane."""
@@ -48,9 +39,8 @@ class Rig:
     """Frames of the twin of ``skin`` with a preset and a seed, as fast as they are asked for."""
 
     def __init__(self, skin: Skin, preset: str, seed: int) -> None:
-        self.skin = skin
-        self.board = make_electronics(skin, TwinSettings.preset(preset, seed))
-        self.table = table_of(Scan.of(skin.pattern()), ScanSettings.of(skin))
+        self.skin, self._scans = skin, Scans(skin, TwinSettings.preset(preset, seed))
+        self.board, self.table = self._scans.electronics, self._scans.table
         self.interval, self.number = self.table.seconds, 0
 
     def frame(self, presses: Iterable[Press] = (), faults: Faults = NONE) -> Frame:
@@ -63,9 +53,7 @@ class Rig:
 
     def at(self, time: float) -> Frame:
         """A frame of what presses now, at ``time`` s."""
-        ticks = round(time * self.skin.readout.tick_rate)
-        readings = self.table.readings(self.board.sample(self.table, time))
-        return Frame(self.number, ticks, time, 1, 0, 0, *readings)
+        return self._scans.frame(self.number, time)
 
     def push(
         self,
@@ -172,7 +160,7 @@ def labelled_presses(skin: Skin, seed: int, count: int) -> tuple[Floats, Floats]
 @contextmanager
 def served(runner: Runner) -> Iterator[AccessPolicy]:
     """Serve the page of ``runner`` on a free port; who may read it, with the port."""
-    hub = Hub(runner, limit=colour_limit(runner.prepared))
+    hub = Hub(runner)
     SettingsHandlers(hub)
     with listen("127.0.0.1", 0) as listener:
         policy = AccessPolicy(listener.getsockname()[1])

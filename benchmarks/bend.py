@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -84,15 +83,9 @@ def hinged(degrees: float) -> Pose:
     return (Bent(Hinge(math.radians(degrees), STRIP)),) if degrees else ()
 
 
-@dataclass
-class Found:
-    """What was found while the sheet moved: m, rad."""
-
-    places: list[float] = field(default_factory=list)
-    plain: list[float] = field(default_factory=list)
-    free: list[float] = field(default_factory=list)
-    touched: list[float] = field(default_factory=list)
-    right: list[bool] = field(default_factory=list)
+Moving = dict[str, list[float]]
+"""While the sheet moved: m to ``places``, and to ``plain`` ones; rad by which angles are missed,
+``free`` and ``touched``; whether states are ``right``."""
 
 
 class Bench:
@@ -172,10 +165,11 @@ class Bench:
         examples = BendExamples.checked(np.array(rows), angles, axis, times)
         return BendModel.learn(examples, voltage_covariance(self.lab.prepared, self.flat))
 
-    def moved(self) -> Found:
+    def moved(self) -> Moving:
         """Single touches while the sheet bends up and down, as the live pipeline sees them."""
         bends = BENDS.of(self.model, self.lab.prepared.pattern)
-        out, pipeline = Found(), Pipeline(self.lab.prepared.calibrated(bends))
+        pipeline = Pipeline(self.lab.prepared.calibrated(bends))
+        out: Moving = {name: [] for name in ("places", "plain", "free", "touched", "right")}
         self.frame((), (), REST)
         for _ in range(REFERENCE_FRAMES):
             pipeline.push(self.frame((), (), STEP))
@@ -190,17 +184,17 @@ class Bench:
             if result is None or result.bend is None:
                 raise AssertionError("every frame is read")
             told = result.bend
-            (out.touched if on else out.free).append(told.angle - math.radians(angle))
+            out["touched" if on else "free"].append(told.angle - math.radians(angle))
             readings = [touch.detection for touch in result.touches]
             if on and steady:
-                out.places.append(missed(readings, press))
-                if len(out.places) % PLAIN == 0:
+                out["places"].append(missed(readings, press))
+                if len(out["places"]) % PLAIN == 0:
                     change = result.voltages - result.reference
-                    out.plain.append(missed(plain(change, none), press))
+                    out["plain"].append(missed(plain(change, none), press))
             if steady and (angle >= 3.0 or angle < 0.1):
                 bent, both = angle >= 3.0, "bend and touch"
                 wanted = (both if on else "bend") if bent else ("touch" if on else "idle")
-                out.right.append(told.state == wanted)
+                out["right"].append(told.state == wanted)
         return out
 
     def jointed(self) -> tuple[list[float], list[float]]:
@@ -244,7 +238,7 @@ def _static(benches: Sequence[Bench]) -> dict[str, float]:
 
 def _moving(benches: Sequence[Bench]) -> dict[str, Any]:
     def all_of(name: str) -> Floats:
-        return np.concatenate([getattr(b.moving, name) for b in benches])
+        return np.concatenate([b.moving[name] for b in benches])
 
     places, free, touched = all_of("places"), all_of("free"), all_of("touched")
     both = np.degrees(np.abs(np.concatenate([free, touched])))

@@ -8,7 +8,6 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -105,9 +104,11 @@ def _ran(
     # emulated time runs faster than the host's on a Mega, so must the heartbeat; slower on a Pico
     timing = Timing(ping=0.02) if board == "mega" else Timing(answer=5.0, silence=60.0)
     wanted, seen = _expected(scan, front, oversampling), Seen()
-    with _emulated(
-        board, front, np.arange(1.0, electrodes + 1), partial(_linked, scan, settings, timing)
-    ) as (link, watch):
+    arms = np.arange(1.0, electrodes + 1)
+    with _emulated(board, front, arms, lambda to: Link(to, scan, settings, timing=timing)) as (
+        link,
+        watch,
+    ):
         link.connect()
         before, began = _counted(watch), time.monotonic()
         seen.watch(link, wanted, count)
@@ -129,10 +130,6 @@ def _ran(
         awake = (after["busy"] - before["busy"]) / (after["now"] - before["now"])
         row |= {"jitter, ns": f"{after['jitter']:.0f}", "processor": f"{100 * awake:.0f} %"}
     return row
-
-
-def _linked(scan: Scan, settings: ScanSettings, timing: Timing, transport: SerialTransport) -> Link:
-    return Link(transport, scan, settings, timing=timing)
 
 
 def _counted(watch: Path) -> dict[str, float]:
@@ -221,8 +218,9 @@ def _rows(
     )
     front = Front(CURRENT, 1e9, GAIN, 0.5, REFERENCE, float(1 << bits), noise * finer)
     arms, frames = ARM * np.arange(1.0, len(own) + 1), list[Frame]()
-    to = partial(_linked, scan, settings, Timing(ping=0.02))
-    with _emulated(board, front, arms, to, own) as (link, _):
+    with _emulated(
+        board, front, arms, lambda to: Link(to, scan, settings, timing=Timing(ping=0.02)), own
+    ) as (link, _):
         while len(frames) < count:
             frames += [item for item in link.poll(0.05) if isinstance(item, Frame)]
         mode = link.configuration.mode

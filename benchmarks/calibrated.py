@@ -59,23 +59,18 @@ class Tally:
 
 
 def run() -> Iterator[Report]:
-    yield report(SKINS, SEEDS)
-
-
-def report(names: tuple[str, ...], seeds: tuple[int, ...]) -> Report:
-    """Of some skins."""
-    return table(
+    yield table(
         "touches on a calibrated skin",
-        (row for name in names for turn in TURNS for row in _rows(name, turn, seeds)),
-        f"textile preset, {LABELLED} labelled presses, seeds {seeds}, {SCENES} scenes of "
+        (row for name in SKINS for turn in TURNS for row in _rows(name, turn)),
+        f"textile preset, {LABELLED} labelled presses, seeds {SEEDS}, {SCENES} scenes of "
         f"{LAST - SETTLED} frames each; found: within {1e3 * FOUND:g} mm",
     )
 
 
-def _rows(name: str, turn: float, seeds: tuple[int, ...]) -> Iterator[dict[str, Any]]:
+def _rows(name: str, turn: float) -> Iterator[dict[str, Any]]:
     plain = prepare(Skin.load(name))
     tallies = [(Tally(), Tally()) for _ in range(3)]
-    for seed in seeds:
+    for seed in SEEDS:
         progress(f"{name}, turned by {turn:g}°, seed {seed}")
         dv, xy = labelled_presses(plain.skin, seed, LABELLED)
         locator = Locator.fit(dv, _turned(xy, turn), skin=plain.skin)

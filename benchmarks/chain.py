@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from bench_rig import served
+from bench_rig import load_example, served
 from report import Report, progress, table
 from tomoskin.board.source import SerialTransport
 from tomoskin.core import FloatArray
@@ -33,6 +33,9 @@ from tomoskin.twin.emulator.source import front_of
 SKIN, SEED = "textile-disc-8", 5
 SETTLING = "228 us"
 """With 4 conversions of 12 bits a sample: 404 frames/s."""
+
+PRESSES, PRESSES_SEED = 30, 11
+"""Of the reflex."""
 
 SECONDS = 60.0
 LEAD = 10.0
@@ -61,6 +64,22 @@ def run() -> Iterator[Report]:
 def run_long() -> Iterator[Report]:
     """The same as chain, for ten minutes."""
     yield measured(10 * SECONDS)
+
+
+def run_reflex() -> Iterator[Report]:
+    """Milliseconds from a contact on the twin to the command of an arm that draws back."""
+    reflex, rows = load_example("reflex"), []
+    for name in ("textile-disc-8", "textile-disc-16"):
+        progress(name)
+        row = reflex.measured(Skin.load(name), PRESSES, PRESSES_SEED)
+        promised = {"promised": round(row["one scan, ms"] + 5, 1)}
+        rows.append({"skin": name} | {k: round(v, 1) for k, v in row.items()} | promised)
+    yield table(
+        "a reflex",
+        rows,
+        "medians; promised: one scan and 5 ms",
+        "a touch without doubt is reported in the first frame that shows it, else in the second",
+    )
 
 
 def measured(seconds: float) -> Report:

@@ -23,8 +23,9 @@ from forward_measure import (
 )
 from forward_others import peer_name
 from report import Report, cell, clock, medians, table
-from tomoskin.imaging import PRIORS, OneStep
+from tomoskin.imaging import OneStep
 from tomoskin.model.forward import ForwardModel
+from tomoskin.model.prior import PRIORS
 
 
 def run() -> Iterator[Report]:
@@ -159,21 +160,16 @@ Times = Mapping[str, float]
 
 
 def run_inverse() -> Iterator[Report]:
-    """Inverse engine: set-up of one-step operators, applying them, rows that leave."""
+    """Inverse engine: set-up of one-step operators, rows that leave."""
     cases = [disc(name, cells) for name, cells in SIZES.items()]
     models = [ForwardModel(case.mesh, PATTERN, case.contact_impedance) for case in cases]
-    set_up, applied, out = ([time(m) for m in models] for time in (_priors, _applied, _rows_out))
+    set_up, out = ([time(m) for m in models] for time in (_priors, _rows_out))
     yield table(
         "set-up: a conductivity → the one-step operator, ms",
         _in_ms(models, set_up, ("products", "symmetric", "jacobian", *PRIORS)),
         f"medians of {clock()[1]}",
         "priors: with the forward solution and Jacobian; mesh and model are there",
         "products: JP and PK of this size; symmetric: the first as JJᵀ, half the work",
-    )
-    yield table(
-        "applying: difference data → image, ms",
-        _in_ms(models, applied, ("double", "read double", "single", "read single")),
-        "read: every byte of the matrix once, a dot product with itself",
     )
     yield table(
         f"rows that leave, {len(PATTERN.rows_of(DEAD))} of an electrode, ms",
@@ -205,23 +201,6 @@ def _priors(model: ForwardModel) -> Times:
         if prior not in DENSE or len(model.mesh.cells) <= MOST_DENSE:
             calls[prior] = lambda prior=prior: OneStep(model, prior, alpha=ALPHA)
     return medians(calls, SECONDS, least=3)
-
-
-def _applied(model: ForwardModel) -> Times:
-    """Images, in turn with reading the bytes of the matrix once."""
-    operator = OneStep(model, alpha=ALPHA)
-    dv = np.random.default_rng(1).standard_normal(PATTERN.n_meas)
-    double = np.ravel(operator.matrix, order="K")
-    single = double.astype(np.float32)
-    _ = operator.deferred(dv).values
-    calls: dict[str, Callable[[], object]] = {
-        "double": lambda: operator(dv),
-        "single": lambda: operator.deferred(dv).values,
-        "read double": lambda: float(double @ double),
-        "read single": lambda: float(single @ single),
-    }
-    times = medians({name: partial(_many, call) for name, call in calls.items()}, SECONDS)
-    return {name: seconds / APPLIED for name, seconds in times.items()}
 
 
 def _many(call: Callable[[], object]) -> None:

@@ -19,7 +19,7 @@ from report import medians
 from tomoskin.core import FloatArray, IntArray
 from tomoskin.imaging import OneStep
 from tomoskin.model.forward import ForwardModel, State
-from tomoskin.model.mesh import Disc, ElectrodeArc, Mesh, cylinder, triangulate
+from tomoskin.model.mesh import Disc, ElectrodeArc, Mesh, extrude, ring, triangulate
 from tomoskin.model.pattern import Pattern
 
 ELECTRODES, RADIUS = 16, 0.1
@@ -57,16 +57,8 @@ def disc(name: str, cells: int) -> Case:
 
 def tank(name: str, cells: int, layers: int) -> Case:
     """Tetrahedra of a cylinder with a ring of electrodes."""
-    mesh = cylinder(
-        RADIUS,
-        RADIUS,
-        count=ELECTRODES,
-        width=0.02,
-        bottom=0.04,
-        top=0.06,
-        cells=cells,
-        layers=layers,
-    )
+    patches = ring(Disc(RADIUS), ELECTRODES, 0.02, 0.04, 0.06)
+    mesh = extrude(Disc(RADIUS), RADIUS, patches, cells=cells, layers=layers)
     return Case(name, mesh)
 
 
@@ -161,7 +153,7 @@ def _factor_and_solve(state: State) -> dict[str, Callable[[], object]]:
         return calls
     faer = reference(n, ready.indptr, ready.indices, n - n_points)
     columns = np.eye(n - n_points, n, n_points)
-    _agree(faer.solve(ready.values, columns).T, state.basis, "faer")
+    _agree(faer.solve(ready.values, columns).T, state.solution.basis, "faer")
     return {**calls, "faer": lambda: faer.solve(ready.values, columns)}
 
 
@@ -201,13 +193,7 @@ def _agree(other: FloatArray, own: FloatArray, whose: str) -> None:
 
 
 def _against_peer(model: ForwardModel, sigma: FloatArray, which: str) -> dict[str, float]:
-    peer = others.Peer(model.mesh, model.pattern)
-    peer.prepare()
-    calls = {
-        "peer forward": lambda: peer.forward(sigma),
-        "peer jacobian": lambda: peer.jacobian(sigma),
-        "peer set-up": lambda: peer.set_up(ALPHA),
-    }
+    calls = others.Peer(model.mesh, model.pattern).calls(sigma, ALPHA)
     chosen = {name: call for name, call in calls.items() if name.split()[1][0] in which}
     return medians(chosen, SECONDS) if chosen else {}
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from importlib.metadata import version
 from importlib.util import find_spec
 from typing import Any
@@ -108,13 +109,22 @@ class Peer:
         """Jacobian and voltages."""
         return self._forward.compute_jac(sigma)
 
-    def set_up(self, alpha: float) -> object:
+    def set_up(self, alpha: float) -> Any:
         """One-step operator, from points and cells."""
         from pyeit.eit.jac import JAC
 
         solver = JAC(self._its_mesh(), self._protocol())
         solver.setup(p=0.5, lamb=alpha**2, method="kotre")
         return solver.H
+
+    def calls(self, sigma: FloatArray, alpha: float) -> dict[str, Callable[[], object]]:
+        """What is timed of it, by name."""
+        self.prepare()
+        return {
+            "peer forward": lambda: self.forward(sigma),
+            "peer jacobian": lambda: self.jacobian(sigma),
+            "peer set-up": lambda: self.set_up(alpha),
+        }
 
     def _its_mesh(self) -> Any:
         from pyeit.mesh import PyEITMesh

@@ -13,7 +13,6 @@ import numpy as np
 
 from bench_rig import Rig
 from report import Report, clock, progress, table
-from tomoskin.board.source import Link, ScanSettings
 from tomoskin.board.wire import Decoder, encode
 from tomoskin.core import FloatArray, Frame
 from tomoskin.model.pattern import Pattern, Scan
@@ -22,7 +21,6 @@ from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Pipeline, Prepared, prepare
 from tomoskin.run.sinks import Contacts, Stream
 from tomoskin.twin import Press
-from tomoskin.twin.source import open_twin
 
 SKINS, CELLS, TIME_CONSTANTS = ("textile-disc-8", "textile-disc-16"), (660, 3000), ("0 s", "0.2 s")
 BY_FIT = (1, 2, 3)
@@ -129,23 +127,14 @@ def _growth(decoder: Decoder, pipeline: Pipeline, chunks: list[bytes]) -> float:
 
 def _chunks(prepared: Prepared, presses: int) -> tuple[list[bytes], list[bytes]]:
     """Encoded frames of an idle twin, then of one with so many presses that circle."""
-    transport = open_twin(f"fast,seed={SEED}", prepared.skin)
-    with Link(transport, prepared.scan, ScanSettings.of(prepared.skin)) as link:
-        idle = _take(link, IDLE)
-        pressed = []
-        for step in range(PRESSED):
-            turns = step / PRESSED + np.arange(presses) / presses
-            places = (0.05 * np.exp(2j * np.pi * turns)).tolist()
-            transport.set_presses(tuple(Press(p.real, p.imag, 4.0, 0.012) for p in places))
-            pressed += _take(link, 2)[1:]
+    rig, pressed = Rig(prepared.skin, "textile", SEED), []
+    idle = [encode(rig.frame()) for _ in range(IDLE)]
+    for step in range(PRESSED):
+        places = (
+            0.05 * np.exp(2j * np.pi * (step / PRESSED + np.arange(presses) / presses))
+        ).tolist()
+        pressed.append(encode(rig.frame(Press(p.real, p.imag, 4.0, 0.012) for p in places)))
     return idle, pressed
-
-
-def _take(link: Link, count: int) -> list[bytes]:
-    frames: list[Frame] = []
-    while len(frames) < count:
-        frames += [item for item in link.poll(1.0) if isinstance(item, Frame)]
-    return [encode(frame) for frame in frames[:count]]
 
 
 def run_several() -> Iterator[Report]:
@@ -153,9 +142,7 @@ def run_several() -> Iterator[Report]:
     prepared = prepare(Skin.load(SEVERAL))
     prepared.warm_up()
     progress("processor time")
-    parts = processor_times(prepared, frames_of(prepared))
-    costs = parts.sum(axis=1)
-    yield table("processor time of a frame, ms", _costs(parts))
+    costs = processor_times(prepared, frames_of(prepared))
     yield table(
         f"{BOARDS} skins of 16 electrodes on one core that does nothing else",
         ({"frames/s a board": f"{rate:g}"} | queued(costs, rate) for rate in RATES),
@@ -163,22 +150,6 @@ def run_several() -> Iterator[Report]:
         f"measured, and the wait for the frames of the others in a queue; promised: {PROMISED} "
         "ms",
     )
-
-
-def _costs(parts: FloatArray) -> Iterator[dict[str, Any]]:
-    """What a frame costs with none, one and two presses, and what of it is not the pipeline."""
-    ends = np.cumsum(CYCLE)
-    spans = zip(("none", "one", "two", "none again"), ends - CYCLE, ends, strict=True)
-    for presses, first, last in spans:
-        whole = 1e3 * parts[first:last].sum(axis=1)
-        around = 1e3 * (parts[first:last, 0] + parts[first:last, 2])
-        yield {
-            "presses": presses,
-            "median": f"{np.median(whole):.2f}",
-            "mean": f"{whole.mean():.2f}",
-            "99 of 100": f"{np.percentile(whole, 99):.2f}",
-            "of it decoding and contacts": f"{np.median(around):.2f}",
-        }
 
 
 def frames_of(prepared: Prepared) -> list[Frame]:
@@ -191,7 +162,7 @@ def frames_of(prepared: Prepared) -> list[Frame]:
 
 
 def processor_times(prepared: Prepared, frames: Sequence[Frame]) -> FloatArray:
-    """(n, 3) s for each frame to be decoded, to become touches, and these contacts.
+    """(n,) s for each frame to be decoded, to become touches, and these contacts.
 
     In a second cycle, when the sheet and the alpha are found.
     """
@@ -200,16 +171,13 @@ def processor_times(prepared: Prepared, frames: Sequence[Frame]) -> FloatArray:
     for number in range(2 * len(frames)):
         ticks = round(number / RATE * prepared.skin.readout.tick_rate)
         data = encode(replace(frames[number % len(frames)], sequence=number, ticks=ticks))
-        marks = [time.thread_time()]
+        began = time.thread_time()
         (frame,) = decoder.feed(data, number / RATE)
         assert isinstance(frame, Frame)
-        marks.append(time.thread_time())
         result = pipeline.push(frame)
-        marks.append(time.thread_time())
         if result is not None:
             _ = Contacts.of(stream, result).touches
-        marks.append(time.thread_time())
-        times.append(np.diff(marks))
+        times.append(time.thread_time() - began)
     return np.array(times[len(frames) :])
 
 

@@ -11,13 +11,12 @@ import numpy as np
 import force as weighing
 from bench_rig import Rig, gap, nearest
 from report import Floats, Report, progress, table
-from tomoskin.board.source import Link, ScanSettings, Transport
-from tomoskin.core import Frame, Touch, VirtualClock
+from tomoskin.core import Touch
 from tomoskin.learning import FORCE
 from tomoskin.model.skin import Skin
-from tomoskin.pipeline import FrameResult, Pipeline, Prepared, prepare
+from tomoskin.pipeline import Pipeline, Prepared, prepare
 from tomoskin.run.board_memory import Trial
-from tomoskin.twin import Press, TwinSettings, make_twin
+from tomoskin.twin import Press
 
 SEEDS = (11,)
 """Nothing here was chosen on them."""
@@ -80,38 +79,21 @@ def seen(
     prepared: Prepared, place: Floats, force: float, seed: int, hold: float = HOUR
 ) -> tuple[list[Seen], list[Seen]]:
     """Frames while a press is held, and after it is lifted."""
-    clock = VirtualClock()
-    twin = make_twin(prepared.skin, TwinSettings.preset("textile", seed), clock)
-    press = Press(float(place[0]), float(place[1]), force=force, radius=RADIUS)
+    rig, pipeline = Rig(prepared.skin, "textile", seed), Pipeline(prepared)
+    press = (Press(float(place[0]), float(place[1]), force=force, radius=RADIUS),)
     held, after, warmed = [], [], 0.0
-    for result in _results(twin, prepared, clock, LEAD + hold + AFTER):
-        time = result.host_time - LEAD
-        if 0 <= time < hold:
-            if not twin.presses:
-                twin.set_presses((press,))
-            held.append((time, result.touches))
-            due = WARMING * time / hold
-            twin.sheet.warm(due - warmed)
-            warmed = due
-        elif time >= hold:
-            if twin.presses:
-                twin.set_presses(())
+    while (time := rig.number * rig.interval - LEAD) < hold + AFTER:
+        result = pipeline.push(rig.frame(press if 0 <= time < hold else ()))
+        if result is None or time < 0:
+            continue
+        if time >= hold:
             after.append((time - hold, result.touches))
+            continue
+        held.append((time, result.touches))
+        due = WARMING * time / hold
+        rig.board.sheet.warm(due - warmed)
+        warmed = due
     return held, after
-
-
-def _results(
-    twin: Transport, prepared: Prepared, clock: VirtualClock, seconds: float
-) -> Iterator[FrameResult]:
-    pipeline, settings = Pipeline(prepared), ScanSettings.of(prepared.skin)
-    with Link(twin, prepared.scan, settings, clock=clock.now) as link:
-        while True:
-            for item in link.poll(0.5):
-                result = pipeline.push(item) if isinstance(item, Frame) else None
-                if result is not None and result.host_time > seconds:
-                    return
-                if result is not None:
-                    yield result
 
 
 def judged(held: Sequence[Seen], after: Sequence[Seen], place: Floats) -> dict[str, Any]:
@@ -167,32 +149,23 @@ def run_restarted() -> Iterator[Report]:
 def _again(
     prepared: Prepared, pause: float, warmer: float, force: float, seed: int
 ) -> tuple[str, int, float]:
-    """Verdict, touches in the last frame, and mm from the press to the nearest of them."""
+    """Verdict, touches in the last frame, and mm from the press to the nearest of them, of a second
+    run, which begins with the last frames of the first."""
     x, y = np.random.default_rng(seed).uniform(-SPREAD, SPREAD, 2).tolist()
-    press = (Press(x, y, force=force, radius=RADIUS),) if force else ()
     trial, verdict, last = Trial(0.0), None, None
-    for last in _restarted(prepared, pause, warmer, press, seed):
-        verdict = trial.push(last) if verdict is None else verdict
-    assert last is not None
-    near = nearest(last.touches, (x, y)) if force else None
-    error = np.nan if near is None else 1e3 * gap(near, (x, y))
-    return VERDICTS[verdict], len(last.touches), error
-
-
-def _restarted(
-    prepared: Prepared, pause: float, warmer: float, presses: tuple[Press, ...], seed: int
-) -> Iterator[FrameResult]:
-    """Results of the second run, which begins with the last frames of the first."""
-    rig = Rig(prepared.skin, "textile", seed)
+    rig, pipeline = Rig(prepared.skin, "textile", seed), Pipeline(prepared)
     begun, rate = KEPT * rig.interval + pause, prepared.skin.readout.tick_rate
     kept = [rig.frame() for _ in range(KEPT)]
     rig.board.sheet.warm(warmer)
-    rig.board.sheet.set_presses(presses)
-    pipeline = Pipeline(prepared)
+    rig.board.sheet.set_presses((Press(x, y, force=force, radius=RADIUS),) if force else ())
     for number, frame in enumerate(kept):
         pipeline.push(replace(frame, host_time=begun - 1e-3 * (KEPT - number)))
     for number in range(FRAMES):
         since = number * rig.interval
         frame = replace(rig.at(begun + since), sequence=number, ticks=round(since * rate))
         if (result := pipeline.push(frame)) is not None:
-            yield result
+            verdict, last = trial.push(result) if verdict is None else verdict, result
+    assert last is not None
+    near = nearest(last.touches, (x, y)) if force else None
+    error = np.nan if near is None else 1e3 * gap(near, (x, y))
+    return VERDICTS[verdict], len(last.touches), error

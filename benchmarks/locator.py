@@ -155,21 +155,16 @@ def run_fingers(data: Path | None) -> Iterator[Report]:
         truth, numbers = kept["separation_mm"].tolist(), kept["row"].tolist()
     rows = []
     for far, number, readings in zip(truth, numbers, several(pairs), strict=True):
-        two, ends = len(readings) == 2, [(r.x, r.y) for r in readings]
-        one = "too close" if readings[0].close else "one"
-        rows.append(
-            {
-                "truly apart, mm": far,
-                "row": number,
-                "says": "two" if two else one,
-                "places, mm": "; ".join(f"{1e3 * x:.0f}, {1e3 * y:.0f}" for x, y in ends),
-                "found apart, mm": round(1e3 * float(np.hypot(*np.subtract(*ends))))
-                if two
-                else "–",
-            }
-        )
-    other = several(Set.of(folder / "round16_single500_ohmc.npz").dv[:200])
-    wrong = sum(len(readings) == 2 for readings in other)
+        row = {"truly apart, mm": far, "row": number, "says": "one", "found apart, mm": "–"}
+        if len(readings) == 2:
+            one, other = readings
+            apart = float(np.hypot(one.x - other.x, one.y - other.y))
+            row |= {"says": "two", "found apart, mm": round(1e3 * apart)}
+        elif readings[0].close:
+            row["says"] = "too close"
+        rows.append(row)
+    singles = several(Set.of(folder / "round16_single500_ohmc.npz").dv[:200])
+    wrong = sum(len(readings) == 2 for readings in singles)
     yield table(
         "two fingers on a hydrogel skin, learnt from single presses",
         rows,
@@ -179,15 +174,16 @@ def run_fingers(data: Path | None) -> Iterator[Report]:
     )
 
 
-def _disc() -> Skin:
+def disc(**electrodes: str) -> Skin:
+    """The five skins' outline, and where their electrodes are, as far as that is given."""
     return Skin.load("textile-disc-16").altered(
-        {"outline": {"diameter": DIAMETER}, "electrodes": {"width": "3 mm"}}
+        {"outline": {"diameter": DIAMETER}, "electrodes": {"width": "3 mm"} | electrodes}
     )
 
 
 def _five_skins(folder: Path) -> Iterator[Report]:
-    disc = _disc()
-    sets = {name: Set.of(folder / f"{name}.npz", disc) for name in SKINS}
+    skin = disc()
+    sets = {name: Set.of(folder / f"{name}.npz", skin) for name in SKINS}
     rows, skins = [], []
     for count, repeats in COUNTS.items():
         scores = {
@@ -255,7 +251,7 @@ def _another_session(folder: Path) -> Iterator[dict[str, Any]]:
 def _aligned(data: Path) -> Iterator[dict[str, Any]]:
     """A calibration on other sessions and skins: as learnt, aligned without labels and with ten."""
     ways = ("as learnt", "aligned, no labels", "with ten")
-    for (before, today), skin in (*((pair, None) for pair in PAIRS), (OUTLINE, _disc())):
+    for (before, today), skin in (*((pair, None) for pair in PAIRS), (OUTLINE, disc())):
         old, new = (Set.of(data / f"{name}.npz", skin) for name in (before, today))
         scores = np.array([_transferred(old, new, seed) for seed in DRAWS])
         means = scores[:, 1:].mean(axis=0).reshape(-1, 2)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
 
 from report import Report, mm, table
+from tomoskin.core import ModelError
 from tomoskin.imaging import (
     Greit,
     LinearProblem,
@@ -20,12 +20,14 @@ from tomoskin.imaging import (
     figures,
     noise_figure,
 )
+from tomoskin.imaging.choice.alpha_choice import Explanation, Level, crossing
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.skin import Skin
 
 SKINS = ("textile-disc-8", "textile-disc-16", "textile-square-16", "tank-16")
 FIGURES = (1.0, 1.5)  # below 1.2 no NOSER of the tank has one
 CELLS, TRAINED_ON, TESTED_ON = 900, 3600, 6000
+WHY = Explanation("noise-figure", "as large as GREIT's", "noise figure")
 
 
 def run() -> Iterator[Report]:
@@ -67,26 +69,16 @@ def _pair(name: str, figure: float) -> list[dict[str, Any]]:
     trained, start = figures(greit, targets), time.perf_counter()
     spectrum = Spectrum.of(LinearProblem.of(image, "noser", **about))
 
-    def excess(decade: float) -> float:
-        matrix = spectrum.operator(10.0**decade).matrix
-        return noise_figure(matrix, image.mesh.volumes, targets.dv[0]) - trained.noise_figure
+    def reached(alpha: float) -> float:
+        return noise_figure(spectrum.operator(alpha).matrix, image.mesh.volumes, targets.dv[0])
 
-    alpha = _crossing(excess, np.log10(spectrum.alphas))
     rows = [_row(name, "greit", trained, taken)]
-    if alpha is None:
+    try:
+        chosen = crossing(spectrum, reached, Level(trained.noise_figure, "falling", ("", "")), WHY)
+    except ModelError:
         return [*rows, {"skin": name, "operator": "noser: no alpha"}]
-    noser = figures(spectrum.operator(alpha), targets)
+    noser = figures(spectrum.operator(chosen.alpha), targets)
     return [_row(name, "noser", noser, time.perf_counter() - start), *rows]
-
-
-def _crossing(excess: Callable[[float], float], decades: np.ndarray) -> float | None:
-    """The alpha at which the noise figure falls to what is asked; far beyond, it rises again."""
-    values = [excess(float(decade)) for decade in decades[::8]]
-    for i in range(len(values) - 1, 0, -1):
-        if values[i] <= 0 < values[i - 1]:
-            low, high = float(decades[::8][i - 1]), float(decades[::8][i])
-            return float(10.0 ** brentq(excess, low, high, xtol=1e-3))
-    return None
 
 
 def _row(name: str, operator: str, m: Merit, seconds: float) -> dict[str, Any]:

@@ -7,7 +7,7 @@ import shutil
 import statistics
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -39,7 +39,6 @@ class Stream(Runner):
         super().__init__(prepared, lambda: None)  # type: ignore[arg-type, return-value]
         self._ending, self.made = threading.Event(), 0
         self._shown: Snapshot | None = None
-        self._announces: list[Callable[[], None]] = []
         self._period = 1 / rate
         self._pictures = [_picture(prepared, step) for step in range(STEPS)]
         self._worker = threading.Thread(target=self._make, daemon=True)
@@ -49,13 +48,6 @@ class Stream(Runner):
     def newest(self) -> Snapshot | None:
         """What was made last."""
         return self._shown
-
-    @contextmanager
-    def watch(self, announce: Callable[[], None]) -> Iterator[None]:
-        """Call it at each result."""
-        self._announces.append(announce)
-        yield
-        self._announces.remove(announce)
 
     def end(self) -> None:
         """Make no more."""
@@ -71,8 +63,7 @@ class Stream(Runner):
             self._shown = Snapshot(
                 replace(picture, sequence=self.made, host_time=now), (), 1e-3, now
             )
-            for announce in tuple(self._announces):
-                announce()
+            self.audience.wake()
             due = max(due + self._period, now - 1)
             time.sleep(max(due - time.monotonic(), 0.0))
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from bench_rig import scan_time, stage
 from life import Condition, Worn, touches
-from locator import Set, held, mean_error, plain
+from locator import Set, disc, held, mean_error, plain
 from report import Report, progress, recordings, table
 from sliding import LEAD, SPEED, START, Way, recorded
 from tomoskin import Skin
@@ -51,11 +51,12 @@ def run(data: Path | None) -> Iterator[Report]:
 
 def _public(data: Path) -> Report:
     rows = []
-    for name, ring in SKINS.items():
+    for name, (first, order) in SKINS.items():
         progress(name)
-        known = Set.of(data / f"{name}.npz", _disc(*ring))
-        order = np.random.default_rng(SEED).permutation(len(known.dv))
-        touched, asked = known.at(order[:TOUCHED]), known.at(order[-ASKED:])
+        turn = f"{first - 360 if first > 180 else first} deg"
+        known = Set.of(data / f"{name}.npz", disc(first=turn, order=order))
+        drawn = np.random.default_rng(SEED).permutation(len(known.dv))
+        touched, asked = known.at(drawn[:TOUCHED]), known.at(drawn[-ASKED:])
         alone = plain(touched.dv[:PLAIN], touched.xy[:PLAIN], asked.dv)
         error = 1e3 * np.linalg.norm(alone - asked.xy, axis=1).mean()
         learnt = {f"{n} labels": _rubbed(touched, asked, n) for n in LABELS}
@@ -116,16 +117,6 @@ def _slide(seed: int) -> Set:
 def _pressed(skin: Skin, n: int, seed: int) -> Set:
     xy, forces = touches(Region.of(skin), n, np.random.default_rng((seed, 5)))
     return Set(Worn(skin, Condition(0), seed)(xy, forces), xy, skin.pattern(), skin)
-
-
-def _disc(first: int, order: str) -> Skin:
-    turn = f"{first - 360 if first > 180 else first} deg"
-    return Skin.load("textile-disc-16").altered(
-        {
-            "outline": {"diameter": "80 mm"},
-            "electrodes": {"width": "3 mm", "first": turn, "order": order},
-        }
-    )
 
 
 def _rubbed(touched: Set, asked: Set, labelled: int) -> str:

@@ -50,21 +50,21 @@ def run() -> Iterator[Report]:
         )
         (place / "long.mcap").unlink()
         hour = of_length(place / "hour.mcap", skin, frames, HOUR)
-        row = opened(hour, HOUR) | _exported(hour, place / "hour.parquet")
-    yield _recorded(*rows)
+        row, target, start = opened(hour, HOUR), place / "hour.parquet", time.perf_counter()
+        with SessionReader(hour) as session:
+            write_parquet(Export(session), target)
+        row["Parquet s"] = round(time.perf_counter() - start, 1)
+        row["Parquet MB"] = round(target.stat().st_size / 1e6)
     yield table(
-        "a session of one hour",
-        [row],
-        f"{HOUR_RATE:.0f} frames/s of {SKIN}, {SEEKS} random places, seed {SEED}",
-    )
-
-
-def _recorded(*rows: dict[str, Any]) -> Report:
-    return table(
         "recording raw bytes and frames beside a pipeline",
         rows,
         f"{SKIN}, seed {SEED}; processor time of the whole process, which also makes the frames, "
         "by the seconds recorded; growth of the process",
+    )
+    yield table(
+        "a session of one hour",
+        [row],
+        f"{HOUR_RATE:.0f} frames/s of {SKIN}, {SEEKS} random places, seed {SEED}",
     )
 
 
@@ -148,11 +148,3 @@ def opened(path: Path, seconds: int) -> dict[str, Any]:
         "open and seek ms": round(statistics.median(sought), 1),
         "worst ms": round(max(sought), 1),
     }
-
-
-def _exported(path: Path, target: Path) -> dict[str, Any]:
-    start = time.perf_counter()
-    with SessionReader(path) as session:
-        write_parquet(Export(session), target)
-    taken = time.perf_counter() - start
-    return {"Parquet s": round(taken, 1), "Parquet MB": round(target.stat().st_size / 1e6)}

@@ -10,14 +10,12 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from bench_rig import evenly, gap, held
+from bench_rig import Rig, evenly, gap, held
 from report import Floats, Report, mm, progress, table
-from tomoskin.board.source import Link, ScanSettings
-from tomoskin.core import FloatArray, Frame, Touch
+from tomoskin.core import FloatArray, Touch
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Pipeline, Prepared, prepare
 from tomoskin.twin import Press, SteppedSkin, TwinSettings
-from tomoskin.twin.source import open_twin
 
 SEEDS = (41, 42)
 """Nothing was chosen on them; 31 to 33 are there to choose on."""
@@ -80,38 +78,32 @@ class Counts:
 
 
 def run() -> Iterator[Report]:
-    yield report(tuple(SKINS), SEEDS, PRESSES)
-
-
-def report(names: tuple[str, ...], seeds: tuple[int, ...], presses: int) -> Report:
-    """Of some skins."""
     rows = []
-    for name in names:
-        base, changes = SKINS[name]
+    for name, (base, changes) in SKINS.items():
         prepared, counts = prepare(Skin.load(base).altered(changes)), Counts()
-        for seed in seeds:
+        for seed in SEEDS:
             progress(f"{name}, seed {seed}")
-            counts.add(standing(prepared, seed, presses))
-        row = {"skin, electrodes": name, "presses": presses * len(seeds)}
+            counts.add(standing(prepared, seed))
+        row = {"skin, electrodes": name, "presses": PRESSES * len(SEEDS)}
         row |= {"not found": counts.missed, "torn or interrupted": counts.torn}
         row |= {"doubled": counts.doubled, "still shown after": counts.late}
         median = mm(np.median(counts.away), digits=1)[0] if counts.away else None
         rows.append(row | {"median, mm": median})
-    return table(
+    yield table(
         "standing presses, one after the other",
         rows,
-        f"textile preset, seeds {seeds}, {FORCES[0]:g} to {FORCES[1]:g} N, held for {HELD:g} s "
+        f"textile preset, seeds {SEEDS}, {FORCES[0]:g} to {FORCES[1]:g} N, held for {HELD:g} s "
         f"every {HELD + PAUSE:g} s without a new reference, as a live run shows them",
         f"after: {GONE:g} s after the release",
     )
 
 
-def standing(prepared: Prepared, seed: int, presses: int) -> Counts:
-    """So many presses, one after the other, on one run of a twin."""
+def standing(prepared: Prepared, seed: int) -> Counts:
+    """Presses, one after the other, on one run of a twin."""
     twin = SteppedSkin(prepared, TwinSettings.preset("textile", seed))
     random, counts = np.random.default_rng((seed, 99)), Counts()
-    places = _places(prepared.skin, random, presses)
-    forces, radii = random.uniform(*FORCES, presses), random.uniform(*RADII, presses)
+    places = _places(prepared.skin, random, PRESSES)
+    forces, radii = random.uniform(*FORCES, PRESSES), random.uniform(*RADII, PRESSES)
     for (x, y), force, radius in zip(places.tolist(), forces, radii, strict=True):
         counts.add(_one(twin, Press(x, y, float(force), float(radius))))
     return counts
@@ -170,8 +162,7 @@ def _trials(prepared: Prepared, seed: int, heavy: float, light: float) -> list[t
     twin, trials = SteppedSkin(prepared, TwinSettings.preset("textile", seed)), []
     for number in range(TRIALS):
         random = np.random.default_rng((seed, number))
-        reach, turn = 0.07 * np.sqrt(random.uniform()), random.uniform(0, 2 * np.pi)
-        x, y = float(reach * np.cos(turn)), float(reach * np.sin(turn))
+        ((x, y),) = evenly(random, 1, 0.07).tolist()
         twin.reset(seed)
         first = _is_found(twin, Press(x, y, heavy, 10e-3), FIRST)
         between = _is_shown(twin, random.uniform(*BETWEEN))
@@ -255,30 +246,20 @@ def counted(name: str) -> dict[str, Any]:
 def measured(prepared: Prepared, seed: int) -> tuple[FloatArray, ...]:
     """Errors m (infinite: none), forces N, s a frame at rest and pressed."""
     random, pipeline = np.random.default_rng(seed), Pipeline(prepared)
-    transport = open_twin(f"fast,seed={seed}", prepared.skin)
+    rig, forces = Rig(prepared.skin, "textile", seed), np.resize(COUNTED_FORCES, COUNTED_PRESSES)
     errors, rest, pressed = [], [], []
-    forces = np.resize(COUNTED_FORCES, COUNTED_PRESSES)
-    with Link(transport, prepared.scan, ScanSettings.of(prepared.skin)) as link:
-        _pushed(link, pipeline, UNTOUCHED, rest)
-        for force in forces:
-            ((x, y),) = evenly(random, 1, 0.1 - RIM).tolist()
-            transport.set_presses((Press(x, y, force, TIP),))
-            touches = _pushed(link, pipeline, PRESSED, pressed)
-            errors.append(min((gap(t, (x, y)) for t in touches), default=np.inf))
-            transport.set_presses(())
-            _pushed(link, pipeline, FREE, rest)
+
+    def pushed(presses: tuple[Press, ...], count: int, taken: list[float]) -> tuple[Touch, ...]:
+        for frame in [rig.frame(presses) for _ in range(count)]:
+            began = time.process_time()
+            result = pipeline.push(frame)
+            taken.append(time.process_time() - began)
+        return result.touches if result else ()
+
+    pushed((), UNTOUCHED, rest)
+    for force in forces:
+        ((x, y),) = evenly(random, 1, 0.1 - RIM).tolist()
+        touches = pushed((Press(x, y, force, TIP),), PRESSED, pressed)
+        errors.append(min((gap(t, (x, y)) for t in touches), default=np.inf))
+        pushed((), FREE, rest)
     return np.array(errors), forces, np.array(rest), np.array(pressed)
-
-
-def _pushed(link: Link, pipeline: Pipeline, count: int, spent: list[float]) -> tuple[Touch, ...]:
-    """The touches of the last of the next ``count`` frames; s of each are added to ``spent``."""
-    touches: tuple[Touch, ...] = ()
-    while count:
-        for frame in link.poll(1.0):
-            if isinstance(frame, Frame) and count:
-                began = time.process_time()
-                result = pipeline.push(frame)
-                spent.append(time.process_time() - began)
-                touches = result.touches if result else ()
-                count -= 1
-    return touches

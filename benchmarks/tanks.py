@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -20,7 +19,6 @@ from report import Report, recordings, table
 from tomoskin.core import FloatArray
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Disc, ElectrodeArc, triangulate
-from tomoskin.model.pattern import Pattern
 
 RADIUS, PIXELS, CELLS = 0.115, 256, 9000
 WIDTHS = (0.0115, 0.0125, 0.0135)
@@ -32,32 +30,23 @@ GAP, RIM, SMALLEST = 6, 0.108, 400
 Inside = Callable[[FloatArray], NDArray[np.bool_]]
 
 
-@dataclass(frozen=True, eq=False)
-class Tank:
-    """What was in it, (256, 256), and what was measured, (rows,) V."""
-
-    truth: NDArray[np.uint8]
-    u: FloatArray
-    u_ref: FloatArray
-
-
-def simulated(seed: int, inj: FloatArray, mpat: FloatArray) -> Tank:
-    """A tank with one to four targets, its own contacts, channels and change of the water."""
+def simulated(example: Any, seed: int, inj: FloatArray, mpat: FloatArray) -> Any:
+    """A sample with one to four targets, its own contacts, channels and change of the water."""
     rng = np.random.default_rng(seed)
     truth = targets(rng)
-    model = _model(float(rng.choice(WIDTHS)), inj, mpat)
+    model = _model(example, float(rng.choice(WIDTHS)))
     model = ForwardModel(
         model.mesh, model.pattern, np.exp(rng.normal(np.log(3e-4), 0.9, 32)), model.current
     )
-    leak = np.asarray(rng.normal(0.0, 0.012, mpat.shape[1]))
+    readout = example.Readout(inj, mpat, np.ones(inj.shape[1] * mpat.shape[1], bool))
+    rows = readout.rows(rng.normal(0.0, 0.012, mpat.shape[1]))
     water = 0.73
     drifted, plastic = water * np.exp(rng.normal(0.0, 0.03)), 0.004
     metal = np.exp(rng.uniform(np.log(8.0), np.log(300.0)))
     sigma = _mixed(model, truth, np.array([drifted, plastic, metal]))
-    u_ref, change = _read(model, water, inj, mpat, leak), _read(model, sigma, inj, mpat, leak)
-    change -= u_ref
-    touched = ((inj != 0).T @ (mpat != 0)).ravel()
-    n = len(change)
+    u_ref = rows @ model.solve(water).voltages
+    change = rows @ model.solve(sigma).voltages - u_ref
+    n, touched = len(change), readout.touched
     u_ref += rng.normal(0.0, 0.004, n) + touched * rng.normal(0.0, 0.02, n)
     change *= 1.0 + 0.025 * rng.standard_normal(n)
     change += 3e-4 * rng.standard_normal(n) + touched * rng.normal(0.0, 0.01, n)
@@ -65,7 +54,7 @@ def simulated(seed: int, inj: FloatArray, mpat: FloatArray) -> Tank:
     gain = (1 + 0.01 * rng.standard_normal((shape[0], 1))) * (
         1 + 0.01 * rng.standard_normal(shape[1])
     )
-    return Tank(truth, u_ref + change * gain.ravel(), u_ref)
+    return example.Sample(str(seed), u_ref + change * gain.ravel(), u_ref, inj, mpat, truth)
 
 
 def targets(rng: np.random.Generator) -> NDArray[np.uint8]:
@@ -121,20 +110,12 @@ def _pixels() -> FloatArray:
     return np.column_stack([x.ravel(), y.ravel()])
 
 
-_MODELS: dict[float, ForwardModel] = {}
-
-
-def _model(width: float, inj: FloatArray, mpat: FloatArray) -> ForwardModel:
-    if width not in _MODELS:
-        rim = Disc(RADIUS)
-        arcs = [ElectrodeArc.around((0.25 + k / 32) * rim.length, width) for k in range(32)]
-        drives = np.column_stack([inj.argmax(axis=0), inj.argmin(axis=0)])
-        pairs = np.column_stack([mpat.argmax(axis=0), mpat.argmin(axis=0)])
-        unique = np.unique(np.sort(drives, axis=1), axis=0)
-        pattern = Pattern.from_pairs(32, unique, pairs, include_driven=True)
-        mesh = triangulate(rim, arcs, CELLS, seed=5)
-        _MODELS[width] = ForwardModel(mesh, pattern, 1e-4)
-    return _MODELS[width]
+@cache
+def _model(example: Any, width: float) -> ForwardModel:
+    """On a mesh of its own, of 1 A, as the example's is."""
+    rim = Disc(RADIUS)
+    arcs = [ElectrodeArc.around((0.25 + k / 32) * rim.length, width) for k in range(32)]
+    return ForwardModel(triangulate(rim, arcs, CELLS, seed=5), example.resistances(), 1e-4)
 
 
 def _mixed(model: ForwardModel, truth: NDArray[np.uint8], values: FloatArray) -> FloatArray:
@@ -149,19 +130,6 @@ def _mixed(model: ForwardModel, truth: NDArray[np.uint8], values: FloatArray) ->
     return np.asarray(water * (1 + reflection) / (1 - reflection))
 
 
-def _read(
-    model: ForwardModel,
-    sigma: float | FloatArray,
-    inj: FloatArray,
-    mpat: FloatArray,
-    leak: FloatArray,
-) -> FloatArray:
-    """(rows,) V: differences of potentials, and a part of the common voltage over the sink's."""
-    at = inj.T @ model.transfer_resistance(sigma)
-    sink = np.take_along_axis(at, inj.argmin(axis=0)[:, None], axis=1)
-    return np.asarray((at @ mpat + leak * (at @ (np.abs(mpat) / 2) - sink)).ravel())
-
-
 LEVELS = range(1, 8)
 METHODS = ("shapes", "linear and Otsu", "water only")
 TANKS = 8
@@ -171,31 +139,14 @@ COARSE = 64
 """Pixels a side where certainty is judged."""
 
 
-@dataclass(frozen=True, eq=False)
-class Judged:
-    """One tank at one level.
+CERTAINTY = ("wrong", "ranked", "loss", "constant")
+"""Part of the pixels with a wrong label; how often a wrong pixel is less sure than a right one; the
+mean of −log₂ of the probability that the true label was given, in bits; and what that were if each
+label counted as wrong as often as labels are."""
 
-    Attributes
-    ----------
-    scores
-        (3,) in the order of METHODS.
-    seconds
-        Of processor time, of one segmentation.
-    wrong
-        Part of the pixels with a wrong label.
-    ranked
-        How often a wrong pixel is less sure than a right one; 0.5 is chance.
-    loss, constant
-        Mean of −log₂ of the probability that the true label was given, in bits, and what it were
-        if each label counted as wrong as often as labels are.
-    """
-
-    scores: FloatArray
-    seconds: float
-    wrong: float
-    ranked: float
-    loss: float
-    constant: float
+Judged = dict[str, float]
+"""Of one tank at one level: the score of each of METHODS, ``seconds`` of processor time of one
+segmentation, and CERTAINTY."""
 
 
 def run(data: Path | None) -> Iterator[Report]:
@@ -225,11 +176,7 @@ def run(data: Path | None) -> Iterator[Report]:
 
 def _simulated(example: Any, level: int, inj: FloatArray, mpat: FloatArray) -> list[Judged]:
     seeds = range(6000 + 100 * level, 6000 + 100 * level + TANKS)
-    tanks = ((seed, simulated(seed, inj, mpat)) for seed in seeds)
-    return [
-        judged(example, example.Sample(str(seed), t.u, t.u_ref, inj, mpat, t.truth), level)
-        for seed, t in tanks
-    ]
+    return [judged(example, simulated(example, seed, inj, mpat), level) for seed in seeds]
 
 
 def judged(example: Any, tank: Any, level: int) -> Judged:
@@ -241,15 +188,16 @@ def judged(example: Any, tank: Any, level: int) -> Judged:
     seconds = time.process_time() - begun
     linear = example.linear(tank.u, tank.u_ref, tank.inj, tank.mpat, keep)
     pictures = (labels, linear, np.zeros_like(labels))
-    scores = np.array([example.score(picture, tank.truth) for picture in pictures])
+    scores = (example.score(picture, tank.truth) for picture in pictures)
     points, inside = example.pixels(COARSE)
     step = example.PIXELS // COARSE
     truth = np.asarray(tank.truth)[step // 2 :: step, step // 2 :: step][inside]
-    return Judged(scores, seconds, *certainty(found, points, truth))
+    about = zip(CERTAINTY, certainty(found, points, truth), strict=True)
+    return {**dict(zip(METHODS, scores, strict=True)), "seconds": seconds, **dict(about)}
 
 
 def certainty(found: Any, points: FloatArray, truth: Any) -> tuple[float, float, float, float]:
-    """Part of the ``points`` that is wrong, and the three numbers of :class:`Judged` about it."""
+    """What CERTAINTY names, at ``points``."""
     wrong = found.at(points) != truth
     rank, n = rankdata(found.entropy(points)), int(wrong.sum())
     above = rank[wrong].sum() - n * (n + 1) / 2
@@ -262,20 +210,20 @@ def certainty(found: Any, points: FloatArray, truth: Any) -> tuple[float, float,
 
 def _scores(name: str, group: Sequence[Sequence[Judged]]) -> Iterator[dict[str, Any]]:
     """Mean and its standard error at each level, and over all."""
-    for k, method in enumerate(METHODS):
-        scores = np.array([[tank.scores[k] for tank in tanks] for tanks in group])
+    for method in METHODS:
+        scores = np.array([[tank[method] for tank in tanks] for tanks in group])
         error = scores.std(axis=1, ddof=1) / np.sqrt(scores.shape[1])
         means = [*scores.mean(axis=1), scores.mean()]
         errors = [*error, np.sqrt((error**2).sum()) / len(error)]
         values = [f"{m:.3f} ± {e:.3f}" for m, e in zip(means, errors, strict=True)]
         yield _by_level(name, method, values) | {"times 21": f"{21 * scores.mean():.2f}"}
-    taken = np.array([np.mean([tank.seconds for tank in tanks]) for tanks in group])
+    taken = np.array([np.mean([tank["seconds"] for tank in tanks]) for tanks in group])
     yield _by_level(name, "seconds", [f"{s:.1f}" for s in (*taken, taken.mean())])
 
 
 def _certainty(name: str, group: Sequence[Sequence[Judged]]) -> Iterator[dict[str, Any]]:
-    for what in ("wrong", "ranked", "loss", "constant"):
-        means = np.array([np.mean([getattr(tank, what) for tank in tanks]) for tanks in group])
+    for what in CERTAINTY:
+        means = np.array([np.mean([tank[what] for tank in tanks]) for tanks in group])
         yield _by_level(name, what, [f"{m:.3f}" for m in (*means, means.mean())])
 
 

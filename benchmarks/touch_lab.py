@@ -21,7 +21,7 @@ from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, prepare
 from tomoskin.pipeline.finding import Finder, finder_of
 from tomoskin.pipeline.frame_subspace import JUMP
-from tomoskin.pipeline.tune import tuned, tuned_sheet
+from tomoskin.pipeline.rest import tuned, tuned_sheet
 from tomoskin.sensing.fit import Whitener, row_covariance
 from tomoskin.sensing.signal import FIGURES, NuisanceSubspace, Readout, Reference
 from tomoskin.sensing.signal.health import Roles
@@ -324,13 +324,7 @@ def drawn_fingers(random: np.random.Generator, skin: Skin, count: int) -> tuple[
     low, high = rim.min(axis=0), rim.max(axis=0)
     while True:
         places = random.uniform(low, high, (count, 2))
-        if far_apart(places, APART) and all(_encloses(rim, place) for place in places):
+        if far_apart(places, APART) and skin.outline.contains(places / INSIDE).all():
             radii, falls = random.uniform(*RADII, count), random.uniform(*FALLS, count)
             each = np.column_stack([places, radii, falls]).tolist()
             return tuple(Finger(*values) for values in each)
-
-
-def _encloses(rim: Floats, point: Floats) -> bool:
-    """Whether a convex ``rim`` (n, 2), counter-clockwise, goes round the point."""
-    along, towards = np.roll(rim, -1, axis=0) - rim, point - rim
-    return bool((along[:, 0] * towards[:, 1] >= along[:, 1] * towards[:, 0]).all())

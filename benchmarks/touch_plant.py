@@ -68,7 +68,14 @@ def run_quick() -> Iterator[Report]:
 
 def run_twin() -> Iterator[Report]:
     """The same on the twin, whose probes are rigid."""
-    yield _on_twin(TWIN, PLACES, TRIPLES)
+    yield table(
+        "flat round probes on the twin",
+        (_row(case, _twin_frames(case, PLACES if case.anywhere else TRIPLES)) for case in TWIN),
+        f"seeds {SEEDS}, {PLACES} places of one press and then {TRIPLES} of one, two and three; "
+        "probes of 8 to 15 mm radius, 2 to 4 N; each frame alone, from a cold start",
+        "ideal: read-out noise alone; bound: Cramér–Rao of the twin itself; first rows: wherever "
+        "the nearest touch is",
+    )
 
 
 def on_plant(cases: Sequence[Case], sheets: int) -> Report:
@@ -82,17 +89,6 @@ def on_plant(cases: Sequence[Case], sheets: int) -> Report:
         f"{100 * FALLS[0]:.0f} to {100 * FALLS[1]:.0f} %, over {100 * INSIDE:.0f} % of the "
         f"breadth, {1e3 * APART:.0f} mm apart at least",
         "all found: each press within half of that; bound: Cramér–Rao of the plant itself",
-    )
-
-
-def _on_twin(cases: Sequence[Case], places: int, triples: int) -> Report:
-    return table(
-        "flat round probes on the twin",
-        (_row(case, _twin_frames(case, places if case.anywhere else triples)) for case in cases),
-        f"seeds {SEEDS}, {places} places of one press and then {triples} of one, two and three; "
-        "probes of 8 to 15 mm radius, 2 to 4 N; each frame alone, from a cold start",
-        "ideal: read-out noise alone; bound: Cramér–Rao of the twin itself; first rows: wherever "
-        "the nearest touch is",
     )
 
 

@@ -145,7 +145,9 @@ def _forward() -> Iterator[Line]:
         "scipy picture": lambda: plain @ change,
     }
     if INSTALLED:
-        calls |= _peer_calls(Peer(case.mesh, PATTERN), sigma, change)
+        peer = Peer(case.mesh, PATTERN)
+        its = peer.set_up(ALPHA)
+        calls |= peer.calls(sigma, ALPHA) | {"peer picture": lambda: -np.dot(its, change)}
     times = medians(calls, SECONDS)
     for name, what in MODEL.items():
         plain_ms, peer_ms = (_ms(times.get(f"{who} {name}")) for who in ("scipy", "peer"))
@@ -162,19 +164,6 @@ def _plain_operator(script: Script, sigma: FloatArray) -> FloatArray:
     normal[np.diag_indices_from(normal)] += ALPHA**2 * np.sqrt(normal.diagonal())
     solved: FloatArray = scipy.linalg.solve(normal, jacobian.T, assume_a="pos")
     return solved
-
-
-def _peer_calls(
-    peer: Peer, sigma: FloatArray, change: FloatArray
-) -> dict[str, Callable[[], object]]:
-    peer.prepare()
-    operator = peer.set_up(ALPHA)
-    return {
-        "peer forward": lambda: peer.forward(sigma),
-        "peer jacobian": lambda: peer.jacobian(sigma),
-        "peer set-up": lambda: peer.set_up(ALPHA),
-        "peer picture": lambda: -np.dot(operator, change),
-    }
 
 
 def _frame() -> Iterator[Line]:

@@ -33,12 +33,12 @@ MARK = "<!-- from here on written by docs/doc_tables.py -->\n\n"
 FOLDER = Path(__file__).parent
 
 _STAGES = {
-    "Contact": ContactSettings,
-    "Material": MaterialSettings,
-    "Electronics": ElectronicsSettings,
-    "Bending": BendSettings,
+    "contact": ("Contact", ContactSettings),
+    "material": ("Material", MaterialSettings),
+    "electronics": ("Electronics", ElectronicsSettings),
+    "bend": ("Bending", BendSettings),
 }
-"""Settings of the twin, in the order of a preset."""
+"""Title and settings of each stage of the twin, by its name in a preset."""
 
 
 def tables(sections: Iterable[type[Section]]) -> str:
@@ -52,7 +52,7 @@ def tables(sections: Iterable[type[Section]]) -> str:
 
 def parameter_tables() -> str:
     """A table for each stage of the twin, with a column for each preset; and the line's."""
-    return "\n".join([*(_stage(*named) for named in enumerate(_STAGES)), _line()])
+    return "\n".join([*map(_stage, _STAGES), _line()])
 
 
 def schema_tables() -> str:
@@ -157,15 +157,16 @@ def _default(key: Key) -> str:
     return text
 
 
-def _stage(place: int, title: str) -> str:
+def _stage(stage: str) -> str:
+    title, record = _STAGES[stage]
     rows = (
         [f"`{name}`", unit]
-        + [_shown(getattr(parts[place], name)) for parts in PRESETS.values()]
+        + [_shown(getattr(getattr(preset, stage), name)) for preset in PRESETS.values()]
         + [meaning, SOURCES.get(name, _assumed(source))]
-        for name, unit, meaning, source in documented(_STAGES[title])
+        for name, unit, meaning, source in documented(record)
     )
     head = ["number", "unit", *PRESETS, "meaning", "source"]
-    return f"### {title}: `{_STAGES[title].__name__}`\n\n{_table(head, rows)}"
+    return f"### {title}: `{record.__name__}`\n\n{_table(head, rows)}"
 
 
 def _line() -> str:

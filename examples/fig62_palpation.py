@@ -36,10 +36,11 @@ from lab import Changes, report
 from layered import Inclusion, Layered, Plate
 from tomoskin.board.source import ScanSettings
 from tomoskin.core import Detection, FloatArray, Frame, Image
-from tomoskin.imaging import Matern, OneStep
+from tomoskin.imaging import OneStep
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.pattern import Scan
+from tomoskin.model.prior import Matern
 from tomoskin.model.skin import Skin
 from tomoskin.sensing.fit import SpotFinder, SpotModel, measured_covariance
 from tomoskin.sensing.segment import Segmenter

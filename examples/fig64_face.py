@@ -39,10 +39,11 @@ from bodies import options_of
 from face import CONTACT, EXPRESSIONS, Bump, Face, face, movement
 from lab import report
 from tomoskin.core import ComplexArray, FloatArray
-from tomoskin.imaging import LinearProblem, Matern
+from tomoskin.imaging import LinearProblem
 from tomoskin.learning import Classifier
 from tomoskin.model.forward import ForwardModel, State
 from tomoskin.model.pattern import Pattern
+from tomoskin.model.prior import Matern
 
 PATTERN = Pattern.adjacent(8)
 CURRENT = 1e-3

@@ -31,7 +31,7 @@ from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, prepare
 from tomoskin.pipeline.finding import finder_of
 from tomoskin.pipeline.frame_subspace import JUMP
-from tomoskin.pipeline.tune import tuned_sheet
+from tomoskin.pipeline.rest import tuned_sheet
 from tomoskin.sensing.fit import Whitener, row_covariance
 from tomoskin.sensing.signal import Reference
 from tomoskin.twin import Press, TwinSettings, TwinSkin

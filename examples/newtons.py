@@ -30,7 +30,7 @@ from tomoskin.core import FloatArray
 from tomoskin.learning import FORCE, ForceModel, WeighedPresses
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, prepare
-from tomoskin.twin import Circle, Contact, Press, Probe, SteppedSkin, TwinSettings
+from tomoskin.twin import Circle, Press, Probe, SteppedSkin, TwinSettings
 
 SKIN, RADIUS = "textile-disc-16", 12e-3
 LIGHT, HEAVY, WEIGHED, STAGE = 2.0, 20.0, (0.5, 1.0, 0.5), 0.5
@@ -102,7 +102,7 @@ def slid(twin: SteppedSkin) -> FloatArray:
     rows, gone = [], 0.0
     while gone < length:
         x, y = (WAY[0] + gone * along).tolist()
-        finger: Contact = Probe(Circle(RADIUS), x, y, FORCE_N).moving(*along.tolist(), FRICTION)
+        finger: Probe = Probe(Circle(RADIUS), x, y, FORCE_N).moving(*along.tolist(), FRICTION)
         for touch in twin.step((finger,)).touches[:1]:
             here = np.array([touch.detection.x, touch.detection.y]) - WAY[0]
             rows.append((gone, gone - float(here @ along)))

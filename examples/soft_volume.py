@@ -27,10 +27,11 @@ import figures
 from bodies import options_of
 from lab import report
 from tomoskin.core import FloatArray
-from tomoskin.imaging import Matern, OneStep, Operator
+from tomoskin.imaging import OneStep, Operator
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Disc, Mesh, extrude, ring
 from tomoskin.model.pattern import named
+from tomoskin.model.prior import Matern
 
 RADIUS, HEIGHT = 50e-3, 40e-3
 WALL = Disc(RADIUS)

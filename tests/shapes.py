@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, IntArray
-from tomoskin.model.mesh import Disc, ElectrodeArc, Mesh, triangulate
+from tomoskin.model.mesh import Disc, ElectrodeArc, Mesh, extrude, ring, triangulate
 
 
 @cache
@@ -19,6 +19,15 @@ def disc(n: int = 8, cells: int = 220, *, width: float = 0.02) -> Mesh:
     outline = Disc(0.1)
     centres = (0.25 - np.arange(n) / n) * outline.length
     return triangulate(outline, [ElectrodeArc.around(float(c), width) for c in centres], cells)
+
+
+def cylinder(
+    radius: float, height: float, *, count: int, span: tuple[float, float], cells: int, layers: int
+) -> Mesh:
+    """Tank with ``count`` electrodes of 20 mm, which reach over the heights ``span``, m."""
+    outline = Disc(radius)
+    patches = ring(outline, count, 0.02, *span)
+    return extrude(outline, height, patches, cells=cells, layers=layers)
 
 
 def grid(nx: int, ny: int) -> IntArray:
@@ -129,8 +138,8 @@ def rings(radii: FloatArray, n: int) -> Mesh:
     following = np.roll(np.arange(n), -1)
     fan = np.column_stack([np.zeros(n, dtype=int), 1 + np.arange(n), 1 + following])
     cells = [fan]
-    for ring in range(len(radii) - 1):
-        a, b = 1 + ring * n + np.arange(n), 1 + ring * n + following
+    for inner in range(len(radii) - 1):
+        a, b = 1 + inner * n + np.arange(n), 1 + inner * n + following
         cells += [np.column_stack([a, a + n, b + n]), np.column_stack([a, b + n, b])]
     rim = 1 + (len(radii) - 1) * n + np.arange(2)
     return Mesh(points, np.concatenate(cells), (rim[None],))

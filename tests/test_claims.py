@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -13,7 +14,7 @@ from claims import Claim, read, written
 from gallery import documented
 from report import Part, Report
 
-REPORTS = [
+REPORTS: list[dict[str, Any]] = [
     {
         "title": "presses on the twin",
         "columns": ["skin", "presses", "median mm", "in 90 %"],

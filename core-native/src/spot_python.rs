@@ -54,7 +54,7 @@ struct Fitted<'py> {
     known: Bound<'py, PyTuple>,
 }
 
-/// What is likely of a spot, as tomoskin.sensing.fit.prior.SpotPrior has it.
+/// What is likely of a spot, as tomoskin.sensing.fit.spot_fit.SpotPrior has it.
 #[derive(FromPyObject)]
 struct PriorArrays<'py> {
     middle: Any<'py>,

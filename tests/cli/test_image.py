@@ -21,6 +21,7 @@ from tomoskin.core import FloatArray
 from tomoskin.files.exports.display import circular_average
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import triangulate
+from tomoskin.model.pattern import Pattern
 from tomoskin.model.skin import Skin
 
 PLACE = (0.03, 0.04)
@@ -69,6 +70,30 @@ def test_a_press_is_found_where_it_was(save, image, tmp_path, reference) -> None
     code, _, err = image(save(), "--touches", table, "--frames", "3:4", *chosen)
     assert (code, err) == (0, "")
     assert np.hypot(*np.subtract(places(table)[3], PLACE)) < 0.012
+
+
+def test_currents_into_many_electrodes(save, image, tmp_path) -> None:
+    """Cosines of all electrodes: the same press, of files with all they need and with too few."""
+    angle, ring = 2.0 * np.pi * np.arange(8) / 8, [[e, (e + 1) % 8] for e in range(8)]
+    waves = [f(k * angle + 0.1) for k in range(1, 5) for f in (np.cos, np.sin)][:7]
+    pattern = Pattern.from_pairs(8, waves, ring, include_driven=True)
+    mesh = triangulate(SKIN.outline, SKIN.arcs, 1100, seed=11)
+    model = ForwardModel(mesh, pattern, SKIN.contact_impedance, SKIN.current)
+    near = np.hypot(*(mesh.centroids - PLACE).T) < 0.015
+    sigma = np.where(near, 0.7, 1.0) * SKIN.conductivity
+    values = np.array([model.solve(SKIN.conductivity).voltages, model.solve(sigma).voltages])
+    rows = {"voltages": values, "drive": pattern.drive, "measure": pattern.measure}
+    table = tmp_path / "touches.csv"
+    code, _, err = image(save(**rows), "--touches", table)
+    assert code == 0
+    assert "56 rows with drives of several electrodes were summed to pairs" in err
+    assert np.hypot(*np.subtract(places(table)[1], PLACE)) < 0.012
+    few = {key: value[..., :40] if key == "voltages" else value[:40] for key, value in rows.items()}
+    code, _, err = image(save(**few))
+    assert code == 1
+    assert "40 of 40 rows are not in the recording: row 0: source E2, sink E1" in err
+    leak = save(**rows | {"drive": pattern.drive + 0.01})
+    assert "drive row 0: expected currents that are not all zero and sum to zero" in image(leak)[2]
 
 
 def test_idle_frames_with_known_noise_give_no_touch(save, image, tmp_path) -> None:

@@ -13,7 +13,7 @@ import pytest
 
 from model.robot.test_robot import URDF
 from tomoskin.cli.live import chosen_robot
-from tomoskin.files.session.repair import split_names
+from tomoskin.files.session import split_targets
 from tomoskin.model.robot import Robot
 
 COMMAND = [sys.executable, "-c", "from tomoskin.cli import main; main()"]
@@ -123,7 +123,7 @@ def test_all_skins_are_live_on_one_page_and_in_one_file(tomoskin, tmp_path):
         finally:
             live.kill()
     assert json.loads(last)["skins"].keys() == {"left", "right"}
-    assert split_names(recording) == ("left", "right")
+    assert tuple(split_targets(recording)) == ("left", "right")
     code, _, err = tomoskin("session", "info", recording)
     assert (code, "session split" in err) == (1, True)
     assert tomoskin("session", "split", recording)[0] == 0
@@ -145,7 +145,7 @@ def test_a_robot_file_says_all(tomoskin, arm):
         ("--skin left=textile-disc-8 --skin textile-disc-8", "expected NAME=SKIN"),
         ("--skin textile-disc-8 --skin textile-disc-8", "expected NAME=SKIN"),
         ("--skin a=textile-disc-8 --skin a=textile-disc-8", "two skins have the same name a"),
-        ("--skin Left=textile-disc-8", 'skin 1 "Left": expected a name of small letters'),
+        ("--skin Left=textile-disc-8", '[[skin]] 1 "Left": expected a name of small letters'),
         ("--skin a=textile-disc-8 --skin b=textile-disc-8 --source twin", "one for each --skin: 2"),
         ("--source twin --source twin", "one for each --skin: 1; got 2"),
         ("--skin a=textile-disc-8 --calibration {c}", "does not say to which skin it belongs"),

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tomoskin.core import Arrays, cache, kept
+from tomoskin.core import Arrays, archive, kept
 
 
 class Counted:
@@ -24,7 +24,7 @@ class Counted:
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setenv(cache.VARIABLE, str(tmp_path / "new"))
+    monkeypatch.setenv(archive.VARIABLE, str(tmp_path / "new"))
     return tmp_path / "new"
 
 
@@ -41,7 +41,7 @@ def test_what_was_made_lies_in_memory_as_what_was_kept(
     where: str, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Sums over other strides round otherwise: the first run would not replay to the bit."""
-    monkeypatch.setenv(cache.VARIABLE, str(folder) if where == "new" else where)
+    monkeypatch.setenv(archive.VARIABLE, str(folder) if where == "new" else where)
     table = np.arange(24.0).reshape(2, 3, 4)
 
     def make() -> Arrays:
@@ -74,7 +74,7 @@ def test_a_folder_that_cannot_be_costs_time_only(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "file").write_text("no folder")
-    monkeypatch.setenv(cache.VARIABLE, str(tmp_path / "file"))
+    monkeypatch.setenv(archive.VARIABLE, str(tmp_path / "file"))
     make = Counted()
     for _ in range(2):
         np.testing.assert_array_equal(kept("a", make)["values"], np.arange(3.0))
@@ -82,8 +82,8 @@ def test_a_folder_that_cannot_be_costs_time_only(
 
 
 def test_off_keeps_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(cache.VARIABLE, "off")
-    assert cache.cache_folder() is None
+    monkeypatch.setenv(archive.VARIABLE, "off")
+    assert archive.cache_folder() is None
     make = Counted()
     kept("a", make)
     kept("a", make)
@@ -94,7 +94,7 @@ def test_what_was_not_used_for_longest_goes(folder: Path, monkeypatch: pytest.Mo
     make = Counted()
     kept("old", make)
     size = (folder / "old.npz").stat().st_size
-    monkeypatch.setattr(cache, "MOST_BYTES", 2 * size)
+    monkeypatch.setattr(archive, "MOST_BYTES", 2 * size)
     kept("used", make)
     os.utime(folder / "old.npz", (1, 1))
     os.utime(folder / "used.npz", (2, 2))
@@ -103,8 +103,8 @@ def test_what_was_not_used_for_longest_goes(folder: Path, monkeypatch: pytest.Mo
 
 
 def test_the_users_own_folder_is_the_systems(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv(cache.VARIABLE)
+    monkeypatch.delenv(archive.VARIABLE)
     monkeypatch.setenv("XDG_CACHE_HOME", "/elsewhere")
-    folder = cache.cache_folder()
+    folder = archive.cache_folder()
     assert folder is not None
     assert folder.name == "tomoskin"

@@ -10,21 +10,13 @@ import pytest
 
 from shapes import box, disc, patched
 from tomoskin.core import DataError, FloatArray, ModelError
-from tomoskin.imaging import (
-    AbsoluteImaging,
-    Laplace,
-    Noser,
-    Observation,
-    Sparse,
-    TotalVariation,
-    homogeneous,
-)
+from tomoskin.imaging import AbsoluteImaging, Observation, homogeneous
 from tomoskin.imaging.iterative.newton import Descent, Goal, descend, minimiser
 from tomoskin.imaging.iterative.unknowns import Cells, Joint, Unknowns, others
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.pattern import Pattern
-from tomoskin.model.prior import Diagonal
+from tomoskin.model.prior import Diagonal, Laplace, Noser, Sparse, TotalVariation
 
 LESS, MORE = np.array([-0.04, -0.02]), np.array([0.04, 0.03])
 NOISE = 1e-3
@@ -85,7 +77,7 @@ def test_conductivity_itself_is_found(name: str) -> None:
     assert (sigma > 0).all()
     assert found.conductivity.unit == "S"
     assert found.conductivity.mesh_id == coarse().identity
-    assert (np.diff([step.objective for step in found.steps]) < 0).all()
+    assert (np.diff([step.objective for step in found.descent.steps]) < 0).all()
     # 1 mV/V of a mesh with a third of the cells: its own error is a part of the misfit
     assert found.misfit < 10 * found.n_values
 
@@ -170,12 +162,12 @@ def test_l1_changes_few_cells() -> None:
 def test_record_explains_itself() -> None:
     model = ForwardModel(coarse(300), pattern(), 0.01)
     short = AbsoluteImaging(model, alpha=1.0, steps=2)(seen())
-    assert not short.converged
+    assert not short.descent.converged
     assert "stopped: reached the limit of 2 steps" in str(short)
-    assert len(short.steps) == 3
+    assert len(short.descent.steps) == 3
     done = AbsoluteImaging(model, alpha=30.0)(seen())
-    assert done.converged
-    assert "of its value" in done.reason
+    assert done.descent.converged
+    assert "of its value" in done.descent.reason
     assert f"of {done.n_values} values" in str(done)
 
 

@@ -9,7 +9,8 @@ import pytest
 
 from golden import SHARED, Golden, mismatch
 from tomoskin.core import FloatArray
-from tomoskin.imaging import OneStep, prior_matrix
+from tomoskin.imaging import OneStep
+from tomoskin.model.prior import penalty_of
 from tomoskin.sensing.signal import difference
 
 pytestmark = pytest.mark.data
@@ -28,12 +29,12 @@ def images(operator: OneStep, golden: Golden) -> FloatArray:
 
 
 def test_noser_matrix(golden: Golden) -> None:
-    noser = prior_matrix("noser", golden.mesh, golden.model().jacobian(1.0))
+    noser = penalty_of("noser", golden.mesh, golden.model().jacobian(1.0)).matrix
     assert mismatch(noser, golden.fields["RtR_noser_diag"].ravel()) < 1e-10
 
 
 def test_laplace_matrix(golden: Golden) -> None:
-    laplace = prior_matrix("laplace", golden.mesh, np.empty((0, 0)))
+    laplace = penalty_of("laplace", golden.mesh, np.empty((0, 0))).matrix
     assert np.array_equal(laplace, golden.matrix("RtR_laplace_ijv"))
 
 

@@ -13,9 +13,10 @@ from hypothesis import strategies as st
 from golden import mismatch
 from shapes import disc
 from tomoskin.core import DataError, FloatArray
-from tomoskin.imaging import PRIORS, OneStep, Operator
+from tomoskin.imaging import OneStep, Operator
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.pattern import Pattern
+from tomoskin.model.prior import PRIORS
 
 PATTERN = Pattern.adjacent(8)
 ALPHA = 0.02

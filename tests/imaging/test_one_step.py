@@ -13,10 +13,11 @@ from scipy.sparse import csr_array, diags_array
 from golden import mismatch
 from shapes import box, disc
 from tomoskin.core import DataError, FloatArray, ModelError
-from tomoskin.imaging import PRIORS, LinearProblem, OneStep, prior_matrix
+from tomoskin.imaging import LinearProblem, OneStep
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.pattern import Pattern
+from tomoskin.model.prior import PRIORS, penalty_of
 from tomoskin.sensing.signal import difference
 
 ALPHA = 0.05
@@ -57,7 +58,7 @@ def test_matrix_is_that_of_the_formula(prior: str, kind: str, weighted: bool) ->
         difference=kind,
         weights=w if weighted else None,
     )
-    q = prior_matrix(prior, model().mesh, jacobian)
+    q = penalty_of(prior, model().mesh, jacobian).matrix
     assert mismatch(operator.matrix, by_the_book(jacobian, w, q, ALPHA)) < 1e-7
     assert np.array_equal(operator.reference, v)
 
@@ -204,7 +205,7 @@ def test_complex_data_are_inverted_alike(prior: str, kind: str) -> None:
     state = turned.at(1.0 + 0.2j)
     size = np.abs(state.voltages) if kind == "normalised" else np.ones(40)
     jacobian = state.jacobian / size[:, None]
-    q = prior_matrix(prior, turned.mesh, jacobian)
+    q = penalty_of(prior, turned.mesh, jacobian).matrix
     expected = by_the_book(jacobian, size**2, q, ALPHA)
     assert np.iscomplexobj(expected)
     assert mismatch(operator.matrix, expected) < 1e-7

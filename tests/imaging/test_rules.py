@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from typing import Any
@@ -24,7 +25,7 @@ from tomoskin.imaging import (
     for_recording,
     noise_figure,
 )
-from tomoskin.imaging.choice.alpha_choice import Explanation, Level, crossing
+from tomoskin.imaging.choice.alpha_choice import crossing
 from tomoskin.imaging.choice.criteria import by_noise_figure, corner, in_the_middle
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.pattern import Pattern
@@ -192,12 +193,16 @@ def test_noise_figure_is_taken_where_it_falls_not_where_it_rises_again() -> None
 
 def test_a_figure_that_only_rises_to_the_level_is_not_taken() -> None:
     """From 0 up to 1 and never down: the end of the range is not where it falls to 1/2."""
-    s, told = spectrum(), Explanation("noise-figure", "", "noise figure")
+    s = spectrum()
     middle = float(np.median(s.alphas))
-    level = Level(0.5, "falling", ("larger", "smaller"))
+
+    def fallen(quantity: Callable[[float], float]) -> AlphaChoice:
+        words: dict[str, Any] = {"rule": "noise-figure", "reason": "", "label": "noise figure"}
+        return crossing(s, quantity, 0.5, rising=False, hints=("larger", "smaller"), **words)
+
     with pytest.raises(ModelError, match=r"starts below 0.5: .*smaller"):
-        crossing(s, lambda alpha: alpha / (alpha + middle), level, told)
-    found = crossing(s, lambda alpha: middle / (alpha + middle), level, told)
+        fallen(lambda alpha: alpha / (alpha + middle))
+    found = fallen(lambda alpha: middle / (alpha + middle))
     assert found.alpha == pytest.approx(middle)
 
 

@@ -14,9 +14,10 @@ from hypothesis import strategies as st
 from golden import mismatch
 from shapes import disc
 from tomoskin.core import FloatArray, ModelError
-from tomoskin.imaging import PRIORS, LinearProblem, Spectrum, prior_matrix
+from tomoskin.imaging import LinearProblem, Spectrum
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.pattern import Pattern
+from tomoskin.model.prior import PRIORS, penalty_of
 
 ALPHAS = [1e-3, 0.03, 1.0, 30.0]
 
@@ -73,7 +74,7 @@ def test_operator_of_a_complex_problem(prior: str) -> None:
 def test_operator_where_every_part_of_the_mesh_is_free() -> None:
     """A prior that looks at differences within two halves only: two free images."""
     centroids = model().mesh.centroids
-    q = prior_matrix("laplace", model().mesh, np.empty((0, 0))).copy()
+    q = penalty_of("laplace", model().mesh, np.empty((0, 0))).matrix.copy()
     left = centroids[:, 0] < 0
     q[np.ix_(left, ~left)] = q[np.ix_(~left, left)] = 0.0
     q[np.diag_indices_from(q)] -= q.sum(axis=1)
@@ -90,7 +91,7 @@ def test_residual_seminorm_and_noise_are_those_of_the_image(exponent: float) -> 
     volumes = model().mesh.volumes
     for prior in ("noser", "laplace"):
         spectrum = cached(prior)
-        q = prior_matrix(prior, model().mesh, spectrum.problem.jacobian)
+        q = penalty_of(prior, model().mesh, spectrum.problem.jacobian).matrix
         q = np.diag(q) if q.ndim == 1 else q
         matrix = spectrum.problem.operator(alpha).matrix
         images = dv @ matrix.T
@@ -101,8 +102,9 @@ def test_residual_seminorm_and_noise_are_those_of_the_image(exponent: float) -> 
         covariance = spectrum.noise_coefficients(noise)
         assert spectrum.residual(alpha, dv) == pytest.approx(left_over, rel=1e-6, abs=0)
         assert spectrum.seminorm(alpha, dv) == pytest.approx(weighed, rel=1e-5, abs=0)
-        assert spectrum.image_noise(alpha, covariance) == pytest.approx(spread, rel=1e-6, abs=0)
-        assert spectrum.freedom(alpha) == pytest.approx(influence, rel=1e-6)
+        (energy,) = spectrum.energies(np.array([alpha]), covariance)
+        assert np.sqrt(energy / volumes.sum()) == pytest.approx(spread, rel=1e-6, abs=0)
+        assert spectrum.filters(alpha).sum() == pytest.approx(influence, rel=1e-6)
 
 
 @cache
@@ -112,7 +114,7 @@ def cached(prior: str) -> Spectrum:
 
 def test_singular_values_of_a_diagonal_prior() -> None:
     p = problem("noser")
-    q = prior_matrix("noser", model().mesh, p.jacobian)
+    q = penalty_of("noser", model().mesh, p.jacobian).matrix
     expected = np.linalg.svd(p.jacobian / np.sqrt(q), compute_uv=False)
     spectrum = cached("noser")
     n = len(spectrum.singular_values)
@@ -123,9 +125,9 @@ def test_singular_values_of_a_diagonal_prior() -> None:
 
 def test_limits_of_alpha(spectrum: Spectrum) -> None:
     free = np.isinf(spectrum.values).sum()
-    assert spectrum.freedom(1e9) == pytest.approx(free, abs=1e-9)
-    assert spectrum.freedom(1e-7) == pytest.approx(20, abs=1.5)
-    steps = [spectrum.freedom(a) for a in spectrum.alphas]
+    assert spectrum.filters(1e9).sum() == pytest.approx(free, abs=1e-9)
+    assert spectrum.filters(1e-7).sum() == pytest.approx(20, abs=1.5)
+    steps = [spectrum.filters(a).sum() for a in spectrum.alphas]
     assert (np.diff(steps) < 0).all()
 
 

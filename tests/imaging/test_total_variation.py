@@ -7,17 +7,11 @@ import pytest
 
 from shapes import box, disc, mapped, strip
 from tomoskin.core import FloatArray, ModelError
-from tomoskin.imaging import (
-    Observation,
-    OneStep,
-    SharpDifference,
-    SharpPrior,
-    Sparse,
-    TotalVariation,
-)
+from tomoskin.imaging import Observation, OneStep, SharpDifference
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.pattern import Pattern
+from tomoskin.model.prior import SharpPrior, Sparse, TotalVariation
 
 SHARP: tuple[SharpPrior, ...] = (TotalVariation(0.05), Sparse(0.05))
 
@@ -119,8 +113,8 @@ def test_every_step_lowers_the_objective(prior: SharpPrior) -> None:
     model = ForwardModel(mesh, Pattern.adjacent(8), 0.01)
     dv = model.jacobian(1.0) @ (0.2 * spot(mesh))
     found = SharpDifference(model, prior, alpha=3.0)(Observation.of(dv, 1e-3 * np.abs(dv).max()))
-    objective = [step.objective for step in found.steps]
-    assert found.converged
+    objective = [step.objective for step in found.descent.steps]
+    assert found.descent.converged
     assert (np.diff(objective) < 0).all()
     assert "stopped: the last step lowered" in str(found)
 

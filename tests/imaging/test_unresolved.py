@@ -10,10 +10,11 @@ import pytest
 from golden import mismatch
 from shapes import disc
 from tomoskin.core import FloatArray, ModelError
-from tomoskin.imaging import PRIORS, OneStep, prior_matrix, unresolved
+from tomoskin.imaging import OneStep, unresolved
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.pattern import Pattern
+from tomoskin.model.prior import PRIORS, penalty_of
 
 MODEL = ForwardModel(disc(8), Pattern.adjacent(8), 0.01)
 
@@ -37,7 +38,7 @@ def test_what_is_unresolved_is_the_variance_that_bayes_leaves(prior: str, differ
     """Prior N(0, Q⁻¹), noise N(0, α²W⁻¹): the posterior's covariance, by inverting all of it."""
     operator = OneStep(MODEL, prior, alpha=ALPHA, difference=difference)
     problem = operator.problem
-    q = prior_matrix(prior, MODEL.mesh, problem.jacobian)
+    q = penalty_of(prior, MODEL.mesh, problem.jacobian).matrix
     q = np.diag(q) if q.ndim == 1 else q
     information = (problem.jacobian.T * problem.weights) @ problem.jacobian / ALPHA**2
     means = disc_means()
@@ -56,7 +57,7 @@ def test_what_is_unresolved_of_a_smooth_image_is_the_error_of_many(
     problem = OneStep(MODEL, prior, alpha=ALPHA).problem
     operator = problem.operator(ALPHA).without(lost)
     rng, means = np.random.default_rng(8), disc_means()
-    values, vectors = np.linalg.eigh(prior_matrix(prior, MODEL.mesh, problem.jacobian))
+    values, vectors = np.linalg.eigh(penalty_of(prior, MODEL.mesh, problem.jacobian).matrix)
     images = (vectors[:, 1:] / np.sqrt(values[1:])) @ rng.normal(size=(len(values) - 1, 20_000))
     noise = ALPHA * rng.normal(size=(len(problem.weights), 20_000))
     error = operator.matrix @ (problem.jacobian @ (images + 5.0) + noise) - 5.0 - images

@@ -185,7 +185,7 @@ def test_a_reading_that_is_no_touch_to_who_saw_the_frames_before(skin):
 
 def test_the_angle_is_read_beside_a_touch(skin):
     from tomoskin.core import Detection
-    from tomoskin.sensing.fit import depth_of, spots_of
+    from tomoskin.sensing.fit.spot import depth_of, spots_of
 
     read, shape, noise = reader(skin)
     common = skin.response.reference[:, None]

@@ -13,7 +13,8 @@ from tomoskin.learning import (
     WeighedPresses,
     identify,
 )
-from tomoskin.model.skin import MaterialMemory, MemoryState, Skin, advanced, response, responses
+from tomoskin.model.skin import MaterialMemory, MemoryState, Skin, advanced, responses
+from tomoskin.model.skin.hysteresis import response
 
 SHEET, UNIT = 0.1, 0.1
 LAW = MaterialMemory(play=(0.25,), play_widths=(0.04,))

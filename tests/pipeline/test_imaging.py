@@ -143,7 +143,8 @@ def test_alpha_that_follows_the_noise_takes_the_filter_with_it() -> None:
     for make in islice(source, 50):
         last = shown(pipeline.push(make(False)))
     assert "measured on 20 idle frames" in pipeline.choice.reason
-    tuned = pipeline._prepared
+    assert isinstance(pipeline._state, Following)
+    tuned = pipeline._state.prepared
     assert tuned.modes is not None
     assert tuned.modes.operator is tuned.operator
     assert np.isfinite(last.image.values).all()

@@ -15,7 +15,7 @@ from tomoskin.model.mesh import Mesh
 from tomoskin.model.pattern import Pattern
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import prepare
-from tomoskin.pipeline.tune import tuned_by_rule
+from tomoskin.pipeline.rest import tuned_by_rule
 from tomoskin.sensing.segment import Segmenter
 
 PREPARED = prepare(Skin.load("textile-disc-8").altered({"inverse": {"alpha": 0.1}}))

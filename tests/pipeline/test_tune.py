@@ -13,7 +13,7 @@ from tomoskin.core import Frame, ModelError
 from tomoskin.imaging import Evidence
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Pipeline, prepare
-from tomoskin.pipeline.tune import tune, tuned, tuned_by_rule
+from tomoskin.pipeline.rest import tune, tuned, tuned_by_rule
 from tomoskin.sensing.signal import Reference
 
 NEEDED = 20

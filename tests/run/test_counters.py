@@ -8,7 +8,7 @@ import pytest
 from server.serving import Site
 from server.test_server import ask, first, ready
 from tomoskin.core import Frame
-from tomoskin.run.counters import Latency
+from tomoskin.run.status import Latency
 
 STAGES = ["sample", "decode", "reconstruct", "publish", "paint"]
 

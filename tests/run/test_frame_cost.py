@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tomoskin.core import Frame, reach
-from tomoskin.run.counters import CostMeter
+from tomoskin.run.status import CostMeter
 
 
 class Clock:

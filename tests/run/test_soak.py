@@ -21,7 +21,7 @@ from tomoskin.board.wire import Decoder
 from tomoskin.core import Frame, SourceError, WallClock
 from tomoskin.files.session import session_info
 from tomoskin.model.skin import Skin
-from tomoskin.pipeline import colour_limit, prepare
+from tomoskin.pipeline import prepare
 from tomoskin.run import Runner, commands
 from tomoskin.run.sinks import Item, Sink, Stream
 from tomoskin.server import AccessPolicy, Hub, Server, application, listen
@@ -184,7 +184,7 @@ def sleeping_page(runner: Runner) -> Iterator[None]:
 def _served(runner: Runner) -> Iterator[AccessPolicy]:
     with listen("127.0.0.1", 0) as listener:
         policy = AccessPolicy(listener.getsockname()[1])
-        server = Server.of(application(Hub(runner, limit=colour_limit(runner.prepared)), policy))
+        server = Server.of(application(Hub(runner), policy))
         thread = threading.Thread(target=server.run_on, args=(listener,))
         thread.start()
         try:

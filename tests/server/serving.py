@@ -7,7 +7,6 @@ from contextlib import contextmanager
 import httpx
 from websockets.sync.client import connect
 
-from tomoskin.pipeline import colour_limit
 from tomoskin.server import AccessPolicy, Hub, Server, application, listen
 from tomoskin.server.server import STATIC
 
@@ -27,7 +26,7 @@ class Site:
             AccessPolicy(self.port) if token is None else AccessPolicy(self.port, token=token)
         )
         self.origin = f"http://127.0.0.1:{self.port}"
-        hub = Hub(runner, limit=colour_limit(runner.prepared), folder=folder)
+        hub = Hub(runner, folder)
         take(hub)
         self._server = Server.of(application(hub, self.policy, static))
         self._thread = threading.Thread(target=self._server.run_on, args=(self._listener,))

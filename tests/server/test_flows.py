@@ -450,7 +450,7 @@ def test_a_flow_takes_nothing_from_a_recording_that_is_played(flows, tmp_path):
 
 def test_a_press_is_taken_back_and_the_flow_left(flows):
     site, page = flows
-    page.ask("flow_undo")
+    page.ask("flow_delete")
     assert "no press" in page.told("error")["message"]
     page.ask("flow_keep", name="early")
     assert "there are no presses to save" in page.told("error")["message"]
@@ -458,7 +458,7 @@ def test_a_press_is_taken_back_and_the_flow_left(flows):
     first = press_dots(site, page, 1)["presses"][0]
     page.ask("flow_keep", name="early")
     assert "more presses are needed" in page.told("error")["message"]
-    page.ask("flow_undo")
+    page.ask("flow_delete")
     told = page.told("flow", lambda m: m["presses"] == [])
     assert told["dot"] == first
     page.ask("flow_end")

@@ -78,15 +78,6 @@ def test_electrode_points_run_along_the_arc(prepared):
         assert np.linalg.norm(along.mean(axis=0) - (electrode["x"], electrode["y"])) < 2e-3
 
 
-def test_chain():
-    assert views.chain(np.array([[3, 4], [2, 3], [4, 9]])) in ([2, 3, 4, 9], [9, 4, 3, 2])
-    assert views.chain(np.array([[1, 2]])) in ([1, 2], [2, 1])
-    ring = np.array([[0, 1], [1, 2], [2, 0]])
-    assert views.chain(ring) == [0, 1, 2]
-    pieces = np.array([[0, 1], [5, 6]])
-    assert views.chain(pieces) == [0, 1, 5, 6]
-
-
 def test_state():
     state = json.loads(views.state(make_status()).json)
     assert state["p99_ms"] == 1.0
@@ -114,7 +105,7 @@ def test_sick_electrodes_and_the_drift_of_the_reference_are_told():
     }
     assert "30 s" in state["baseline"]["stale"]
     assert state["sick"] == [
-        {"electrode": 4, "state": "open", "reason": "no current", "since_s": 3.5}
+        {"electrode": 4, "state": "open", "reason": "no current", "since": 3.5}
     ]
     assert "drift 1.2 %" in status.text
 

@@ -12,7 +12,7 @@ PATIENCE = 300
 
 def test_a_page_that_vanishes_is_written_to_no_more(runner):
     """Its connection says so in the loop's next turn; asyncio warns of every later write."""
-    hub, written, gone = Hub(runner, limit=1.0), [], asyncio.Event()
+    hub, written, gone = Hub(runner), [], asyncio.Event()
     for number in range(20):
         runner.say("test", f"event {number}")
 

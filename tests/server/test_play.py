@@ -127,7 +127,7 @@ def test_the_time_line(run, replay):
     assert {span["id"] for span in told["touches"]} == ids
     first = told["touches"][0]
     times = [time for time, rows in held if any(row[0] == first["id"] for row in rows)]
-    assert (first["begin_s"], first["end_s"]) == (times[0], times[-1])
+    assert (first["begin"], first["end"]) == (times[0], times[-1])
     assert "connected" in [event["kind"] for event in told["events"]]
     assert told["notes"] == []
 

@@ -14,9 +14,8 @@ from run.test_robot_run import Watch
 from server.serving import PATIENCE, Site
 from server.watching import Watched
 from tomoskin.core import WallClock
-from tomoskin.files.session.repair import split_names
+from tomoskin.files.session import split_targets
 from tomoskin.model.robot import Robot
-from tomoskin.pipeline import colour_limit
 from tomoskin.run import Member, RobotRun, Runner
 from tomoskin.server import Hub, Overview, Server, listen, robot_application, serve_requests
 from tomoskin.server.access import AccessPolicy
@@ -58,7 +57,7 @@ class RobotSite(Site):
         self.origin = f"http://127.0.0.1:{self.port}"
         hubs = {}
         for name, runner in run.runners.items():
-            hubs[name] = Hub(runner, limit=colour_limit(runner.prepared), folder=folder)
+            hubs[name] = Hub(runner, folder)
             serve_requests(hubs[name], "twin")
         app = robot_application(Overview(robot, run, folder), hubs, self.policy, STATIC)
         self._server = Server.of(app)
@@ -166,7 +165,7 @@ def test_all_are_recorded_to_one_file_from_the_page(site, run, folder):
         while "one skin" not in str(page.recv(PATIENCE)):
             pass
     assert path.parent == folder
-    assert split_names(path) == ("left", "right")
+    assert tuple(split_targets(path)) == ("left", "right")
 
 
 @pytest.mark.page

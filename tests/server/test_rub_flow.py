@@ -12,7 +12,7 @@ from learning.test_rubbing import touches
 from tomoskin.core import DataError, Detection, Touch, WireError
 from tomoskin.learning import Locator, Rubbing
 from tomoskin.server.guided_flow import StoppedError
-from tomoskin.server.requests import AskPoint, LearnFlow, StopLearning, UndoPress
+from tomoskin.server.requests import AskPoint, DeletePress, LearnFlow, StopLearning
 from tomoskin.server.rub_flow import RubFlow
 
 RATE = 0.03
@@ -158,9 +158,9 @@ def test_known_positions_are_taken_beside_the_rubbing(rubber):
     assert fields.presses == [first]
     assert fields.dot != first
     assert fields.rubbed.touches == 20, "a press at the dot is no rubbing"
-    flow.answers[UndoPress](UndoPress())
+    flow.answers[DeletePress](DeletePress())
     assert flow.now().presses == []
     flow.answers[AskPoint](AskPoint(on=False))
     assert flow.now().dot is None
     with pytest.raises(WireError, match="no press"):
-        flow.answers[UndoPress](UndoPress())
+        flow.answers[DeletePress](DeletePress())

@@ -399,7 +399,7 @@ def test_stopping_with_a_page_open_is_quick(runner, static):
 def test_a_signal_before_it_begins_ends_it_at_once(runner, static, number):
     listener = listen("127.0.0.1", 0)
     policy = AccessPolicy(listener.getsockname()[1])
-    server = Server.of(application(Hub(runner, limit=1.0), policy, static))
+    server = Server.of(application(Hub(runner), policy, static))
     before = signal.getsignal(number)
     with server.stopped_by_signals():
         os.kill(os.getpid(), number)

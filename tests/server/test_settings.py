@@ -16,7 +16,7 @@ from tomoskin.core import PatternError, reach
 from tomoskin.core.outputs import MAGIC
 from tomoskin.files.session import SessionReader, replayed
 from tomoskin.model.pattern import named
-from tomoskin.pipeline import colour_limit, prepare
+from tomoskin.pipeline import prepare
 from tomoskin.run import Runner, commands
 from tomoskin.server import Hub
 from tomoskin.server.requests import decode_request
@@ -86,7 +86,7 @@ class Office:
 
     def __init__(self, runner, folder):
         self.runner, self.page = runner, Heard()
-        self.hub = Hub(runner, limit=colour_limit(runner.prepared), folder=folder)
+        self.hub = Hub(runner, folder)
         SettingsHandlers(self.hub)
 
     def ask(self, *requests):

@@ -50,7 +50,7 @@ def twin(prepared):
     runner = Runner(prepared, opener)
     runner.start()
     Watch(runner).until(lambda: runner.twin.breakable)
-    hub = Hub(runner, limit=1.0)
+    hub = Hub(runner)
     TwinHandlers(hub)
     yield hub, transports
     runner.stop()
@@ -81,7 +81,7 @@ def test_an_electrode_that_is_not_there(twin):
 
 def test_a_board_is_not_broken(runner):
     runner.start()
-    hub = Hub(runner, limit=1.0)
+    hub = Hub(runner)
     TwinHandlers(hub)
     with pytest.raises(WireError, match="cannot simulate faults"):
         hub.obey(Heard(), asked(cut=[1]))
@@ -181,7 +181,7 @@ def test_a_sheet_on_a_limb_bends_at_its_joint():
 
 def test_a_board_is_not_bent(runner):
     runner.start()
-    hub = Hub(runner, limit=1.0)
+    hub = Hub(runner)
     TwinHandlers(hub)
     with pytest.raises(WireError, match="cannot be bent"):
         hub.obey(Heard(), posing(bend=BEND))

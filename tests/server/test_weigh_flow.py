@@ -10,7 +10,7 @@ import pytest
 
 from tomoskin.core import DataError, Detection, Touch, WireError
 from tomoskin.learning import FORCE, Weight
-from tomoskin.server.requests import DeletePress, SetWeight, UndoPress, decode_request
+from tomoskin.server.requests import DeletePress, SetWeight, decode_request
 from tomoskin.server.weigh_flow import PlacementTaker, WeighFlow, weighed_presses
 
 RATE = 0.04
@@ -146,7 +146,7 @@ def test_a_wrong_label_is_named_and_can_be_deleted(flow):
     assert flow.answers[DeletePress](DeletePress(6))
     estimate = flow.estimated(flow.examples())
     assert estimate.figures.doubtful == []
-    assert flow.answers[UndoPress](UndoPress())
+    assert flow.answers[DeletePress](DeletePress())
     assert len(flow.examples()) == 10
     with pytest.raises(WireError, match="no press"):
         flow.answers[DeletePress](DeletePress(10))

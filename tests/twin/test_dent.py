@@ -18,7 +18,7 @@ CELL = (SIDE[1] - SIDE[0]) ** 2
 
 
 def borne(load):
-    return LINEAR.spring * load.depth.sum() * CELL
+    return LINEAR.spring * load[3].sum() * CELL
 
 
 @pytest.mark.parametrize("shape", [Circle(0.012), Finger(), Square(0.02, 0.05)], ids=repr)
@@ -30,11 +30,11 @@ def test_the_body_bears_the_force(shape, force):
 
 def test_a_flat_dent_is_linear_in_the_force_and_its_slope_strain_quadratic():
     one, two = (indent([Probe(Circle(0.012), 0, 0, f)], LINEAR, POINTS) for f in (1.0, 2.0))
-    assert two.depth == pytest.approx(2 * one.depth)
+    assert two[3] == pytest.approx(2 * one[3])
     stiff = replace(LINEAR, bulge=0.0)
     one, two = (indent([Probe(Circle(0.012), 0, 0, f)], stiff, POINTS) for f in (1.0, 2.0))
-    assert two.strain == pytest.approx(4 * one.strain, abs=1e-15)
-    assert one.strain[:, :2].max() > 1e-4
+    assert pytest.approx(4 * one[:3].T, abs=1e-15) == two[:3].T
+    assert one[:3].T[:, :2].max() > 1e-4
 
 
 def test_a_curved_face_blends_close_to_what_it_solves():
@@ -42,7 +42,7 @@ def test_a_curved_face_blends_close_to_what_it_solves():
     read = indent([Probe(Finger(), 0, 0, at)], LINEAR, POINTS)
     dent = solved_dent(Finger(), LINEAR, at, 0.0)
     depth = dent.table[3].reshape(dent.grid.n, -1)
-    assert read.depth.max() == pytest.approx(depth.max(), rel=0.01)
+    assert read[3].max() == pytest.approx(depth.max(), rel=0.01)
 
 
 def test_it_is_read_between_the_nodes_of_its_grid():
@@ -64,22 +64,22 @@ def test_it_is_read_between_the_nodes_of_its_grid():
         depth += inside * map_coordinates(field[3], place, order=1)
         mean += inside * map_coordinates(trace, place, order=1)
     load = indent(probes, LINEAR, POINTS)
-    assert load.depth == pytest.approx(depth, abs=1e-15)
-    assert load.strain[:, :2].sum(axis=1) == pytest.approx(mean, abs=1e-15)
+    assert load[3] == pytest.approx(depth, abs=1e-15)
+    assert load[:3].T[:, :2].sum(axis=1) == pytest.approx(mean, abs=1e-15)
 
 
 def test_a_body_that_locks_gives_way_less_and_never_beyond():
     light, hard = (indent([Probe(Circle(0.012), 0, 0, f)], FOAM, POINTS) for f in (0.01, 1e4))
     free = indent([Probe(Circle(0.012), 0, 0, 0.01)], LINEAR, POINTS)
-    assert light.depth == pytest.approx(free.depth, rel=0.02)
+    assert light[3] == pytest.approx(free[3], rel=0.02)
     most = FOAM.lock * FOAM.thickness
-    assert 0.99 * most < hard.depth.max() <= 1.01 * most
+    assert 0.99 * most < hard[3].max() <= 1.01 * most
 
 
 def test_a_wider_probe_of_the_same_force_stretches_more_sheet():
     """The source's figure 5.7, and what the lock was chosen for."""
     stretched = [
-        indent([Probe(Circle(r), 0, 0, 5.0)], FOAM, POINTS).strain[:, :2].sum()
+        indent([Probe(Circle(r), 0, 0, 5.0)], FOAM, POINTS)[:3].T[:, :2].sum()
         for r in (0.015, 0.018, 0.025)
     ]
     assert stretched == sorted(stretched)
@@ -92,30 +92,30 @@ def test_moving_and_turning_the_probe_moves_and_turns_the_load():
     place = np.array([0.004, -0.002])
     straight = indent([Probe(Finger(), 0, 0, 2.0)], FOAM, POINTS)
     turned = indent([Probe(Finger(), *place.tolist(), 2.0, angle)], FOAM, POINTS @ turn.T + place)
-    assert turned.depth == pytest.approx(straight.depth, rel=1e-9, abs=1e-12)
-    tensor = straight.strain[:, [0, 2, 2, 1]].reshape(-1, 2, 2)
+    assert turned[3] == pytest.approx(straight[3], rel=1e-9, abs=1e-12)
+    tensor = straight[:3].T[:, [0, 2, 2, 1]].reshape(-1, 2, 2)
     expected = (turn @ tensor @ turn.T).reshape(-1, 4)[:, [0, 3, 1]]
-    assert turned.strain == pytest.approx(expected, abs=1e-12)
+    assert pytest.approx(expected, abs=1e-12) == turned[:3].T
 
 
 def test_several_probes_add_up():
     probes = [Probe(Circle(0.01), -0.02, 0, 1.0), Probe(Square(0.015), 0.02, 0.01, 2.0, 0.3)]
     both = indent(probes, FOAM, POINTS)
     apart = [indent([probe], FOAM, POINTS) for probe in probes]
-    assert both.depth == pytest.approx(apart[0].depth + apart[1].depth)
-    assert both.strain == pytest.approx(apart[0].strain + apart[1].strain)
-    assert indent([], FOAM, POINTS).depth.max() == 0.0
+    assert both[3] == pytest.approx(apart[0][3] + apart[1][3])
+    assert pytest.approx(apart[0][:3].T + apart[1][:3].T) == both[:3].T
+    assert indent([], FOAM, POINTS)[3].max() == 0.0
 
 
 def test_blur_keeps_what_lies_under_it():
     sharp, even = (indent([Probe(Circle(0.01), 0, 0, 1.0)], FOAM, POINTS, b) for b in (0.0, 2e-3))
-    assert even.depth.sum() == pytest.approx(sharp.depth.sum(), rel=5e-3)
-    assert np.abs(np.diff(even.depth)).max() < np.abs(np.diff(sharp.depth)).max()
+    assert even[3].sum() == pytest.approx(sharp[3].sum(), rel=5e-3)
+    assert np.abs(np.diff(even[3])).max() < np.abs(np.diff(sharp[3])).max()
 
 
 def test_a_sliding_probe_pushes_the_sheet_together_ahead_and_stretches_it_behind():
     def strain_at(x, probe):
-        return indent([probe], replace(FOAM, bulge=0.0), np.array([[x, 0.0]])).strain[0, 0]
+        return indent([probe], replace(FOAM, bulge=0.0), np.array([[x, 0.0]]))[:3].T[0, 0]
 
     still = Probe(Circle(0.01), 0, 0, 0.5)
     slid = still.moving(1.0, 0.0, FOAM.friction)

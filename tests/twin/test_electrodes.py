@@ -88,8 +88,8 @@ def test_contacts_wander_by_as_much_as_they_should():
 
 
 def test_they_are_off_in_every_preset():
-    for *_, electronics, _ in PRESETS.values():
-        assert Electrodes(8, CURRENT, electronics, CHANCE).silent
+    for preset in PRESETS.values():
+        assert Electrodes(8, CURRENT, preset.electronics, CHANCE).silent
     on = TwinSettings.preset("hydrogel").with_electrodes("polarising").electronics
     assert not Electrodes(8, CURRENT, on, CHANCE).silent
     assert on.double_layer == POLARISING["double_layer"]

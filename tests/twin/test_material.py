@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 from tomoskin.core import ModelError
 from tomoskin.twin import MaterialSettings, TwinSettings
-from tomoskin.twin.dent import Load
 from tomoskin.twin.material import MaterialState, advance, conductivity, spread_over
 
 TEXTILE = TwinSettings.preset("textile").material
@@ -19,10 +18,10 @@ UNLOADED = np.array([1.25, 1.25])
 
 
 def loaded(strain, depth=0.0):
-    return Load(np.array([(*strain, depth), (0.0, 0.0, 0.0, 0.0)]).T)
+    return np.array([(*strain, depth), (0.0, 0.0, 0.0, 0.0)]).T
 
 
-REST = Load.none(2)
+REST = np.zeros((4, 2))
 
 
 def after(settings, *steps):
@@ -80,7 +79,7 @@ def told(settings, steps):
     """The settings' laws cell by cell and part by part, as they are written."""
     late, lag, worn, before = [0.0, 0.0], 0.0, 0.0, np.zeros(4)
     for load, dt in steps:
-        felt = np.append(load.strain[0], load.depth[0] / settings.thickness)
+        felt = load[:, 0] / [1, 1, 1, settings.thickness]
         worn += max((felt[:2] - before[:2]).sum() / 2, 0.0)
         before, slack = felt, lag - felt
         size = math.sqrt((slack[0] ** 2 + slack[1] ** 2) / 2 + slack[2] ** 2)

@@ -16,7 +16,6 @@ from tomoskin.model.skin import Skin
 from tomoskin.twin import (
     PRESETS,
     Circle,
-    Contact,
     Finger,
     Probe,
     Square,
@@ -26,14 +25,13 @@ from tomoskin.twin import (
     make_electronics,
     table_of,
 )
-from tomoskin.twin.dent import Load
 from tomoskin.twin.material import MaterialState, stepped
 
 SEEDS = (101, 102, 103)
 BRITTLE = {"breakdown": (1.4, 0.3), "breakdown_times": (0.2, 3.0), "wear": 3e-4}
 
 
-def scene(random: np.random.Generator, reach: float) -> tuple[Contact, ...]:
+def scene(random: np.random.Generator, reach: float) -> tuple[Probe, ...]:
     """Up to four probes of any face, some of them turned and dragging."""
     probes = []
     for _ in range(random.integers(0, 5)):
@@ -60,9 +58,7 @@ def frames(
         sheet.set_presses(scene(random, reach))
         sheet.set_pose((Stretched(0.02, 0.1),) if number == 3 and settings.bend.height else ())
         counts = board.sample(table, 0.2 * number**2)
-        found.append(
-            (sheet.load.felt, sheet.conductivity(), sheet.resistance(), counts.astype(float))
-        )
+        found.append((sheet.load, sheet.conductivity(), sheet.resistance(), counts.astype(float)))
     return found
 
 
@@ -93,7 +89,7 @@ def test_sheets_of_any_number_of_cells_remember_the_same(
     if preset == "brittle":
         settings = replace(settings, **BRITTLE)
     random, unloaded = np.random.default_rng(n), np.linspace(1.0, 2.0, n)
-    loads = [Load(random.normal(0.0, 0.02, (4, n)) * [[1], [1], [1], [0.1]]) for _ in range(5)]
+    loads = [random.normal(0.0, 0.02, (4, n)) * [[1], [1], [1], [0.1]] for _ in range(5)]
     native, plain = (MaterialState.fresh(settings, n) for _ in range(2))
     for load in loads:
         monkeypatch.setenv(engine_choice.VARIABLE, "native")

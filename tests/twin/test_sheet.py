@@ -129,7 +129,9 @@ def test_either_way_of_solving_is_exact(sheet, radius):
 
 def test_few_changed_cells_are_solved_by_the_local_update(skin, monkeypatch):
     """In the tank no tension moves what lies beside the probe."""
-    sheet = TwinSkin.of(skin, replace(TwinSettings.preset("ideal"), contact=PRESETS["tank"][0]))
+    sheet = TwinSkin.of(
+        skin, replace(TwinSettings.preset("ideal"), contact=PRESETS["tank"].contact)
+    )
     sheet.material = replace(sheet.material, compression=-1.0, gauge=0.0)
     rest = sheet.conductivity()
     exact = sheet.resistance()
@@ -208,7 +210,7 @@ def test_the_seed_decides_on_spread_and_temperature(skin):
 def test_asking_for_the_load_first_changes_nothing(sheet):
     rest = sheet.conductivity()
     sheet.set_presses((Press(0.01, 0.02, 2.0, 0.01),))
-    assert sheet.load.depth.max() > 0
+    assert sheet.load[3].max() > 0
     assert sheet.conductivity().min() < 0.95 * rest.min()
 
 

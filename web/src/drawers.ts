@@ -32,7 +32,6 @@ export function toggleDrawer(id: string): void {
   wanted.value = wanted.peek() === id ? null : id;
 }
 
-export const openDrawer = (id: string): void => void (wanted.value = id);
 export const closeDrawer = (): void => void (wanted.value = null);
 
 /** Call back whenever a drawer opens, and every so many ms while it is open (null: not again), as to

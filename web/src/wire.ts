@@ -77,7 +77,7 @@ export interface RunState {
   readonly slowest: readonly SlowFrame[];
   readonly reference: ReferenceNow;
   readonly baseline: BaselineNow | null;
-  readonly sick: readonly Sick[];
+  readonly sick: readonly ElectrodeHealth[];
   readonly noise_v: number | null;
   readonly alpha: number;
   readonly rule: string;
@@ -122,12 +122,12 @@ export interface BaselineNow {
   readonly stale: string | null;
 }
 
-/** An electrode that is not good, and why, in words. */
-export interface Sick {
+/** One electrode: ``electrode`` from 0, its ``state`` of :data:`STATES`, the ``reason`` in words and numbers, and ``since`` when in the frames' seconds (None while good). */
+export interface ElectrodeHealth {
   readonly electrode: number;
   readonly state: string;
   readonly reason: string;
-  readonly since_s: number | null;
+  readonly since: number | null;
 }
 
 /** How a sink is doing: ``well`` or not, in words, and what it sent and what was left out. */
@@ -192,34 +192,24 @@ export interface UnresolvedMap {
   readonly problem: string;
 }
 
-/** What happened in the recording that is played. */
+/** What happened in the recording that is played, at times from its first frame. */
 export interface PlayedTimeline {
   readonly type: "timeline";
   readonly end_s: number;
-  readonly notes: readonly Tick[];
-  readonly events: readonly TimedEvent[];
-  readonly touches: readonly TouchSpan[];
+  readonly notes: readonly EventNote[];
+  readonly events: readonly EventNote[];
+  readonly touches: readonly Span[];
 }
 
-/** A moment of a recording, from its first frame, and what happened. */
-export interface Tick {
-  readonly time_s: number;
-  readonly text: string;
-}
-
-/** An event of a recording, at its time. */
-export interface TimedEvent {
-  readonly time_s: number;
-  readonly kind: string;
-  readonly text: string;
-}
-
-/** A touch of a recording, and when it was there. */
-export interface TouchSpan {
+/** A touch from its first frame to its last, s. */
+export interface Span {
   readonly id: number;
   readonly kind: string;
-  readonly begin_s: number;
-  readonly end_s: number;
+  readonly begin: number;
+  readonly end: number;
+  readonly x: number;
+  readonly y: number;
+  readonly peak: number;
 }
 
 /** The session folder; ``others`` are not listed; ``share`` of the export is done, 0 to 1. */
@@ -697,15 +687,10 @@ export interface ShowFlow {
   readonly on: boolean;
 }
 
-/** The page takes the last press back. */
-export interface UndoPress {
-  readonly type: "flow_undo";
-}
-
-/** Take one press back, by its number from 0 on. */
+/** Take one press back, by its number from 0 on; null: the last one. */
 export interface DeletePress {
   readonly type: "flow_delete";
-  readonly number: number;
+  readonly number?: number | null;
 }
 
 /** What lies on the skin, or comes next; ``sure``: an unusual weight is meant as it is said. */
@@ -828,7 +813,6 @@ export type PageRequest =
   | Connect
   | BeginFlow
   | ShowFlow
-  | UndoPress
   | DeletePress
   | SetWeight
   | AskPoint

@@ -90,8 +90,8 @@ describe("the headline", () => {
 
   it("warns of each thing once, the server's own sentence first", () => {
     const sick = [
-      { electrode: 4, state: "open", reason: "no current flows", since_s: 1 },
-      { electrode: 6, state: "noisy", reason: "ten times its noise", since_s: 1 },
+      { electrode: 4, state: "open", reason: "no current flows", since: 1 },
+      { electrode: 6, state: "noisy", reason: "ten times its noise", since: 1 },
     ];
     expect(texts({ problem: "E5 is open: no current flows", sick })).toEqual([
       "E5 is open: no current flows",

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tomoskin.cli.named_files import FIGURE, ForceFlag, Reads, Writes
-from tomoskin.cli.named_parts import frame_range, idle_frames
+from tomoskin.cli.named_parts import Recorded, frame_range
 from tomoskin.cli.options import FramesOption, ReferenceOption, SkinArgument
 from tomoskin.cli.output import JsonFlag, tell
 from tomoskin.core import TomoskinError, meant
@@ -54,7 +54,8 @@ def alpha(
             param_hint="--rule",
         )
     prepared = prepare(Skin.load(skin))
-    prepared, evidence = _evidence(prepared, recording, reference, frames)
+    given = None if recording is None else Recorded.of(recording, skin, reference)
+    prepared, evidence = _evidence(prepared, given, frames)
     spectrum = Spectrum.of(prepared.problem)
     outcomes = [(name, _outcome(spectrum, name, evidence)) for name in ([rule] if rule else RULES)]
     if rule and isinstance(outcomes[0][1], TomoskinError):
@@ -77,21 +78,19 @@ def alpha(
 
 
 def _evidence(
-    prepared: Prepared, recording: Path | None, reference: str | None, frames: str | None
+    prepared: Prepared, given: Recorded | None, frames: str | None
 ) -> tuple[Prepared, Evidence]:
     """What the recording says, and the skin without the rows that are dead in it.
 
     Without a recording: the noise that the read-out predicts.
     """
-    from tomoskin.files.imports import read_recording
     from tomoskin.imaging import Evidence
     from tomoskin.pipeline import recorded_frames
 
-    if recording is None:
+    if given is None:
         return prepared, Evidence(noise=prepared.predicted_noise())
-    recorded = read_recording(recording).in_order_of(prepared.pattern)
-    idle = idle_frames(recorded, reference, prepared.pattern)
-    changes = recorded_frames(prepared, recorded.part(*frame_range(recorded, frames)), idle)
+    some = given.data.part(*frame_range(given.data, frames))
+    changes = recorded_frames(prepared, some, given.idle)
     return changes.prepared, changes.evidence()
 
 

@@ -102,7 +102,7 @@ def known_benchmarks() -> dict[str, Benchmark]:
             where="tomoskin bench",
             hint="run it from a checkout of the source code",
         )
-    found = {}
+    benchmarks = {}
     for path in sorted(_FOLDER.glob("*.py")):
         tree = ast.parse(path.read_text(encoding="utf-8"))
         for node in tree.body:
@@ -110,8 +110,8 @@ def known_benchmarks() -> dict[str, Benchmark]:
                 about = tree if node.name == "run" else node
                 summary = (ast.get_docstring(about) or "").partition("\n")[0]
                 name = path.stem + node.name.removeprefix("run")
-                found[name] = Benchmark(path.stem, node.name, summary)
-    return found
+                benchmarks[name] = Benchmark(path.stem, node.name, summary)
+    return benchmarks
 
 
 def _load(name: str) -> ModuleType:

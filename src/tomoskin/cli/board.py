@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -12,7 +11,7 @@ import typer
 from tomoskin.board.source import BOARDS, DEFAULT_BOARD
 from tomoskin.cli.app import group
 from tomoskin.cli.choices import quantity
-from tomoskin.cli.output import JsonFlag, emit
+from tomoskin.cli.output import JsonFlag, concluded
 
 if TYPE_CHECKING:
     from tomoskin.board.source import Transport
@@ -65,17 +64,8 @@ def check(
     amperes = quantity(current, "current", "--current")
     if not 1e-6 <= amperes <= 0.1:
         raise typer.BadParameter(f"expected 1 µA to 100 mA, got {current}", param_hint="--current")
-    findings = []
     read = {} if five_volts is None else {FIVE: five_volts}
-    for finding in _findings(source, channels, amperes, read, meter=meter):
-        findings.append(finding)
-        if not json:
-            mark = "ok  " if finding.ok else "FAIL"
-            typer.echo(f"{mark}  {finding.name:<10} {finding.text}")
-    sound = all(finding.ok for finding in findings)
-    if json:
-        emit({"ok": sound, "findings": [asdict(finding) for finding in findings]})
-    raise typer.Exit(0 if sound else 1)
+    raise concluded(_findings(source, channels, amperes, read, meter=meter), json=json)
 
 
 def _findings(

@@ -8,11 +8,10 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from enum import StrEnum
-from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Self, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import numpy as np
 import typer
@@ -27,99 +26,20 @@ from tomoskin.cli.calibrate_reports import (
     touch_facts,
     touch_lines,
 )
-from tomoskin.cli.choices import skin_for_file, skin_if_any
 from tomoskin.cli.named_files import SKIN, ForceFlag, Reads, Writes, with_options
-from tomoskin.cli.named_parts import (
-    changes,
-    idle_frames,
-    labelled_frames,
-    labels,
-    reconstructed,
-    say_notes,
-)
+from tomoskin.cli.named_parts import Recorded, labelled_frames, reconstructed
 from tomoskin.cli.options import CalibrationOut, KnownSkinOption, ReferenceOption, SkinOption
 from tomoskin.cli.output import Bar, JsonFlag, remark, tell
 from tomoskin.core import DataError, FloatArray, write_text
 
 if TYPE_CHECKING:
     from tomoskin.core import IntArray
-    from tomoskin.learning import Calibration, Locator
-    from tomoskin.model.pattern import Pattern
-    from tomoskin.model.skin import Skin
-    from tomoskin.sensing.signal import Recording, Reference
+    from tomoskin.learning import Locator
 
 app = group("calibrate")
 
 _STANDS_OUT = 4.0
 """Root mean square of a frame's changes, in noise deviations, from which it shows a touch."""
-
-
-@dataclass(frozen=True, eq=False)
-class Labelled:
-    """A file that is learnt from: the ``skin`` that it is of, where that is known, the ``pattern``
-    of its rows, and which frames are untouched (``reference``)."""
-
-    path: Path
-    recording: Recording
-    skin: Skin | None
-    pattern: Pattern
-    reference: str | None
-
-    @classmethod
-    def of(cls, path: Path, skin: str | None, reference: str | None, *, needs_skin: bool) -> Self:
-        """Read the file; without a skin its rows are as they stand there."""
-        from tomoskin.files.imports import read_recording
-        from tomoskin.model.pattern import Pattern
-
-        recording = read_recording(path)
-        say_notes(recording)
-        chosen = skin_for_file(skin, path) if needs_skin else skin_if_any(skin, path)
-        if chosen is None:
-            pattern = Pattern.from_tables(recording.drive, recording.measure)
-        else:
-            pattern = chosen.pattern()
-        return cls(path, recording, chosen, pattern, reference)
-
-    def onto(self, old: Calibration[Any] | None) -> Self:
-        """The same with the rows of an older calibration, where there is one, of the same skin."""
-        if old is None:
-            return self
-        if self.skin is not None:
-            old.check_skin(self.skin)
-        return replace(self, pattern=old.pattern)
-
-    @property
-    def drawn(self) -> Skin:
-        """The skin, of a kind that needs one."""
-        assert self.skin is not None
-        return self.skin
-
-    @cached_property
-    def data(self) -> Recording:
-        """The recording in the order of the pattern."""
-        return self.recording.in_order_of(self.pattern)
-
-    @cached_property
-    def dv(self) -> FloatArray:
-        """(n, n_meas) frames minus the untouched skin."""
-        return changes(self.data, self.reference, self.pattern)
-
-    @cached_property
-    def rest(self) -> Reference | None:
-        """The untouched skin, where the file, or the reference, holds it."""
-        from tomoskin.sensing.signal import Reference
-
-        idle = idle_frames(self.data, self.reference, self.pattern)
-        if idle is None or isinstance(idle, str):
-            return None
-        return Reference.of(idle.real.astype(float))
-
-    @property
-    def noise(self) -> FloatArray | None:
-        """(n_meas,) V of the untouched skin; None where that is not known of every row."""
-        rest = self.rest
-        usable = rest is not None and rest.noise_is_known and (rest.noise > 0).all()
-        return rest.noise if rest is not None and usable else None
 
 
 @dataclass(frozen=True)
@@ -154,12 +74,12 @@ def _kind(
             json: bool,
             **own: Any,
         ) -> None:
-            found = learn(Labelled.of(recording, skin, reference, needs_skin=needs_skin), **own)
-            if found.write is not None:
-                found.write(out, overwrite=force)
-            tell(found.facts, found.lines, json=json)
-            if found.problem is not None:
-                raise found.problem
+            outcome = learn(Recorded.of(recording, skin, reference, needs_skin=needs_skin), **own)
+            if outcome.write is not None:
+                outcome.write(out, overwrite=force)
+            tell(outcome.facts, outcome.lines, json=json)
+            if outcome.problem is not None:
+                raise outcome.problem
 
         needs_skin = skin is SkinOption
         hints, needed = get_type_hints(learn, include_extras=True), inspect.Parameter.empty
@@ -185,7 +105,7 @@ _TOUCHED = "Frames with labels, one touch in each."
 
 @_kind("touch", _TOUCHED, KnownSkinOption)
 def touch(
-    labelled: Labelled,
+    labelled: Recorded,
     onto: Annotated[
         Path | None,
         typer.Option(
@@ -214,7 +134,7 @@ def touch(
         )
     old = TOUCH.read(onto) if onto else None
     given = labelled.onto(old)
-    dv, xy = given.dv, _positions(given.data, optional=unlabelled)
+    dv, xy = given.dv, given.labels if unlabelled else given.xy
     frames = np.arange(len(dv)) if unlabelled else labelled_frames(xy)
     dv, xy = dv[frames], xy[frames]
     if old is None:
@@ -235,13 +155,6 @@ def touch(
             "answer is always their middle. Check --reference and the labels, or press harder"
         )
     return LearningOutcome(calibration.write, facts, touch_lines(facts))
-
-
-def _positions(data: Recording, *, optional: bool) -> FloatArray:
-    """(n_frames, 2) m, rows of NaN where there is no label."""
-    if optional and data.labels is None:
-        return np.full((len(data.time), 2), np.nan)
-    return data.labels if optional and data.labels is not None else labels(data)
 
 
 def _aligned(locator: Locator, dv: FloatArray, xy: FloatArray) -> Locator:
@@ -267,7 +180,7 @@ def _added(locator: Locator, frames: IntArray, dv: FloatArray, xy: FloatArray) -
 
 
 @_kind("rub", _TOUCHED)
-def rub(labelled: Labelled) -> LearningOutcome:
+def rub(labelled: Recorded) -> LearningOutcome:
     """Learn where a touch is from one finger that rubs the whole skin, without labels.
 
     The skin file says where the electrodes are. Five frames with a label improve the result.
@@ -309,7 +222,7 @@ class Unit(StrEnum):
 
 @_kind("force", "Frames; some have a label with their force.")
 def force(
-    labelled: Labelled,
+    labelled: Recorded,
     weight: Annotated[
         list[str] | None,
         typer.Option(
@@ -349,7 +262,7 @@ def force(
 
 @_kind("class", "Frames; some have a label with their class.", KnownSkinOption)
 def classes(
-    labelled: Labelled,
+    labelled: Recorded,
     label: Annotated[
         list[str] | None,
         typer.Option(
@@ -391,7 +304,7 @@ def classes(
 
 @_kind("bend", "Frames of known bends, without touches.")
 def bend(
-    labelled: Labelled,
+    labelled: Recorded,
     bend: Annotated[
         list[str] | None,
         typer.Option(
@@ -449,7 +362,7 @@ _MappedOut = Annotated[
 
 
 @_kind("mapping", _TOUCHED, out=_MappedOut)
-def mapping(labelled: Labelled) -> LearningOutcome:
+def mapping(labelled: Recorded) -> LearningOutcome:
     """Find rotation, mirroring, swapped wires and polarity from some presses.
 
     The result is a skin file whose electrodes are where the wires end. Give it as --skin to any
@@ -457,7 +370,7 @@ def mapping(labelled: Labelled) -> LearningOutcome:
     """
     from tomoskin.learning import solve_channel_mapping
 
-    xy, dv, rest = labels(labelled.data), labelled.dv, labelled.rest
+    xy, dv, rest = labelled.xy, labelled.dv, labelled.rest
     frames, skin = labelled_frames(xy), labelled.drawn
     with Bar("comparing channel mappings") as bar:
         answer = solve_channel_mapping(

@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tomoskin.cli.named_files import TABLE, ForceFlag, Reads, Writes
-from tomoskin.cli.named_parts import changes, say_notes
+from tomoskin.cli.named_parts import Recorded
 from tomoskin.cli.options import RecordingArgument, ReferenceOption, SameSkinOption
-from tomoskin.cli.output import Bar, JsonFlag, emit
+from tomoskin.cli.output import Bar, JsonFlag, tell
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from tomoskin.learning import Answers
     from tomoskin.sensing.signal import Recording
 
@@ -42,29 +44,21 @@ def classify(
     json: JsonFlag = False,
 ) -> None:
     """Tell the class of each frame, or that it is none of those that were learnt."""
-    from tomoskin.cli.choices import skin_if_any
-    from tomoskin.files.imports import read_recording
     from tomoskin.learning import CLASSES
 
     with Bar("learning"):
         loaded = CLASSES.read(calibration)
     classifier = loaded.model
-    data = read_recording(recording)
-    say_notes(data)
-    if (chosen := skin_if_any(skin, recording)) is not None:
-        loaded.check_skin(chosen)
-    data = data.in_order_of(loaded.pattern)
-    dv = changes(data, reference, loaded.pattern)
+    given = Recorded.of(recording, skin, reference).onto(loaded)
+    data, dv = given.data, given.dv
     with Bar("classifying"):
         answers = classifier.predict(dv)
     asked = _spread(min(ask, len(dv)), len(dv))
     names = classifier.examples.codes.names
+    frames = _documents(data, answers)
     if out is not None:
-        _write(out, data, answers, names, overwrite=force)
-    if json:
-        emit({"names": names, "frames": _documents(data, answers), "ask": asked})
-    else:
-        _say(answers, asked)
+        _write(out, frames, names, overwrite=force)
+    tell({"names": names, "frames": frames, "ask": asked}, _lines(answers, asked), json=json)
 
 
 def _spread(count: int, n: int) -> list[int]:
@@ -87,7 +81,7 @@ def _documents(data: Recording, answers: Answers) -> list[dict[str, Any]]:
 
 
 def _write(
-    path: Path, data: Recording, answers: Answers, names: tuple[str, ...], *, overwrite: bool
+    path: Path, frames: list[dict[str, Any]], names: tuple[str, ...], *, overwrite: bool
 ) -> None:
     from tomoskin.core import written
 
@@ -97,23 +91,22 @@ def _write(
     ):
         table = csv.writer(file, lineterminator="\n")
         table.writerow(["frame", "time_s", "class", "probability", "unknown", *names])
-        for row in _documents(data, answers):
+        for row in frames:
+            when, sure, unknown = f"{row['time_s']:.6f}", row["probability"], int(row["unknown"])
             each = [f"{p:.4f}" for p in row["each"]]
-            sure, unknown = f"{row['probability']:.4f}", int(row["unknown"])
-            when = f"{row['time_s']:.6f}"
-            table.writerow([row["frame"], when, row["class"], sure, unknown, *each])
+            table.writerow([row["frame"], when, row["class"], f"{sure:.4f}", unknown, *each])
 
 
-def _say(answers: Answers, asked: list[int]) -> None:
+def _lines(answers: Answers, asked: list[int]) -> Iterator[str]:
     rows = list(zip(answers.label, answers.rejected.tolist(), answers.probability, strict=True))
     runs = [list(run) for _, run in groupby(enumerate(rows), key=lambda item: item[1][:2])]
     for run in runs[:_SHOWN]:
         (first, (label, rejected, _)), (last, _) = run[0], run[-1]
         sure = min(probability for _, (_, _, probability) in run)
         text = f"unknown (nearest: {label})" if rejected else f"{label}  {100 * sure:.0f} % or more"
-        typer.echo(f"frames {first:>4} to {last:>4}  {text}")
+        yield f"frames {first:>4} to {last:>4}  {text}"
     if len(runs) > _SHOWN:
-        typer.echo(f"… and {len(rows) - runs[_SHOWN][0][0]} more frames: --out writes all")
-    typer.echo(f"{int(answers.rejected.sum())} of {len(rows)} frames show an unknown class")
+        yield f"… and {len(rows) - runs[_SHOWN][0][0]} more frames: --out writes all"
+    yield f"{int(answers.rejected.sum())} of {len(rows)} frames show an unknown class"
     if asked:
-        typer.echo(f"label frames {', '.join(map(str, asked))}")
+        yield f"label frames {', '.join(map(str, asked))}"

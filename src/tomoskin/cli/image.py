@@ -186,6 +186,8 @@ def image(
             prepared = with_recorded_calibrations(prepared, recording)
     recorded = data.in_order_of(prepared.pattern)
     say_notes(recorded)
+    if not recorded.board_known:
+        _say_order(data, prepared)
     with Bar("reconstructing") as bar:
         result = reconstructed(recorded, prepared, reference, frames, bar, rule=rule)
     surface, forces = prepared.skin.surface, FORCE.name in prepared.calibrations
@@ -195,9 +197,9 @@ def image(
             tables[thorough] = reconstructed(
                 recorded, prepared, reference, frames, bar, rule=rule, setting=ALONE
             )
-    for path, found in tables.items():
+    for path, part in tables.items():
         if path is not None:
-            rows = zip(found.frames.tolist(), found.time.tolist(), found.touches, strict=True)
+            rows = zip(part.frames.tolist(), part.time.tolist(), part.touches, strict=True)
             write_touches(path, rows, surface, forces=forces, overwrite=force)
     if results.out is not None:
         write = WRITERS[results.out.suffix.lower()]
@@ -211,6 +213,8 @@ def image(
     if thorough is not None:
         count = sum(map(len, tables[thorough].touches))
         lines.append(f"{thorough}: each frame searched by itself, {count} touches in them all")
+    if not recorded.board_known:
+        lines.append(_unknowable(chosen))
     if not recorded.timed:
         lines.append("the file has no times of its frames, so each is searched by itself")
     tell(_document(result, spans, prepared), lines, json=json)
@@ -239,6 +243,18 @@ def _lines(result: Reconstruction, spans: tuple[Span, ...], prepared: Prepared) 
             "times count from the first frame; --touches X.csv writes each touch in each frame"
         )
     return lines
+
+
+def _say_order(recording: Recording, prepared: Prepared) -> None:
+    """Say on stderr that the electrodes of a file seem to stand in another order."""
+    from tomoskin.pipeline import order_fault
+
+    resistance = prepared.model.transfer_resistance(prepared.skin.conductivity)
+    if fault := order_fault(recording, resistance):
+        remark(
+            f"{recording.source}: {fault}: check its tables, or say where each electrode is "
+            "by positions in [electrodes] of the skin file"
+        )
 
 
 def _warn(recorded: Recording, result: Reconstruction) -> None:
@@ -321,6 +337,15 @@ def _document(
             for t in touches
         ],
     }
+
+
+def _unknowable(skin: Skin) -> str:
+    """What no data can tell of a file's image, and which keys of the skin file say it."""
+    given = skin.document["electrodes"]
+    keys = "positions"
+    if given.get("count") is not None:
+        keys = f'first = "{given["first"]}" and order = "{given["order"]}"'
+    return f"no data can tell how this is turned or mirrored: {keys} of [electrodes] in the skin do"
 
 
 def _newtons(touch: Touch) -> dict[str, Any]:

@@ -172,10 +172,9 @@ def _prepared(skin: str | None, source: str) -> Prepared:
 def _hub_of(runner: Runner, source: str, folder: Path) -> Hub:
     """What serves the page of one skin, whose frames come from ``source``."""
     from tomoskin.board.source import open_source
-    from tomoskin.pipeline import colour_limit
     from tomoskin.server import Hub, serve_requests
 
-    hub = Hub(runner, limit=colour_limit(runner.prepared), folder=folder)
+    hub = Hub(runner, folder)
     hub.opener = partial(open_source, source)
     serve_requests(hub, source)
     return hub

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tomoskin.cli.named_files import ForceFlag, Reads
-from tomoskin.cli.named_parts import changes, reconstructed, say_notes
+from tomoskin.cli.named_parts import Recorded, reconstructed
 from tomoskin.cli.options import RecordingArgument, ReferenceOption, SameSkinOption, TouchesOut
-from tomoskin.cli.output import Bar, JsonFlag, emit, remark
+from tomoskin.cli.output import Bar, JsonFlag, remark, tell
 
 if TYPE_CHECKING:
     from tomoskin.core import FloatArray, Touch
@@ -41,19 +41,17 @@ def locate(
     """Find the touches of a session by a calibration, or the one press (with --several up to two)
     in every frame of another file."""
     from tomoskin.files.exports import write_touches
-    from tomoskin.files.imports import is_session, read_recording
+    from tomoskin.files.imports import is_session
     from tomoskin.learning import TOUCH
 
     with Bar("learning") as bar:
         loaded = TOUCH.read(calibration, bar)
-    data = read_recording(recording)
-    say_notes(data)
-    own = _check_skin(loaded, skin, recording)
-    data = data.in_order_of(loaded.pattern)
-    if own is not None and is_session(recording) and not several:
-        frames, located = _in_flow(data, own, loaded, reference)
+    given = Recorded.of(recording, skin, reference).onto(loaded)
+    data = given.data
+    if given.skin is not None and is_session(recording) and not several:
+        frames, located = _in_flow(given, given.skin, loaded)
     else:
-        frames, located = _alone(data, loaded, reference, several=several)
+        frames, located = _alone(given, loaded, several=several)
     if touches is not None:
         rows = zip(frames, located, strict=True)
         timed = ((k, float(data.time[k]), t) for k, t in rows)
@@ -65,30 +63,26 @@ Located = tuple[list[int], list[tuple["Touch", ...]]]
 """Frames, and the touches in each."""
 
 
-def _in_flow(
-    data: Recording, skin: Skin, loaded: Calibration[Locator], reference: str | None
-) -> Located:
+def _in_flow(given: Recorded, skin: Skin, loaded: Calibration[Locator]) -> Located:
     """As a live run with the calibration finds and locates them."""
     from tomoskin.pipeline import prepare
 
     with Bar("preparing"):
         prepared = prepare(skin).calibrated(loaded)
     with Bar("locating") as bar:
-        result = reconstructed(data, prepared, reference, None, bar)
+        result = reconstructed(given.data, prepared, given.reference, None, bar)
     return result.frames.tolist(), list(result.touches)
 
 
-def _alone(
-    data: Recording, loaded: Calibration[Locator], reference: str | None, *, several: bool
-) -> Located:
+def _alone(given: Recorded, loaded: Calibration[Locator], *, several: bool) -> Located:
     """By the calibration alone: each frame is one press, or two, of a skin that may be unknown."""
     import numpy as np
 
-    dv = changes(data, reference, loaded.pattern)
+    dv = given.dv
     frames = np.flatnonzero(np.isfinite(dv[:, loaded.model.features.rows]).any(axis=1))
     if len(frames) < len(dv):
         remark(
-            f"{data.source}: {len(dv) - len(frames)} frames hold no finite value and were left out"
+            f"{given.path}: {len(dv) - len(frames)} frames hold no finite value and were left out"
         )
     _say_health(_strangeness(loaded.model, dv[frames]))
     return frames.tolist(), list((_several if several else _single)(loaded, dv[frames]))
@@ -107,15 +101,6 @@ def _say_health(health: CalibrationHealth) -> None:
     """Say what speaks against the calibration."""
     for finding in () if health.well else health.findings:
         remark(finding)
-
-
-def _check_skin(loaded: Calibration[Locator], name: str | None, path: Path) -> Skin | None:
-    """The skin, where it is known."""
-    from tomoskin.cli.choices import skin_if_any
-
-    if (skin := skin_if_any(name, path)) is not None:
-        loaded.check_skin(skin)
-    return skin
 
 
 def _several(loaded: Calibration[Locator], dv: FloatArray) -> Iterator[tuple[Touch, ...]]:
@@ -151,29 +136,29 @@ def _report(
     data: Recording, frames: list[int], touches: list[tuple[Touch, ...]], *, json: bool
 ) -> None:
     rows = [(frame, touch) for frame, some in zip(frames, touches, strict=True) for touch in some]
-    if json:
-        emit(
-            [
-                {
-                    "frame": frame,
-                    "time_s": float(data.time[frame]),
-                    "x_m": touch.detection.x,
-                    "y_m": touch.detection.y,
-                    "sd_x_m": touch.detection.sd_x,
-                    "sd_y_m": touch.detection.sd_y,
-                    "strength": touch.detection.peak,
-                    "kind": touch.said,
-                }
-                for frame, touch in rows
-            ]
-        )
-        return
+    document = [
+        {
+            "frame": frame,
+            "time_s": float(data.time[frame]),
+            "x_m": touch.detection.x,
+            "y_m": touch.detection.y,
+            "sd_x_m": touch.detection.sd_x,
+            "sd_y_m": touch.detection.sd_y,
+            "strength": touch.detection.peak,
+            "kind": touch.said,
+        }
+        for frame, touch in rows
+    ]
+    tell(document, _lines(rows), json=json)
+
+
+def _lines(rows: list[tuple[int, Touch]]) -> Iterator[str]:
     for frame, touch in rows[:_SHOWN]:
         r = touch.detection
         close = "" if touch.said == touch.kind else f"  {touch.said}"
-        typer.echo(
+        yield (
             f"frame {frame:>4}  x {1e3 * r.x:+7.1f} ± {1e3 * r.sd_x:4.1f} mm  "
             f"y {1e3 * r.y:+7.1f} ± {1e3 * r.sd_y:4.1f} mm  strength {r.peak:.2f}{close}"
         )
     if len(rows) > _SHOWN:
-        typer.echo(f"… and {len(rows) - _SHOWN} more touches: --touches writes all")
+        yield f"… and {len(rows) - _SHOWN} more touches: --touches writes all"

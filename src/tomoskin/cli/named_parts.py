@@ -1,12 +1,15 @@
-"""Parts of a recording that options name: untouched frames, a range; changes, and their labels."""
+"""A recording as options name it: its skin, its untouched frames, a range of it, its labels."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 import typer
 
+from tomoskin.cli.choices import skin_for_file, skin_if_any
 from tomoskin.cli.output import remark
 from tomoskin.core import DataError
 
@@ -17,21 +20,135 @@ if TYPE_CHECKING:
 
     from tomoskin.core import FloatArray, IntArray
     from tomoskin.files.session import Advance
+    from tomoskin.learning import Calibration
     from tomoskin.model.pattern import Pattern
+    from tomoskin.model.skin import Skin
     from tomoskin.pipeline import Idle, Prepared, Reconstruction, Setting
-    from tomoskin.sensing.signal import Recording
+    from tomoskin.sensing.signal import Recording, Reference
     from tomoskin.sensing.track import Span
 
 _SHOWN = 20
 """Touches that are listed."""
 
 
-def idle_frames(
-    recording: Recording, spec: str | None, pattern: Pattern
-) -> NDArray[Any] | Literal["previous"] | None:
-    """(n_idle, n_meas) what the frames are held against; None for a file of differences."""
-    idle = _idle(recording, spec, pattern)
-    return recording.voltages[idle.start : idle.stop] if isinstance(idle, range) else idle
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """A file that a command reads: the ``skin`` that it is of, where that is known, the ``pattern``
+    of its rows, and which frames are untouched (``reference``)."""
+
+    path: Path
+    recording: Recording
+    skin: Skin | None
+    pattern: Pattern
+    reference: str | None
+
+    @classmethod
+    def of(
+        cls, path: Path, skin: str | None, reference: str | None, *, needs_skin: bool = False
+    ) -> Self:
+        """Read the file; without a skin its rows are as they stand there."""
+        from tomoskin.files.imports import read_recording
+        from tomoskin.model.pattern import Pattern
+
+        recording = read_recording(path)
+        say_notes(recording)
+        chosen = skin_for_file(skin, path) if needs_skin else skin_if_any(skin, path)
+        if chosen is None:
+            if recording.spread:
+                raise DataError(
+                    "has drives of several electrodes",
+                    where=str(path),
+                    hint="give --skin, to whose pattern they are summed",
+                )
+            pattern = Pattern.from_tables(recording.drive, recording.measure)
+        else:
+            pattern = chosen.pattern()
+        return cls(path, recording, chosen, pattern, reference)
+
+    def onto(self, old: Calibration[Any] | None) -> Self:
+        """The same with the rows of an older calibration, where there is one, of the same skin."""
+        if old is None:
+            return self
+        if self.skin is not None:
+            old.check_skin(self.skin)
+        return replace(self, pattern=old.pattern)
+
+    @property
+    def drawn(self) -> Skin:
+        """The skin, of a kind that needs one."""
+        assert self.skin is not None
+        return self.skin
+
+    @cached_property
+    def data(self) -> Recording:
+        """The recording in the order of the pattern."""
+        return self.recording.in_order_of(self.pattern)
+
+    @cached_property
+    def idle(self) -> NDArray[Any] | Literal["previous"] | None:
+        """(n_idle, n_meas) what the frames are held against; None for a file of differences."""
+        idle = _idle(self.data, self.reference, self.pattern)
+        return self.data.voltages[idle.start : idle.stop] if isinstance(idle, range) else idle
+
+    @cached_property
+    def dv(self) -> FloatArray:
+        """(n, n_meas) frames minus the untouched skin.
+
+        Raises DataError for complex data, or a reference that is no untouched skin.
+        """
+        import numpy as np
+
+        if isinstance(self.idle, str):
+            raise DataError(
+                f"expected untouched frames, got {self.reference}",
+                where="--reference",
+                hint="give first:N or a file",
+            )
+        values = self.data.voltages
+        if self.idle is not None:
+            values = values - self.idle.mean(axis=0)
+        if np.iscomplexobj(values):
+            raise DataError(
+                "holds complex voltages",
+                where=self.data.source,
+                hint="calibrate with their magnitudes instead",
+            )
+        return np.asarray(values, dtype=np.float64)
+
+    @property
+    def rest(self) -> Reference | None:
+        """The untouched skin, where the file, or the reference, holds it."""
+        from tomoskin.sensing.signal import Reference
+
+        if self.idle is None or isinstance(self.idle, str):
+            return None
+        return Reference.of(self.idle.real.astype(float))
+
+    @property
+    def noise(self) -> FloatArray | None:
+        """(n_meas,) V of the untouched skin; None where that is not known of every row."""
+        rest = self.rest
+        usable = rest is not None and rest.noise_is_known and (rest.noise > 0).all()
+        return rest.noise if rest is not None and usable else None
+
+    @property
+    def labels(self) -> FloatArray:
+        """(n, 2) m, NaN where a frame has no label."""
+        import numpy as np
+
+        labels = self.data.labels
+        return np.full((len(self.data), 2), np.nan) if labels is None else labels
+
+    @property
+    def xy(self) -> FloatArray:
+        """The labels. Raises DataError where there is none at all."""
+        if not len(labelled_frames(self.labels)):
+            raise DataError(
+                "holds no labels: expected xy_m (n_frames, 2), the position of each press",
+                where=self.data.source,
+                hint="docs/touch.md shows how to make them",
+            )
+        return self.labels
 
 
 def _idle(recording: Recording, spec: str | None, pattern: Pattern) -> Idle:
@@ -160,48 +277,8 @@ def frame_range(recording: Recording, spec: str | None) -> tuple[int, int]:
     return start, stop
 
 
-def changes(recording: Recording, reference: str | None, pattern: Pattern) -> FloatArray:
-    """(n, n_meas) frames minus the untouched skin.
-
-    Raises
-    ------
-    DataError
-        For complex data, or a reference that is no untouched skin.
-    """
-    import numpy as np
-
-    idle = idle_frames(recording, reference, pattern)
-    if isinstance(idle, str):
-        raise DataError(
-            f"expected untouched frames, got {reference}",
-            where="--reference",
-            hint="give first:N or a file",
-        )
-    values = recording.voltages if idle is None else recording.voltages - idle.mean(axis=0)
-    if np.iscomplexobj(values):
-        raise DataError(
-            "holds complex voltages",
-            where=recording.source,
-            hint="calibrate with their magnitudes instead",
-        )
-    return np.asarray(values, dtype=np.float64)
-
-
 def labelled_frames(positions: FloatArray) -> IntArray:
     """(k,) frames of ``places`` (n, 2) that have a label."""
     import numpy as np
 
     return np.flatnonzero(np.isfinite(positions).all(axis=1))
-
-
-def labels(recording: Recording) -> FloatArray:
-    """(n, 2) m, NaN where a frame has no label. Raises DataError where there is none at all."""
-    import numpy as np
-
-    if recording.labels is None or not np.isfinite(recording.labels).all(axis=1).any():
-        raise DataError(
-            "holds no labels: expected xy_m (n_frames, 2), the position of each press",
-            where=recording.source,
-            hint="docs/touch.md shows how to make them",
-        )
-    return recording.labels

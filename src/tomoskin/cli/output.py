@@ -5,7 +5,7 @@ from __future__ import annotations
 import textwrap
 import threading
 import time
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from types import TracebackType
 from typing import TYPE_CHECKING, Annotated, Any, Self
 
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from rich.table import Table
 
+    from tomoskin.run import CheckFinding
 
 _PATIENCE = 2.0
 """Seconds without a bar."""
@@ -108,6 +109,20 @@ def tell(document: Any, lines: Iterable[str | Table], *, json: bool) -> None:
             from rich.console import Console
 
             Console().print(line, crop=False)
+
+
+def concluded(findings: Iterable[CheckFinding], *, json: bool, **facts: object) -> typer.Exit:
+    """Write findings as they come, or with ``facts`` as a document; what is to be raised then: exit
+    0 where all is as needed, else 1."""
+    looked_at = []
+    for finding in findings:
+        looked_at.append(finding)
+        if not json:
+            typer.echo(f"{finding.mark:<4}  {finding.name:<10} {finding.text}")
+    sound = all(finding.ok or finding.optional for finding in looked_at)
+    if json:
+        emit({"ok": sound, **facts, "findings": [asdict(finding) for finding in looked_at]})
+    return typer.Exit(0 if sound else 1)
 
 
 def remark(text: str) -> None:

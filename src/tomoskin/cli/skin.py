@@ -11,7 +11,7 @@ import typer
 from tomoskin.cli.alpha import alpha
 from tomoskin.cli.app import group
 from tomoskin.cli.named_files import SKIN, ForceFlag, Otherwise, Reads, Writes
-from tomoskin.cli.options import DEFAULT_SKIN, NamedSkinOption, SkinArgument
+from tomoskin.cli.options import DEFAULT_SKIN, NamedSkinOption, RecordingArgument, SkinArgument
 from tomoskin.cli.output import JsonFlag, tell
 from tomoskin.cli.skin_merit import merit
 
@@ -70,6 +70,29 @@ def check(file: SkinArgument, json: JsonFlag = False) -> None:
     )
     document = {"ok": True, "mesh": figures, "headroom": headroom.figures()}
     tell(_summary(skin) | document, [line, f"expected: {headroom.text}"], json=json)
+
+
+@app.command()
+def guess(
+    recording: RecordingArgument,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="X.toml", help="File for the skin. Default: it is printed."),
+        Writes(SKIN),
+    ] = None,
+    force: ForceFlag = False,
+) -> None:
+    """Write a skin file for a recording of another board; comments say what is sure in it."""
+    from tomoskin.core import write_text
+    from tomoskin.files.imports import read_recording
+    from tomoskin.pipeline import guess_skin
+
+    text = guess_skin(read_recording(recording))
+    if out is None:
+        typer.echo(text)
+        return
+    write_text(out, text, overwrite=force)
+    typer.echo(f"{out}: check its comments; next: tomoskin image {recording} --skin {out}")
 
 
 @app.command()
@@ -191,8 +214,8 @@ def place(
     from tomoskin.model.robot import Robot, Urdf, add_skin
     from tomoskin.model.skin import Skin
 
-    found = Urdf.read(urdf)
-    found.check_link(link, "LINK")
+    robot = Urdf.read(urdf)
+    robot.check_link(link, "LINK")
     Skin.load(skin)
     earlier = Robot.load(out).skins if out.exists() else ()
     given: dict[str, Any] = {
@@ -200,7 +223,7 @@ def place(
         "skin": _from(skin, out) if skin.endswith(".toml") else skin,
         "source": source or f"twin:seed={len(earlier) + 1}",
         "link": link,
-    } | _pose(found, link, at, on_mesh=on_mesh)
+    } | _pose(robot, link, at, on_mesh=on_mesh)
     text = add_skin(out, given, _from(str(urdf), out))
     before = out.read_text(encoding="utf-8") if out.exists() else None
     write_text(out, text, overwrite=True)

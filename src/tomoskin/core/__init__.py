@@ -18,20 +18,38 @@ from tomoskin.core.errors import (
     WireError,
     meant,
 )
-from tomoskin.core.inputs import check_is_file, open_input
-from tomoskin.core.outputs import MAGIC, RECORDING, Output, StrPath, check_outputs
+from tomoskin.core.inputs import check_fits, check_is_file, most_bytes, open_input
+from tomoskin.core.outputs import (
+    MAGIC,
+    RECORDING,
+    Output,
+    StrPath,
+    check_outputs,
+    write_text,
+    written,
+)
 from tomoskin.core.stages import finished, reach, watch_stages
 from tomoskin.core.units import DIMENSIONS, parse_quantity
-from tomoskin.core.written import write_text, written
 
 if TYPE_CHECKING:
-    from tomoskin.core.archive import Arrays, load_arrays, pack_arrays, save_arrays, unpack_arrays
-    from tomoskin.core.cache import cache_folder, kept
+    from tomoskin.core.archive import (
+        MOST_ELECTRODES,
+        Arrays,
+        cache_folder,
+        electrode_table,
+        kept,
+        load_arrays,
+        numbers,
+        pack_arrays,
+        real_numbers,
+        save_arrays,
+        unpack_arrays,
+        whole_number,
+    )
     from tomoskin.core.clocks import Clock, VirtualClock, WallClock, clock_ahead
-    from tomoskin.core.colours import AMOUNT, CHANGE, CHANGE_ON_DARK, ColourScale
+    from tomoskin.core.colours import AMOUNT, CHANGE, CHANGE_ON_DARK
     from tomoskin.core.extras import install_hint, needed
     from tomoskin.core.json_bytes import encode_json, plain_values
-    from tomoskin.core.memory import check_fits, machine_memory, most_bytes
     from tomoskin.core.records import (
         ComplexArray,
         DeferredImage,
@@ -48,50 +66,11 @@ if TYPE_CHECKING:
         Touch,
         Voltages,
     )
-    from tomoskin.core.typed_arrays import (
-        MOST_ELECTRODES,
-        electrode_table,
-        numbers,
-        real_numbers,
-        whole_number,
-    )
     from tomoskin.core.worker import Capacity, Consumer, Say, Worker, stop_workers
 
-_HOME = {
-    "AMOUNT": "colours",
-    "Arrays": "archive",
-    "CHANGE": "colours",
-    "CHANGE_ON_DARK": "colours",
-    "ColourScale": "colours",
-    "check_fits": "memory",
-    "MOST_ELECTRODES": "typed_arrays",
-    "electrode_table": "typed_arrays",
-    "encode_json": "json_bytes",
-    "cache_folder": "cache",
-    "Capacity": "worker",
-    "Clock": "clocks",
-    "Consumer": "worker",
-    "Say": "worker",
-    "VirtualClock": "clocks",
-    "WallClock": "clocks",
-    "Worker": "worker",
-    "clock_ahead": "clocks",
-    "install_hint": "extras",
-    "needed": "extras",
-    "kept": "cache",
-    "load_arrays": "archive",
-    "machine_memory": "memory",
-    "most_bytes": "memory",
-    "numbers": "typed_arrays",
-    "pack_arrays": "archive",
-    "plain_values": "json_bytes",
-    "real_numbers": "typed_arrays",
-    "save_arrays": "archive",
-    "stop_workers": "worker",
-    "unpack_arrays": "archive",
-    "whole_number": "typed_arrays",
-}
-"""Where names live that need more, if not in ``records``: loaded when they are first asked for."""
+_LATER = ("records", "worker", "clocks", "json_bytes", "extras", "colours", "archive")
+"""Modules that need more, numpy for one, and are loaded when one of their names is first asked for:
+the command line needs errors only until a command runs."""
 
 __all__ = [
     "AMOUNT",
@@ -105,7 +84,6 @@ __all__ = [
     "Arrays",
     "Capacity",
     "Clock",
-    "ColourScale",
     "ComplexArray",
     "Consumer",
     "DataError",
@@ -149,7 +127,6 @@ __all__ = [
     "install_hint",
     "kept",
     "load_arrays",
-    "machine_memory",
     "meant",
     "most_bytes",
     "needed",
@@ -171,7 +148,8 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    # numpy comes with them; the command line needs errors only until a command runs.
-    if name not in __all__:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"tomoskin.core.{_HOME.get(name, 'records')}"), name)
+    for module in _LATER if name in __all__ else ():
+        later = import_module(f"tomoskin.core.{module}")
+        if hasattr(later, name):
+            return globals().setdefault(name, getattr(later, name))
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,25 +1,27 @@
-"""Writing .npz archives, and opening those that may be damaged, hostile or of another kind."""
+"""Arrays in .npz archives: writing them, opening those that may be damaged or hostile, checking
+them, and keeping on disk those that take long to compute."""
 
 from __future__ import annotations
 
 import io
 import math
+import os
 import tokenize
 import zipfile
 import zlib
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from platformdirs import user_cache_path
 
 from tomoskin.core.errors import EMPTY, DataError
-from tomoskin.core.inputs import open_input
-from tomoskin.core.memory import check_fits
-from tomoskin.core.outputs import StrPath
-from tomoskin.core.written import written
+from tomoskin.core.inputs import check_fits, open_input
+from tomoskin.core.outputs import StrPath, written
+from tomoskin.core.records import FloatArray, IntArray
 
 _UNREADABLE = (
     ValueError,
@@ -144,3 +146,100 @@ def _size(archive: zipfile.ZipFile, name: str) -> int:
     if count < 0 or count * dtype.itemsize > held - begun:
         raise ValueError(f"{name} has the shape {shape} in its header but holds {held} bytes")
     return int(count * max(dtype.itemsize, _IN_MEMORY.get(dtype.kind, 0)))
+
+
+MOST_ELECTRODES = 1024
+"""More are taken for damage of a file."""
+
+
+def numbers(arrays: Arrays, key: str, source: str) -> NDArray[Any]:
+    """Array ``key`` as float64, or complex128 where it is complex."""
+    array = arrays[key]
+    if array.dtype.kind not in "biufc":
+        raise DataError(f"expected numbers in {key}, got {array.dtype}", where=source)
+    return array.astype(np.complex128 if array.dtype.kind == "c" else np.float64, copy=False)
+
+
+def real_numbers(arrays: Arrays, key: str, source: str) -> FloatArray:
+    """Array ``key`` as float64 numbers."""
+    array = numbers(arrays, key, source)
+    if array.dtype.kind == "c":
+        raise DataError(f"expected real numbers in {key}, got complex ones", where=source)
+    return array
+
+
+def whole_number(arrays: Arrays, key: str, where: str, most: int = 1 << 31) -> int:
+    """Array ``key`` as one whole number, at most ``most``."""
+    value = real_numbers(arrays, key, where)
+    if value.shape or value != np.round(value) or not abs(value) <= most:
+        got = f"shape {value.shape}" if value.shape else f"{value:g}"
+        raise DataError(f"expected one whole number up to {most} as {key}, got {got}", where=where)
+    return int(value)
+
+
+def electrode_table(arrays: Arrays, key: str, source: str) -> IntArray:
+    """Array ``key`` as an (n, 2) table of electrodes from 0."""
+    table = real_numbers(arrays, key, source)
+    if table.ndim != 2 or table.shape[1] != 2:
+        raise DataError(f"expected {key} of shape (n_meas, 2), got {table.shape}", where=source)
+    good = (table >= 0) & (table < MOST_ELECTRODES) & (table == np.round(table))
+    if not good.all():
+        row = int(np.argmin(good.all(axis=1)))
+        raise DataError(
+            f"expected whole electrode numbers from 0 (E1), got {table[row].tolist()}",
+            where=f"{source}, {key} row {row}",
+        )
+    return table.astype(np.int64)
+
+
+VARIABLE = "TOMOSKIN_CACHE"
+"""Environment variable that names the folder; "off": nothing is kept."""
+
+MOST_BYTES = 1 << 29
+"""Beyond it the files that were not used for longest go."""
+
+
+def kept(name: str, make: Callable[[], Arrays]) -> Arrays:
+    """What ``make`` returns: from the file ``name``, which holds it since it was first made.
+
+    ``name`` says all that the result depends on, as a hash does. A disk that cannot be read or
+    written costs time, and nothing else. Arrays lie in memory as those of the file do: sums over
+    other strides round otherwise, and a replay of the first run would differ in the last bits.
+    """
+    folder = cache_folder()
+    if folder is None:
+        return _dense(make())
+    path = folder / f"{name}.npz"
+    with suppress(DataError, OSError):
+        arrays = dict(load_arrays(path))
+        path.touch()  # used last
+        return arrays
+    arrays = _dense(make())
+    with suppress(DataError, OSError):
+        folder.mkdir(parents=True, exist_ok=True)
+        with written(path, overwrite=True) as part, part.open("wb") as file:
+            np.savez(file, allow_pickle=False, **arrays)
+        _discard_oldest(folder)
+    return arrays
+
+
+def _dense(arrays: Arrays) -> dict[str, NDArray[Any]]:
+    return {name: np.asarray(array, order="C") for name, array in arrays.items()}
+
+
+def cache_folder() -> Path | None:
+    """Where arrays are kept; None where they are not."""
+    chosen = os.environ.get(VARIABLE, "")
+    if chosen == "off":
+        return None
+    return Path(chosen) if chosen else user_cache_path("tomoskin", appauthor=False)
+
+
+def _discard_oldest(folder: Path) -> None:
+    files = [(path, path.stat()) for path in folder.glob("*.npz")]
+    files.sort(key=lambda item: item[1].st_mtime, reverse=True)
+    total = 0
+    for path, state in files:
+        total += state.st_size
+        if total > MOST_BYTES:
+            path.unlink(missing_ok=True)

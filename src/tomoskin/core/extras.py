@@ -44,10 +44,6 @@ def _requirements(extra: str) -> list[str]:
         listed = requires("tomoskin") or []
     except PackageNotFoundError:
         return []
-    parted = [line.partition(";") for line in listed]
-    return [name.strip() for name, _, marker in parted if _is_of(marker, extra)]
-
-
-def _is_of(marker: str, extra: str) -> bool:
-    words = marker.replace("'", '"').split()
-    return words == ["extra", "==", f'"{extra}"']
+    parted = [line.replace("'", '"').partition(";") for line in listed]
+    marked = ["extra", "==", f'"{extra}"']
+    return [name.strip() for name, _, marker in parted if marker.split() == marked]

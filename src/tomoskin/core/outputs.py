@@ -1,14 +1,17 @@
-"""What may be written where: the one decision for every command, the page and the library."""
+"""What may be written where, for every command, the page and the library; and files that appear
+when they are complete: what was there before stays until then."""
 
 from __future__ import annotations
 
 import os
+import secrets
 import stat
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from tomoskin.core.errors import OutputError
+from tomoskin.core.errors import DataError, OutputError
 
 StrPath = str | os.PathLike[str]
 """What every public function takes for a file: its name, or its path."""
@@ -90,13 +93,15 @@ def is_same_file(one: Path, other: Path) -> bool:
 
     Neither needs to be there.
     """
-    try:
+    with suppress(OSError):  # one of them is not there
         if one.samefile(other):
             return True
-    except OSError:
-        pass  # one of them is not there
-    (folder, name), (its_folder, its_name) = (_parts(path) for path in (one, other))
-    return name == its_name and (folder == its_folder or _is_one_folder(folder, its_folder))
+    one, other = real_path(one), real_path(other)
+    if one.name.casefold() != other.name.casefold():
+        return False
+    with suppress(OSError):
+        return one.parent == other.parent or one.parent.samefile(other.parent)
+    return False
 
 
 def real_path(path: Path) -> Path:
@@ -173,14 +178,50 @@ def _is_recording(path: Path) -> bool:
         return file.read(len(MAGIC)) == MAGIC
 
 
-def _parts(path: Path) -> tuple[Path, str]:
-    """Folder and name, without links and relative steps; the name without its case."""
-    real = real_path(path)
-    return real.parent, real.name.casefold()
+@contextmanager
+def written(path: StrPath, *, overwrite: bool = False) -> Iterator[Path]:
+    """An empty file beside ``path``, of the same ending, that takes its place after the block.
 
+    When the block raises, and at Ctrl-C, it is taken away, and what was at ``path`` stays as it
+    was. A link stays a link: the file that it leads to is replaced.
 
-def _is_one_folder(one: Path, other: Path) -> bool:
+    Raises
+    ------
+    OutputError
+        Before and after the block: as :func:`check_outputs` does.
+    DataError
+        When the disk refuses.
+    """
+    path = Path(path)
+    check_outputs([Output(path)], overwrite=overwrite)
+    target = real_path(path)
+    part = target.with_name(f".tomoskin-{secrets.token_hex(8)}{target.suffix}")
     try:
-        return one.samefile(other)
-    except OSError:
-        return False
+        try:
+            os.close(os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
+            yield part
+            _settle(part, target)
+            check_outputs([Output(path)], overwrite=overwrite)  # the block may have taken hours
+            part.replace(target)
+        finally:
+            part.unlink(missing_ok=True)
+    except OSError as error:
+        raise DataError(
+            f"cannot be written: {error.strerror or error}",
+            where=str(path),
+            hint="check that the disk is connected and has space",
+        ) from error
+
+
+def write_text(path: StrPath, text: str, *, overwrite: bool = False) -> None:
+    """Write ``text`` as UTF-8, complete or not at all; raises as :func:`written` does."""
+    with written(path, overwrite=overwrite) as part:
+        part.write_text(text, encoding="utf-8", newline="\n")
+
+
+def _settle(part: Path, target: Path) -> None:
+    """On the disk, and readable by those who could read what was there."""
+    with part.open("rb+") as file:
+        os.fsync(file.fileno())
+    if target.exists():
+        part.chmod(stat.S_IMODE(target.stat().st_mode))

@@ -323,11 +323,6 @@ class Touch:
     possible: tuple[int, ...] = ()
 
     @property
-    def reading(self) -> Detection:
-        """The :attr:`detection`, by its name of 0.1."""
-        return self.detection
-
-    @property
     def said(self) -> str:
         """Its kind for tables: "merged 1+2", "1 or 2" and "too close" say what is not certain."""
         if self.merged:

@@ -215,7 +215,8 @@ class Worker(Generic[C]):
             while (item := self._next()) is not None:
                 self._call(consumer.take, item)
                 self.taken += 1
-                self._report_gap()
+                if self._behind and not self._waiting:
+                    self._report_gap()
             self._call(consumer.close)
         except Exception as error:
             pause = self._recover(error)
@@ -271,8 +272,6 @@ class Worker(Generic[C]):
             return bool(self._waiting) or self._deadline is None
 
     def _report_gap(self) -> None:
-        if not self._behind or self._waiting:
-            return
         with self._news:
             count, self._behind = self._behind, 0
         self._tell("gap", f"{count} messages were left out")

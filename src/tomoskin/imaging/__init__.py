@@ -10,33 +10,19 @@ from tomoskin.imaging.iterative.sharp_difference import SharpDifference, SharpIm
 from tomoskin.imaging.linear.linear_problem import LinearProblem, OneStep
 from tomoskin.imaging.linear.operator import MOST_EXCLUDED, Operator
 from tomoskin.imaging.linear.spectrum import Assembly, Spectrum
-from tomoskin.imaging.linear.temporal import Modes, Steady, Temporal
+from tomoskin.imaging.linear.temporal import Modes, Temporal
 from tomoskin.imaging.resolution import (
     Picard,
+    disc_means,
     picard,
     unresolved,
 )
 from tomoskin.imaging.trained.merit import Merit, ThesisMetrics, figures, noise_figure
 from tomoskin.imaging.trained.targets import Targets, along
 from tomoskin.imaging.trained.trainer import Greit
-from tomoskin.model.prior import (
-    PRIORS,
-    GaussianHighPass,
-    Identity,
-    Laplace,
-    Matern,
-    Noser,
-    Prior,
-    SharpPrior,
-    Sparse,
-    Structural,
-    TotalVariation,
-    prior_matrix,
-)
 
 __all__ = [
     "MOST_EXCLUDED",
-    "PRIORS",
     "RULES",
     "Absolute",
     "AbsoluteImaging",
@@ -44,42 +30,31 @@ __all__ = [
     "Assembly",
     "Curve",
     "Evidence",
-    "GaussianHighPass",
     "Greit",
-    "Identity",
-    "Laplace",
     "LightTouch",
     "LinearProblem",
-    "Matern",
     "Merit",
     "Modes",
-    "Noser",
     "Observation",
     "OneStep",
     "Operator",
     "Picard",
-    "Prior",
     "RandomField",
     "Segmented",
     "ShapeImaging",
     "SharpDifference",
     "SharpImage",
-    "SharpPrior",
-    "Sparse",
     "Spectrum",
-    "Steady",
-    "Structural",
     "Targets",
     "Temporal",
     "ThesisMetrics",
-    "TotalVariation",
     "along",
     "choose",
+    "disc_means",
     "figures",
     "for_recording",
     "homogeneous",
     "noise_figure",
     "picard",
-    "prior_matrix",
     "unresolved",
 ]

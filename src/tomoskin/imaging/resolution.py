@@ -42,7 +42,7 @@ def unresolved(
     _check_pair(operator, problem)
     if not radius > 0:
         raise ModelError(f"expected a radius above 0 m, got {radius:g} m")
-    discs = _discs(problem.model.mesh, radius)
+    discs = disc_means(problem.model.mesh, radius)
     spread, gram = problem.carried
     data = gram + np.diag(alpha**2 / problem.weights)  # covariance of the data
     prior = _prior_variance(problem, discs)
@@ -51,7 +51,7 @@ def unresolved(
     return np.asarray(np.clip(1.0 - explained / prior, 0.0, 1.0))
 
 
-def _discs(mesh: Mesh, radius: float) -> csr_array:
+def disc_means(mesh: Mesh, radius: float) -> csr_array:
     """(n_cells, n_cells) means by area over the cells within ``radius`` m of each, its own too."""
     tree = cKDTree(mesh.centroids)
     near = tree.query_ball_tree(tree, radius)

@@ -1,18 +1,19 @@
 """The one frame flow, pure: a reference is collected, then frames are followed to touches."""
 
+from tomoskin.pipeline.electrode_order import order_fault
 from tomoskin.pipeline.finding import located_alone, voltage_covariance
 from tomoskin.pipeline.following import Setting
-from tomoskin.pipeline.frame_result import DOUBTED, FrameResult, ModelAgreement, ReferenceState
+from tomoskin.pipeline.frame_result import FrameResult, ModelAgreement, ReferenceState
+from tomoskin.pipeline.guess import guess_skin
 from tomoskin.pipeline.imaging import Unresolved
 from tomoskin.pipeline.offline import ALONE, Gathered, Reconstruction, reconstruct
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES, Pipeline
 from tomoskin.pipeline.prepare import Prepared, colour_limit, prepare
-from tomoskin.pipeline.recorded import Idle, RecordedFrames, recorded_frames
-from tomoskin.pipeline.tune import tuned, tuned_by_rule, tuned_image, with_choice
+from tomoskin.pipeline.recorded import Idle, recorded_frames
+from tomoskin.pipeline.rest import tuned, tuned_by_rule, tuned_image, with_choice
 
 __all__ = [
     "ALONE",
-    "DOUBTED",
     "REFERENCE_FRAMES",
     "FrameResult",
     "Gathered",
@@ -21,12 +22,13 @@ __all__ = [
     "Pipeline",
     "Prepared",
     "Reconstruction",
-    "RecordedFrames",
     "ReferenceState",
     "Setting",
     "Unresolved",
     "colour_limit",
+    "guess_skin",
     "located_alone",
+    "order_fault",
     "prepare",
     "reconstruct",
     "recorded_frames",

@@ -78,6 +78,11 @@ class BaselineDifferences:
         What has been learnt of electrodes and reference.
     health
         Of the electrodes, where it is known.
+
+    Attributes
+    ----------
+    prepared
+        The skin with the operator for the electrodes that are well.
     """
 
     def __init__(
@@ -135,18 +140,13 @@ class BaselineDifferences:
 
     def renew(self, prepared: Prepared) -> None:
         """Go on with another operator of the same skin."""
-        self._given = self._prepared = prepared
+        self._given = self.prepared = prepared
         health = self._health
         if health is not None and health.sick:
             lost = nuisance_directions(prepared.pattern, health.lost, health.floating)
             if lost.shape[1] <= MOST_NUISANCE * len(lost):  # else no image is made
-                self._prepared = prepared.without_directions(lost / self._scale[:, None])
-        self._nuisance = Nuisance(self._prepared, self._scale, self._drift)
-
-    @property
-    def prepared(self) -> Prepared:
-        """The skin with the operator for the electrodes that are well."""
-        return self._prepared
+                self.prepared = prepared.without_directions(lost / self._scale[:, None])
+        self._nuisance = Nuisance(self.prepared, self._scale, self._drift)
 
     @property
     def reference(self) -> Reference:
@@ -183,23 +183,23 @@ class BaselineDifferences:
         subspace = self._nuisance(health)
         self._excluded = health.lost
         if health.floating.any():
-            self._excluded = health.lost | health.floating[self._prepared.pattern.measure].any(
+            self._excluded = health.lost | health.floating[self.prepared.pattern.measure].any(
                 axis=1
             )
         n_excluded = int(np.count_nonzero(self._excluded))
         if n_excluded:
             values = np.where(health.lost, mean, values)
-        if subspace.nuisance.count > MOST_NUISANCE * len(values):
+        if subspace.nuisance.directions.shape[1] > MOST_NUISANCE * len(values):
             return Conditioned(None, n_excluded, health)
         if self._levels.mean is not mean or self._levels.excluded is not self._excluded:
             self._levels = _Levels.of(mean, self._excluded)
         times = self._levels.gain(values)
         self._has_gain = times is not None
-        if times is not None and self._prepared.skin.signal.common_modes != "projected":
+        if times is not None and self.prepared.skin.signal.common_modes != "projected":
             return Conditioned(None, n_excluded, health, f"{_gain_text(times)}; no image is shown")
         if times is not None:
             values = values / times  # touches and noise are then as large as they were learnt
-        whole = difference(values, mean, self._prepared.operator.difference)
+        whole = difference(values, mean, self.prepared.operator.difference)
         differences = Differences(
             dv=subspace.nuisance(whole),
             nuisance=subspace.nuisance.directions,
@@ -251,7 +251,7 @@ class BaselineDifferences:
 
     def _signatures(self) -> FloatArray:
         """(n_meas, n_cells) V: what a change of each cell does."""
-        return np.asarray((self._prepared.problem.jacobian * self._scale[:, None]).real)
+        return np.asarray((self.prepared.problem.jacobian * self._scale[:, None]).real)
 
 
 class GivenDifferences:

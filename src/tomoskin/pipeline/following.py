@@ -11,7 +11,6 @@ import numpy as np
 from tomoskin.core import Detection, FloatArray, Image, ModelError, Touch, Voltages, reach
 from tomoskin.learning import BENDS, Differences, FrameView
 from tomoskin.model.pattern import Scan
-from tomoskin.pipeline.collecting import Rest
 from tomoskin.pipeline.conditioning import (
     BaselineDifferences,
     Conditioned,
@@ -28,10 +27,10 @@ from tomoskin.pipeline.finding import (
 from tomoskin.pipeline.frame_result import FrameResult, looks_bent
 from tomoskin.pipeline.imaging import Filtered, SingleFrame
 from tomoskin.pipeline.prepare import Prepared
-from tomoskin.pipeline.tune import tune, tuned_sheet
+from tomoskin.pipeline.rest import Rest, tune, tuned_sheet
 from tomoskin.sensing.fit import LIVE, Pace
 from tomoskin.sensing.signal import Reference
-from tomoskin.sensing.track import FingerTracker, Tracker
+from tomoskin.sensing.track import SlideCorrection, Tracker
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,7 +98,7 @@ class Following:
             prepared = tuned_sheet(prepared, reference, excluded)  # they are applied once
         self.rest, self._setting = rest, setting
         self.prepared, self.conditioning = prepared, conditioning
-        self._tracker = FingerTracker(tracker, prepared.skin.touch.slide_lag)
+        self._tracker, tracker.slides = tracker, SlideCorrection(prepared.skin.touch.slide_lag)
         self._imaging = _imaging(conditioning, rest, reference)
         interval = np.nan if rest is None else rest.interval
         if not interval > 0:
@@ -161,9 +160,8 @@ class Following:
             return self._without_touches(measured, failed)
         reach("tracking")
         touches = self._tracker.update(detections, measured.time, measured.host_time)
-        tracker = self._tracker.tracker
-        if self._finder.learn(touched=bool(tracker.traces)):
-            tracker.residuals.forget()
+        if self._finder.learn(touched=bool(self._tracker.traces)):
+            self._tracker.residuals.forget()
         readings = {}
         if self._applied:
             reach("calibrations")
@@ -200,13 +198,8 @@ class Following:
 
     def first(self, measured: Voltages) -> FrameResult:
         """The frame that completed the rest: nothing shows in it."""
-        return FrameResult.at_rest(
-            measured,
-            self.prepared.no_image,
-            self.conditioning.mean,
-            self._tracker.events,
-            self.conditioning.state,
-        )
+        state = self.conditioning.state
+        return FrameResult.at_rest(measured, self.prepared.no_image, self.conditioning.mean, state)
 
     def _learn(self, time: float, *, touched: bool, noise: bool) -> None:
         conditioning = self.conditioning

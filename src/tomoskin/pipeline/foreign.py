@@ -13,7 +13,7 @@ from tomoskin.imaging import AlphaChoice, Evidence, Greit, Spectrum, for_recordi
 from tomoskin.model.pattern import Pattern
 from tomoskin.model.skin import InverseSettings
 from tomoskin.pipeline.prepare import Prepared
-from tomoskin.pipeline.tune import with_choice
+from tomoskin.pipeline.rest import with_choice
 from tomoskin.sensing.signal import Reference
 
 _GREIT_ERROR = 0.003

@@ -125,7 +125,6 @@ class FrameResult:
         measured: Voltages,
         image: Image,
         reference: FloatArray,
-        events: tuple[TouchEvent, ...],
         baseline: BaselineState | None = None,
     ) -> Self:
         """Of a frame that the reference is collected from; ``baseline`` once that stands."""
@@ -139,7 +138,6 @@ class FrameResult:
             reference=reference,
             touches=(),
             left_out=int(np.count_nonzero(measured.excluded)),
-            events=events,
             baseline=baseline,
             scanned=measured.scanned,
             scan_time=measured.scan_time,
@@ -164,7 +162,11 @@ class FrameResult:
     def problem(self) -> str | None:
         """What is wrong with the picture, in a sentence, or None."""
         if self.health is not None and self.health.sick:
-            return self._sick(self.health)
+            if not self.has_image:
+                return (
+                    f"{self.health.text}; too few rows are left for an image: check the electrodes"
+                )
+            return f"{self.health.text}; the image is made without {self.left_out} rows"
         if not self.left_out:
             stale = self.baseline.stale if self.baseline else None
             return self.unexplained or stale
@@ -178,12 +180,6 @@ class FrameResult:
             f"{rows} are at a rail of the converter or without a reference: the image is made "
             "without them"
         )
-
-    def _sick(self, health: Health) -> str:
-        """Which electrodes, why, and what becomes of the picture."""
-        if not self.has_image:
-            return f"{health.text}; too few rows are left for an image: check the electrodes"
-        return f"{health.text}; the image is made without {self.left_out} rows"
 
 
 _FOLD = 3

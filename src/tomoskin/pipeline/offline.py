@@ -19,7 +19,7 @@ from tomoskin.pipeline.frame_result import FrameResult, ModelAgreement
 from tomoskin.pipeline.pipeline import Pipeline
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.pipeline.recorded import Idle, RecordedFrames, recorded_frames
-from tomoskin.pipeline.tune import tuned_by_rule
+from tomoskin.pipeline.rest import tuned_by_rule
 from tomoskin.sensing.fit import EXHAUSTIVE
 from tomoskin.sensing.signal import Recording
 

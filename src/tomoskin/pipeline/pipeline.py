@@ -7,10 +7,10 @@ import numpy as np
 from tomoskin.board.source import ScanTimer
 from tomoskin.core import Frame, Mark, Voltages, reach
 from tomoskin.imaging import AlphaChoice
-from tomoskin.pipeline.collecting import Collecting
 from tomoskin.pipeline.following import Following, Setting
 from tomoskin.pipeline.frame_result import FrameResult, ReferenceState
 from tomoskin.pipeline.prepare import Prepared
+from tomoskin.pipeline.rest import Collecting
 from tomoskin.sensing.signal import Reference
 from tomoskin.sensing.track import Tracker, TrackSettings
 
@@ -110,20 +110,17 @@ class Pipeline:
     @property
     def numbered(self) -> int:
         """The last identity that was given to a touch."""
-        return self._tracker.numbered
+        return self._tracker.ledger.numbered
 
     def number_after(self, last: int) -> None:
         """Give identities after ``last`` from here on."""
-        self._tracker.numbered = last
+        self._tracker.ledger.numbered = last
 
     @property
     def choice(self) -> AlphaChoice:
         """The alpha of the images, and what chose it."""
-        return self._prepared.choice
-
-    @property
-    def _prepared(self) -> Prepared:
-        return self._state.prepared if isinstance(self._state, Following) else self._given
+        state = self._state
+        return (state.prepared if isinstance(state, Following) else self._given).choice
 
     def push(self, frame: Frame, mark: Mark = Mark.NONE) -> FrameResult | None:
         """Take one frame as its ``mark`` says; None where it is left out or not of this scan."""
@@ -155,9 +152,7 @@ class Pipeline:
             reach("reference")
             self._state = Following.from_rest(given, rest, self._tracker, self._setting)
             return self._state.first(measured)
-        return FrameResult.at_rest(
-            measured, given.no_image, given.operator.reference, self._tracker.events
-        )
+        return FrameResult.at_rest(measured, given.no_image, given.operator.reference)
 
     def _new_tracker(self) -> Tracker:
         return Tracker(TrackSettings(self._given.skin.touch.snr, still=self._setting.alone))

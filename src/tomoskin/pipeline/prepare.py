@@ -265,7 +265,7 @@ def _prepared(skin: Skin, problem: LinearProblem, previous: Prepared | None = No
     if _fits(skin, calibrations):
         kept = previous.spots if previous and _same_spots(previous.skin, skin) else None
         spots = kept or SpotModel.of(skin, model)
-    return Prepared(
+    made = Prepared(
         skin=skin,
         mesh=model.mesh,
         pattern=model.pattern,
@@ -273,7 +273,7 @@ def _prepared(skin: Skin, problem: LinearProblem, previous: Prepared | None = No
         model=model,
         problem=problem,
         operator=operator,
-        modes=_modes(skin, problem, light_touch, choice, operator),
+        modes=None,
         segmenter=segmenter or Segmenter(model.mesh, skin.touch),
         readout=readout,
         choice=choice,
@@ -281,20 +281,10 @@ def _prepared(skin: Skin, problem: LinearProblem, previous: Prepared | None = No
         spots=spots,
         calibrations=calibrations,
     )
-
-
-def _modes(
-    skin: Skin,
-    problem: LinearProblem,
-    light_touch: LightTouch | None,
-    choice: AlphaChoice,
-    operator: Operator,
-) -> Modes | None:
-    """Those of a filter over frames, where the skin has one."""
     if not skin.inverse.time_constant:
-        return None
+        return made
     spectrum = light_touch.spectrum if light_touch else Spectrum.of(problem)
-    return Modes.of(spectrum, choice.alpha, operator)
+    return made.with_alpha(choice, spectrum, operator)
 
 
 def _fits(skin: Skin, calibrations: Mapping[str, Calibration[Any]]) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
@@ -15,7 +16,7 @@ from tomoskin.pipeline.conditioning import MOST_NUISANCE
 from tomoskin.pipeline.foreign import open_electrodes
 from tomoskin.pipeline.frame_result import NO_AGREEMENT, REFUSED, ModelAgreement
 from tomoskin.pipeline.prepare import Prepared
-from tomoskin.sensing.signal import Consecutive, Recording, Reference, difference, in_phase
+from tomoskin.sensing.signal import Recording, Reference, difference, in_phase
 
 _LISTED = 5
 """Measurements that a message names."""
@@ -265,8 +266,8 @@ def _against_the_one_before(frames: RecordedFrames) -> RecordedFrames:
         )
     missing = frames.missing
     values, mean, agreement = _in_volts(frames, frames.values.mean(axis=0, where=~missing)[None])
-    steps = Consecutive(frames.prepared.operator.difference)
-    changes = np.array([steps.push(frame) for frame in np.where(missing, mean, values)][1:])
+    kind, pairs = frames.prepared.operator.difference, pairwise(np.where(missing, mean, values))
+    changes = np.array([difference(now, before, kind) for before, now in pairs])
     changes[missing[1:] | missing[:-1]] = np.nan
     return replace(frames, values=changes, first=1, agreement=agreement)
 

@@ -61,11 +61,19 @@ _AT_ONCE = Timing(hello=0.05)
 
 @dataclass(frozen=True, slots=True)
 class CheckFinding:
-    """One thing that was looked at: whether it is as expected, and a sentence."""
+    """What was looked at: whether it is as expected, a sentence; ``optional``: it need not be."""
 
     name: str
     ok: bool
     text: str
+    optional: bool = False
+
+    @property
+    def mark(self) -> str:
+        """What stands before it."""
+        if self.ok:
+            return "ok"
+        return "-" if self.optional else "FAIL"
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,8 +146,7 @@ def check_board(
     yield _noise(np.vstack([first.sd, second.sd]))
     early = _measure(transport, onward, replace(settings, settling=_EARLY), frames, _AT_ONCE)
     yield _settling(early, first)
-    for name, problem, text in check_safe_off(transport, onward, settings):
-        yield CheckFinding(name, not problem, problem or text)
+    yield from check_safe_off(transport, onward, settings)
 
 
 def _measure(
@@ -211,8 +218,8 @@ def _differences(readings: _Readings) -> Iterator[CheckFinding]:
 def _noise(sd: FloatArray) -> CheckFinding:
     by_channel = np.sqrt(np.mean(sd**2, axis=0))
     worst = int(by_channel.argmax())
-    text = f"{np.median(by_channel):.2f} counts a conversion, most on E{worst + 1} ({{:.2f}})"
-    text = text.format(by_channel[worst])
+    text = f"{np.median(by_channel):.2f} counts a conversion, "
+    text += f"most on E{worst + 1} ({by_channel[worst]:.2f})"
     ok = bool(by_channel[worst] < _NOISE)
     look = f"; expected less than {_NOISE:g}: C{100 * (worst + 1) + 3}, its supply, a long cable"
     return CheckFinding("noise", ok, text if ok else text + look)
@@ -231,11 +238,10 @@ _ANSWER, _TRIES = 0.3, 5
 _HEARTBEAT, _USUAL = 300, 2000
 """ms of silence that the board tolerates: while this is tried, and after reset."""
 
-Look = tuple[str, str, str]
-"""What was looked at; what is wrong with it, or nothing; what is to be said when it is right."""
 
-
-def check_safe_off(transport: Transport, scan: Scan, settings: ScanSettings) -> Iterator[Look]:
+def check_safe_off(
+    transport: Transport, scan: Scan, settings: ScanSettings
+) -> Iterator[CheckFinding]:
     """STOP, a silent host, SAFE_OFF: frames end, and nothing starts again by itself.
 
     Frames stand for the current here, since only a drive is sampled; whether a switch really opens
@@ -255,24 +261,21 @@ def check_safe_off(transport: Transport, scan: Scan, settings: ScanSettings) -> 
     _accepted(_asked(board, start), start, transport)
     _asked(board, Stop(0))
     late = any(isinstance(m, Frame) for m in board.listen(4 * configuration.scan_time))
-    yield "stop", "frames continue after STOP" if late else "", "no frame after STOP"
+    text = "frames continue after STOP" if late else "no frame after STOP"
+    yield CheckFinding("stop", not late, text)
     _accepted(_asked(board, start), start, transport)
     heard = board.listen(5e-3 * _HEARTBEAT)
     silent = any(isinstance(m, Fault) and m.code is FaultCode.HOST_SILENT for m in heard)
-    yield (
-        "silence",
-        "" if silent else f"frames continue {_HEARTBEAT} ms after the last message of the host",
-        f"no frame {_HEARTBEAT} ms after the last message of the host",
-    )
+    since = f"{_HEARTBEAT} ms after the last message of the host"
+    text = f"no frame {since}" if silent else f"frames continue {since}"
+    yield CheckFinding("silence", silent, text)
     _asked(board, SetHeartbeat(0, _USUAL))
     _asked(board, SafeOff(0))
     forgotten = _asked(board, start).result is Result.WRONG_CONFIGURATION
     _asked(board, Stop(0))
-    yield (
-        "safe off",
-        "" if forgotten else "START is accepted after SAFE_OFF",
-        "nothing starts after SAFE_OFF until the board is set up again",
-    )
+    text = "nothing starts after SAFE_OFF until the board is set up again"
+    text = text if forgotten else "START is accepted after SAFE_OFF"
+    yield CheckFinding("safe off", forgotten, text)
 
 
 def _asked(board: Exchange, command: Command) -> Ack:

@@ -20,7 +20,7 @@ from tomoskin.board.source import Transport
 from tomoskin.core import WireError
 from tomoskin.files.session import MessageLog
 from tomoskin.pipeline import Prepared
-from tomoskin.twin import FACES, Contact, Face, Grid, Press, Probe, Shape
+from tomoskin.twin import FACES, Face, Grid, Press, Probe, Shape
 
 MAX_PRESSES = 8
 """Most presses that one page may hold."""
@@ -55,7 +55,7 @@ class PressRequest(StrictRequest, frozen=True):
     vertices: Annotated[tuple[tuple[_Corner, _Corner], ...], Meta(max_length=24)] | None = None
 
     @property
-    def contact(self) -> Contact:
+    def contact(self) -> Probe:
         """What presses on the twin.
 
         Raises WireError where corners are missing, GeometryError where they make no polygon.
@@ -196,7 +196,7 @@ class HoldPresses:
     """All presses on the twin that ``owner`` holds now; an empty tuple lifts them."""
 
     owner: object
-    presses: tuple[Contact, ...]
+    presses: tuple[Probe, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

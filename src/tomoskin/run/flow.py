@@ -16,12 +16,11 @@ from tomoskin.core import Event, Frame, Mark, MarkedFrame, TomoskinError
 from tomoskin.files.session import BoardInfo, RawRead, Truth
 from tomoskin.pipeline import FrameResult, Pipeline, Prepared, ReferenceState
 from tomoskin.run.board_memory import Recall
-from tomoskin.run.counters import CostMeter, Latency
 from tomoskin.run.intake import Intake, Marker, replay_status
 from tomoskin.run.publisher import Audience, Publisher
-from tomoskin.run.status import Status
+from tomoskin.run.status import CostMeter, Latency, Status
 from tomoskin.run.twin_control import TwinControl, described
-from tomoskin.twin import Contact, Press
+from tomoskin.twin import Press, Probe
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,7 +29,7 @@ class Snapshot:
     latency in s, and when it was ready, host monotonic s."""
 
     result: FrameResult
-    truth: tuple[Contact, ...]
+    truth: tuple[Probe, ...]
     latency: float
     ready: float
 
@@ -130,9 +129,9 @@ class Flow:
         if link.info is not self.board:
             self._note_board(link.info, link.board.text if link.board else "")
         if items:
-            for event in intake.worth_saying(items[-1].host_time, items):
+            for event in intake.repeats.push(items[-1].host_time, items):
                 out.put(event)
-        late = intake.late(len(frames))
+        late = intake.backlog.late(len(frames), intake.waited) if frames else 0
         for number, frame in enumerate(frames):
             mark = self.marker.mark(frame, late=number < late)
             if mark is not None:
@@ -195,7 +194,7 @@ class Flow:
         if self._recall.is_due(self._clock(), at_end=True):
             self._recall.keep(self.prepared, self.out)
 
-    def _truth(self, frame: Frame) -> tuple[Contact, ...]:
+    def _truth(self, frame: Frame) -> tuple[Probe, ...]:
         """What pressed when the frame was read."""
         replay = self.marker.replay
         if replay is None:
@@ -227,7 +226,7 @@ class Flow:
         except TomoskinError as error:  # of this frame: the source is well
             intake.skipped += 1
             refused = Event(frame.host_time, "refused", f"a frame was left out: {error}")
-            for event in intake.worth_saying(frame.host_time, [refused]):
+            for event in intake.repeats.push(frame.host_time, [refused]):
                 self.out.put(event)
             return
         if result is None:

@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import Self
+from dataclasses import replace
+from operator import add
+from typing import NamedTuple
 
 from tomoskin.board.source import Link, Transport
 from tomoskin.core import Event, Frame, Mark
@@ -114,8 +115,7 @@ _STANDSTILL = frozenset({"silent", "fault", "reset"})
 """Events after which no frame comes until the board is well again."""
 
 
-@dataclass(frozen=True, slots=True)
-class Losses:
+class Losses(NamedTuple):
     """Counts of what did not arrive.
 
     ``dropped`` frames that the device or this host left out, ``corrupt`` messages damaged on
@@ -125,20 +125,6 @@ class Losses:
     dropped: int = 0
     corrupt: int = 0
     gaps: int = 0
-
-    @classmethod
-    def of(cls, link: Link, device_drops: int) -> Self:
-        """Counts of one link; ``device_drops`` is what its last frame said."""
-        frames = link.frames
-        return cls(device_drops + frames.foreign, link.counters.corrupt, frames.lost)
-
-    def __add__(self, other: Losses) -> Losses:
-        """The losses of both, added count by count."""
-        return Losses(
-            self.dropped + other.dropped,
-            self.corrupt + other.corrupt,
-            self.gaps + other.gaps,
-        )
 
 
 class Backlog:
@@ -171,9 +157,12 @@ class Repeats:
         self._said: dict[tuple[str, str], float] = {}
         self._waiting: dict[tuple[str, str], tuple[Event, int]] = {}
 
-    def push(self, now: float, events: Sequence[Event]) -> Iterator[Event]:
-        """What is to be said at ``now``, s: of ``events``, and of those that have waited."""
-        for event in events:
+    def push(self, now: float, items: Sequence[Frame | Event]) -> Iterator[Event]:
+        """What is to be said at ``now``, s: of the events of a read, and of those that have
+        waited."""
+        for event in items:
+            if isinstance(event, Frame):
+                continue
             key = event.kind, event.text
             if event.kind not in COUNTED:
                 yield event
@@ -203,6 +192,8 @@ class Intake:
         Why no frame comes until the board is well again, or None.
     skipped
         Frames that this host has left out.
+    backlog, repeats
+        How many frames of a read are left out; events that come again and again.
     """
 
     def __init__(self) -> None:
@@ -211,7 +202,7 @@ class Intake:
         self.skipped = 0
         self._link: Link | None = None
         self._drops, self._earlier = 0, Losses()
-        self._backlog, self._repeats = Backlog(), Repeats()
+        self.backlog, self.repeats = Backlog(), Repeats()
 
     def open(self) -> None:
         """A protocol session is to begin."""
@@ -225,7 +216,10 @@ class Intake:
     def losses(self) -> Losses:
         """All that did not arrive, but what this host has left out; from any thread."""
         link = self._link
-        return self._earlier if link is None else self._earlier + Losses.of(link, self._drops)
+        if link is None:
+            return self._earlier
+        now = self._drops + link.frames.foreign, link.counters.corrupt, link.frames.lost
+        return Losses(*map(add, self._earlier, now))
 
     def take(self, link: Link, items: Sequence[Frame | Event], now: float) -> list[Frame]:
         """The frames of a read of ``link`` that was made at ``now``, host s."""
@@ -238,11 +232,3 @@ class Intake:
             elif item.kind in _STANDSTILL:
                 self.standstill = item.text
         return frames
-
-    def late(self, frames: int) -> int:
-        """How many of ``frames`` of the newest read, the oldest, are left out."""
-        return self._backlog.late(frames, self.waited) if frames else 0
-
-    def worth_saying(self, now: float, items: Sequence[Frame | Event]) -> Iterator[Event]:
-        """The events of a read, and what happens again and again once a second."""
-        return self._repeats.push(now, [item for item in items if isinstance(item, Event)])

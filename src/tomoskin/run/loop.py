@@ -95,7 +95,10 @@ class Loop:
         flow = self.flow
         try:
             with flow.link(transport) as link:
-                while not self._is_over():
+                while True:
+                    self.commands.carry_out()
+                    if self._stopping or self._change is not None:
+                        break
                     flow.press()
                     items = link.poll(_POLL)
                     if link.running:
@@ -113,11 +116,6 @@ class Loop:
         if trouble != self.trouble:
             self.trouble = trouble
             self.flow.out.say(kind, trouble)
-
-    def _is_over(self) -> bool:
-        """Carry out what is asked; whether the source of the moment is to be left."""
-        self.commands.carry_out()
-        return self._stopping or self._change is not None
 
     def _next(self) -> Transport | None:
         """What is followed next: what was changed to, else the old one again; None at the end."""

@@ -49,8 +49,8 @@ class PreRoll:
         self._newest: Frame | None = None
 
     def frame(self, frame: Frame, mark: Mark, number: int) -> None:
-        """A frame and what becomes of it, before the pipeline has it; ``number``: the last
-        identity that it has given to a touch."""
+        """A frame and what becomes of it, before the pipeline has it; ``number``: where a reference
+        begins, the last identity that it has given to a touch."""
         self._newest = None
         if mark & Mark.REFERENCE:
             self._since, self._complete, self._number = [], True, number
@@ -188,10 +188,11 @@ class Recordings:
     def put(self, message: RunMessage) -> None:
         """Have it recorded, and remember what a new recording needs; events from any thread."""
         match message:
-            case RawRead():
+            case RawRead() if self._awaiting is not None:
                 self._head()
             case MarkedFrame():
-                self._pre_roll.frame(message.frame, message.mark, self._numbered())
+                number = self._numbered() if message.mark & Mark.REFERENCE else 0
+                self._pre_roll.frame(message.frame, message.mark, number)
             case FrameResult():
                 self._pre_roll.result(message)
             case BoardInfo():

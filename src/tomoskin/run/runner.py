@@ -18,17 +18,15 @@ from tomoskin.run.commands import (
     DirectCommand,
     Note,
     Opener,
-    ReplayCommand,
     SetPose,
     SetTwin,
 )
-from tomoskin.run.counters import Latency
 from tomoskin.run.flow import Flow, Snapshot
 from tomoskin.run.intake import play
 from tomoskin.run.loop import Loop
 from tomoskin.run.publisher import Audience, Turns
 from tomoskin.run.sinks import Sink
-from tomoskin.run.status import Status
+from tomoskin.run.status import Latency, Status
 from tomoskin.run.twin_control import TwinControl
 from tomoskin.sensing.signal import Reference
 
@@ -49,28 +47,20 @@ def do(flow: Flow, command: DirectCommand) -> None:
             host_time = newest.result.host_time if newest else flow.now()
             flow.out.put(Event(host_time, "note", command.text))
         case SetTwin():
-            _break(flow, command)
+            if not flow.twin.breakable:
+                raise WireError(f"{flow.source} cannot simulate faults")
+            try:
+                flow.twin.set_harm(command)
+            except ModelError as error:
+                raise WireError(str(error)) from None
         case SetPose():
             if not flow.twin.bendable:
                 raise WireError(f"{flow.source} cannot be bent on the page")
             flow.twin.set_pose(command, flow.prepared.skin.surface)
         case _:
-            _play(flow, command)
-
-
-def _break(flow: Flow, command: SetTwin) -> None:
-    if not flow.twin.breakable:
-        raise WireError(f"{flow.source} cannot simulate faults")
-    try:
-        flow.twin.set_harm(command)
-    except ModelError as error:
-        raise WireError(str(error)) from None
-
-
-def _play(flow: Flow, command: ReplayCommand) -> None:
-    if flow.marker.replay is None:
-        raise WireError(f"{flow.source} is not a replay")
-    play(flow.marker.replay, command)
+            if flow.marker.replay is None:
+                raise WireError(f"{flow.source} is not a replay")
+            play(flow.marker.replay, command)
 
 
 class Runner:

@@ -16,7 +16,6 @@ from tomoskin.model.skin import Skin
 from tomoskin.pipeline import REFERENCE_FRAMES
 from tomoskin.run.twin_control import described
 from tomoskin.twin import (
-    Contact,
     Disturbance,
     Line,
     LineSettings,
@@ -121,7 +120,7 @@ class _Run:
         self._frame_time = Configuration.of(self._scan, self._asked).scan_time
         contact = settings.contact
         self._friction = {"slide": contact.friction, "roll": contact.rolling_friction}
-        self._truth: tuple[tuple[Contact, ...], list[dict[str, float | str]]] = ((), [])
+        self._truth: tuple[tuple[Probe, ...], list[dict[str, float | str]]] = ((), [])
         self._disturbance = Disturbance()
         self._marks = sorted(script.marks, key=lambda mark: mark.given.at)
         self._frames = 0
@@ -140,9 +139,8 @@ class _Run:
             except BaseException as error:  # Ctrl-C too
                 gone, complete = clock.now(), script.lead_in + script.duration
                 with contextlib.suppress(DataError):  # of a disk that is full, say
-                    self._writer.note(
-                        gone, f"stopped after {gone:.1f} of {complete:g} s: {_why(error)}"
-                    )
+                    why = "interrupted" if isinstance(error, KeyboardInterrupt) else str(error)
+                    self._writer.note(gone, f"stopped after {gone:.1f} of {complete:g} s: {why}")
                 raise
             return Simulated(self._frames, link.frames.lost, script.duration + script.lead_in)
 
@@ -208,10 +206,6 @@ def _idle_frames(script: Script, frame_time: float) -> int:
     starts += [fault.given.start for fault in script.faults]
     quiet = script.lead_in + min(starts, default=script.duration)
     return max(1, min(REFERENCE_FRAMES, int(quiet / frame_time)))
-
-
-def _why(error: BaseException) -> str:
-    return "interrupted" if isinstance(error, KeyboardInterrupt) else str(error)
 
 
 def _described(script: Script, settings: TwinSettings, idle: int) -> dict[str, object]:

@@ -1,18 +1,213 @@
-"""How the running pipeline is doing, for a person and for a program."""
+"""How the run is doing: how fast frames came, where the age of a picture comes from, what a frame
+took its time for; and all of it for a person and for a program."""
 
 from __future__ import annotations
 
+import heapq
 import math
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
+
+import numpy as np
 
 from tomoskin.board.wire import Info
+from tomoskin.core import Frame, watch_stages
 from tomoskin.imaging import AlphaChoice
 from tomoskin.learning import BendReading, CalibrationHealth, ClassReading
 from tomoskin.pipeline import ReferenceState
-from tomoskin.run.counters import FrameCost, StageLatency
 from tomoskin.run.sinks import SinkReport
 from tomoskin.sensing.signal import ElectrodeHealth
+
+_KEPT = 50
+"""Frames of which the cost is kept: the slowest."""
+
+_SLOW_AMONG = 20_000
+"""Newest frames that these are of."""
+
+_OFTEN = 100
+"""Frames after which what is older than the window is forgotten."""
+
+_BEGIN = "voltages"
+_SHOWN = 4
+"""Stages that a text names, those that took longest first."""
+
+
+@dataclass(frozen=True, slots=True)
+class FrameCost:
+    """What one frame's work was.
+
+    Attributes
+    ----------
+    number, sequence, host_time
+        Of the frame: counted by the host and by the board, and when it was read, s.
+    stages
+        Of each stage its name, µs, and how often it began, in the order of the first time.
+    """
+
+    number: int
+    sequence: int
+    host_time: float
+    stages: tuple[tuple[str, float, int], ...]
+
+    @property
+    def seconds(self) -> float:
+        """The seconds that all stages took together."""
+        return 1e-6 * sum(spent for _, spent, _ in self.stages)
+
+    @property
+    def text(self) -> str:
+        """What took longest, in words: "3.1 ms: touches 1.9 (2 times), one touch more 0.7"."""
+        longest = sorted(self.stages, key=lambda stage: -stage[1])[:_SHOWN]
+        parts = [
+            f"{name} {spent / 1e3:.2f}" + (f" ({times} times)" if times > 1 else "")
+            for name, spent, times in longest
+        ]
+        return f"{1e3 * self.seconds:.2f} ms: {', '.join(parts)}"
+
+
+class CostMeter:
+    """Times the stages that a frame's work says it has reached (:func:`tomoskin.core.reach`).
+
+    Written by one thread, read by any.
+    """
+
+    def __init__(self, clock: Callable[[], float]) -> None:
+        """Begin to measure with ``clock``, which gives seconds."""
+        self._clock, self._count = clock, 0
+        self._stage, self._since = _BEGIN, 0.0
+        self._spent: dict[str, list[float]] = {}
+        self._kept: list[tuple[float, int, FrameCost]] = []  # a heap by s and number, negative
+
+    @property
+    def slowest(self) -> tuple[FrameCost, ...]:
+        """The slowest of the newest frames, the slowest first."""
+        return tuple(cost for _, _, cost in sorted(self._kept, reverse=True))
+
+    @contextmanager
+    def of(self, frame: Frame) -> Iterator[None]:
+        """Time what the block does with ``frame``."""
+        begun = self._clock()
+        self._spent, self._stage, self._since = {}, _BEGIN, begun
+        try:
+            with watch_stages(self._reach):
+                yield
+        finally:
+            self._reach("")
+            self._keep(frame, self._since - begun)
+
+    def _reach(self, stage: str) -> None:
+        now = self._clock()
+        spent = self._spent.setdefault(self._stage, [0.0, 0])
+        spent[0] += now - self._since
+        spent[1] += stage != self._stage
+        self._stage, self._since = stage or self._stage, now
+
+    def _keep(self, frame: Frame, seconds: float) -> None:
+        number, self._count = self._count, self._count + 1
+        if number % _OFTEN == 0:
+            first = number - _SLOW_AMONG
+            self._kept = [one for one in self._kept if -one[1] > first]
+            heapq.heapify(self._kept)
+        if len(self._kept) >= _KEPT and seconds <= self._kept[0][0]:
+            return
+        stages = [(name, 1e6 * spent, int(times)) for name, (spent, times) in self._spent.items()]
+        cost = FrameCost(number, frame.sequence, frame.host_time, tuple(stages))
+        if len(self._kept) < _KEPT:
+            heapq.heappush(self._kept, (seconds, -number, cost))
+        else:
+            heapq.heapreplace(self._kept, (seconds, -number, cost))
+
+
+_WINDOW = 512
+"""Frames whose times are kept: some seconds of a real board."""
+
+_RECENT = 1.0
+"""Seconds over which the rate is counted."""
+
+Timed = Literal["sample", "decode", "reconstruct", "publish"]
+_TIMED: tuple[Timed, ...] = ("sample", "decode", "reconstruct", "publish")
+
+
+@dataclass(frozen=True, slots=True)
+class StageLatency:
+    """How long one stage took of late, s: median and 99th percentile; NaN: not known."""
+
+    name: str
+    p50: float
+    p99: float
+
+
+class Latency:
+    """Times of the last frames, in bounded memory; each is written by one thread, read by any.
+
+    ``frames``: their number since the start.
+    """
+
+    def __init__(self, window: int = _WINDOW) -> None:
+        """Make counters without any times."""
+        self._times = {name: deque[float](maxlen=window) for name in _TIMED}
+        self._arrivals, self._ages = deque[float](maxlen=window), deque[float](maxlen=window)
+        self._painted: dict[object, tuple[float, float]] = {}
+        self._last: Frame | None = None
+        self.frames = 0
+
+    def add_frame(self, frame: Frame, read: float, tick_rate: float) -> None:
+        """Note a frame whose last byte was read at ``read``, s; ``tick_rate`` in Hz."""
+        self.frames += 1
+        self._arrivals.append(read)
+        last, self._last = self._last, frame
+        if last is not None and frame.sequence == last.sequence + 1 and frame.ticks > last.ticks:
+            self._times["sample"].append((frame.ticks - last.ticks) / tick_rate)
+
+    def add_result(self, decode: float, reconstruct: float) -> None:
+        """Note how long a frame took from its last byte to the pipeline, and from there to its
+        touches, s."""
+        self._times["decode"].append(decode)
+        self._times["reconstruct"].append(reconstruct)
+        self._ages.append(decode + reconstruct)
+
+    def add_published(self, seconds: float) -> None:
+        """Note how long it took from a frame's touches to a page's connection."""
+        self._times["publish"].append(seconds)
+
+    def set_paint(self, page: object, p50: float, p99: float) -> None:
+        """What a page says of its own drawing, s."""
+        self._painted[page] = p50, p99
+
+    def forget(self, page: object) -> None:
+        """Forget a page that has stopped drawing."""
+        self._painted.pop(page, None)
+
+    def age(self) -> tuple[float, float]:
+        """(p50, p99) from a frame's last byte to its touches, s; NaN before the first."""
+        return _percentiles(self._ages)
+
+    def rate(self, now: float) -> float:
+        """Frames per second over the last second; 0 where fewer than two came."""
+        recent = [time for time in self._arrivals.copy() if time > now - _RECENT]
+        span = max(recent) - min(recent) if recent else 0.0
+        return (len(recent) - 1) / span if span > 0 else 0.0
+
+    def stages(self) -> tuple[StageLatency, ...]:
+        """All stages, in the order of the flow; of the pages the one that is slowest."""
+        slowest = max(
+            self._painted.copy().values(), key=lambda p: p[1], default=(float("nan"),) * 2
+        )
+        timed = [StageLatency(name, *_percentiles(self._times[name])) for name in _TIMED]
+        return *timed, StageLatency("paint", *slowest)
+
+
+def _percentiles(times: deque[float]) -> tuple[float, float]:
+    """(p50, p99); NaN before the first. ``times`` may grow meanwhile, in another thread."""
+    values = list(times.copy())
+    if not values:
+        return float("nan"), float("nan")
+    p50, p99 = np.percentile(values, (50, 99))
+    return float(p50), float(p99)
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,18 +317,10 @@ class Status:
             taken, needed = self.reference.frames, self.reference.needed
             return f"{self.source}: taking the reference, {taken} of {needed} frames; do not touch"
         drift = self.reference.baseline.drift if self.reference.baseline else 0.0
-        return (
+        text = (
             f"{self.source}: {self.fps:.0f} frames/s, {self.dropped} dropped, "
             f"p99 {1e3 * self.p99:.1f} ms, drift {100 * drift:.1f} %"
-            f"{self._bend_text}{self._state_text}"
         )
-
-    @property
-    def _bend_text(self) -> str:
-        if self.bend is None:
-            return ""
-        return f", bend {math.degrees(self.bend.angle):.0f}° ({self.bend.state})"
-
-    @property
-    def _state_text(self) -> str:
-        return "" if self.class_reading is None else f", {self.class_reading.text}"
+        if self.bend is not None:
+            text += f", bend {math.degrees(self.bend.angle):.0f}° ({self.bend.state})"
+        return text if self.class_reading is None else f"{text}, {self.class_reading.text}"

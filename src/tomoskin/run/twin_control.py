@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import threading
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any, Protocol, runtime_checkable
 
 from tomoskin.core import TomoskinError, WireError
 from tomoskin.model.mesh import Arm, Hinge, Plane, Surface
 from tomoskin.run.commands import BendRequest, SetPose, SetTwin
-from tomoskin.twin import Bent, Contact, Faults, Pose, Press, Stretched
+from tomoskin.twin import Bent, Faults, Pose, Press, Probe, Stretched
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +67,7 @@ def _surface(bend: BendRequest, rest: Surface) -> Surface:
 class Pressable(Protocol):
     """A source that can be pressed, as the twin can."""
 
-    def set_presses(self, presses: tuple[Contact, ...]) -> None:
+    def set_presses(self, presses: tuple[Probe, ...]) -> None:
         """Set all presses from now on."""
 
 
@@ -109,11 +109,11 @@ class TwinControl:
 
     def __init__(self) -> None:
         """Nothing is done, and there is no source."""
-        self.truth: tuple[Contact, ...] = ()
+        self.truth: tuple[Probe, ...] = ()
         self.refusals: tuple[str, ...] = ()
         self.pose = SheetPose()
         self.harm = SetTwin((), None)
-        self._presses: dict[object, tuple[Contact, ...]] = {}
+        self._presses: dict[object, tuple[Probe, ...]] = {}
         self._is_due = True
         self._pressable: Pressable | None = None
         self._breakable: Breakable | None = None
@@ -158,7 +158,7 @@ class TwinControl:
         with self._lock:
             self._bend(pose)
 
-    def hold(self, owner: object, presses: tuple[Contact, ...]) -> None:
+    def hold(self, owner: object, presses: tuple[Probe, ...]) -> None:
         """All presses that ``owner`` holds now; an empty tuple lifts them."""
         self._presses.pop(owner, None)
         if presses:
@@ -188,13 +188,13 @@ class TwinControl:
 
 
 def _felt(
-    source: Pressable, presses: tuple[Contact, ...]
-) -> tuple[tuple[Contact, ...], tuple[str, ...]]:
+    source: Pressable, presses: tuple[Probe, ...]
+) -> tuple[tuple[Probe, ...], tuple[str, ...]]:
     """Those of ``presses`` that ``source`` takes, and why it does not take the others."""
     with contextlib.suppress(Exception):  # which of them it was is found below
         source.set_presses(presses)
         return presses, ()
-    felt: tuple[Contact, ...] = ()
+    felt: tuple[Probe, ...] = ()
     refusals = []
     for press in presses:
         try:
@@ -207,15 +207,9 @@ def _felt(
     return felt, tuple(refusals)
 
 
-def described(contact: Contact) -> dict[str, Any]:
+def described(probe: Probe) -> dict[str, Any]:
     """A press as a recording describes it: by the circle with the area of its face."""
-    if isinstance(contact, Press):
-        return asdict(contact)
-    return {
-        "x": contact.x,
-        "y": contact.y,
-        "force": contact.force,
-        "radius": contact.radius,
-        "angle": contact.angle,
-        "shape": type(contact.shape).__name__.lower(),
-    }
+    circle = {"x": probe.x, "y": probe.y, "force": probe.force, "radius": probe.radius}
+    if isinstance(probe, Press):
+        return circle
+    return circle | {"angle": probe.angle, "shape": type(probe.shape).__name__.lower()}

@@ -12,7 +12,7 @@ from tomoskin.files.session import SessionReader
 from tomoskin.run import Runner
 from tomoskin.server.folder import SESSION, Folder
 from tomoskin.server.hub import Hub
-from tomoskin.server.page_connection import Listener
+from tomoskin.server.page_connection import Page
 from tomoskin.server.page_messages import Exported, FileEntry, Files
 from tomoskin.server.requests import (
     Annotate,
@@ -84,34 +84,34 @@ class FileHandlers:
             }
         )
 
-    def _list(self, page: Listener) -> None:
+    def _list(self, page: Page) -> None:
         def answer(listed: tuple[tuple[FileEntry, ...], int]) -> None:
             files, others = listed
             page.post(Files.of(self._use, files=files, others=others).json)
 
         self._hub.tasks.run(page, self._folder.list_files, answer)
 
-    def _rename(self, page: Listener, request: RenameSession) -> None:
+    def _rename(self, page: Page, request: RenameSession) -> None:
         def work() -> str:
             self._use.check_idle(request.name)
             return self._folder.rename(request.name, request.to)
 
         self._change(page, work, lambda new: f"{request.name} is now {new}")
 
-    def _delete(self, page: Listener, request: DeleteSession) -> None:
+    def _delete(self, page: Page, request: DeleteSession) -> None:
         def work() -> None:
             self._use.check_idle(request.name)
             self._folder.delete(request.name)
 
         self._change(page, work, lambda _: f"{request.name} is deleted")
 
-    def _annotate(self, page: Listener, request: Annotate) -> None:
+    def _annotate(self, page: Page, request: Annotate) -> None:
         def work() -> None:
             self._folder.annotate(request.name, request.text)
 
         self._change(page, work, lambda _: f"Notes on {request.name} are saved")
 
-    def _change(self, page: Listener, work: Callable[[], _T], said: Callable[[_T], str]) -> None:
+    def _change(self, page: Page, work: Callable[[], _T], said: Callable[[_T], str]) -> None:
         """Change the folder, and say to every page what has been done."""
 
         def done(outcome: _T) -> None:
@@ -120,16 +120,16 @@ class FileHandlers:
 
         self._hub.tasks.run(page, work, done)
 
-    def _open(self, page: Listener, request: OpenSession) -> None:
+    def _open(self, page: Page, request: OpenSession) -> None:
         def work() -> None:
             self._switch.play(self._complete(request.name))
 
         self._hub.tasks.run(page, work, lambda _: self._hub.show())
 
-    def _live(self, page: Listener) -> None:
+    def _live(self, page: Page) -> None:
         self._hub.tasks.run(page, self._switch.back, lambda _: self._hub.show())
 
-    def _export(self, page: Listener, request: ExportSession) -> None:
+    def _export(self, page: Page, request: ExportSession) -> None:
         if self._use.exporting is not None:
             raise WireError(f"{self._use.exporting} is being exported: wait until it has ended")
         self._use.exporting, self._use.share = request.name, 0.0

@@ -21,7 +21,6 @@ bit 2 some rows are left out of the image; bit 3 bends of this skin were learnt.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from enum import IntFlag
 
@@ -30,9 +29,8 @@ import numpy as np
 from tomoskin.core import Force, Touch
 from tomoskin.learning import BendReading
 from tomoskin.pipeline import FrameResult
-from tomoskin.run import Runner, Snapshot
 from tomoskin.sensing.track import force_values
-from tomoskin.twin import Contact
+from tomoskin.twin import Probe
 
 MAGIC = b"TSK1"
 
@@ -84,30 +82,7 @@ _MOST = 255
 """Labels are bytes: more touches than that are not sent."""
 
 
-class NewestFrame:
-    """The newest result of a runner as a message, made once for all pages."""
-
-    def __init__(self, runner: Runner) -> None:
-        self._runner = runner
-        self._made: tuple[Snapshot, bytes] | None = None
-
-    def __call__(self) -> bytes | None:
-        """The message; None before the first result."""
-        newest = self._runner.newest
-        if newest is None:
-            return None
-        if self._made is None or self._made[0] is not newest:
-            data = encode_result(newest.result, newest.truth, newest.latency)
-            self._made = (newest, data)
-        return self._made[1]
-
-    def note_sent(self, message: bytes) -> None:
-        """Note how long it took until a page's connection had ``message``."""
-        if self._made is not None and self._made[1] is message:
-            self._runner.latency.add_published(time.monotonic() - self._made[0].ready)
-
-
-def encode_result(result: FrameResult, truth: Sequence[Contact], latency: float) -> bytes:
+def encode_result(result: FrameResult, truth: Sequence[Probe], latency: float) -> bytes:
     """Message of one result.
 
     Parameters

@@ -15,7 +15,7 @@ from tomoskin.run import Runner
 from tomoskin.server.folder import Folder
 from tomoskin.server.guided_flow import GuidedFlow, StoppedError
 from tomoskin.server.hub import Hub
-from tomoskin.server.page_connection import Listener
+from tomoskin.server.page_connection import Page
 from tomoskin.server.page_messages import FlowNow
 from tomoskin.server.press_flow import MappingFlow, TouchFlow
 from tomoskin.server.requests import (
@@ -29,19 +29,15 @@ from tomoskin.server.requests import (
     SetWeight,
     ShowFlow,
     StopLearning,
-    UndoPress,
 )
 from tomoskin.server.rub_flow import RubFlow
 from tomoskin.server.weigh_flow import WeighFlow
 
-_OF_FLOWS = (UndoPress, DeletePress, SetWeight, AskPoint, LearnFlow, StopLearning)
+_OF_FLOWS = (DeletePress, SetWeight, AskPoint, LearnFlow, StopLearning)
 """Requests that the flow of the moment answers."""
 
 _FLOWS: dict[FlowKind, Callable[[Prepared], GuidedFlow]] = {
-    "touch": TouchFlow,
-    "mapping": MappingFlow,
-    "force": WeighFlow,
-    "rub": RubFlow,
+    flow.kind: flow for flow in (TouchFlow, MappingFlow, WeighFlow, RubFlow)
 }
 _LOOKS = 0.3
 """Seconds after which pages are told how far an estimate is."""
@@ -65,7 +61,7 @@ class GuideHandlers:
         self._hub, self._note = hub, note
         self._folder = Folder(hub.folder)
         self._flow: GuidedFlow | None = None
-        self._shown_by: set[Listener] = set()
+        self._shown_by: set[Page] = set()
         self._watching = contextlib.ExitStack()
         hub.serve(
             {
@@ -95,7 +91,7 @@ class GuideHandlers:
         flow.show(on=on)
         return True
 
-    def _begin(self, page: Listener, kind: FlowKind) -> None:
+    def _begin(self, page: Page, kind: FlowKind) -> None:
         if self._hub.runner.replay is not None:
             raise WireError("presses need a live source: go back to live first")
         flow = _FLOWS[kind](self._hub.runner.prepared)
@@ -105,7 +101,7 @@ class GuideHandlers:
         self._watching.enter_context(self._hub.runner.audience.subscribe("guide", look))
         self._tell()
 
-    def _show(self, page: Listener, *, on: bool) -> None:
+    def _show(self, page: Page, *, on: bool) -> None:
         """A page shows the flow, or does not any more."""
         if on:
             self._shown_by.add(page)
@@ -174,7 +170,7 @@ class GuideHandlers:
         if flow is self._flow:
             self._tell()
 
-    def _keep(self, page: Listener, request: KeepFlow) -> None:
+    def _keep(self, page: Page, request: KeepFlow) -> None:
         flow = self._flow
         if flow is None:
             raise WireError("there are no presses to save: press the skin first")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal
 
@@ -17,7 +17,7 @@ from tomoskin.run import Runner, commands
 from tomoskin.sensing.segment import Region
 from tomoskin.server.folder import Folder
 from tomoskin.server.page_messages import Figures, FlowNow, Point
-from tomoskin.server.requests import FlowKind
+from tomoskin.server.requests import DeletePress, FlowKind
 
 _FILLED, _INSIDE = 0.6, 0.85
 """Parts of the way to the rim that dots stay within: those that fill the sheet, since presses all
@@ -62,6 +62,11 @@ class Estimate:
     answer: Any = None
 
 
+def counted(count: int, one: str, many: str) -> str:
+    """A number of things in words."""
+    return f"{count} {one if count == 1 else many}"
+
+
 class StoppedError(TomoskinError):
     """Nobody waits for the answer any more."""
 
@@ -74,8 +79,10 @@ class GuidedFlow(ABC):
     ----------
     teaches
         The kind of calibration that is kept; None: something else is.
-    kind, prepared
-        What it is for, and the skin.
+    kind
+        What it is for.
+    prepared
+        The skin.
     estimate, trouble
         What the presses tell, or why that is not known.
     estimating, stage
@@ -89,14 +96,17 @@ class GuidedFlow(ABC):
         whether there is something to estimate. WireError refuses.
     """
 
+    kind: ClassVar[FlowKind]
     teaches: ClassVar[Kind[Any] | None] = None
 
-    def __init__(self, kind: FlowKind, prepared: Prepared) -> None:
-        self.kind, self.prepared = kind, prepared
+    def __init__(self, prepared: Prepared) -> None:
+        self.prepared = prepared
         self.estimate: Estimate | None = None
         self.trouble = self.stage = ""
         self.estimating = self.paused = False
-        self.answers: Mapping[type, Callable[[Any], bool]] = {}
+        self.answers: dict[type, Callable[[Any], bool]] = {
+            DeletePress: lambda request: self.delete(request.number)
+        }
         self.taken: list[Any] = []
         self._dots = Dots(prepared)
         self.lock = threading.RLock()
@@ -114,11 +124,23 @@ class GuidedFlow(ABC):
         """What an estimate rests on now."""
         return tuple(self.taken)
 
-    def take_back(self, number: int) -> Any:
-        """Remove what was recorded ``number``-th; WireError where there is none."""
+    def take_back(self, number: int | None) -> Any:
+        """Remove what was recorded ``number``-th, or last; WireError where there is none."""
+        number = len(self.taken) - 1 if number is None else number
         if not 0 <= number < len(self.taken):
             raise WireError("there is no press to undo")
         return self.taken.pop(number)
+
+    def delete(self, number: int | None) -> bool:
+        """Remove a press as :meth:`take_back` does; whether there is something to estimate."""
+        self.take_back(number)
+        self.estimate = None
+        return True
+
+    @property
+    def hint(self) -> str:
+        """What is wrong with what is being recorded, and what to do; "" where nothing is."""
+        return ""
 
     @abstractmethod
     def estimate_from(self, examples: tuple[Any, ...]) -> Estimate:
@@ -166,7 +188,7 @@ class GuidedFlow(ABC):
             "kind": self.kind,
             "paused": self.paused,
             "thinking": self.estimating,
-            "text": self.trouble or estimate.text,
+            "text": self.hint or self.trouble or estimate.text,
             "ready": estimate.ready and not self.estimating,
             "figures": estimate.figures,
         }

@@ -15,7 +15,7 @@ from tomoskin.server.file_handlers import FileHandlers
 from tomoskin.server.folder import Folder
 from tomoskin.server.guide_handlers import GuideHandlers
 from tomoskin.server.hub import Hub
-from tomoskin.server.page_connection import Listener
+from tomoskin.server.page_connection import Page
 from tomoskin.server.page_messages import Calibrations
 from tomoskin.server.requests import UseCalibration
 from tomoskin.server.settings_handlers import SettingsHandlers
@@ -64,7 +64,7 @@ class CalibrationHandlers:
             self._files[kind.name] = name
         self._hub.tell(*self.greeting())
 
-    def _use(self, page: Listener, request: UseCalibration) -> None:
+    def _use(self, page: Page, request: UseCalibration) -> None:
         def work() -> Kind[Any]:
             runner = self._hub.runner
             if request.name is None:
@@ -103,19 +103,19 @@ class TwinHandlers:
         )
         return (now,)
 
-    def _set(self, _: Listener, request: SetTwin) -> None:
+    def _set(self, _: Page, request: SetTwin) -> None:
         """Raise WireError where the source is no twin, or has no such electrode."""
         self._hub.runner.ask(request)
         self._hub.tell(*self.greeting())
 
-    def _pose(self, page: Listener, request: SetPose) -> None:
+    def _pose(self, page: Page, request: SetPose) -> None:
         """Raise WireError where the source has no sheet to bend."""
         if not self._hub.runner.twin.bendable:
             raise WireError(f"{self._hub.runner.status().source} cannot be bent on the page")
         self._newest = request
         self._hub.tasks.keep(self._bring(page, request))
 
-    async def _bring(self, page: Listener, request: SetPose) -> None:
+    async def _bring(self, page: Page, request: SetPose) -> None:
         """Bend the sheet unless something newer is asked for already, and say how it lies."""
         async with self._posing:
             if request is self._newest:

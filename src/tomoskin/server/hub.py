@@ -18,10 +18,10 @@ from tomoskin.core import DataError, GeometryError, TomoskinError, WireError
 from tomoskin.files.session import read_timeline
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, Unresolved, colour_limit
-from tomoskin.run import Runner, SetPresses, StrictRequest, commands
+from tomoskin.run import Runner, SetPresses, Snapshot, StrictRequest, commands
 from tomoskin.server import views
-from tomoskin.server.frames import NewestFrame
-from tomoskin.server.page_connection import Handler, Handlers, Host, Listener, Tasks, during
+from tomoskin.server.frames import encode_result
+from tomoskin.server.page_connection import Handler, Handlers, Host, Page, Tasks, during
 from tomoskin.server.page_messages import (
     EventNote,
     Message,
@@ -31,7 +31,7 @@ from tomoskin.server.page_messages import (
     UnresolvedMap,
 )
 from tomoskin.server.requests import AskUnresolved, Painted, SetRecording
-from tomoskin.twin import Contact
+from tomoskin.twin import Probe
 
 FILE_NAME = "tomoskin-%Y%m%d-%H%M%S.mcap"
 """Of a recording that is asked for on a page, for ``time.strftime``."""
@@ -40,22 +40,22 @@ FILE_NAME = "tomoskin-%Y%m%d-%H%M%S.mcap"
 def run_handlers(runner: Runner, folder: Path, tasks: Tasks) -> Handlers:
     """Handlers of a run whose recordings go to ``folder``, under names of their own."""
 
-    def submit(_: Listener, request: commands.Command) -> None:
+    def submit(_: Page, request: commands.Command) -> None:
         runner.submit(request)
 
-    def press(page: Listener, request: SetPresses) -> None:
+    def press(page: Page, request: SetPresses) -> None:
         runner.submit(commands.HoldPresses(page, _on_skin(request, runner.prepared.skin)))
 
-    def paint(page: Listener, request: Painted) -> None:
+    def paint(page: Page, request: Painted) -> None:
         runner.latency.set_paint(page, request.p50_s, request.p99_s)
 
-    def record(_: Listener, request: SetRecording) -> None:
+    def record(_: Page, request: SetRecording) -> None:
         tasks.keep(_record(runner, folder, on=request.on))
 
-    def map_out(page: Listener, _: AskUnresolved) -> None:
-        tasks.run(page, partial(_unresolved, runner), lambda found: page.post(found.json))
+    def map_out(page: Page, _: AskUnresolved) -> None:
+        tasks.run(page, partial(_unresolved, runner), lambda map_: page.post(map_.json))
 
-    def play(page: Listener, request: commands.ReplayCommand) -> None:
+    def play(page: Page, request: commands.ReplayCommand) -> None:
         tasks.run(page, partial(runner.ask, request), lambda _: None)  # a seek may read a file
 
     return {
@@ -76,10 +76,10 @@ def _unresolved(runner: Runner) -> UnresolvedMap:
     health = newest.result.health if newest else None
     lost = np.zeros(prepared.pattern.n_meas, bool) if health is None else health.lost
     try:
-        found = Unresolved.of(prepared, runner.status().choice.alpha, np.flatnonzero(lost))
+        part = Unresolved.of(prepared, runner.status().choice.alpha, np.flatnonzero(lost))
     except TomoskinError as error:
         return UnresolvedMap(values=None, radius_m=0.0, problem=error.message)
-    return UnresolvedMap(values=found.values.round(3).tolist(), radius_m=found.radius, problem="")
+    return UnresolvedMap(values=part.values.round(3).tolist(), radius_m=part.radius, problem="")
 
 
 async def _record(runner: Runner, folder: Path, *, on: bool) -> None:
@@ -90,7 +90,7 @@ async def _record(runner: Runner, folder: Path, *, on: bool) -> None:
         runner.say("recording-stopped", f"the recording did not start: {error}")
 
 
-def _on_skin(request: SetPresses, skin: Skin) -> tuple[Contact, ...]:
+def _on_skin(request: SetPresses, skin: Skin) -> tuple[Probe, ...]:
     """A finger that has slid off the sheet presses nothing; WireError for no face at all."""
     asked = request.presses
     if not asked:
@@ -114,8 +114,6 @@ class Hub(Host):
     ----------
     runner
         Where results come from.
-    limit
-        End of the colour scale, in the image's unit.
     folder
         Where a page's recordings go, under names of their own.
 
@@ -123,34 +121,33 @@ class Hub(Host):
     ----------
     opener
         Opens the source of the moment for a skin; None: it cannot follow another skin.
-    frame
-        The newest result as a page takes it.
     tasks
         What pages have asked for and is under way.
     """
 
-    def __init__(self, runner: Runner, *, limit: float, folder: Path | None = None) -> None:
+    def __init__(self, runner: Runner, folder: Path | None = None) -> None:
         super().__init__()
         self.runner = runner
         self.folder = folder or Path()
         self.opener: Callable[[Skin], Transport] | None = None
-        self.frame, self.tasks = NewestFrame(runner), Tasks()
+        self.tasks = Tasks()
         self._handlers: dict[type, Handler] = {}
         self._greetings: list[Callable[[], Sequence[Message]]] = []
-        self._farewells: list[Callable[[Listener], None]] = []
+        self._farewells: list[Callable[[Page], None]] = []
         self._wake_is_due = False
         self._next_event = 0
         self._timeline: PlayedTimeline | None = None
         self._past: deque[EventNote] = deque(maxlen=_FIRST_EVENTS)
-        self._limit = limit
+        self._limit = colour_limit(runner.prepared)
         self._scene: Scene | None = None
+        self._made: tuple[Snapshot, bytes] | None = None
         self.serve(run_handlers(runner, self.folder, self.tasks))
 
     def serve(
         self,
         handlers: Handlers,
         greeting: Callable[[], Sequence[Message]] = tuple,
-        farewell: Callable[[Listener], None] = lambda _: None,
+        farewell: Callable[[Page], None] = lambda _: None,
     ) -> None:
         """Answer these requests too, before the first page comes.
 
@@ -169,7 +166,11 @@ class Hub(Host):
         def announce() -> None:
             if not self._wake_is_due:
                 self._wake_is_due = True
-                loop.call_soon_threadsafe(self._wake)
+                loop.call_soon_threadsafe(wake)
+
+        def wake() -> None:
+            self._wake_is_due = False
+            self.wake()
 
         async with during(self._tick()):
             self._read_timeline()
@@ -181,7 +182,21 @@ class Hub(Host):
         timeline = [self._timeline] if self._timeline else []
         return [*self._now(), *timeline, *self._greeting(), *self._past]
 
-    def leave(self, page: Listener, why: str = "") -> None:
+    def newest(self) -> bytes | None:
+        """The newest result as a message, made once for all pages; None before the first."""
+        shown = self.runner.newest
+        if shown is None:
+            return None
+        if self._made is None or self._made[0] is not shown:
+            self._made = shown, encode_result(shown.result, shown.truth, shown.latency)
+        return self._made[1]
+
+    def note_sent(self, frame: bytes) -> None:
+        """Note how long it took until a page's connection had ``frame``."""
+        if self._made is not None and self._made[1] is frame:
+            self.runner.latency.add_published(time.monotonic() - self._made[0].ready)
+
+    def leave(self, page: Page, why: str = "") -> None:
         """Serve ``page`` no longer, and lift what it pressed."""
         super().leave(page)
         self.runner.submit(commands.HoldPresses(page, ()))
@@ -191,7 +206,7 @@ class Hub(Host):
         if why:
             self.runner.say("page-dropped", why)
 
-    def obey(self, page: Listener, request: StrictRequest) -> None:
+    def obey(self, page: Page, request: StrictRequest) -> None:
         """Do what a page asks. Raises WireError where that cannot be."""
         handler = self._handlers.get(type(request))
         if handler is None:
@@ -239,10 +254,6 @@ class Hub(Host):
             return
         self._timeline = views.timeline(timeline)
         self.tell(self._timeline)
-
-    def _wake(self) -> None:
-        self._wake_is_due = False
-        self.wake()
 
     async def _tick(self) -> None:
         while True:

@@ -18,7 +18,7 @@ from tomoskin.files.messages import Contacts, Stream
 from tomoskin.model.robot import PlacedSkin, Pose, Robot
 from tomoskin.run import RobotRun, Runner, StrictRequest, commands
 from tomoskin.server.hub import FILE_NAME
-from tomoskin.server.page_connection import Host, Listener, Tasks, during
+from tomoskin.server.page_connection import Host, Page, Tasks, during
 from tomoskin.server.page_messages import (
     PlacedShape,
     RobotScene,
@@ -36,47 +36,6 @@ PERIOD = 1 / 20
 
 _STATES = 5
 """So many looks, and all states are sent."""
-
-
-class NewestTouches:
-    """Touches of all skins as one message, JSON in bytes; a page gets the newest only."""
-
-    def __init__(self, run: RobotRun, streams: Mapping[str, Stream], poses: Mapping[str, Pose]):
-        self._run, self._streams, self._poses = run, streams, poses
-        self._made = b""
-
-    def __call__(self) -> bytes | None:
-        """The message that was made last; None before the first."""
-        return self._made or None
-
-    def note_sent(self, message: bytes) -> None:
-        """Do nothing: no latency is measured here."""
-
-    def renew(self) -> None:
-        """Make it of the newest results; the same object where nothing has changed."""
-        skins = {n: self._touches(n, r) for n, r in self._run.runners.items() if r.newest}
-        made = encode_json(RobotTouches(skins=skins))
-        if made != self._made:
-            self._made = made
-
-    def _touches(self, name: str, runner: Runner) -> TouchesOfSkin:
-        assert runner.newest is not None
-        if not runner.running:  # what touched last may touch no more
-            return TouchesOfSkin(valid=False, touches=[])
-        contacts = Contacts.of(self._streams[name], runner.newest.result)
-        pose = self._poses[name]
-        touches = [
-            SpaceTouch(
-                id=contact.touch.id,
-                position=_rounded(pose(np.array([contact.position]))[0]),
-                normal=_rounded(pose.rotation @ contact.normal),
-                peak=contact.touch.detection.peak,
-                force=contact.force,
-                more_than=_more_than(contact.touch.detection.force),
-            )
-            for contact in contacts.touches
-        ]
-        return TouchesOfSkin(valid=contacts.valid, touches=touches)
 
 
 class Overview(Host):
@@ -99,7 +58,7 @@ class Overview(Host):
             n: Stream.of(r.prepared, n, 0.0, placed[n].place) for n, r in run.runners.items()
         }
         poses = {n: robot.link_pose(placed[n].place) for n in run.runners}
-        self.frame = self._touches = NewestTouches(run, streams, poses)
+        self._streams, self._poses, self._touches = streams, poses, b""
         self._scene = scene(robot, streams, poses)
 
     @contextlib.asynccontextmanager
@@ -110,17 +69,21 @@ class Overview(Host):
 
     def first(self) -> tuple[RobotScene, RobotState]:
         """The robot, and how its skins are doing."""
-        self._touches.renew()  # while nobody looked it was not
+        self._renew()  # while nobody looked it was not
         return self._scene, states(self.run)
 
-    def leave(self, page: Listener, why: str = "") -> None:
+    def newest(self) -> bytes | None:
+        """The newest touches on all skins, JSON in bytes; None before the first."""
+        return self._touches or None
+
+    def leave(self, page: Page, why: str = "") -> None:
         """Stop serving ``page``, and say why in every run."""
         super().leave(page)
         if why:
             for runner in self.run.runners.values():
                 runner.say("page-dropped", why)
 
-    def obey(self, page: Listener, request: StrictRequest) -> None:
+    def obey(self, page: Page, request: StrictRequest) -> None:
         """Do what a page asks of all skins. Raises WireError where that cannot be."""
         match request:
             case commands.TakeReference():
@@ -147,12 +110,38 @@ class Overview(Host):
         count = 0
         while True:
             if self.pages:
-                self._touches.renew()
+                self._renew()
                 if count % _STATES == 0:
                     self._tell()
                 self.wake()
             count += 1
             await asyncio.sleep(PERIOD)
+
+    def _renew(self) -> None:
+        """Take the newest results; the same object where nothing has changed."""
+        runners = {n: r for n, r in self.run.runners.items() if r.newest}
+        made = encode_json(RobotTouches(skins={n: self._on(n, r) for n, r in runners.items()}))
+        if made != self._touches:
+            self._touches = made
+
+    def _on(self, name: str, runner: Runner) -> TouchesOfSkin:
+        assert runner.newest is not None
+        if not runner.running:  # what touched last may touch no more
+            return TouchesOfSkin(valid=False, touches=[])
+        contacts = Contacts.of(self._streams[name], runner.newest.result)
+        pose = self._poses[name]
+        touches = [
+            SpaceTouch(
+                id=contact.touch.id,
+                position=_rounded(pose(np.array([contact.position]))[0]),
+                normal=_rounded(pose.rotation @ contact.normal),
+                peak=contact.touch.detection.peak,
+                force=contact.force,
+                more_than=_more_than(contact.touch.detection.force),
+            )
+            for contact in contacts.touches
+        ]
+        return TouchesOfSkin(valid=contacts.valid, touches=touches)
 
 
 def scene(robot: Robot, streams: Mapping[str, Stream], poses: Mapping[str, Pose]) -> RobotScene:

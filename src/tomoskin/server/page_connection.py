@@ -7,7 +7,7 @@ import contextlib
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import AsyncIterator, Callable, Coroutine, Iterable, Mapping
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
@@ -19,17 +19,7 @@ from tomoskin.server.requests import decode_request
 _T = TypeVar("_T")
 
 
-class Listener(Protocol):
-    """What a handler needs of a page's connection."""
-
-    def wake(self) -> None:
-        """Say that there is a new frame."""
-
-    def post(self, text: str) -> None:
-        """Send ``text`` soon, without waiting for it."""
-
-
-Handler = Callable[[Listener, Any], None]
+Handler = Callable[["Page", Any], None]
 """Does what a page asks; in the event loop, so it returns at once. WireError refuses."""
 
 Handlers = Mapping[type, Handler]
@@ -61,7 +51,7 @@ class Tasks:
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
-    def run(self, page: Listener, work: Callable[[], _T], then: Callable[[_T], None]) -> None:
+    def run(self, page: Page, work: Callable[[], _T], then: Callable[[_T], None]) -> None:
         """Do ``work`` in a thread and ``then`` in the loop; what it raises goes to ``page``."""
 
         async def run() -> None:
@@ -88,16 +78,6 @@ _OUTBOX = 64
 _TRY_AGAIN_LATER = 1013
 
 
-class NewestMessage(Protocol):
-    """What a page is sent again and again, the newest only."""
-
-    def __call__(self) -> bytes | None:
-        """The message; None before the first."""
-
-    def note_sent(self, message: bytes) -> None:
-        """Note that a page has the message."""
-
-
 class Host(ABC):
     """Whom pages' connections are of; each message is encoded once for all pages.
 
@@ -107,21 +87,26 @@ class Host(ABC):
         The pages that are served.
     """
 
-    frame: NewestMessage
-    """The newest message for a page."""
-
     def __init__(self) -> None:
-        self.pages: set[Listener] = set()
+        self.pages: set[Page] = set()
 
     @abstractmethod
     def first(self) -> Iterable[Message]:
         """The messages that a new page is sent first."""
 
     @abstractmethod
-    def obey(self, page: Listener, request: StrictRequest) -> None:
+    def newest(self) -> bytes | None:
+        """The newest frame as a page takes it, the same object until there is another; None before
+        the first."""
+
+    def note_sent(self, frame: bytes) -> None:  # noqa: B027
+        """Note that a page has the frame."""
+
+    @abstractmethod
+    def obey(self, page: Page, request: StrictRequest) -> None:
         """Do what a page asks. Raises WireError where that cannot be."""
 
-    def join(self, page: Listener) -> bool:
+    def join(self, page: Page) -> bool:
         """Serve ``page`` from now on; False where there are too many."""
         if len(self.pages) >= MAX_PAGES:
             return False
@@ -130,7 +115,7 @@ class Host(ABC):
             page.post(message.json)
         return True
 
-    def leave(self, page: Listener, why: str = "") -> None:  # noqa: ARG002
+    def leave(self, page: Page, why: str = "") -> None:  # noqa: ARG002
         """Stop serving ``page``, whatever the reason."""
         self.pages.discard(page)
 
@@ -215,11 +200,11 @@ class Page:
         while self._outbox:
             await self._socket.send_text(self._outbox.popleft())
             await asyncio.sleep(0)  # that the page is gone is said in the loop's next turn
-        frame = self._host.frame()
+        frame = self._host.newest()
         if frame is not None and frame is not self._sent:
             await self._socket.send_bytes(frame)
             self._sent = frame
-            self._host.frame.note_sent(frame)
+            self._host.note_sent(frame)
 
 
 def _reason(done: set[asyncio.Task[None]]) -> str:

@@ -16,6 +16,8 @@ from tomoskin.core import encode_json
 from tomoskin.learning import ClassReading
 from tomoskin.run import ReplayStatus
 from tomoskin.run.sinks import SinkReport
+from tomoskin.sensing.signal import ElectrodeHealth
+from tomoskin.sensing.track import Span
 from tomoskin.server.requests import FlowKind, Unit
 
 Point = tuple[float, float]
@@ -161,15 +163,6 @@ class CalibrationNow(MessagePart, frozen=True):
     findings: tuple[str, ...]
 
 
-class Sick(MessagePart, frozen=True):
-    """An electrode that is not good, and why, in words."""
-
-    electrode: int
-    state: str
-    reason: str
-    since_s: float | None
-
-
 class RunState(Message, frozen=True, tag="state"):
     """One look at the runner.
 
@@ -191,7 +184,7 @@ class RunState(Message, frozen=True, tag="state"):
     slowest: list[SlowFrame]
     reference: ReferenceNow
     baseline: BaselineNow | None
-    sick: list[Sick]
+    sick: tuple[ElectrodeHealth, ...]
     noise_v: float | None
     alpha: float
     rule: str
@@ -228,37 +221,13 @@ class UnresolvedMap(Message, frozen=True, tag="unresolved"):
     problem: str
 
 
-class Tick(MessagePart, frozen=True):
-    """A moment of a recording, from its first frame, and what happened."""
-
-    time_s: float
-    text: str
-
-
-class TimedEvent(MessagePart, frozen=True):
-    """An event of a recording, at its time."""
-
-    time_s: float
-    kind: str
-    text: str
-
-
-class TouchSpan(MessagePart, frozen=True):
-    """A touch of a recording, and when it was there."""
-
-    id: int
-    kind: str
-    begin_s: float
-    end_s: float
-
-
 class PlayedTimeline(Message, frozen=True, tag="timeline"):
-    """What happened in the recording that is played."""
+    """What happened in the recording that is played, at times from its first frame."""
 
     end_s: float
-    notes: list[Tick]
-    events: list[TimedEvent]
-    touches: list[TouchSpan]
+    notes: list[EventNote]
+    events: list[EventNote]
+    touches: tuple[Span, ...]
 
 
 # Files, sources, calibrations.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, Literal
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -20,10 +20,16 @@ from tomoskin.learning import (
 from tomoskin.pipeline import FrameResult, Prepared, prepare
 from tomoskin.run import Runner, commands
 from tomoskin.server.folder import Folder
-from tomoskin.server.guided_flow import EFFORTS, Effort, Estimate, GuidedFlow, GuidedPress
-from tomoskin.server.page_messages import Figures
+from tomoskin.server.guided_flow import (
+    EFFORTS,
+    Effort,
+    Estimate,
+    GuidedFlow,
+    GuidedPress,
+    counted,
+)
+from tomoskin.server.page_messages import Figures, Point
 from tomoskin.server.press_taker import PressTaker
-from tomoskin.server.requests import UndoPress
 
 _FEWEST_TOUCH, _FEWEST_MAPPING = 6, 3
 _FIRST = 10
@@ -33,8 +39,7 @@ _FIRST = 10
 def estimate_touch(prepared: Prepared, presses: Sequence[GuidedPress]) -> Estimate:
     """A locator of the presses, and by how much it misses them. Raises DataError."""
     if len(presses) < _FEWEST_TOUCH:
-        left = _FEWEST_TOUCH - len(presses)
-        return Estimate(f"{_counted(left)} more for a first estimate")
+        return Estimate(f"{_presses(_FEWEST_TOUCH - len(presses))} more for a first estimate")
     dv, xy = _arrays(presses)
     locator = Locator.fit(dv, xy, pattern=prepared.pattern, skin=prepared.skin)
     errors = 1e3 * locator.errors
@@ -86,8 +91,7 @@ def estimate_mapping(
 ) -> Estimate:
     """The likeliest channel mapping and how sure it is; ``untouched`` mean, noise V. DataError."""
     if len(presses) < _FEWEST_MAPPING:
-        left = _FEWEST_MAPPING - len(presses)
-        return Estimate(f"{_counted(left)} more for a first answer")
+        return Estimate(f"{_presses(_FEWEST_MAPPING - len(presses))} more for a first answer")
     dv, xy = _arrays(presses)
     rest, noise = untouched or (None, None)
     solution = solve_channel_mapping(dv, xy, prepared.skin, reference=rest, noise=noise)
@@ -114,82 +118,87 @@ def _in_words(solution: MappingAnswer, figures: Figures) -> str:
     return f"Not sure yet: {figures.mapping}, or {figures.runner_up}. The next dot decides"
 
 
-class _DotFlow(GuidedFlow):
-    """Presses where the dot is; see :class:`GuidedFlow`."""
+class DotFlow(GuidedFlow):
+    """Presses where the dot is, while there is one; see :class:`GuidedFlow`."""
 
-    efforts: tuple[Effort | None, ...] = (None,)
+    efforts: ClassVar[tuple[Effort | None, ...]] = (None,)
 
-    def __init__(self, kind: Literal["touch", "mapping"], prepared: Prepared) -> None:
-        super().__init__(kind, prepared)
-        self.answers = {UndoPress: lambda _: self._undo()}
-        self._taker = PressTaker.of(prepared)
+    def __init__(self, prepared: Prepared) -> None:
+        super().__init__(prepared)
+        self._taker: PressTaker | None = PressTaker.of(prepared)
+        self._dot: Point | None = self._next_dot()
         self._undone = False
-        self._dot = self._dots.next((), None)
 
     def see(self, result: FrameResult) -> bool | None:
         """Take a press on the dot, and move the dot on; or say what else is to be done."""
-        taker, before = self._taker, (self._taker.phase, self._taker.hint)
+        taker, dot = self._taker, self._dot
+        if taker is None or dot is None:
+            return None
+        before = taker.phase, taker.hint
         if self._undone and taker.phase == "release":  # it may have been no press
             taker.restart()
         self._undone = False
         dv = taker.push(result.host_time, result.voltages, touched=bool(result.touches))
         if dv is None:
             return None if before == (taker.phase, taker.hint) else False
-        away = [math.dist((t.detection.x, t.detection.y), self._dot) for t in result.touches]
-        missed = min(away, default=None)
-        self.taken.append(GuidedPress(self._dot, dv, self.effort, missed))
-        self._dot = self._dots.next([p.place for p in self.taken], self.estimate)
+        away = [math.dist((t.detection.x, t.detection.y), dot) for t in result.touches]
+        self.taken.append(GuidedPress(dot, dv, self.effort, min(away, default=None)))
+        self._dot = self._next_dot()
         return True
+
+    def _next_dot(self) -> Point:
+        return self._dots.next([press.place for press in self.taken], self.estimate)
 
     def restart(self) -> None:
         """Forget the press that is being made."""
-        self._taker.restart()
+        if self._taker is not None:
+            self._taker.restart()
 
     @property
     def effort(self) -> Effort | None:
         """How to press the dot; None where that does not matter."""
         return self.efforts[len(self.taken) % len(self.efforts)]
 
-    def _undo(self) -> bool:
-        """Remove the last press, and ask for it again."""
-        self._dot = self.take_back(len(self.taken) - 1).place
+    def delete(self, number: int | None) -> bool:
+        """Remove a press, and ask for it again."""
+        self._dot = self.take_back(number).place
         self.estimate, self._undone = None, True
         return True
 
+    @property
+    def hint(self) -> str:
+        """What is wrong with the press that is being made."""
+        return "" if self._taker is None else self._taker.hint
+
     def details(self) -> dict[str, Any]:
-        """What the page shows: the dot to press, the presses, and a hint."""
-        hint = {"text": self._taker.hint} if self._taker.hint else {}
-        return hint | {
-            "phase": self._taker.phase,
+        """What the page shows: the dot to press, and the presses."""
+        return {
+            "phase": "rub" if self._taker is None else self._taker.phase,
             "dot": self._dot,
             "effort": self.effort,
             "presses": [press.place for press in self.taken],
         }
 
 
-class TouchFlow(_DotFlow):
+class TouchFlow(DotFlow):
     """Touch is learnt from presses on dots, soft and hard in turn."""
 
-    teaches = TOUCH
-    efforts = EFFORTS
-
-    def __init__(self, prepared: Prepared) -> None:
-        super().__init__("touch", prepared)
+    kind, teaches, efforts = "touch", TOUCH, EFFORTS
 
     def estimate_from(self, examples: tuple[GuidedPress, ...]) -> Estimate:
         """Estimate the map of touches from these presses."""
         return estimate_touch(self.prepared, examples)
 
 
-class MappingFlow(_DotFlow):
+class MappingFlow(DotFlow):
     """The channel mapping is found from presses on dots."""
 
-    def __init__(self, prepared: Prepared) -> None:
-        super().__init__("mapping", prepared)
+    kind = "mapping"
 
     def estimate_from(self, examples: tuple[GuidedPress, ...]) -> Estimate:
         """Estimate the channel mapping from these presses."""
-        return estimate_mapping(self.prepared, examples, self._taker.untouched)
+        untouched = None if self._taker is None else self._taker.untouched
+        return estimate_mapping(self.prepared, examples, untouched)
 
     def keep(self, answer: MappingAnswer, folder: Folder, name: str, runner: Runner) -> str:
         """Write a skin file with the mapping, and change over to it."""
@@ -205,5 +214,5 @@ def _arrays(presses: Sequence[GuidedPress]) -> tuple[FloatArray, FloatArray]:
     return dv, np.array([press.place for press in presses])
 
 
-def _counted(left: int) -> str:
-    return f"{left} press{'es' if left != 1 else ''}"
+def _presses(count: int) -> str:
+    return counted(count, "press", "presses")

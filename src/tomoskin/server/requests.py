@@ -170,14 +170,10 @@ class ShowFlow(StrictRequest, frozen=True, tag="flow_show"):
     on: bool
 
 
-class UndoPress(StrictRequest, frozen=True, tag="flow_undo"):
-    """The page takes the last press back."""
-
-
 class DeletePress(StrictRequest, frozen=True, tag="flow_delete"):
-    """Take one press back, by its number from 0 on."""
+    """Take one press back, by its number from 0 on; null: the last one."""
 
-    number: Annotated[int, Meta(ge=0, le=10_000)]
+    number: Annotated[int, Meta(ge=0, le=10_000)] | None = None
 
 
 class SetWeight(StrictRequest, frozen=True, tag="flow_weight"):

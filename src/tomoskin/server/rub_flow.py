@@ -11,10 +11,11 @@ from tomoskin.core import DataError, FloatArray, WireError, reach
 from tomoskin.learning import TOUCH, Rubbing, quiet_electrodes
 from tomoskin.pipeline import FrameResult, Prepared
 from tomoskin.sensing.segment import Region
-from tomoskin.server.guided_flow import Estimate, GuidedFlow, GuidedPress
-from tomoskin.server.page_messages import Figures, Point, RubbedNow
+from tomoskin.server.guided_flow import Estimate
+from tomoskin.server.page_messages import Figures, RubbedNow
+from tomoskin.server.press_flow import DotFlow
 from tomoskin.server.press_taker import OFTEN, PressTaker
-from tomoskin.server.requests import AskPoint, LearnFlow, StopLearning, UndoPress
+from tomoskin.server.requests import AskPoint, LearnFlow, StopLearning
 
 _FEWEST, _GOOD = 150, 400
 """Touches from which it can be learnt, and that are good."""
@@ -152,63 +153,48 @@ class RubbedTouches:
         return Rubbed(dv, self._covered, self._several, self._frames, quiet)
 
 
-class RubFlow(GuidedFlow):
-    """What was rubbed so far; see :class:`GuidedFlow`. It learns when it is asked to.
+class RubFlow(DotFlow):
+    """What was rubbed so far, with presses on dots where these are asked for; see :class:`DotFlow`.
+    It learns when it is asked to.
 
     ``rubbed``: touches everywhere; ``taken``: presses at known positions.
     """
 
-    teaches = TOUCH
+    kind, teaches = "rub", TOUCH
 
     def __init__(self, prepared: Prepared) -> None:
-        super().__init__("rub", prepared)
+        super().__init__(prepared)
+        self._taker = self._dot = None
         self._touches = RubbedTouches(prepared)
         self.rubbed = self._touches.now()
-        self.answers = {
+        self.answers |= {
             AskPoint: lambda request: self._ask(on=request.on),
-            UndoPress: lambda _: self._undo(),
             LearnFlow: lambda _: self._learn(),
             StopLearning: lambda _: self._stop(),
         }
-        self._taker: PressTaker | None = None
-        self._dot: Point | None = None
         self._examples: tuple[Any, ...] = ()
         self._shown = -np.inf
 
     def see(self, result: FrameResult) -> bool | None:
         """Take a touch, or a press at the dot."""
-        taker, dv, moved = self._taker, None, False
-        if taker is None:
+        news = super().see(result)
+        if self._taker is None:
             self._touches.push(result)
-        else:
-            phase = taker.phase
-            dv = taker.push(result.host_time, result.voltages, touched=bool(result.touches))
-            moved = taker.phase != phase
-        if dv is not None and self._dot is not None:
-            self.taken.append(GuidedPress(self._dot, dv))
-            self._dot = self._next_dot()
-        elif not moved and 0 <= result.host_time - self._shown < _PERIOD:
+        if news is None and 0 <= result.host_time - self._shown < _PERIOD:
             return None
         self._shown = result.host_time
         self.rubbed = self._touches.now()
         return False
-
-    def restart(self) -> None:
-        """Forget the point that is being pressed."""
-        if self._taker is not None:
-            self._taker.restart()
-
-    def _next_dot(self) -> Point:
-        return self._dots.next([point.place for point in self.taken], None)
 
     def _ask(self, *, on: bool) -> bool:
         self._taker = PressTaker.of(self.prepared) if on else None
         self._dot = self._next_dot() if on else None
         return False
 
-    def _undo(self) -> bool:
-        self.take_back(len(self.taken) - 1)
-        self._dot = self._next_dot() if self._taker is not None else None
+    def delete(self, number: int | None) -> bool:
+        """Remove a press, and ask for it again where presses are asked for."""
+        place = self.take_back(number).place
+        self._dot = None if self._taker is None else place
         return False
 
     def _learn(self) -> bool:
@@ -252,12 +238,9 @@ class RubFlow(GuidedFlow):
         )
 
     def details(self) -> dict[str, Any]:
-        """What the page shows: the dot, the points, and what was rubbed."""
+        """What the page shows: the dot, the presses on dots, and what was rubbed."""
         rubbed = self.rubbed
-        return {
-            "phase": "rub" if self._taker is None else self._taker.phase,
-            "dot": self._dot,
-            "presses": [point.place for point in self.taken],
+        return super().details() | {
             "stage": self.stage,
             "rubbed": RubbedNow.of(
                 rubbed,

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any, get_args
@@ -26,7 +27,7 @@ from tomoskin.pipeline import Prepared, colour_limit, prepare, tuned_image
 from tomoskin.run import Runner, commands
 from tomoskin.server.folder import Folder
 from tomoskin.server.hub import Hub
-from tomoskin.server.page_connection import Listener
+from tomoskin.server.page_connection import Page
 from tomoskin.server.page_messages import Message
 from tomoskin.server.requests import (
     AskPattern,
@@ -159,48 +160,37 @@ class SettingsHandlers:
         """The schema, the settings as they are, and how far a change is."""
         return (schema(), self._message(), _progress(self._stage))
 
-    def _set(self, page: Listener, request: SetSettings) -> None:
+    def _set(self, page: Page, request: SetSettings) -> None:
         keys = sorted((s, k) for s, keys in request.changes.items() for k in keys)
-        try:
+        with _refusals_to(page):
             skin = altered(self._present(), request.changes)
             self._check(skin)
-        except TomoskinError as error:
-            page.post(refusal(error).json)
-            return
-        self._history.add(self._present(), keys, time.monotonic())
-        self._go(page, skin)
+            self._history.add(self._present(), keys, time.monotonic())
+            self._go(page, skin)
 
-    def _step(self, page: Listener, step: Callable[[Skin], Skin | None]) -> None:
+    def _step(self, page: Page, step: Callable[[Skin], Skin | None]) -> None:
         """Go on with what a ``step`` through the history gives, where there is one."""
         if (skin := step(self._present())) is not None:
             self._go(page, skin)
 
-    def _load(self, page: Listener, request: LoadSkin) -> None:
+    def _load(self, page: Page, request: LoadSkin) -> None:
         path = self._hub.folder / f"{request.name}.toml"
-        try:
+        with _refusals_to(page):
             skin = Skin.load(path if path.is_file() else request.name)
             self._check(skin)
-        except TomoskinError as error:
-            page.post(refusal(error).json)
-            return
-        self._history.add(self._present())
-        self._go(page, skin)
+            self._history.add(self._present())
+            self._go(page, skin)
 
-    def _save(self, page: Listener, request: SaveSkin) -> None:
+    def _save(self, page: Page, request: SaveSkin) -> None:
         name = f"{request.name}.toml"
-        try:
+        with _refusals_to(page, where=name):  # the page is told names, never paths
             _save(self._hub.folder / name, self._present(), replace=request.replace)
-        except TomoskinError as error:  # the page is told names, never paths
-            page.post(refusal(type(error)(error.message, where=name, hint=error.hint)).json)
-            return
-        self._hub.runner.say("saved", f"settings saved as {name}")
-        self._hub.tell(self._message())
+            self._hub.runner.say("saved", f"settings saved as {name}")
+            self._hub.tell(self._message())
 
-    def _pattern(self, page: Listener, request: AskPattern) -> None:
-        try:
+    def _pattern(self, page: Page, request: AskPattern) -> None:
+        with _refusals_to(page):
             page.post(table_of(request.name, self._present().n_electrodes).json)
-        except TomoskinError as error:
-            page.post(refusal(error).json)
 
     def _present(self) -> Skin:
         """The settings as they are, or will be when what is being prepared is ready."""
@@ -217,14 +207,14 @@ class SettingsHandlers:
         if self._hub.opener is None:
             raise SourceError("this source cannot change its sheet or scan while it runs")
 
-    def _go(self, page: Listener, skin: Skin) -> None:
+    def _go(self, page: Page, skin: Skin) -> None:
         self._asked = skin
         if not self._working:
             self._working = True
             self._hub.tasks.keep(self._work(page))
         self._hub.tell(self._message())
 
-    async def _work(self, page: Listener) -> None:
+    async def _work(self, page: Page) -> None:
         """Prepare what is wanted until nothing newer is; what fails is taken back."""
         skin = None
         while skin is not self._asked:
@@ -301,6 +291,16 @@ class SettingsHandlers:
             files=Folder(self._hub.folder).skins(),
             builtin=Skin.names(),
         )
+
+
+@contextlib.contextmanager
+def _refusals_to(page: Page, where: str = "") -> Iterator[None]:
+    """Send what the block refuses to a page; as said of ``where``, if that is given."""
+    try:
+        yield
+    except TomoskinError as error:
+        named = type(error)(error.message, where=where, hint=error.hint) if where else error
+        page.post(refusal(named).json)
 
 
 def _progress(stage: Any) -> Progress:

@@ -16,7 +16,7 @@ from tomoskin.model.section import (
     Choice,
     Number,
     NumberOrWord,
-    OneOrEach,
+    OneOrMore,
     Quantity,
     Table,
     ValueKind,
@@ -281,7 +281,7 @@ def _form(kind: ValueKind[Any]) -> KindForm:
             form = KindForm(form="quantity", unit=kind.unit, low=kind.low, high=kind.high)
         case NumberOrWord():
             form = replace(_form(kind.number), words=kind.words.words)
-        case OneOrEach():
+        case OneOrMore():
             form = _form(kind.inner)
         case Table():
             names, kinds = zip(*kind.row.entries.items(), strict=True)

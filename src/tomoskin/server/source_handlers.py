@@ -20,7 +20,7 @@ from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared
 from tomoskin.run import commands
 from tomoskin.server.hub import Hub
-from tomoskin.server.page_connection import Listener
+from tomoskin.server.page_connection import Page
 from tomoskin.server.page_messages import BoardNow, Offer, Sources
 from tomoskin.server.requests import Connect, ListSources
 
@@ -108,13 +108,13 @@ class SourceHandlers:
         self._hub, self._switch = hub, switch
         hub.serve({ListSources: self._list, Connect: self._connect})
 
-    def _list(self, page: Listener, _: ListSources) -> None:
+    def _list(self, page: Page, _: ListSources) -> None:
         def answer(offers: list[Offer]) -> None:
             page.post(self._message(offers).json)
 
         self._hub.tasks.run(page, self._switch.offers, answer)
 
-    def _connect(self, page: Listener, request: Connect) -> None:
+    def _connect(self, page: Page, request: Connect) -> None:
         work = partial(self._switch.connect, request.source)
         self._hub.tasks.run(page, work, lambda _: self._hub.show())
 

@@ -40,7 +40,7 @@ def scene(
         cells=flat(mesh.cells),
         outline=flat(skin.outline.polyline(skin.outline.length / _OUTLINE_POINTS)),
         electrodes=[
-            to_page.Electrode(x=x, y=y, label=f"E{number}", points=chain(facets))
+            to_page.Electrode(x=x, y=y, label=f"E{number}", points=arc(facets))
             for number, ((x, y), facets) in enumerate(
                 zip(skin.electrode_centres.tolist(), mesh.electrodes, strict=True), 1
             )
@@ -77,7 +77,7 @@ def state(status: Status) -> to_page.RunState:
         reference=to_page.ReferenceNow.of(reference, age_s=status.reference_age),
         baseline=baseline
         and to_page.BaselineNow.of(baseline, held_s=baseline.held, noise_v=baseline.noise),
-        sick=[to_page.Sick.of(one, since_s=one.since) for one in status.electrodes],
+        sick=status.electrodes,
         noise_v=reference.noise,
         alpha=status.choice.alpha,
         rule=status.choice.rule,
@@ -98,32 +98,15 @@ def timeline(line: Timeline) -> to_page.PlayedTimeline:
     """What happened in a recording."""
     return to_page.PlayedTimeline(
         end_s=line.end,
-        notes=[to_page.Tick.of(note, time_s=time) for time, note in line.notes],
-        events=[to_page.TimedEvent.of(one, time_s=time) for time, one in line.events],
-        touches=[
-            to_page.TouchSpan.of(span, begin_s=span.begin, end_s=span.end) for span in line.touches
-        ],
+        notes=[to_page.EventNote.of(note, time_s=time) for time, note in line.notes],
+        events=[to_page.EventNote.of(one, time_s=time) for time, one in line.events],
+        touches=line.touches,
     )
 
 
-def chain(facets: IntArray) -> list[int]:
-    """Points along an open chain of edges, from one end to the other.
-
-    ``facets`` is (n, 2); where the edges do not form a single open chain, their points in
-    ascending order.
-    """
-    neighbours: dict[int, list[int]] = {}
-    for a, b in facets.tolist():
-        neighbours.setdefault(a, []).append(b)
-        neighbours.setdefault(b, []).append(a)
-    ends = [point for point, others in neighbours.items() if len(others) == 1]
-    if len(ends) != 2 or max(map(len, neighbours.values())) > 2:
-        return sorted(neighbours)
-    walk, before = [ends[0]], -1
-    while len(onward := [p for p in neighbours[walk[-1]] if p != before]) == 1:
-        before = walk[-1]
-        walk.append(onward[0])
-    return walk
+def arc(facets: IntArray) -> list[int]:
+    """Points along an electrode, whose edges the mesher lays one after the other."""
+    return [*facets[:, 0].tolist(), int(facets[-1, 1])]
 
 
 def flat(table: FloatArray | IntArray) -> list[Any]:

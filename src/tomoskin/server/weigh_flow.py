@@ -11,10 +11,10 @@ import numpy as np
 from tomoskin.core import DataError, Detection, FloatArray, Touch, WireError
 from tomoskin.learning import FORCE, ForceModel, ForceReport, WeighedPresses, Weight, least_known
 from tomoskin.pipeline import FrameResult, Prepared
-from tomoskin.server.guided_flow import Estimate, GuidedFlow
+from tomoskin.server.guided_flow import Estimate, GuidedFlow, counted
 from tomoskin.server.page_messages import Figures, Phase, Point, WeightNow
 from tomoskin.server.press_taker import OFTEN
-from tomoskin.server.requests import DeletePress, SetWeight, UndoPress
+from tomoskin.server.requests import SetWeight
 
 _FEWEST, _ENOUGH, _GOOD = 5, 10, 20
 """Placements from which forces are learnt, that are enough to begin with, and that are good."""
@@ -147,17 +147,13 @@ class WeighFlow(GuidedFlow):
         What was said, where it is probably meant otherwise.
     """
 
-    teaches = FORCE
+    kind, teaches = "force", FORCE
 
     def __init__(self, prepared: Prepared) -> None:
-        super().__init__("force", prepared)
+        super().__init__(prepared)
         self.weight: Weight | None = None
         self.asked: Weight | None = None
-        self.answers = {
-            SetWeight: self._set,
-            DeletePress: lambda request: self._delete(request.number),
-            UndoPress: lambda _: self._delete(len(self.taken) - 1),
-        }
+        self.answers[SetWeight] = self._set
         self._taker = PlacementTaker()
         self._waiting: Placement | None = None
 
@@ -192,15 +188,15 @@ class WeighFlow(GuidedFlow):
             raise WireError(str(error)) from None
         return self._record()
 
-    def _delete(self, number: int) -> bool:
-        self.take_back(number)
-        self.estimate = None
-        return True
+    @property
+    def hint(self) -> str:
+        """Why no placement is recorded."""
+        return self._taker.hint
 
     def estimate_from(self, examples: tuple[Weighed, ...]) -> Estimate:
         """Estimate the forces of touches from these weights."""
         if len(examples) < _FEWEST:
-            return Estimate(f"{_counted(_FEWEST - len(examples))} more for a first answer")
+            return Estimate(f"{_placements(_FEWEST - len(examples))} more for a first answer")
         model = ForceModel.fit(weighed_presses(examples), self.prepared.skin)
         report = ForceReport.of(model)
         return Estimate(
@@ -216,10 +212,9 @@ class WeighFlow(GuidedFlow):
         )
 
     def details(self) -> dict[str, Any]:
-        """What the page shows: the dot, the weights so far, and a hint."""
+        """What the page shows: the dot, and the weights so far."""
         places = [one.placement.xy for one in self.taken]
-        hint = {"text": self._taker.hint} if self._taker.hint else {}
-        return hint | {
+        return {
             "phase": "name" if self._waiting else self._taker.phase,
             "dot": self._dots.next(places, self.estimate),
             "presses": places,
@@ -248,7 +243,7 @@ def weighed_presses(examples: tuple[Weighed, ...]) -> WeighedPresses:
 def _advice(report: ForceReport) -> str:
     n = report.presses
     if n < _ENOUGH:
-        return f"Ten placements are a start: {_counted(_ENOUGH - n)} more."
+        return f"Ten placements are a start: {_placements(_ENOUGH - n)} more."
     if report.remarks:
         return "These would be enough without the problems below."
     if n < _GOOD:
@@ -264,5 +259,5 @@ def _shown(weight: Weight | None) -> WeightNow | None:
     return None if weight is None else WeightNow.of(weight)
 
 
-def _counted(left: int) -> str:
-    return f"{left} placement{'s' if left != 1 else ''}"
+def _placements(count: int) -> str:
+    return counted(count, "placement", "placements")

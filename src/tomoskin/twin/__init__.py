@@ -5,11 +5,11 @@ from tomoskin.twin.circuit import ElectronicsSettings, ThermalVoltages
 from tomoskin.twin.contact import ContactSettings, Grid, solve_contact
 from tomoskin.twin.course import Disturbance, bent, bent_truth, disturbed, pressed, reboots
 from tomoskin.twin.faults import Faults, Line, LineSettings
-from tomoskin.twin.held_scanning import Board, HeldScanning
+from tomoskin.twin.held_scanning import Board, HeldScanning, Question, Setting
 from tomoskin.twin.labelled import COMMON_PRESSES, Population, SetPlan, make_shard
 from tomoskin.twin.material import MaterialSettings
 from tomoskin.twin.presets import PRESETS, TwinSettings
-from tomoskin.twin.probe import FACES, Circle, Contact, Face, Finger, Press, Probe, Shape, Square
+from tomoskin.twin.probe import FACES, Circle, Face, Finger, Press, Probe, Shape, Square
 from tomoskin.twin.scanning import (
     SampleTable,
     ScanClock,
@@ -21,6 +21,7 @@ from tomoskin.twin.script import Script
 from tomoskin.twin.script_check import check_script, check_settling
 from tomoskin.twin.sheet import TwinSkin
 from tomoskin.twin.source import (
+    SheetTransport,
     TwinTransport,
     make_electronics,
     make_twin,
@@ -38,7 +39,6 @@ __all__ = [
     "Bent",
     "Board",
     "Circle",
-    "Contact",
     "ContactSettings",
     "Deformation",
     "Disturbance",
@@ -55,11 +55,14 @@ __all__ = [
     "Pose",
     "Press",
     "Probe",
+    "Question",
     "SampleTable",
     "ScanClock",
     "Script",
     "SetPlan",
+    "Setting",
     "Shape",
+    "SheetTransport",
     "Square",
     "SteppedSkin",
     "Stretched",

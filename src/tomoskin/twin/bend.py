@@ -111,18 +111,13 @@ order."""
 
 def strain_of(pose: Pose, uv: FloatArray, rest: Surface, height: float) -> FloatArray:
     """(n, 3) xx, yy, xy of all deformations of a ``pose`` together."""
-    total = np.zeros((len(uv), 3))
-    for deformation in pose:
-        total += deformation.strain(uv, rest, height)
-    return total
+    each = (deformation.strain(uv, rest, height) for deformation in pose)
+    return sum(each, np.zeros((len(uv), 3)))
 
 
 def depth_of(pose: Pose, uv: FloatArray) -> FloatArray:
     """(n,) m of all deformations of a ``pose`` together."""
-    total = np.zeros(len(uv))
-    for deformation in pose:
-        total += deformation.depth(uv)
-    return total
+    return sum((deformation.depth(uv) for deformation in pose), np.zeros(len(uv)))
 
 
 def layer_metric(surface: Surface, uv: FloatArray, height: float) -> FloatArray:

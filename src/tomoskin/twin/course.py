@@ -66,11 +66,6 @@ class ScriptedPress(Scripted[PressSection]):
         return self.given.start
 
     @property
-    def force_key(self) -> str:
-        """The key of the script that the force is from."""
-        return "profile" if self.given.profile else "hold"
-
-    @property
     def end(self) -> float:
         """The time when the force is gone, in s."""
         return self.start + self.force[-1][0]
@@ -87,7 +82,8 @@ class ScriptedPress(Scripted[PressSection]):
 
     def stages(self) -> Iterator[tuple[str, float]]:
         """Key and length in s of each piece of the courses."""
-        for key, rows in ((self.force_key, self.force), ("path", self.path)):
+        force = "profile" if self.given.profile else "hold"
+        for key, rows in ((force, self.force), ("path", self.path)):
             for length in np.diff([row[0] for row in rows]).tolist():
                 yield key, length
 
@@ -133,18 +129,7 @@ class ScriptedBend(Scripted[BendSection | StretchSection]):
     def of(cls, given: BendSection | StretchSection, where: str) -> Self:
         """Raises ScriptError for a profile that does not end at 0, and impossible shapes."""
         most = given.strain if isinstance(given, StretchSection) else given.angle
-        if most is not None and given.hold is not None:
-            course = ramp(most, given.rise, given.hold, given.fall)
-        else:
-            rows = given.profile or ()
-            if not rows[0][0] > 0 or rows[-1][1] != 0.0:
-                raise ScriptError(
-                    f"expected times above 0 s, and 0 in the last row, got {rows[0][0]:g} s "
-                    f"and {rows[-1][1]:g}",
-                    where=f"{where} profile",
-                    hint="the profile begins with 0 at 0 s by itself",
-                )
-            course = ((0.0, 0.0), *rows)
+        course = there_and_back(given, most, where)
         made = cls(given, where, course)
         try:
             for _, amount in course:
@@ -203,10 +188,31 @@ def bent_truth(bends: Iterable[ScriptedBend], time: float) -> list[dict[str, flo
     return [bend.truth(time) for bend in bends if bend.amount(time) != 0.0]
 
 
-def ramp(most: float, rise: float, hold: float, fall: float) -> Rows:
-    """Course that rises to ``most``, stays and falls to 0; the times are s."""
-    held = rise + hold
-    return ((0.0, 0.0), (rise, most), (held, most), (held + fall, 0.0))
+def there_and_back(
+    given: PressSection | BendSection | StretchSection, most: float | None, where: str
+) -> Rows:
+    """Course from 0 to 0: by its profile, or up to ``most``, held for a while, and down.
+
+    Raises ScriptError for a profile that does not end at 0.
+    """
+    if most is not None and given.hold is not None:
+        held = given.rise + given.hold
+        return ((0.0, 0.0), (given.rise, most), (held, most), (held + given.fall, 0.0))
+    place = f"{where} profile"
+    rows = after((0.0, 0.0), given.profile, place)
+    if rows[-1][1] != 0.0:
+        hint = "add a row with the time at which nothing is left of it"
+        raise ScriptError(
+            f"expected 0 in the last row, got {rows[-1][1]:g}", where=place, hint=hint
+        )
+    return rows
+
+
+def after(first: tuple[float, ...], rows: Rows | None, where: str) -> Rows:
+    """``rows`` after the ``first`` one, which stands at time 0."""
+    if rows and not rows[0][0] > 0:
+        raise ScriptError("row 0: expected a time above 0 s, got 0 s", where=where)
+    return (first, *(rows or ()))
 
 
 def pressed(presses: Iterable[ScriptedPress], time: float, friction: Friction) -> tuple[Probe, ...]:

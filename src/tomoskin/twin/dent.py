@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 from tomoskin.core import FloatArray
 from tomoskin.model.forward import choose_engine
 from tomoskin.twin.contact import ContactSettings, Grid, solve_contact
-from tomoskin.twin.probe import Contact, Probe, Shape
+from tomoskin.twin.probe import Probe, Shape
 
 _NODES = 128
 _ROUND = ((0, 0), (_NODES // 2, _NODES // 2), (_NODES // 2, _NODES // 2))
@@ -29,34 +29,6 @@ _REACHES = 6.0
 
 _SHIFTS = 3.0
 """And the strain along the sheet so many times √(stiffness / shear spring), where it fades out."""
-
-
-@dataclass(frozen=True, eq=False)
-class Load:
-    """What the sheet feels.
-
-    Attributes
-    ----------
-    felt
-        (4, n) strain xx, yy, xy in the plane of the sheet, and depth in m.
-    """
-
-    felt: FloatArray
-
-    @classmethod
-    def none(cls, n: int) -> Self:
-        """The load of a sheet that nothing presses."""
-        return cls(np.zeros((4, n)))
-
-    @property
-    def strain(self) -> FloatArray:
-        """(n, 3) xx, yy, xy in the plane of the sheet."""
-        return self.felt[:3].T
-
-    @property
-    def depth(self) -> FloatArray:
-        """The depths (n,) of the sheet, in m."""
-        return np.asarray(self.felt[3])
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,9 +84,11 @@ def solved_dent(shape: Shape, settings: ContactSettings, force: float, blur: flo
 
 
 def indent(
-    probes: Sequence[Contact], settings: ContactSettings, points: FloatArray, blur: float = 0.0
-) -> Load:
-    """What ``probes`` do to the sheet at ``points`` (n, 2) m.
+    probes: Sequence[Probe], settings: ContactSettings, points: FloatArray, blur: float = 0.0
+) -> FloatArray:
+    """(4, n) what ``probes`` do to the sheet at ``points`` (n, 2) m.
+
+    Strain xx, yy, xy in the plane of the sheet, and depth in m.
 
     The dents of several probes add up: exact for their pressures, as the body is linear; a rigid
     face within a few reaches of another would in truth press a little otherwise
@@ -123,7 +97,8 @@ def indent(
     x, y = np.ascontiguousarray(points.T)
     placed = [_placed(probe, settings, blur) for probe in probes if probe.force > 0]
     core = choose_engine().core
-    return Load(_felt(placed, x, y) if core is None else core.dented(x, y, placed))
+    felt: FloatArray = _felt(placed, x, y) if core is None else core.dented(x, y, placed)
+    return felt
 
 
 def turned(strain: FloatArray, angle: float) -> FloatArray:
@@ -159,7 +134,7 @@ class _Placed(NamedTuple):
     place: tuple[float, float, float, float]
 
 
-def _placed(probe: Contact, settings: ContactSettings, blur: float) -> _Placed:
+def _placed(probe: Probe, settings: ContactSettings, blur: float) -> _Placed:
     c, s = math.cos(probe.angle), math.sin(probe.angle)
     dx, dy = probe.drag
     along = (c * dx + s * dy, c * dy - s * dx)

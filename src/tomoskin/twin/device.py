@@ -2,40 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-from tomoskin.board.wire import (
-    SCHEMA,
-    Ack,
-    Command,
-    Deframer,
-    Fault,
-    FaultCode,
-    Format,
-    FrameFlag,
-    GetBoard,
-    GetInfo,
-    GetMode,
-    GetPattern,
-    GetScan,
-    Hello,
-    Result,
-    SafeOff,
-    SetBaud,
-    SetFormat,
-    SetHeartbeat,
-    SetMode,
-    SetPattern,
-    SetScan,
-    Start,
-    Stop,
-    crc16,
-    decode_payload,
-    encode,
-    is_command,
-)
+from tomoskin.board import wire
 from tomoskin.core import Frame
-from tomoskin.twin.held_scanning import OK, Board, HeldScanning, Verdict
+from tomoskin.twin.held_scanning import OK, Board, HeldScanning, Question, Setting, Verdict
 from tomoskin.twin.scanning import Analogue, SampleTable, ScanClock, chopped_table, sample_table
 
 _HELLO_INTERVAL = 0.5
@@ -71,7 +42,7 @@ class TwinDevice:
     def reboot(self, now: float) -> None:
         """Power off and on: what was set, scanned or still to be sent is gone."""
         self._out.clear()
-        self._deframer = Deframer(SCHEMA.to_device_bytes)
+        self._deframer = wire.Deframer(wire.SCHEMA.to_device_bytes)
         self._power_on = self._heard = now
         self._next_hello: float | None = now
         self._heartbeat = _HEARTBEAT
@@ -98,8 +69,8 @@ class TwinDevice:
         for payload in self._deframer.feed(data):
             if len(payload) < 2:
                 continue
-            message = decode_payload(payload, now)
-            if message is None or not is_command(message):
+            message = wire.decode_payload(payload, now)
+            if message is None or not wire.is_command(message):
                 self._refuse(payload)
             else:
                 self._obey(message, payload, now)
@@ -109,11 +80,11 @@ class TwinDevice:
         if self._next_hello is None and now >= self._heard + self._heartbeat:
             self._fall_silent(now)
         if self._next_hello is not None and now >= self._next_hello:
-            self._say(Hello(SCHEMA.major, SCHEMA.minor, SCHEMA.hash))
+            self._say(wire.Hello(wire.SCHEMA.major, wire.SCHEMA.minor, wire.SCHEMA.hash))
             self._next_hello = max(self._next_hello + _HELLO_INTERVAL, now)
         if self._scanning and now >= self._scanning.due:
             frame = self._frame(self._scanning, now)
-            self._out += encode(frame, packed=self._held.format is Format.PACKED)
+            self._out += wire.encode(frame, packed=self._held.format is wire.Format.PACKED)
         data = bytes(self._out)
         self._out.clear()
         return data
@@ -126,7 +97,7 @@ class TwinDevice:
             ticks=round(scanning.device_time * self._board.tick_rate),
             host_time=now,
             configuration=scanning.configuration,
-            flags=int(FrameFlag.FIRST) if scanning.sequence == 0 else 0,
+            flags=int(wire.FrameFlag.FIRST) if scanning.sequence == 0 else 0,
             drops=0,
             samples=samples,
             sums=sums,
@@ -142,56 +113,50 @@ class TwinDevice:
     def _fall_silent(self, now: float) -> None:
         if self._scanning:
             ticks = round((now - self._power_on) * self._board.tick_rate)
-            self._say(Fault(ticks, FaultCode.HOST_SILENT, 0))
+            self._say(wire.Fault(ticks, wire.FaultCode.HOST_SILENT, 0))
         self._scanning = None
         self._last = None
         self._next_hello = now
 
     def _refuse(self, payload: bytes) -> None:
-        commands = {message.type for message in SCHEMA.messages if message.to_device}
-        result = Result.BAD_LENGTH if payload[0] in commands else Result.UNKNOWN_COMMAND
-        self._say(Ack(payload[1], payload[0], result, 0))
+        commands = {message.type for message in wire.SCHEMA.messages if message.to_device}
+        result = wire.Result.BAD_LENGTH if payload[0] in commands else wire.Result.UNKNOWN_COMMAND
+        self._say(wire.Ack(payload[1], payload[0], result, 0))
 
-    def _obey(self, command: Command, payload: bytes, now: float) -> None:
+    def _obey(self, command: wire.Command, payload: bytes, now: float) -> None:
         self._heard, self._next_hello = now, None
-        identity = (command.request, crc16(payload))
-        if isinstance(command, GetInfo):
-            self._last_reply = encode(self._board.info(command.request))
-        elif isinstance(command, GetBoard):
-            self._last_reply = encode(replace(self._board.limits, request=command.request))
-        elif isinstance(command, GetScan | GetPattern | GetMode):
-            self._last_reply = encode(self._held.answer(command))
+        identity = (command.request, wire.crc16(payload))
+        if isinstance(command, Question):
+            self._last_reply = wire.encode(self._held.answer(command))
         elif identity != self._last:
             result, detail = self._run(command, now)
-            self._last_reply = encode(Ack(command.request, payload[0], result, detail))
+            self._last_reply = wire.encode(wire.Ack(command.request, payload[0], result, detail))
         self._last = identity
         self._out += self._last_reply
 
-    def _run(self, command: Command, now: float) -> Verdict:
+    def _run(self, command: wire.Command, now: float) -> Verdict:
+        if self._scanning and isinstance(command, Setting | wire.Start | wire.SetBaud):
+            return wire.Result.BUSY, 0
+        if isinstance(command, Setting):
+            return self._held.set(command)
         match command:
-            case Stop():
+            case wire.Stop():
                 self._scanning = None
-            case SafeOff():
+            case wire.SafeOff():
                 self._scanning = None
                 self._held = HeldScanning(self._board)
-            case SetHeartbeat():
+            case wire.SetHeartbeat():
                 low, high = _HEARTBEAT_MS
                 if not low <= command.interval <= high:
-                    return Result.BAD_VALUE, 1
+                    return wire.Result.BAD_VALUE, 1
                 self._heartbeat = command.interval / 1e3
-            case SetScan() | SetPattern() | SetFormat() | SetMode() | Start() | SetBaud() if (
-                self._scanning
-            ):
-                return Result.BUSY, 0
-            case SetScan() | SetPattern() | SetFormat() | SetMode():
-                return self._held.set(command)
-            case Start():
+            case wire.Start():
                 return self._start(command, now)
             case _:
                 pass
         return OK
 
-    def _start(self, command: Start, now: float) -> Verdict:
+    def _start(self, command: wire.Start, now: float) -> Verdict:
         held = self._held
         verdict = self._board.check_start(command.configuration, held.scan, held.drives, held.mode)
         if verdict != OK or held.scan is None:
@@ -214,5 +179,5 @@ class TwinDevice:
         )
         return OK
 
-    def _say(self, message: Hello | Fault | Ack) -> None:
-        self._out += encode(message)
+    def _say(self, message: wire.Hello | wire.Fault | wire.Ack) -> None:
+        self._out += wire.encode(message)

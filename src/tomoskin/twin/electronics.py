@@ -17,14 +17,14 @@ from tomoskin.twin.bend import Pose
 from tomoskin.twin.circuit import Electrodes, ElectronicsSettings, Lines, line_potentials, settling
 from tomoskin.twin.faults import Faults, check_electrodes
 from tomoskin.twin.parameters import wandered
-from tomoskin.twin.probe import Contact
+from tomoskin.twin.probe import Probe
 from tomoskin.twin.scanning import SampleTable
 from tomoskin.twin.sheet import TwinSkin
 
 if TYPE_CHECKING:
     from tomoskin.model.skin import ReadoutSettings
 
-Course = Callable[[float], tuple[Contact, ...]]
+Course = Callable[[float], tuple[Probe, ...]]
 """What presses so many seconds after the start of a scan."""
 
 Bending = Callable[[float], Pose]
@@ -193,7 +193,7 @@ class TwinElectronics:
         stuck = [line.stuck for line in lines if line.stuck is not None]
         return Lines(read, np.concatenate(stuck) if stuck else None)
 
-    def _moves(self, times: FloatArray) -> list[tuple[tuple[Contact, ...], Pose]]:
+    def _moves(self, times: FloatArray) -> list[tuple[tuple[Probe, ...], Pose]]:
         """What presses, and how the sheet is bent, at each of the ``times``."""
         course, bending, sheet = self._course, self._bending, self.sheet
         if course is None and bending is None:
@@ -203,7 +203,7 @@ class TwinElectronics:
             for t in times.tolist()
         ]
 
-    def _set(self, presses: tuple[Contact, ...], pose: Pose) -> None:
+    def _set(self, presses: tuple[Probe, ...], pose: Pose) -> None:
         self.sheet.set_presses(presses)
         self.sheet.set_pose(pose)
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, replace
 from typing import Self
 
+from tomoskin.board import wire
 from tomoskin.board.source import (
     BOARDS,
     DEFAULT_BOARD,
@@ -15,35 +16,18 @@ from tomoskin.board.source import (
     ScanSettings,
     chop_limit,
 )
-from tomoskin.board.wire import (
-    SCHEMA,
-    Ack,
-    BoardLimits,
-    Drive,
-    DriveMode,
-    Format,
-    GetMode,
-    GetPattern,
-    GetScan,
-    HeldMode,
-    HeldPattern,
-    HeldScan,
-    Info,
-    Message,
-    Reset,
-    Result,
-    SetFormat,
-    SetMode,
-    SetPattern,
-    SetScan,
-    type_byte,
-)
 from tomoskin.twin.scanning import LIMITS
 
-Verdict = tuple[Result, int]
+Verdict = tuple[wire.Result, int]
 """Result and detail of an ACK."""
 
-OK: Verdict = (Result.OK, 0)
+Question = wire.GetInfo | wire.GetBoard | wire.GetScan | wire.GetPattern | wire.GetMode
+"""What a host may ask at any time."""
+
+Setting = wire.SetScan | wire.SetPattern | wire.SetFormat | wire.SetMode
+"""What a host may set while nothing is scanned."""
+
+OK: Verdict = (wire.Result.OK, 0)
 _MAX_SETTLING = 100_000
 _MOST_CONVERSIONS, _MOST_SAMPLE = 64, 0xFFFF
 _DRIVES_OF_PATTERN = 9
@@ -62,7 +46,7 @@ class Board:
     max_samples: int = 2000
     firmware: tuple[int, int, int] = (1, 2, 0)
     unique_id: bytes = b"twin\0\0\0\0"
-    limits: BoardLimits = LIMITS
+    limits: wire.BoardLimits = LIMITS
     converter: Converter = BOARDS[DEFAULT_BOARD].converter
 
     @classmethod
@@ -85,15 +69,15 @@ class Board:
         """Conversions whose sum fits a sample."""
         return min(_MOST_CONVERSIONS, _MOST_SAMPLE // ((1 << self.adc_bits) - 1))
 
-    def info(self, request: int) -> Info:
+    def info(self, request: int) -> wire.Info:
         """The board's answer to GET_INFO."""
-        return Info(
+        return wire.Info(
             request=request,
-            major=SCHEMA.major,
-            minor=SCHEMA.minor,
-            schema_hash=SCHEMA.hash,
+            major=wire.SCHEMA.major,
+            minor=wire.SCHEMA.minor,
+            schema_hash=wire.SCHEMA.hash,
             firmware=bytes(self.firmware),
-            reset=Reset.POWER,
+            reset=wire.Reset.POWER,
             channels=self.channels,
             adc_bits=self.adc_bits,
             max_oversampling=self.max_oversampling,
@@ -105,12 +89,12 @@ class Board:
             unique_id=self.unique_id,
         )
 
-    def check_scan(self, command: SetScan) -> Verdict:
+    def check_scan(self, command: wire.SetScan) -> Verdict:
         """Whether a SET_SCAN is acceptable."""
         if command.n_drives > self.max_drives:
-            return Result.TOO_MANY_DRIVES, self.max_drives
+            return wire.Result.TOO_MANY_DRIVES, self.max_drives
         if round(self.current * 1e6) > command.current_limit:
-            return Result.CURRENT_TOO_HIGH, 0
+            return wire.Result.CURRENT_TOO_HIGH, 0
         good = {
             "configuration": command.configuration > 0,
             "n_drives": command.n_drives > 0,
@@ -118,55 +102,55 @@ class Board:
             "oversampling": 1 <= command.oversampling <= self.max_oversampling,
             "prescaler": command.prescaler in PRESCALERS,
         }
-        names = [field.name for field in SCHEMA.by_name["SET_SCAN"].fields]
+        names = [field.name for field in wire.SCHEMA.by_name["SET_SCAN"].fields]
         wrong = next((name for name, fine in good.items() if not fine), None)
-        return OK if wrong is None else (Result.BAD_VALUE, names.index(wrong))
+        return OK if wrong is None else (wire.Result.BAD_VALUE, names.index(wrong))
 
-    def check_drives(self, command: SetPattern, scan: SetScan) -> Verdict:
+    def check_drives(self, command: wire.SetPattern, scan: wire.SetScan) -> Verdict:
         """Whether a SET_PATTERN fits the announced scan and this board."""
         if not command.drives or command.first + len(command.drives) > scan.n_drives:
-            return Result.BAD_VALUE, 2
+            return wire.Result.BAD_VALUE, 2
         for number, drive in enumerate(command.drives, start=command.first):
             if drive.source == drive.sink:
-                return Result.SAME_ELECTRODE, number
+                return wire.Result.SAME_ELECTRODE, number
             if max(drive.source, drive.sink) >= self.channels or drive.mask >> self.channels:
-                return Result.NO_SUCH_CHANNEL, number
+                return wire.Result.NO_SUCH_CHANNEL, number
         return OK
 
-    def check_format(self, command: SetFormat, scan: SetScan) -> Verdict:
+    def check_format(self, command: wire.SetFormat, scan: wire.SetScan) -> Verdict:
         """Whether a SET_FORMAT fits the announced scan and this converter."""
         fits = scan.oversampling == 1 and self.adc_bits == 10
-        return OK if command.format is Format.SIXTEEN or fits else (Result.BAD_VALUE, 2)
+        return OK if command.format is wire.Format.SIXTEEN or fits else (wire.Result.BAD_VALUE, 2)
 
-    def check_mode(self, command: SetMode, scan: SetScan) -> Verdict:
+    def check_mode(self, command: wire.SetMode, scan: wire.SetScan) -> Verdict:
         """Whether a SET_MODE fits the announced scan and this board."""
         periods, frequency = command.periods, command.frequency
-        if command.mode is DriveMode.DIRECT:
+        if command.mode is wire.DriveMode.DIRECT:
             wrong = 3 if frequency else 4 if periods else None
-            return OK if wrong is None else (Result.BAD_VALUE, wrong)
+            return OK if wrong is None else (wire.Result.BAD_VALUE, wrong)
         if frequency < self.limits.min_chop:
-            return Result.BAD_VALUE, 3
+            return wire.Result.BAD_VALUE, 3
         if frequency > self.limits.max_chop:
-            return Result.CHOP_TOO_FAST, self.limits.max_chop
+            return wire.Result.CHOP_TOO_FAST, self.limits.max_chop
         shared = periods and scan.oversampling % (2 * periods) == 0
-        return OK if shared else (Result.BAD_VALUE, 4)
+        return OK if shared else (wire.Result.BAD_VALUE, 4)
 
     def check_start(
         self,
         configuration: int,
-        scan: SetScan | None,
-        drives: Sequence[Drive | None],
-        mode: SetMode | None = None,
+        scan: wire.SetScan | None,
+        drives: Sequence[wire.Drive | None],
+        mode: wire.SetMode | None = None,
     ) -> Verdict:
         """Whether the scan that START names is complete, and not too fast."""
         if scan is None or configuration != scan.configuration:
-            return Result.WRONG_CONFIGURATION, 0
+            return wire.Result.WRONG_CONFIGURATION, 0
         if None in drives:
-            return Result.INCOMPLETE, list(drives).index(None)
+            return wire.Result.INCOMPLETE, list(drives).index(None)
         channels = [drive.mask.bit_count() for drive in drives if drive]
         most = self.max_samples // (2 if mode else 1)
         if sum(channels) > most:
-            return Result.TOO_MANY_SAMPLES, most
+            return wire.Result.TOO_MANY_SAMPLES, most
         if mode is None:
             return OK
         settings = ScanSettings(
@@ -174,7 +158,7 @@ class Board:
             scan.dead_time / 1e6, scan.prescaler,
         )  # fmt: skip
         limit = chop_limit(self.limits, settings, mode.periods, max(channels), self.tick_rate)
-        return OK if mode.frequency <= limit else (Result.CHOP_TOO_FAST, limit)
+        return OK if mode.frequency <= limit else (wire.Result.CHOP_TOO_FAST, limit)
 
 
 class HeldScanning:
@@ -182,46 +166,55 @@ class HeldScanning:
 
     def __init__(self, board: Board) -> None:
         self._board = board
-        self.scan: SetScan | None = None
-        self.format = Format.SIXTEEN
-        self.mode: SetMode | None = None
+        self.scan: wire.SetScan | None = None
+        self.format = wire.Format.SIXTEEN
+        self.mode: wire.SetMode | None = None
         """None: the drive is direct."""
-        self.drives: list[Drive | None] = []
+        self.drives: list[wire.Drive | None] = []
 
-    def set(self, command: SetScan | SetPattern | SetFormat | SetMode) -> Verdict:
+    def set(
+        self, command: wire.SetScan | wire.SetPattern | wire.SetFormat | wire.SetMode
+    ) -> Verdict:
         """Take over what the board accepts."""
-        if isinstance(command, SetScan):
+        if isinstance(command, wire.SetScan):
             if (verdict := self._board.check_scan(command)) == OK:
-                self.scan, self.format, self.mode = command, Format.SIXTEEN, None
+                self.scan, self.format, self.mode = command, wire.Format.SIXTEEN, None
                 self.drives = [None] * command.n_drives
             return verdict
         if self.scan is None or command.configuration != self.scan.configuration:
-            return Result.WRONG_CONFIGURATION, 0
+            return wire.Result.WRONG_CONFIGURATION, 0
         match command:
-            case SetPattern():
+            case wire.SetPattern():
                 if (verdict := self._board.check_drives(command, self.scan)) == OK:
                     end = command.first + len(command.drives)
                     self.drives[command.first : end] = command.drives
-            case SetFormat():
+            case wire.SetFormat():
                 if (verdict := self._board.check_format(command, self.scan)) == OK:
                     self.format = command.format
-            case SetMode():
+            case wire.SetMode():
                 if (verdict := self._board.check_mode(command, self.scan)) == OK:
-                    self.mode = command if command.mode is DriveMode.CHOPPED else None
+                    self.mode = command if command.mode is wire.DriveMode.CHOPPED else None
         return verdict
 
-    def answer(self, command: GetScan | GetPattern | GetMode) -> Message:
-        """What is held, for a host that reads it back."""
+    def answer(self, command: Question) -> wire.Message:
+        """What the board is, or what is held, for a host that reads it back."""
         scan, request = self.scan, command.request
+        if isinstance(command, wire.GetInfo | wire.GetBoard):
+            limits = replace(self._board.limits, request=request)
+            return limits if isinstance(command, wire.GetBoard) else self._board.info(request)
         if scan is None:
-            return Ack(request, type_byte(type(command)), Result.WRONG_CONFIGURATION, 0)
-        if isinstance(command, GetScan):
-            return HeldScan(*(request, *astuple(scan)[1:], self.format))
-        if isinstance(command, GetMode):
-            mode = self.mode or SetMode(0, 0, DriveMode.DIRECT, 0, 0)
-            return HeldMode(request, scan.configuration, mode.mode, mode.frequency, mode.periods)
+            return wire.Ack(
+                request, wire.type_byte(type(command)), wire.Result.WRONG_CONFIGURATION, 0
+            )
+        if isinstance(command, wire.GetScan):
+            return wire.HeldScan(*(request, *astuple(scan)[1:], self.format))
+        if isinstance(command, wire.GetMode):
+            mode = self.mode or wire.SetMode(0, 0, wire.DriveMode.DIRECT, 0, 0)
+            return wire.HeldMode(
+                request, scan.configuration, mode.mode, mode.frequency, mode.periods
+            )
         if command.first >= scan.n_drives:
-            return Ack(request, type_byte(GetPattern), Result.BAD_VALUE, 1)
+            return wire.Ack(request, wire.type_byte(wire.GetPattern), wire.Result.BAD_VALUE, 1)
         some = self.drives[command.first : command.first + _DRIVES_OF_PATTERN]
-        drives = tuple(drive or Drive(255, 255, 0) for drive in some)
-        return HeldPattern(request, scan.configuration, command.first, drives)
+        drives = tuple(drive or wire.Drive(255, 255, 0) for drive in some)
+        return wire.HeldPattern(request, scan.configuration, command.first, drives)

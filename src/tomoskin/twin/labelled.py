@@ -15,12 +15,14 @@ from threadpoolctl import threadpool_limits
 from tomoskin import __version__
 from tomoskin.core import FloatArray, ScriptError
 from tomoskin.model.mesh import Outline
+from tomoskin.model.section import toml_tables
 from tomoskin.model.skin import Skin
+from tomoskin.pipeline import REFERENCE_FRAMES
 from tomoskin.sensing.signal import Readout
 from tomoskin.twin.presets import TwinSettings
 from tomoskin.twin.probe import FACES, Probe
-from tomoskin.twin.script import of_script, tables_of
-from tomoskin.twin.script_schema import PressesSection
+from tomoskin.twin.script import of_script
+from tomoskin.twin.script_schema import FORMAT, SECTIONS, PressesSection
 from tomoskin.twin.source import Scans
 
 _STEP = 0.5e-3
@@ -46,7 +48,7 @@ class Population(PressesSection):
             For an unknown or missing key, or a value that cannot be meant.
         """
         with of_script():
-            tables = tables_of(text, source)
+            tables = toml_tables(text, source, FORMAT, SECTIONS)
             others = [name for name in tables if name != cls.section]
             if others or cls.section not in tables:
                 raise ScriptError(
@@ -113,9 +115,6 @@ COMMON_PRESSES = Population(
 )
 """What is drawn from where nothing is said: one round probe of a finger's to a palm's size."""
 
-
-REFERENCE_FRAMES = 20
-"""Idle frames whose mean is the reference of a set."""
 
 SHARD_FRAMES = 500
 """Frames of a shard: what is drawn from one seed, and written as one file."""

@@ -19,7 +19,6 @@ from tomoskin.model.skin import (
     check_step,
     followed,
 )
-from tomoskin.twin.dent import Load
 from tomoskin.twin.parameters import check_numbers, parameter, wandered
 
 _MOST_COMPRESSION = 0.99
@@ -160,7 +159,7 @@ class MaterialState:
 def stepped(
     state: MaterialState,
     settings: MaterialSettings,
-    load: Load,
+    load: FloatArray,
     dt: float,
     chance: float,
     *,
@@ -180,7 +179,7 @@ def stepped(
     play, creep, breakdown = _series(memory, dt)
     parts = past.lagging, past.late, past.broken
     rows = core.conducted(
-        (load.felt, past.load, unloaded),
+        (load, past.load, unloaded),
         (*parts, worn),
         (play, creep, breakdown),
         (
@@ -195,13 +194,13 @@ def stepped(
         ),
     )
     sigma = rows[0] if settings.scalar else rows.reshape(2, 2, -1).transpose(2, 0, 1)
-    return MaterialState(MemoryState(load.felt, *parts), state.worn, warmer), sigma
+    return MaterialState(MemoryState(load, *parts), state.worn, warmer), sigma
 
 
 def advance(
     state: MaterialState,
     settings: MaterialSettings,
-    load: Load,
+    load: FloatArray,
     dt: float,
     chance: float = 0.0,
 ) -> MaterialState:
@@ -217,8 +216,8 @@ def advance(
     """
     metric = metric_of(settings.thickness)
     return MaterialState(
-        memory=advanced(state.memory, settings.memory, load.felt, dt, metric),
-        worn=_worn(state, load.felt, settings),
+        memory=advanced(state.memory, settings.memory, load, dt, metric),
+        worn=_worn(state, load, settings),
         warmer=_warmed(state.warmer, settings, dt, chance),
     )
 

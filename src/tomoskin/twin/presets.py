@@ -17,8 +17,6 @@ from tomoskin.twin.faults import LineSettings
 from tomoskin.twin.material import MaterialSettings
 from tomoskin.twin.parameters import check_numbers
 
-Preset = tuple[ContactSettings, MaterialSettings, ElectronicsSettings, BendSettings]
-
 
 @dataclass(frozen=True)
 class TwinSettings:
@@ -47,8 +45,8 @@ class TwinSettings:
         """Check the refinement of the mesh and the seed."""
         check_numbers(self, above="mesh_ratio", least="seed")
 
-    @classmethod
-    def preset(cls, name: str, seed: int = 0) -> Self:
+    @staticmethod
+    def preset(name: str, seed: int = 0) -> TwinSettings:
         """The settings of that name: one of :data:`PRESETS`.
 
         Raises
@@ -58,10 +56,7 @@ class TwinSettings:
         """
         if name not in PRESETS:
             raise ModelError(f'expected a twin of {", ".join(PRESETS)}, got "{name}"', where="twin")
-        contact, material, electronics, bend = PRESETS[name]
-        return cls(
-            seed=seed, contact=contact, material=material, electronics=electronics, bend=bend
-        )
+        return replace(PRESETS[name], seed=seed)
 
     def with_electrodes(self, kind: str | None) -> Self:
         """These settings with electrodes of that kind of a skin file; None: as they are."""
@@ -74,21 +69,19 @@ class TwinSettings:
         return replace(self, electronics=replace(self.electronics, noise=noise))
 
 
-def _numbers(table: Mapping[str, Any]) -> dict[str, Any]:
-    """The numbers of a settings record; a series is a tuple."""
-    return {key: tuple(v) if isinstance(v, list) else v for key, v in table.items()}
+def _preset(table: Mapping[str, Mapping[str, Any]]) -> TwinSettings:
+    """Settings from the numbers of each stage; a series is a tuple."""
 
+    def numbers(stage: str) -> dict[str, Any]:
+        given = table.get(stage, {})
+        return {key: tuple(v) if isinstance(v, list) else v for key, v in given.items()}
 
-def _preset(table: Mapping[str, Mapping[str, Any]]) -> Preset:
-    parts = (table.get(name, {}) for name in ("contact", "material", "bend"))
-    contact, material, bend = map(_numbers, parts)
     own = table.get("electronics")
-    electronics = ElectronicsSettings() if own is None else replace(BOARD, **own)
-    return (
-        ContactSettings(**contact),
-        MaterialSettings(**material),
-        electronics,
-        BendSettings(**bend),
+    return TwinSettings(
+        contact=ContactSettings(**numbers("contact")),
+        material=MaterialSettings(**numbers("material")),
+        electronics=ElectronicsSettings() if own is None else replace(BOARD, **own),
+        bend=BendSettings(**numbers("bend")),
     )
 
 
@@ -110,5 +103,5 @@ POLARISING: dict[str, float] = _FILE["polarising"]
 SOURCES: dict[str, str] = _FILE["sources"]
 """Where the presets' numbers come from; those not named are assumed."""
 
-PRESETS: dict[str, Preset] = {name: _preset(table) for name, table in _FILE["presets"].items()}
-"""Contact, material, electronics and bending by name: ``presets.toml``."""
+PRESETS = {name: _preset(table) for name, table in _FILE["presets"].items()}
+"""Settings by name: ``presets.toml``."""

@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache
 from typing import Self
 
@@ -21,7 +21,16 @@ LEAST_SIZE = 1e-6
 
 
 class Shape(ABC):
-    """The face of a rigid probe in coordinates of its own, m; equal faces are solved once."""
+    """The face of a rigid probe in coordinates of its own, m; equal faces are solved once.
+
+    Raises GeometryError for a length that is no size.
+    """
+
+    def __post_init__(self) -> None:
+        """Check every length; only a crown may be without end."""
+        for one in fields(self):  # type: ignore[arg-type]
+            if one.type == "float":
+                _check(one.name, getattr(self, one.name), curved=one.name == "crown")
 
     @property
     @abstractmethod
@@ -78,11 +87,6 @@ class Circle(_Crowned):
     radius: float
     crown: float = math.inf
 
-    def __post_init__(self) -> None:
-        """Check the radius and the crown."""
-        _check("radius", self.radius)
-        _check("crown", self.crown, curved=True)
-
     @property
     def extent(self) -> float:
         """The radius of the face, in m."""
@@ -104,11 +108,6 @@ class Square(_Crowned):
 
     side: float
     crown: float = math.inf
-
-    def __post_init__(self) -> None:
-        """Check the side and the crown."""
-        _check("side", self.side)
-        _check("crown", self.crown, curved=True)
 
     @property
     def extent(self) -> float:
@@ -142,11 +141,6 @@ class Finger(Shape):
     width: float = 16e-3
     along: float = 12e-3
     across: float = 8e-3
-
-    def __post_init__(self) -> None:
-        """Check that every length is a size."""
-        for name in ("length", "width", "along", "across"):
-            _check(name, getattr(self, name))
 
     @property
     def extent(self) -> float:
@@ -182,7 +176,7 @@ class Face(_Crowned):
 
     def __post_init__(self) -> None:
         """Check the crown and the vertices."""
-        _check("crown", self.crown, curved=True)
+        super().__post_init__()
         _ = self._polygon
 
     @cached_property
@@ -259,8 +253,16 @@ class Probe:
 
     def __post_init__(self) -> None:
         """Check the place, force, angle and drag."""
-        _check_place(self.x, self.y)
-        _check_force(self.force)
+        if not (math.isfinite(self.x) and math.isfinite(self.y)):
+            raise GeometryError(
+                f"expected a finite position, got ({self.x}, {self.y})", where="press"
+            )
+        if not 0 <= self.force < math.inf:
+            raise ModelError(
+                f"expected a force of 0 N or more, got {self.force}",
+                where="press",
+                hint="a probe can only push",
+            )
         if not math.isfinite(self.angle):
             raise GeometryError(f"expected a finite angle, got {self.angle}", where="press")
         if not all(map(math.isfinite, self.drag)):
@@ -269,6 +271,8 @@ class Probe:
     @property
     def radius(self) -> float:
         """Radius of the circle with the area of the face, m."""
+        if isinstance(self.shape, Circle):
+            return self.shape.radius
         return math.sqrt(self.shape.area / math.pi)
 
     def moving(self, vx: float, vy: float, friction: float) -> Self:
@@ -282,77 +286,27 @@ class Probe:
         return replace(self, drag=(drag * vx, drag * vy))
 
 
-@dataclass(frozen=True, slots=True)
-class Press:
-    """A flat round probe, as a page sends it.
+class Press(Probe):
+    """A flat round probe of ``radius`` m, as a page sends it."""
 
-    ``x``, ``y`` and ``radius`` in m, ``force`` in N (0: it only rests there).
+    __slots__ = ()
 
-    Raises
-    ------
-    GeometryError
-        When a place is not finite, or the radius no size of a face.
-    ModelError
-        When the force is negative or not finite.
-    """
-
-    x: float
-    y: float
-    force: float
-    radius: float
-
-    def __post_init__(self) -> None:
-        """Check the place, radius and force."""
-        _check_place(self.x, self.y)
-        _circle(self.radius)
-        _check_force(self.force)
-
-    @property
-    def shape(self) -> Circle:
-        """The face of the tip, which is a circle."""
-        return _circle(self.radius)
-
-    @property
-    def angle(self) -> float:
-        """The angle is zero, for the tip is round."""
-        return 0.0
-
-    @property
-    def drag(self) -> tuple[float, float]:
-        """The drag is zero, for the tip does not slide."""
-        return 0.0, 0.0
+    def __init__(self, x: float, y: float, force: float, radius: float) -> None:
+        super().__init__(_circle(radius), x, y, force)
 
 
 _circle = lru_cache(maxsize=64)(Circle)
 """The same for the same radius, since a press that moves is another at each step."""
 
 
-Contact = Press | Probe
-"""What may press on a twin."""
-
-
-def check_on_skin(contacts: Sequence[Contact], outline: Outline) -> None:
+def check_on_skin(probes: Sequence[Probe], outline: Outline) -> None:
     """Raise GeometryError that names the first press whose centre is off the skin."""
-    if not contacts:
+    if not probes:
         return
-    inside = outline.contains(np.array([(c.x, c.y) for c in contacts]))
+    inside = outline.contains(np.array([(p.x, p.y) for p in probes]))
     if not all(inside.tolist()):
         number = int(np.argmin(inside))
-        x, y = contacts[number].x * 1e3, contacts[number].y * 1e3
+        x, y = probes[number].x * 1e3, probes[number].y * 1e3
         raise GeometryError(
             f"its centre ({x:.1f} mm, {y:.1f} mm) is off the skin", where=f"press {number}"
-        )
-
-
-def _check_place(x: float, y: float) -> None:
-    if not (math.isfinite(x) and math.isfinite(y)):
-        raise GeometryError(f"expected a finite position, got ({x}, {y})", where="press")
-
-
-def _check_force(force: float) -> None:
-    if not 0 <= force < math.inf:
-        raise ModelError(
-            f"expected a force of 0 N or more, got {force}",
-            where="press",
-            hint="a probe can only push",
         )

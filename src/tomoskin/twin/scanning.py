@@ -110,11 +110,6 @@ class SampleTable:
         return np.asarray(place), np.where(direction % 2, -1, 1)
 
     @cached_property
-    def source(self) -> IntArray:
-        """Source electrodes (n_samples,)."""
-        return np.asarray(self.drives[self.drive, 0])
-
-    @cached_property
     def sink(self) -> IntArray:
         """Sink electrodes (n_samples,)."""
         return np.asarray(self.drives[self.drive, 1])

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, Self, TypeVar
+from typing import Self
 
 from tomoskin.core import GeometryError, ScriptError, SkinError
-from tomoskin.model.section import Section, check_names, show, toml_tables
-from tomoskin.twin.course import Rows, Scripted, ScriptedBend, ScriptedPress, ramp
+from tomoskin.model.section import toml_tables
+from tomoskin.twin.course import Scripted, ScriptedBend, ScriptedPress, after, there_and_back
 from tomoskin.twin.probe import Circle, Face, Finger, Shape, Square
 from tomoskin.twin.script_schema import (
     FORMAT,
@@ -25,8 +25,6 @@ from tomoskin.twin.script_schema import (
 )
 
 _DEFAULT_SOURCE = "script"
-
-S = TypeVar("S", bound=Section)
 
 
 @dataclass(frozen=True)
@@ -71,7 +69,7 @@ class Script:
             whole can be run on a skin, :func:`check_script` says.
         """
         with of_script():
-            tables = tables_of(text, source)
+            tables = toml_tables(text, source, FORMAT, SECTIONS)
             if PressesSection.section in tables:
                 raise ScriptError(
                     "describes labelled frames, not a timeline",
@@ -79,11 +77,11 @@ class Script:
                     hint="give the number of frames: --presses N",
                 )
             head = ScriptSection.read(tables.get("script", {}), f"{source}: [script]")
-            presses = tuple(_press(s, w) for s, w in _each(PressSection, tables, source))
-            faults = tuple(_fault(s, w) for s, w in _each(FaultSection, tables, source))
-            marks = tuple(Scripted(s, w) for s, w in _each(MarkSection, tables, source))
-            bends = [ScriptedBend.of(s, w) for s, w in _each(BendSection, tables, source)]
-            bends += [ScriptedBend.of(s, w) for s, w in _each(StretchSection, tables, source)]
+            presses = tuple(_press(s, w) for s, w in PressSection.each(tables, source))
+            faults = tuple(_fault(s, w) for s, w in FaultSection.each(tables, source))
+            marks = tuple(Scripted(s, w) for s, w in MarkSection.each(tables, source))
+            bends = [ScriptedBend.of(s, w) for s, w in BendSection.each(tables, source)]
+            bends += [ScriptedBend.of(s, w) for s, w in StretchSection.each(tables, source)]
         return cls(
             source,
             presses=presses,
@@ -103,41 +101,9 @@ def of_script() -> Iterator[None]:
         raise ScriptError(error.message, where=error.where, hint=error.hint) from None
 
 
-def tables_of(text: str, source: str) -> dict[str, Any]:
-    """Sections of a script as written, known ones only."""
-    tables = toml_tables(text, source, FORMAT)
-    check_names(tables, list(SECTIONS), "section", source)
-    return tables
-
-
-def _each(section: type[S], tables: Mapping[str, Any], source: str) -> Iterator[tuple[S, str]]:
-    """Record and place of each table of a list."""
-    given = tables.get(section.section, [])
-    if not isinstance(given, list):
-        raise ScriptError(
-            f"expected a list of tables, got {show(given)}",
-            where=f"{source}: [{section.section}]",
-            hint=f"write {section.heading}, because there may be several",
-        )
-    for number, table in enumerate(given, start=1):
-        title = table.get("id") if isinstance(table, Mapping) else None
-        name = f' "{title}"' if isinstance(title, str) else ""
-        where = f"{source}: {section.heading} {number}{name}"
-        yield section.read(table, where), where
-
-
 def _press(given: PressSection, where: str) -> ScriptedPress:
-    if given.force is not None and given.hold is not None:
-        force = ramp(given.force, given.rise, given.hold, given.fall)
-    else:
-        force = _course((0.0, 0.0), given.profile, f"{where} profile")
-        if force[-1][1] != 0.0:
-            raise ScriptError(
-                f"expected 0 N in the last row, got {force[-1][1]:g} N",
-                where=f"{where} profile",
-                hint="add a row with the time at which the probe has left the sheet",
-            )
-    path = _course((0.0, *given.at), given.path, f"{where} path")
+    force = there_and_back(given, given.force, where)
+    path = after((0.0, *given.at), given.path, f"{where} path")
     return ScriptedPress(given, where, _shape(given, where), force, path)
 
 
@@ -170,10 +136,3 @@ def _fault(given: FaultSection, where: str) -> Scripted[FaultSection]:
             hint="an electrode is always connected to itself",
         )
     return Scripted(given, where)
-
-
-def _course(first: tuple[float, ...], rows: Rows | None, where: str) -> Rows:
-    """``rows`` after the ``first`` one, which stands at time 0."""
-    if rows and not rows[0][0] > 0:
-        raise ScriptError("row 0: expected a time above 0 s, got 0 s", where=where)
-    return (first, *(rows or ()))

@@ -12,7 +12,7 @@ from tomoskin.core import GeometryError, ScriptError
 from tomoskin.model.pattern import Scan
 from tomoskin.model.skin import Skin
 from tomoskin.twin.bend import strain_of
-from tomoskin.twin.course import NO_FRAME, ScriptedPress, check_stages
+from tomoskin.twin.course import NO_FRAME, ScriptedBend, ScriptedPress, check_stages
 from tomoskin.twin.presets import TwinSettings
 from tomoskin.twin.script import Script
 
@@ -114,16 +114,9 @@ def _check_ids(presses: tuple[ScriptedPress, ...]) -> None:
 
 
 def _check_ends(script: Script) -> None:
-    for press in script.presses:
-        if press.end > script.duration + _ROUNDING:
-            raise ScriptError(
-                f"lasts until {press.end:g} s, but the script ends at {script.duration:g} s",
-                where=f"{press.where} {press.force_key}",
-                hint="raise [script] duration",
-            )
+    lasting: list[ScriptedPress | ScriptedBend] = [*script.presses, *script.bends]
     last = [
-        (bend.end, f"{bend.where} {'profile' if bend.given.profile else 'hold'}")
-        for bend in script.bends
+        (one.end, f"{one.where} {'profile' if one.given.profile else 'hold'}") for one in lasting
     ]
     last += [
         (one.given.stop, f"{one.where} {'end' if one.given.end else 'start'}")

@@ -7,6 +7,7 @@ from typing import Any
 from tomoskin.model.section import (
     Choice,
     Number,
+    OneOrMore,
     OneOrSpan,
     Quantity,
     Row,
@@ -14,7 +15,6 @@ from tomoskin.model.section import (
     Table,
     Text,
     Whole,
-    Words,
     key,
 )
 from tomoskin.twin.presets import PRESETS
@@ -244,7 +244,7 @@ class PressesSection(Section, section="presses"):
 
     count: tuple[int, int] = key(OneOrSpan(Whole(0, 8)), "Number of presses at once.", default=1)
     shapes: tuple[str, ...] = key(
-        Words(Choice(("circle", "square", "finger"))),
+        OneOrMore(Choice(("circle", "square", "finger")), different=True),
         "Shapes of the faces. All are equally likely.",
         default="circle",
     )

@@ -14,10 +14,10 @@ from tomoskin.model.mesh import Outline, Plane, Surface, laid_on, triangulate
 from tomoskin.model.skin import Skin
 from tomoskin.twin import material
 from tomoskin.twin.bend import Pose, depth_of, strain_of
-from tomoskin.twin.dent import Load, indent
+from tomoskin.twin.dent import indent
 from tomoskin.twin.material import MaterialState
 from tomoskin.twin.presets import TwinSettings
-from tomoskin.twin.probe import Contact, check_on_skin
+from tomoskin.twin.probe import Probe, check_on_skin
 
 _MESH_SEED = 7919
 """Seed of the twin's mesh; the reconstruction's is another, so no mesh is ever shared."""
@@ -33,8 +33,8 @@ _FIRST = 64
 """One cell of so many is compared first."""
 
 
-_Under = tuple[tuple[Contact, ...], Pose]
-"""What presses on the sheet, and how it is bent."""
+_Under = tuple[tuple[tuple[Probe, ...], FloatArray], tuple[Pose, FloatArray]]
+"""What presses on the sheet, and how it is bent: each with what the cells feel of it alone."""
 
 
 class _Loading:
@@ -45,49 +45,36 @@ class _Loading:
     ) -> None:
         self._points, self._outline = points, outline
         self._ground = given.contact, points, blur
-        self._rest, self._height = rest, given.bend.height
-        nothing = Load.none(len(points))
-        self.now: _Under = ((), ())
-        self._dented: tuple[tuple[Contact, ...], Load] = ((), nothing)
-        self._posed: tuple[Pose, FloatArray] = ((), nothing.strain)
-        self._felt: tuple[_Under, Load] = (self.now, nothing)
+        self._shape = points, rest, given.bend.height
+        nothing = np.zeros((4, len(points)))
+        self.at_rest: _Under = ((), nothing), ((), nothing[:3])
+        self.now: _Under = self.at_rest
+        self._felt: tuple[_Under, FloatArray] = self.now, nothing
 
-    def press(self, presses: tuple[Contact, ...]) -> None:
+    def press(self, presses: tuple[Probe, ...]) -> None:
         """Replace all presses; GeometryError when one is off the skin or its face cannot press."""
         check_on_skin(presses, self._outline)
-        if presses != self.now[0]:
+        if presses != self.now[0][0]:
             taken = tuple(presses)
-            self._dented = taken, indent(taken, *self._ground)
-            self.now = taken, self.now[1]
+            self.now = (taken, indent(taken, *self._ground)), self.now[1]
 
     def bend(self, pose: Pose) -> None:
         """Bend and stretch; GeometryError when the sheet cannot take that shape."""
-        if pose != self.now[1]:
+        if pose != self.now[1][0]:
             taken = tuple(pose)
-            self._posed = taken, self._strain(taken)
-            self.now = self.now[0], taken
+            self.now = self.now[0], (taken, strain_of(taken, *self._shape).T)
 
     @property
-    def load(self) -> Load:
-        """The load that the cells feel now."""
-        under = presses, pose = self.now
+    def load(self) -> FloatArray:
+        """(4, n_cells) strain xx, yy, xy and depth, m, that the cells feel now."""
+        under = (_, load), (pose, strain) = self.now
         if not _same(under, self._felt[0]):
-            if presses is not self._dented[0]:
-                self._dented = presses, indent(presses, *self._ground)
-            load = self._dented[1]
             if pose:
-                if pose is not self._posed[0]:
-                    self._posed = pose, self._strain(pose)
-                felt = load.felt.copy()
-                felt[:3] += self._posed[1].T
-                felt[3] += depth_of(pose, self._points)
-                load = Load(felt)
+                load = load.copy()
+                load[:3] += strain
+                load[3] += depth_of(pose, self._points)
             self._felt = under, load
         return self._felt[1]
-
-    def _strain(self, pose: Pose) -> FloatArray:
-        """(n_cells, 3) of the pose alone."""
-        return strain_of(pose, self._points, self._rest, self._height)
 
 
 class _Network:
@@ -172,21 +159,21 @@ class TwinSkin:
         return self._network.solves
 
     @property
-    def presses(self) -> tuple[Contact, ...]:
+    def presses(self) -> tuple[Probe, ...]:
         """What presses on the sheet now."""
-        return self._loading.now[0]
+        return self._loading.now[0][0]
 
     @property
     def pose(self) -> Pose:
         """How the sheet is bent and stretched now."""
-        return self._loading.now[1]
+        return self._loading.now[1][0]
 
     @property
-    def load(self) -> Load:
-        """What the cells feel under the present presses, in the present pose."""
+    def load(self) -> FloatArray:
+        """(4, n_cells) strain xx, yy, xy and depth, m, under the present presses and pose."""
         return self._loading.load
 
-    def set_presses(self, presses: tuple[Contact, ...]) -> None:
+    def set_presses(self, presses: tuple[Probe, ...]) -> None:
         """Replace all presses at once, from any thread; they are solved here.
 
         Raises
@@ -231,7 +218,7 @@ class TwinSkin:
         """
         if chance is not None:
             self._random = np.random.default_rng(chance)
-        self._loading.now = self._stood = ((), ())
+        self._loading.now = self._stood = self._loading.at_rest
         self._state = MaterialState.fresh(self.material, len(self._unloaded))
         self._conductivity = None
 

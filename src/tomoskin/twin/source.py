@@ -18,7 +18,7 @@ from tomoskin.twin.electronics import TwinElectronics
 from tomoskin.twin.faults import Faults, Line, LineSettings
 from tomoskin.twin.held_scanning import Board
 from tomoskin.twin.presets import PRESETS, TwinSettings
-from tomoskin.twin.probe import Contact
+from tomoskin.twin.probe import Probe
 from tomoskin.twin.scanning import table_of
 from tomoskin.twin.sheet import TwinSkin
 
@@ -29,7 +29,39 @@ _CHANNELS = (8, 16, 32)
 """Sizes of the simulated board."""
 
 
-class TwinTransport:
+class SheetTransport:
+    """A source before the sheet of a twin, which can be pressed and bent from any thread."""
+
+    def __init__(self, sheet: TwinSkin) -> None:
+        self.sheet = sheet
+
+    @property
+    def presses(self) -> tuple[Probe, ...]:
+        """What presses on the sheet now."""
+        return self.sheet.presses
+
+    def set_presses(self, presses: tuple[Probe, ...]) -> None:
+        """Replace all presses; they show from the next frame on.
+
+        Raises
+        ------
+        GeometryError
+            When the centre of one is off the skin; then nothing is changed.
+        """
+        self.sheet.set_presses(presses)
+
+    def set_pose(self, pose: Pose) -> None:
+        """Bend and stretch the sheet; it shows from the next frame on.
+
+        Raises
+        ------
+        GeometryError
+            When the sheet cannot take that shape; then nothing is changed.
+        """
+        self.sheet.set_pose(pose)
+
+
+class TwinTransport(SheetTransport):
     """Bytes of a twin, in real time.
 
     One thread reads; everything else may come from any.
@@ -43,46 +75,17 @@ class TwinTransport:
         line: Line | None = None,
     ) -> None:
         """``device`` must have been powered on by the same ``clock``, on the ``electronics``."""
+        super().__init__(electronics.sheet)
         self._line = line or Line(LineSettings(), 0)
         self.name = "twin"
         self.device = device
         self.electronics = electronics
-        self._noise: float | None = None
+        self._noise = electronics.settings.noise
         self._clock = clock
         self._condition = threading.Condition()
         self._inbox = bytearray()
         self._closed = False
         self._reboot = False
-
-    @property
-    def sheet(self) -> TwinSkin:
-        """The twin's sheet, which answers the scans."""
-        return self.electronics.sheet
-
-    @property
-    def presses(self) -> tuple[Contact, ...]:
-        """What presses on the twin now."""
-        return self.sheet.presses
-
-    def set_presses(self, presses: tuple[Contact, ...]) -> None:
-        """Replace all presses; they show from the next frame on.
-
-        Raises
-        ------
-        GeometryError
-            When the centre of one is off the skin; then nothing is changed.
-        """
-        self.sheet.set_presses(presses)
-
-    def set_pose(self, pose: Pose) -> None:
-        """Bend and stretch the twin's sheet; it shows from the next frame on.
-
-        Raises
-        ------
-        GeometryError
-            When the sheet cannot take that shape; then nothing is changed.
-        """
-        self.sheet.set_pose(pose)
 
     def set_faults(self, faults: Faults) -> None:
         """Break and mend; it shows from the next frame on.
@@ -96,11 +99,8 @@ class TwinTransport:
 
     def set_noise(self, noise: float | None) -> None:
         """Noise of one conversion, LSB, from the next frame on; None: that of its settings."""
-        electronics = self.electronics
-        if self._noise is None:
-            self._noise = electronics.settings.noise
         value = self._noise if noise is None else noise
-        electronics.settings = replace(electronics.settings, noise=value)
+        self.electronics.settings = replace(self.electronics.settings, noise=value)
 
     def reboot(self) -> None:
         """Cut the board's power for a moment: it forgets everything and says HELLO."""

@@ -10,7 +10,7 @@ import numpy as np
 from tomoskin.core import FloatArray, Touch
 from tomoskin.pipeline import REFERENCE_FRAMES, Pipeline, Prepared
 from tomoskin.twin.presets import TwinSettings
-from tomoskin.twin.probe import Contact
+from tomoskin.twin.probe import Probe
 from tomoskin.twin.source import Scans
 
 
@@ -78,7 +78,7 @@ class SteppedSkin:
         self._steps = 0
         return [self.step(()) for _ in range(REFERENCE_FRAMES if self._with_touches else 1)][-1]
 
-    def step(self, presses: Sequence[Contact]) -> Step:
+    def step(self, presses: Sequence[Probe]) -> Step:
         """One scan while ``presses`` press.
 
         Raises

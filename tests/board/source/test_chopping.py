@@ -24,7 +24,8 @@ from tomoskin.board.wire import OLDER, BoardLimits, DriveMode, GetInfo, HeldMode
 from tomoskin.core import SourceError, VirtualClock
 from tomoskin.files.session import SessionReader, SessionWriter, read_session
 from tomoskin.model.skin import Skin
-from tomoskin.sensing.signal import Readout, directions
+from tomoskin.sensing.signal import Readout
+from tomoskin.sensing.signal.readout import directions
 from tomoskin.twin import TwinSettings, make_twin
 
 CHOPPED = replace(SETTINGS, chop_frequency=500)

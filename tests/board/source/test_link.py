@@ -17,7 +17,8 @@ from board.source.boards import (
     poll_until,
     twin_transport,
 )
-from tomoskin.board.source import FrameCounters, Transport
+from tomoskin.board.source import Transport
+from tomoskin.board.source.command_queue import FrameCounters
 from tomoskin.board.wire import Fault, FaultCode, encode
 from tomoskin.core import SourceError
 

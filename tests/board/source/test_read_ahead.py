@@ -7,7 +7,7 @@ import threading
 
 import pytest
 
-from tomoskin.board.source.read_ahead import ReadAhead
+from tomoskin.board.source.transport import ReadAhead
 
 PATIENCE = 30.0
 

@@ -223,9 +223,9 @@ def test_power_in_cells_and_contacts_is_what_the_source_gives(
     forward = model(mesh, turn=turn)
     state = forward.at(kind(mesh, turn))
     given = (forward.current * driven_voltages(state)).real
-    assert state.power.shape == (forward.pattern.n_drive, len(mesh.cells))
-    assert (state.power > 0).all()
-    assert mismatch(state.power.sum(axis=1) + contact_power(state), given) < 1e-10
+    assert state.solution.power.shape == (forward.pattern.n_drive, len(mesh.cells))
+    assert (state.solution.power > 0).all()
+    assert mismatch(state.solution.power.sum(axis=1) + contact_power(state), given) < 1e-10
 
 
 @pytest.mark.parametrize("kind", [scalar, tensor])
@@ -236,4 +236,4 @@ def test_power_of_quadratic_elements(mesh: Mesh, kind: Any) -> None:
     state = ForwardModel(mesh, pattern, 0.01, 0.3, order=2).at(kind(mesh, 1.0))
     in_contacts = 0.3 * state.contact_jacobian.sum(axis=1) * 0.01
     given = 0.3 * state.solution.voltages
-    assert mismatch(state.power.sum(axis=1) + in_contacts, given) < 1e-10
+    assert mismatch(state.solution.power.sum(axis=1) + in_contacts, given) < 1e-10

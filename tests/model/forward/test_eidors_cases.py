@@ -13,13 +13,15 @@ from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.pattern import Pattern
 
-FOLDER = Path(__file__).resolve().parents[3] / "benchmarks" / "eidors"
+BENCHMARKS = Path(__file__).resolve().parents[3] / "benchmarks"
 
 
-def test_the_files_hold_what_the_script_reads_and_give_our_voltages_again(tmp_path):
-    written = runpy.run_path(str(FOLDER / "write_cases.py"))["main"](tmp_path, (400,))
+def test_the_files_hold_what_the_script_reads_and_give_our_voltages_again(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(BENCHMARKS)
+    written = runpy.run_path(str(BENCHMARKS / "eidors_cases.py"))["main"](tmp_path, (400,))
     case = loadmat(written[0])
-    asked = set(re.findall(r"\bc\.(\w+)", (FOLDER / "time_eidors.m").read_text(encoding="utf-8")))
+    script = (BENCHMARKS / "eidors" / "time_eidors.m").read_text(encoding="utf-8")
+    asked = set(re.findall(r"\bc\.(\w+)", script))
     assert asked <= set(case)
     nodes, cells = case["nodes"], case["elems"] - 1
     edges = np.sort(cells[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)

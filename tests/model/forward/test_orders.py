@@ -62,7 +62,7 @@ def test_voltage_with_electrodes_on_whole_sides() -> None:
 def field_errors(state: State) -> tuple[float, float]:
     """L² and H¹ norms of the error of the potential, V·m and V, by quadrature of degree 4."""
     mesh, element = state.model.mesh, state.model.assembly.element
-    nodal = state.basis[element.cells, 0]
+    nodal = state.solution.basis[element.cells, 0]
     place, weight = triangle_rule(3)
     corner = mesh.points[mesh.cells]
     where = np.einsum("qk,nkd->nqd", place, corner)

@@ -62,7 +62,7 @@ def test_a_rolled_strip_equals_the_flat_one(turns: float, order: int) -> None:
     assert mismatch(got.solution.voltages, expected.solution.voltages) < 1e-10
     assert mismatch(got.solution.potentials, expected.solution.potentials) < 1e-10
     assert mismatch(got.jacobian, expected.jacobian) < 1e-10
-    assert mismatch(got.power, expected.power) < 1e-10
+    assert mismatch(got.solution.power, expected.solution.power) < 1e-10
     assert mismatch(got.contact_jacobian, expected.contact_jacobian) < 1e-10
 
 

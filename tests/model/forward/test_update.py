@@ -131,7 +131,7 @@ def test_many_touches_at_once_are_those_one_by_one(mesh: Mesh) -> None:
 def test_many_touches_without_the_native_engine(
     mesh: Mesh, order: int, turn: complex, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Of all sizes: the small ones are stacked."""
+    """Of all sizes."""
     monkeypatch.setenv("TOMOSKIN_ENGINE", "scipy")
     base = state(mesh, order=order, turn=turn)
     touches = [

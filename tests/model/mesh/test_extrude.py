@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shapes import disc
+from shapes import cylinder, disc
 from tomoskin.core import FloatArray, GeometryError
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import (
@@ -25,7 +25,6 @@ from tomoskin.model.mesh import (
     Polygon,
     Rectangle,
     WallPatch,
-    cylinder,
     extrude,
     ring,
     simplex_measure,
@@ -100,7 +99,7 @@ def test_patches_on_a_flat_wall_are_exact(name: str) -> None:
 
 
 def test_patches_on_a_curved_wall_end_exactly() -> None:
-    mesh = cylinder(0.15, 0.2, count=16, width=0.02, bottom=0.09, top=0.11, cells=800, layers=8)
+    mesh = cylinder(0.15, 0.2, count=16, span=(0.09, 0.11), cells=800, layers=8)
     sound(mesh)
     assert len(mesh.electrodes) == 16
     for k, facets in enumerate(mesh.electrodes):
@@ -115,7 +114,7 @@ def test_patches_on_a_curved_wall_end_exactly() -> None:
 
 
 def test_first_electrode_at_the_top_then_clockwise() -> None:
-    mesh = cylinder(0.1, 0.04, count=4, width=0.02, bottom=0.01, top=0.03, cells=300, layers=4)
+    mesh = cylinder(0.1, 0.04, count=4, span=(0.01, 0.03), cells=300, layers=4)
     middles = np.array([mesh.points[e].mean(axis=(0, 1))[:2] for e in mesh.electrodes])
     directions = middles / np.linalg.norm(middles, axis=1, keepdims=True)
     assert directions == pytest.approx(np.array([(0, 1), (1, 0), (0, -1), (-1, 0)]), abs=1e-9)
@@ -334,7 +333,7 @@ def test_electrodes_of_full_height_tend_to_the_sheet() -> None:
 
 def test_tank_of_sixteen_electrodes() -> None:
     """Homogeneous: reciprocal, positive, and the same seen from every electrode and its mirror."""
-    tank = cylinder(0.15, 0.2, count=16, width=0.02, bottom=0.09, top=0.11, cells=1200, layers=10)
+    tank = cylinder(0.15, 0.2, count=16, span=(0.09, 0.11), cells=1200, layers=10)
     pattern = Pattern.adjacent(16)
     model = ForwardModel(tank, pattern, 1e-3)
     r = model.transfer_resistance(0.1)

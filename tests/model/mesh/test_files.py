@@ -1,4 +1,4 @@
-"""Mesh files: written here, read back; electrodes by name, facets, function and place."""
+"""Mesh files: written here, read back; electrodes by name, facets and function."""
 
 from __future__ import annotations
 
@@ -11,18 +11,17 @@ import meshio
 import numpy as np
 import pytest
 
-from shapes import disc
+from shapes import box, cylinder, disc
 from tomoskin.core import FloatArray, GeometryError, IntArray
-from tomoskin.model.mesh import BoxPatch, Mesh, MeshFile, Places, box, cylinder
+from tomoskin.model.mesh import Mesh, MeshFile
 from tomoskin.model.mesh import simplex_measure as measure
 
-SIZE = (0.3, 0.04, 0.03)
 KINDS = {2: ("line", "triangle"), 3: ("triangle", "tetra")}
 Save = Callable[[Mesh, str], Path]
 
 
 def bar() -> Mesh:
-    return box(SIZE, (4, 2, 2), [BoxPatch("-x"), BoxPatch("+x")])
+    return box(np.linspace(-0.15, 0.15, 5), np.linspace(-0.02, 0.02, 3), np.linspace(0, 0.03, 3))
 
 
 def in_space(points: FloatArray) -> FloatArray:
@@ -69,7 +68,7 @@ def test_msh_22_with_named_groups(tmp_path: Path, make: Callable[[], Mesh], bina
 
 
 def test_groups_are_ordered_by_number_not_by_text(tmp_path: Path) -> None:
-    mesh = cylinder(0.1, 0.04, count=11, width=0.02, bottom=0, top=0.04, cells=500, layers=2)
+    mesh = cylinder(0.1, 0.04, count=11, span=(0, 0.04), cells=500, layers=2)
     names = [f"electrode_{i + 1}" for i in range(11)]
     meshio.gmsh.write(tmp_path / "a.msh", physical(mesh, names), "2.2", binary=False)
     same(Mesh.read(tmp_path / "a.msh"), mesh)
@@ -164,16 +163,6 @@ def test_electrodes_by_a_function_of_centroids(save: Save) -> None:
     same(Mesh.read(save(bar(), "a.vtu"), ends), bar())
 
 
-def test_electrodes_by_places(save: Save) -> None:
-    spots = np.array([[-0.15, 0.01, 0.01], [-0.15, -0.01, 0.01], [0.1, 0.02, 0.02]])
-    mesh = Mesh.read(save(bar(), "a.vtu"), Places(spots, 0.05))
-    for spot, facets in zip(spots, mesh.electrodes, strict=True):
-        centroid = mesh.points[facets].mean(axis=1)
-        gaps = np.linalg.norm(centroid[:, None] - spots, axis=2)
-        assert (gaps.min(axis=1) == np.linalg.norm(centroid - spot, axis=1)).all()
-        assert (gaps.min(axis=1) <= 0.05).all()
-
-
 def test_scale(save: Save) -> None:
     mesh = bar()
     large = Mesh(mesh.points * 1000, mesh.cells, mesh.electrodes)
@@ -191,7 +180,12 @@ def test_stl_joins_the_corners_of_its_triangles(tmp_path: Path, binary: bool) ->
         file, meshio.Mesh(in_space(mesh.points), [("triangle", mesh.cells)]), binary=binary
     )
     middles = np.array([mesh.points[e].mean(axis=(0, 1)) for e in mesh.electrodes])
-    got = Mesh.read(file, Places(middles, 0.011))
+
+    def nearest(x: FloatArray) -> IntArray:
+        gap = np.linalg.norm(x[:, None, :2] - middles, axis=2)
+        return np.where(gap.min(axis=1) <= 0.011, gap.argmin(axis=1), -1)
+
+    got = Mesh.read(file, nearest)
     assert len(got.points) == len(mesh.points)
     assert got.volumes == pytest.approx(mesh.volumes, rel=1e-4)
     for a, b in zip(got.electrodes, mesh.electrodes, strict=True):
@@ -317,9 +311,6 @@ def test_a_degenerate_cell_is_named(tmp_path: Path) -> None:
         (lambda x: np.arange(len(x)) * 2, r"has no facet"),
         (lambda _: np.zeros(3, dtype=int), "one whole number for each"),
         (lambda x: np.zeros(len(x)), "one whole number for each"),
-        (Places([[0.0, 0.0, 0.0], [9.0, 0, 0]], 0.05), r"within 50 mm; the nearest is 885\d mm"),
-        (Places([[0.0, 0.0]], 0.02), "positions with 3 coordinates"),
-        (Places([[0.0, 0.0, 0.0]], -1.0), "radius above 0"),
     ],
 )
 def test_electrodes_that_cannot_be(save: Save, electrodes: Any, message: str) -> None:
@@ -332,7 +323,7 @@ def test_a_closed_surface_has_no_rim(tmp_path: Path) -> None:
     shell = bar().boundary
     file = write_cells(tmp_path / "a.vtu", bar().points, [("triangle", shell)])
     with pytest.raises(GeometryError, match="closed"):
-        Mesh.read(file, Places([[0.15, 0, 0]], 0.1))
+        Mesh.read(file, lambda x: np.zeros(len(x), dtype=int))
     assert len(MeshFile.read(file).cells) == len(shell)  # what it holds can be had
 
 

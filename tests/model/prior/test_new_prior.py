@@ -16,7 +16,7 @@ USE = """
 import json
 import numpy as np
 from tomoskin import OneStep, Skin
-from tomoskin.imaging import prior_matrix
+from tomoskin.model.prior import penalty_of
 from tomoskin.pipeline import prepare
 from tomoskin.server.settings_messages import schema
 
@@ -29,7 +29,7 @@ print(json.dumps(next(k for k in inverse["keys"] if k["name"] == "slope")))
 prepared = prepare(again)
 image = prepared.operator(np.linspace(0, 1e-3, prepared.pattern.n_meas))
 own = OneStep(prepared.model, "central", alpha=1.0, conductivity=skin.conductivity)
-q = prior_matrix(again.inverse.record("prior"), prepared.mesh, own.problem.jacobian)
+q = penalty_of(again.inverse.record("prior"), prepared.mesh, own.problem.jacobian).matrix
 print(json.dumps([bool(np.isfinite(image.values).all()), float(q.min()), float(q.max())]))
 """
 

@@ -19,7 +19,7 @@ from tomoskin.model.prior import (
     Noser,
     Prior,
     Structural,
-    prior_matrix,
+    penalty_of,
 )
 from tomoskin.model.skin import Skin
 
@@ -37,7 +37,7 @@ def jacobian(mesh: Mesh) -> FloatArray:
 
 @pytest.mark.parametrize("name", PRIORS)
 def test_symmetric_and_not_negative(mesh: Mesh, name: str) -> None:
-    q = prior_matrix(name, mesh, jacobian(mesh))
+    q = penalty_of(name, mesh, jacobian(mesh)).matrix
     full = np.diag(q) if q.ndim == 1 else q
     assert full.shape == (len(mesh.cells),) * 2
     assert np.abs(full - full.T).max() < 1e-12
@@ -46,7 +46,7 @@ def test_symmetric_and_not_negative(mesh: Mesh, name: str) -> None:
 
 @pytest.mark.parametrize("name", ["laplace", "gaussian"])
 def test_smoothness_priors_do_not_punish_a_constant(mesh: Mesh, name: str) -> None:
-    q = prior_matrix(name, mesh, jacobian(mesh))
+    q = penalty_of(name, mesh, jacobian(mesh)).matrix
     assert np.abs(q @ np.ones(len(q))).max() < 1e-10
     smooth, rough = mesh.centroids[:, 0], np.random.default_rng(1).permutation(mesh.centroids[:, 0])
     assert smooth @ q @ smooth < 0.7 * (rough @ q @ rough)
@@ -56,14 +56,14 @@ def test_laplace_is_twice_the_sum_over_shared_facets(mesh: Mesh) -> None:
     x = np.random.default_rng(2).standard_normal(len(mesh.cells))
     first, second = mesh.neighbours.T
     expected = 2.0 * ((x[first] - x[second]) ** 2).sum()
-    assert x @ prior_matrix("laplace", mesh, jacobian(mesh)) @ x == pytest.approx(expected)
+    assert x @ penalty_of("laplace", mesh, jacobian(mesh)).matrix @ x == pytest.approx(expected)
 
 
 def test_noser_is_the_root_of_the_sensitivity(mesh: Mesh) -> None:
     j = jacobian(mesh)
-    got = prior_matrix("noser", mesh, j)
+    got = penalty_of("noser", mesh, j).matrix
     assert got == pytest.approx(np.sqrt(np.diag(j.T @ j)))
-    assert prior_matrix("noser", mesh, 9 * j) == pytest.approx(9 * got)
+    assert penalty_of("noser", mesh, 9 * j).matrix == pytest.approx(9 * got)
 
 
 def test_gaussian_is_what_an_area_weighted_average_leaves_over(mesh: Mesh) -> None:
@@ -76,21 +76,21 @@ def test_gaussian_is_what_an_area_weighted_average_leaves_over(mesh: Mesh) -> No
     weights = uneven.volumes * 0.5 ** ((2 * gap / width) ** 2)
     x = rng.standard_normal(len(uneven.cells))
     left_over = x - weights @ x / weights.sum(axis=1)
-    got = x @ prior_matrix("gaussian", uneven, jacobian(uneven)) @ x
+    got = x @ penalty_of("gaussian", uneven, jacobian(uneven)).matrix @ x
     assert got == pytest.approx(left_over @ left_over, rel=1e-10)
 
 
 def test_gaussian_does_not_depend_on_size(mesh: Mesh) -> None:
     large = Mesh(1e3 * mesh.points, mesh.cells, mesh.electrodes)
-    got = prior_matrix("gaussian", large, jacobian(mesh))
-    assert got == pytest.approx(prior_matrix("gaussian", mesh, jacobian(mesh)), abs=1e-12)
+    got = penalty_of("gaussian", large, jacobian(mesh)).matrix
+    assert got == pytest.approx(penalty_of("gaussian", mesh, jacobian(mesh)).matrix, abs=1e-12)
 
 
 @pytest.mark.parametrize("exponent", [0.0, 0.3, 1.0])
 def test_noser_with_any_exponent(mesh: Mesh, exponent: float) -> None:
     j = jacobian(mesh)
     expected = np.linalg.norm(j, axis=0) ** (2.0 * exponent)
-    assert prior_matrix(Noser(exponent), mesh, j) == pytest.approx(expected)
+    assert penalty_of(Noser(exponent), mesh, j).matrix == pytest.approx(expected)
 
 
 def test_a_structural_prior_is_laplace_within_its_regions(mesh: Mesh) -> None:
@@ -98,15 +98,15 @@ def test_a_structural_prior_is_laplace_within_its_regions(mesh: Mesh) -> None:
     first, second = mesh.neighbours.T
     weight = np.where(labels[first] == labels[second], 2.0, 2.0 * 0.05)
     x = np.random.default_rng(4).standard_normal(len(labels))
-    got = x @ prior_matrix(Structural(labels, 0.05), mesh, jacobian(mesh)) @ x
+    got = x @ penalty_of(Structural(labels, 0.05), mesh, jacobian(mesh)).matrix @ x
     assert got == pytest.approx((weight * (x[first] - x[second]) ** 2).sum())
 
 
 def test_a_coupling_of_one_is_laplace(mesh: Mesh) -> None:
     labels = np.arange(len(mesh.cells)) % 3
     j = jacobian(mesh)
-    got = prior_matrix(Structural(labels, coupling=1.0), mesh, j)
-    assert np.array_equal(got, prior_matrix(Laplace(), mesh, j))
+    got = penalty_of(Structural(labels, coupling=1.0), mesh, j).matrix
+    assert np.array_equal(got, penalty_of(Laplace(), mesh, j).matrix)
 
 
 def test_regions_that_are_cut_apart_have_a_constant_each(mesh: Mesh) -> None:
@@ -155,7 +155,7 @@ def test_matern_is_the_covariance_of_the_book(mesh: Mesh, smoothness: float) -> 
 def test_a_covariance_and_its_inverse_are_the_same_prior(mesh: Mesh) -> None:
     j = jacobian(mesh)
     prior = Matern(0.2 * np.ptp(mesh.points[:, 0]), 0.5)
-    precision = prior_matrix(prior, mesh, j)
+    precision = penalty_of(prior, mesh, j).matrix
     spread, _ = prior.penalty(mesh, j).carry(j)
     assert mismatch(precision @ spread, j.T) < 1e-9
 
@@ -163,7 +163,7 @@ def test_a_covariance_and_its_inverse_are_the_same_prior(mesh: Mesh) -> None:
 def test_a_tenth_of_the_extent_is_the_correlation_length_unless_given(mesh: Mesh) -> None:
     j = jacobian(mesh)
     given = Matern(0.1 * np.ptp(mesh.points, axis=0).max())
-    assert np.array_equal(prior_matrix(Matern(), mesh, j), prior_matrix(given, mesh, j))
+    assert np.array_equal(penalty_of(Matern(), mesh, j).matrix, penalty_of(given, mesh, j).matrix)
 
 
 def test_distances_on_a_curved_sheet_are_taken_in_space() -> None:
@@ -206,4 +206,4 @@ def test_a_prior_takes_what_the_skin_file_says(keys: dict[str, Any], prior: Prio
 
 def test_a_prior_that_is_not_known(mesh: Mesh) -> None:
     with pytest.raises(ModelError, match=r'expected a prior among .*, got "tv"'):
-        prior_matrix("tv", mesh, jacobian(mesh))
+        penalty_of("tv", mesh, jacobian(mesh))

@@ -110,7 +110,7 @@ def test_a_moved_surface_is_the_surface_moved():
         ('board = "0102"', 'board = "x1"', "hexadecimal"),
         ('board = "0102"', 'bord = "0102"', 'did you mean "board"'),
         ('["10 mm", "0 mm", "30 mm"]', "[1, 2, 3]", "without a unit"),
-        ('"bend.npz"', "3", 'skin 1 "left" calibration: entry 1: expected text'),
+        ('"bend.npz"', "3", '1 "left" calibration: entry 1: expected text'),
     ],
 )
 def test_what_cannot_be_meant_is_said(files, old, new, said):

@@ -9,16 +9,15 @@ from hypothesis import strategies as st
 
 from tomoskin.core import ModelError
 from tomoskin.model.skin import (
-    SCALAR,
     MaterialMemory,
     MemoryState,
     Metric,
     advanced,
     followed,
     load_of,
-    response,
     responses,
 )
+from tomoskin.model.skin.hysteresis import SCALAR, response
 
 MEMORY = MaterialMemory(
     play=(0.3, 0.2),

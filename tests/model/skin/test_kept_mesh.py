@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tomoskin import Skin
-from tomoskin.core import cache
+from tomoskin.core import archive
 from tomoskin.model.mesh import Disc, ElectrodeArc, Mesh, triangulate
 from tomoskin.model.skin import kept_mesh as module
 from tomoskin.model.skin.build import flat_mesh
@@ -17,7 +17,7 @@ from tomoskin.model.skin.kept_mesh import kept_mesh
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setenv(cache.VARIABLE, str(tmp_path))
+    monkeypatch.setenv(archive.VARIABLE, str(tmp_path))
     module._versions.cache_clear()
     return tmp_path
 

@@ -12,11 +12,10 @@ from sensing.fit.test_pace import finder
 from sensing.fit.test_table import expected, problem
 from tomoskin.core import FloatArray
 from tomoskin.sensing.fit import LIVE
-from tomoskin.sensing.fit.detections import judged
 from tomoskin.sensing.fit.expectation import Expectation
 from tomoskin.sensing.fit.hypotheses import challenged
 from tomoskin.sensing.fit.policy import DetectionPolicy
-from tomoskin.sensing.fit.selection import ForwardSelection
+from tomoskin.sensing.fit.selection import ForwardSelection, judged
 from tomoskin.sensing.fit.spot_fit import Deficit
 
 STRONG = press(0.03, 0.0, depth=-0.5)

@@ -13,7 +13,8 @@ from tomoskin.core import ModelError
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.pattern import Pattern
-from tomoskin.sensing.fit import Response, Spots, depth_of, spots_of
+from tomoskin.sensing.fit import Response, Spots, spots_of
+from tomoskin.sensing.fit.spot import depth_of
 
 
 def test_content_is_what_the_cells_hold() -> None:

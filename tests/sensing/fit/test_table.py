@@ -13,12 +13,12 @@ from sensing.fit.test_finder import data, model, press
 from tomoskin.core import FloatArray, finished
 from tomoskin.sensing.fit import EXHAUSTIVE, LIVE
 from tomoskin.sensing.fit.expectation import Expectation, Known
-from tomoskin.sensing.fit.native import NativeSolver
 from tomoskin.sensing.fit.policy import DetectionPolicy
 from tomoskin.sensing.fit.problem import Problem, Solver, WhitenedTable
 from tomoskin.sensing.fit.selection import ForwardSelection
 from tomoskin.sensing.fit.solver import NumpySolver, SheetDomain
 from tomoskin.sensing.fit.spot_fit import Deficit
+from tomoskin.sensing.fit.spot_model import NativeSolver
 
 TWO = np.concatenate([press(-0.04, 0.03, 0.018, -0.4), press(0.05, -0.02, 0.024, -0.3)])
 SPREAD = np.array([4e-3, 2e-3, 0.2, 3e-5])

@@ -9,9 +9,9 @@ from sensing.fit.test_table import drawn
 from tomoskin.core import FloatArray, finished
 from tomoskin.sensing.fit import Response
 from tomoskin.sensing.fit.candidates import Candidates, footprints_of
-from tomoskin.sensing.fit.sheet_terms import field_modes
 from tomoskin.sensing.fit.table import ResponseTable
 from tomoskin.sensing.fit.tabulate import kept_tabulation
+from tomoskin.sensing.fit.uneven_sheet import field_modes
 
 UNEVEN, LENGTH = 0.2, 0.05
 """Standard deviation of log σ, and m over which it changes."""

@@ -13,8 +13,7 @@ from tomoskin.core import FloatArray, finished
 from tomoskin.model.forward import ForwardModel, State
 from tomoskin.model.mesh import triangulate
 from tomoskin.sensing.fit import SpotFinder
-from tomoskin.sensing.fit.sheet_terms import channel_errors, field_modes
-from tomoskin.sensing.fit.uneven_sheet import fitting_sheet
+from tomoskin.sensing.fit.uneven_sheet import channel_errors, field_modes, fitting_sheet
 
 UNEVEN = 0.2
 """Height of the waves of log σ: a standard deviation of 14 %."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tomoskin.sensing.signal import Baseline, Idle, Reference
-from tomoskin.sensing.signal.idle import BLOCK
+from tomoskin.sensing.signal import Baseline, Reference
+from tomoskin.sensing.signal.idle import BLOCK, Idle
 
 ROWS, DT = 60, 0.05
 SIZE = np.linspace(1.0, 3.0, ROWS)

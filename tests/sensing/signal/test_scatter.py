@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tomoskin.sensing.signal import Reference, Scatter
-from tomoskin.sensing.signal.reference import MEMORY
+from tomoskin.sensing.signal.baseline import MEMORY
 
 LIVING = np.zeros(3, bool)
 

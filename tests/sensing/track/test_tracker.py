@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 
 from sensing.track.detections import AREA, Run, detection
 from tomoskin.core import Detection
-from tomoskin.sensing.track import STILL, Tracker
+from tomoskin.sensing.track import Tracker, TrackSettings
 
+STILL = TrackSettings(still=True)
 FAINT = {"snr": 6.0}
 
 
@@ -191,7 +192,7 @@ def test_touches_that_have_gone_are_forgotten() -> None:
     for number in range(200):
         run([[detection(0.03 * (number % 3))]] * 3 + [[]] * 20)
         sizes.append(len(pickle.dumps(run.tracker)))
-    assert run.tracker.numbered == 200
+    assert run.tracker.ledger.numbered == 200
     assert max(sizes[150:]) <= max(sizes[80:120]) + 16  # numbers become longer
 
 

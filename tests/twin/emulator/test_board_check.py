@@ -11,8 +11,8 @@ from tomoskin.cli import main
 from tomoskin.run import CheckFinding, check_board
 from tomoskin.sensing.signal import LoadRing
 from tomoskin.twin.emulator import emulate_load
-from tomoskin.twin.emulator.board_process import BoardFaults
 from tomoskin.twin.emulator.program import Programs
+from twin.emulator.faulty import BoardFaults
 
 CURRENT = 0.1
 FAULTS = {
@@ -36,8 +36,8 @@ def _built(programs: Programs, monkeypatch: pytest.MonkeyPatch) -> None:
 def findings(
     faults: BoardFaults | None = None, channels: int = 8, five_volts: float | None = None
 ) -> list[CheckFinding]:
-    ring = LoadRing.for_current(channels, CURRENT)
-    with emulate_load(ring.resistance, CURRENT, faults=faults) as transport:
+    ring, broken = LoadRing.for_current(channels, CURRENT), (faults or BoardFaults()).pack()
+    with emulate_load(ring.resistance, CURRENT, faults=broken) as transport:
         return list(check_board(transport, ring, CURRENT, five_volts=five_volts, frames=4))
 
 

@@ -40,10 +40,11 @@ from tomoskin.model.skin import Skin
 from tomoskin.pipeline import prepare
 from tomoskin.run import Runner
 from tomoskin.twin import TwinSettings, TwinSkin
-from tomoskin.twin.emulator.board_process import BoardFaults, BoardProcess, SkinMemory
+from tomoskin.twin.emulator.board_process import BoardProcess, SkinMemory
 from tomoskin.twin.emulator.program import PicoPrograms
 from tomoskin.twin.emulator.source import front_of, open_emulator
 from tomoskin.twin.emulator.uf2 import pack_uf2
+from twin.emulator.faulty import BoardFaults
 from twin.emulator.pico import CURRENT, PATIENCE, Pico, events_of, frames_of, powered, star
 
 SETTLING = 84e-6
@@ -359,8 +360,9 @@ def test_a_multiplexer_that_does_not_reach_an_electrode_is_named(
     skin = Skin.load("textile-disc-8").altered({"readout": {"settling": "84 us"}})
     settings = TwinSettings.preset("textile", seed=2)
     resistance = TwinSkin.of(skin, settings).resistance()
-    faults = BoardFaults(reading={2: 6})
-    memory = SkinMemory(tmp_path / "skin", front_of(skin, settings, "pico"), resistance, faults)
+    faults = BoardFaults(reading={2: 6}).pack()
+    front = front_of(skin, settings, "pico")
+    memory = SkinMemory(tmp_path / "skin", front, resistance, faults=faults)
     board = BoardProcess(pico, memory.path, skin.current, "-f")
     runner = Runner(prepare(skin), lambda: SerialTransport(board.port))
     came = threading.Event()

@@ -26,7 +26,7 @@ function Points({ on, count }: { on: boolean; count: number }) {
         {on ? "Go on rubbing" : "Press known positions"}
       </button>
       {count > 0 && (
-        <button type="button" onClick={() => send({ type: "flow_undo" })}>
+        <button type="button" onClick={() => send({ type: "flow_delete" })}>
           Undo position {count}
         </button>
       )}

@@ -180,7 +180,7 @@ function Going({ kind }: { kind: FlowKind }) {
           type="button"
           data-testid="flow-undo"
           disabled={presses.length === 0}
-          onClick={() => send({ type: "flow_undo" })}
+          onClick={() => send({ type: "flow_delete" })}
         >
           Undo the last press
         </button>

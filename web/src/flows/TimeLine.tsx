@@ -4,9 +4,8 @@ import { signal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { addCommand } from "../commands";
 import { link, send, status } from "../state";
-import type { Tick } from "../wire";
 import { clock } from "./format";
-import { allGaps, allMarks, allSpans, duration, lineOf, position } from "./model";
+import { allGaps, allMarks, allSpans, duration, lineOf, position, type Tick } from "./model";
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5, 10];
 const SEEK_MS = 120;
@@ -100,13 +99,13 @@ function Track({ movable }: { movable: boolean }) {
       <span class="gone" style={{ width: `${(100 * Math.min(at, end)) / end}%` }} />
       {allSpans.value.map((span) => (
         <i
-          key={`${span.id} ${span.begin_s}`}
+          key={`${span.id} ${span.begin}`}
           class="span"
           data-testid="span"
-          title={`Touch ${span.id}, ${clock(span.begin_s)} to ${clock(span.end_s)}`}
+          title={`Touch ${span.id}, ${clock(span.begin)} to ${clock(span.end)}`}
           style={{
-            left: `${(100 * span.begin_s) / end}%`,
-            width: `${(100 * (span.end_s - span.begin_s)) / end}%`,
+            left: `${(100 * span.begin) / end}%`,
+            width: `${(100 * (span.end - span.begin)) / end}%`,
           }}
         />
       ))}

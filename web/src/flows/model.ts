@@ -3,7 +3,7 @@
 import { computed, effect, signal } from "@preact/signals";
 import { opened } from "../drawers";
 import { link, now, onMessage, say, scene, send, shown, status } from "../state";
-import type { Calibrations, Files, FlowNow, PlayedTimeline, Sources, Tick, TouchSpan } from "../wire";
+import type { Calibrations, EventNote, Files, FlowNow, PlayedTimeline, Sources, Span } from "../wire";
 
 export type FlowKind = NonNullable<FlowNow["kind"]>;
 export type Phase = FlowNow["phase"];
@@ -34,9 +34,12 @@ export const flow = signal<FlowNow>(NO_FLOW);
 export const calibrations = signal<Calibrations>({ type: "calibrations", touch: null, force: null, force_most_n: null });
 export const timeline = signal<PlayedTimeline | null>(null);
 /** Notes and gaps since the recording began or the replay was opened, and its touches. */
+/** A moment of a recording, from its first frame, and what happened. */
+export type Tick = Pick<EventNote, "time_s" | "text">;
+
 export const marks = signal<readonly Tick[]>([]);
 export const gaps = signal<readonly Tick[]>([]);
-export const spans = signal<readonly TouchSpan[]>([]);
+export const spans = signal<readonly Pick<Span, "id" | "kind" | "begin" | "end">[]>([]);
 /** The recording that was asked for, until its first frame can be shown; a skin is made for it. */
 export const opening = signal<string | null>(null);
 onMessage("error", () => (opening.value = null));
@@ -124,7 +127,7 @@ effect(() => {
   const before = spans.peek();
   const next = new Map(before.map((span) => [span.id, span]));
   for (const { id, kind } of frame.touches) {
-    next.set(id, { id, kind, begin_s: next.get(id)?.begin_s ?? at, end_s: at });
+    next.set(id, { id, kind, begin: next.get(id)?.begin ?? at, end: at });
   }
   if (frame.touches.length) spans.value = [...next.values()].slice(-MOST_SPANS);
 });

@@ -1,6 +1,6 @@
 /** What stands still around the image: the outline, the electrodes, the scale bar. */
 
-import type { Electrode, Scene, Sick } from "../wire";
+import type { Electrode, ElectrodeHealth, Scene } from "../wire";
 import { narrow } from "../screen";
 import { barLength, boxOf, outward, toPixels, type View } from "./view";
 
@@ -61,7 +61,7 @@ function pixelsOut(scene: Scene, view: View, electrode: Electrode): readonly [nu
 
 /** A dot where it is well, with its sign while it is driven; a square on its corner, with a cross,
  * where it is not well. */
-function Dot({ x, y, sick, sign }: { x: number; y: number; sick: Sick | undefined; sign: string }) {
+function Dot({ x, y, sick, sign }: { x: number; y: number; sick: ElectrodeHealth | undefined; sign: string }) {
   if (!sick && sign) {
     return (
       <>
@@ -107,7 +107,7 @@ function Arrow({ from, to }: Readonly<Record<"from" | "to", readonly [number, nu
 export interface FurnitureProps {
   readonly scene: Scene;
   readonly view: View;
-  readonly sick: readonly Sick[];
+  readonly sick: readonly ElectrodeHealth[];
   /** Source and sink of the drive that is looked at, counted from 0. */
   readonly drive: readonly [number, number] | null;
   /** Plus and minus of the measurement that is looked at. */

@@ -10,7 +10,6 @@ from tomoskin.board.source.boards import (
     board_named,
 )
 from tomoskin.board.source.clock import TICK_RATES, ClockFit, ClockFitter, ScanTimer
-from tomoskin.board.source.command_queue import FrameCounters
 from tomoskin.board.source.configuration import Configuration
 from tomoskin.board.source.link import Link
 from tomoskin.board.source.serial import SerialTransport, list_ports
@@ -42,7 +41,6 @@ __all__ = [
     "Converter",
     "Exchange",
     "FirmwareFiles",
-    "FrameCounters",
     "Link",
     "ScanSettings",
     "ScanTimer",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from dataclasses import dataclass, field
 
 from tomoskin.core import Event, Frame
@@ -48,35 +49,19 @@ class ClockFit:
 
 
 @dataclass(slots=True)
-class _Sums:
-    """Of x (ticks since the first) and y (host time since the first, s)."""
+class _Run:
+    """Frames between two starts of the device: sums of x, ticks since the first, and of y, host
+    time since the first, s; and corners of the lower hull."""
 
+    first: int
+    first_time: float
+    last: int
     n: int = 0
     x: float = 0.0
     y: float = 0.0
     xx: float = 0.0
     xy: float = 0.0
     yy: float = 0.0
-
-    def add(self, x: float, y: float) -> None:
-        self.n += 1
-        self.x, self.y = self.x + x, self.y + y
-        self.xx, self.xy, self.yy = self.xx + x * x, self.xy + x * y, self.yy + y * y
-
-    def misfit(self, a: float, b: float) -> float:
-        """Root mean square of y − a − b x."""
-        square = self.yy - 2 * (a * self.y + b * self.xy) + b * (2 * a * self.x + b * self.xx)
-        return math.sqrt(max(square / self.n + a * a, 0.0))
-
-
-@dataclass(slots=True)
-class _Run:
-    """Frames between two starts of the device."""
-
-    first: int
-    first_time: float
-    last: int
-    sums: _Sums = field(default_factory=_Sums)
     corners: list[tuple[float, float]] = field(default_factory=list)
 
 
@@ -99,24 +84,37 @@ class ClockFitter:
             run = self._run = _Run(ticks, host_time, ticks)
         run.last = ticks
         x, y = float(ticks - run.first), host_time - run.first_time
-        run.sums.add(x, y)
-        _extend(run.corners, (x, y))
+        run.n += 1
+        run.x, run.y = run.x + x, run.y + y
+        run.xx, run.xy, run.yy = run.xx + x * x, run.xy + x * y, run.yy + y * y
+        corners = run.corners  # of the lower convex hull (Andrew 1979), in O(1) on average
+        if corners and x <= corners[-1][0]:
+            return  # the same tick again
+        while len(corners) > 1:
+            (x0, y0), (x1, y1) = corners[-2:]
+            if (y1 - y0) * (x - x0) < (y - y0) * (x1 - x0):  # the last one is below
+                break
+            corners.pop()
+        corners.append((x, y))
+        if len(corners) > _MOST_CORNERS:
+            del corners[1:-1:2]
 
     @property
     def fit(self) -> ClockFit | None:
         """The fit so far; None before there are enough frames."""
         run = self._run
-        if run is None or run.sums.n < _FEWEST or len(run.corners) < 2:
+        if run is None or run.n < _FEWEST or len(run.corners) < 2:
             return None
-        mean = run.sums.x / run.sums.n
-        right = next(n for n, (x, _) in enumerate(run.corners) if n and x >= mean)
+        mean = run.x / run.n
+        right = bisect_left(run.corners, (mean,), 1)
         (x0, y0), (x1, y1) = run.corners[right - 1], run.corners[right]
         b = (y1 - y0) / (x1 - x0)
         a = y0 - b * x0
         if not b > 0:
             return None
-        late = run.sums.misfit(a, b)
-        return ClockFit(1 / b, run.first_time + a - b * run.first, late, run.sums.n)
+        square = run.yy - 2 * (a * run.y + b * run.xy) + b * (2 * a * run.x + b * run.xx)
+        late = math.sqrt(max(square / run.n + a * a, 0.0))  # root mean square of y − a − b x
+        return ClockFit(1 / b, run.first_time + a - b * run.first, late, run.n)
 
 
 class ScanTimer:
@@ -177,19 +175,3 @@ class ClockWatch:
             "by this computer: times and speeds of touches are wrong by as much"
         )
         return Event(frame.host_time, "clock", text)
-
-
-def _extend(corners: list[tuple[float, float]], point: tuple[float, float]) -> None:
-    """The lower convex hull with a point further right (Andrew 1979); amortised O(1)."""
-    if corners and point[0] <= corners[-1][0]:
-        return  # the same tick again
-    while len(corners) > 1 and _above(corners[-2], corners[-1], point):
-        corners.pop()
-    corners.append(point)
-    if len(corners) > _MOST_CORNERS:
-        del corners[1:-1:2]
-
-
-def _above(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> bool:
-    """Whether b is on or above the line from a to c."""
-    return (b[1] - a[1]) * (c[0] - a[0]) >= (c[1] - a[1]) * (b[0] - a[0])

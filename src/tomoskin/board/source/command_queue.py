@@ -16,9 +16,9 @@ _ANY = -1
 """The expected number of a frame that may have any."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class FrameCounters:
-    """Frames since the link was made.
+    """Frames since the link was made, until now.
 
     ``passed`` on; ``lost`` by their sequence numbers; ``foreign``: another configuration or a
     wrong number of samples; ``stale``: behind the sequence, or before START was answered.
@@ -31,14 +31,14 @@ class FrameCounters:
 
 
 class SequenceFilter:
-    """Checks each frame against the configuration and the sequence."""
+    """Checks each frame against the configuration and the sequence, and counts it."""
 
     def __init__(self, configuration: Configuration) -> None:
         """Make a filter that waits for the first frame."""
         self._configuration = configuration
         self._expected: int | None = None
         self._foreign_run = False
-        self._passed = self._lost = self._foreign = self._stale = 0
+        self.counters = FrameCounters()
 
     def open(self) -> None:
         """START has been answered: the sequence begins at 0."""
@@ -53,31 +53,27 @@ class SequenceFilter:
         """No frame passes until START is answered again."""
         self._expected = None
 
-    @property
-    def counters(self) -> FrameCounters:
-        """The counts of frames since the start."""
-        return FrameCounters(self._passed, self._lost, self._foreign, self._stale)
-
     def take(self, frame: Frame) -> list[Frame | Event]:
         """The frame, or nothing; and an event if frames are missing or foreign ones begin."""
+        counters = self.counters
         if self._expected is None:
-            self._stale += 1
+            counters.stale += 1
             return []
         fault = self._fault(frame)
         if fault:
-            self._foreign += 1
+            counters.foreign += 1
             first, self._foreign_run = not self._foreign_run, True
             return [Event(frame.host_time, "foreign", fault)] if first else []
         self._foreign_run = False
         gap = 0 if self._expected == _ANY else (frame.sequence - self._expected) % _MODULUS
         if gap >= _MODULUS // 2:
-            self._stale += 1
+            counters.stale += 1
             return []
         self._expected = (frame.sequence + 1) % _MODULUS
-        self._passed += 1
+        counters.passed += 1
         if not gap:
             return [frame]
-        self._lost += gap
+        counters.lost += gap
         text = f"{gap} frame{'s' if gap > 1 else ''} lost before frame {frame.sequence}"
         return [Event(frame.host_time, "lost", text), frame]
 

@@ -12,7 +12,6 @@ from tomoskin.board.wire import (
     Command,
     Drive,
     DriveMode,
-    Format,
     GetMode,
     GetPattern,
     GetScan,
@@ -76,7 +75,7 @@ class Configuration:
         return replace(
             self,
             scan=replace(self.scan, oversampling=fitted.oversampling),
-            format=replace(self.format, format=_format(fitted)),
+            format=replace(self.format, format=fitted.format),
             mode=self.mode and replace(self.mode, periods=periods),
             scan_time=scan_time(self.scan.n_drives, self.n_samples, fitted, board, periods),
         )
@@ -96,29 +95,20 @@ class Configuration:
         )
         chunks = _chunks(scan)
         content = encode_payload(announce) + b"".join(encode_payload(chunk) for chunk in chunks)
-        mode = _mode(settings)
+        mode = None
+        if settings.chop_frequency:
+            mode = SetMode(0, 0, DriveMode.CHOPPED, settings.chop_frequency, 0)
         content += encode_payload(mode) if mode else b""
         identity = crc16(content) or 1
         return cls(
             identity,
             replace(announce, configuration=identity),
             tuple(replace(chunk, configuration=identity) for chunk in chunks),
-            SetFormat(0, identity, _format(settings)),
+            SetFormat(0, identity, settings.format),
             scan.n_samples,
             scan_time(len(scan.drives), scan.n_samples, settings),
             mode and replace(mode, configuration=identity),
         )
-
-
-def _mode(settings: ScanSettings) -> SetMode | None:
-    if not settings.chop_frequency:
-        return None
-    return SetMode(0, 0, DriveMode.CHOPPED, settings.chop_frequency, 0)
-
-
-def _format(settings: ScanSettings) -> Format:
-    """A sample of one conversion is shorter on the line when it is packed."""
-    return Format.PACKED if settings.packs else Format.SIXTEEN
 
 
 def _chunks(scan: Scan) -> list[SetPattern]:

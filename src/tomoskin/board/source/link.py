@@ -9,12 +9,11 @@ from contextlib import AbstractContextManager
 
 from tomoskin.board.source.agreement import Rated, RateFollower
 from tomoskin.board.source.clock import ClockWatch
-from tomoskin.board.source.command_queue import FrameCounters
 from tomoskin.board.source.configuration import Configuration
 from tomoskin.board.source.protocol_session import ProtocolSession, Stage
 from tomoskin.board.source.settings import ScanSettings, Timing
 from tomoskin.board.source.transport import Diagnosable, Fetched, Played, Transport
-from tomoskin.board.wire import Ack, BoardLimits, Counters, Decoder, Info
+from tomoskin.board.wire import Ack, BoardLimits, Decoder, Info
 from tomoskin.core import Event, Frame, SourceError
 from tomoskin.model.pattern import Scan
 
@@ -32,6 +31,9 @@ class Link(AbstractContextManager["Link"]):
     ----------
     diagnosis
         Why no board answers, once it should have; None where it does, or nobody can tell.
+    counters, frames
+        What the stream has held until now: messages and dropped bytes; frames passed, lost, foreign
+        and stale.
     """
 
     def __init__(
@@ -58,6 +60,7 @@ class Link(AbstractContextManager["Link"]):
         self._fetched = transport if isinstance(transport, Fetched) else None
         self._rate = RateFollower(transport) if isinstance(transport, Rated) else None
         self._session = ProtocolSession(scan, settings, self._timing, self._clock(), transport.name)
+        self.counters, self.frames = self._decoder.counters, self._session.frames.counters
         self._watch = ClockWatch()
         self._closed = False
         self._heard = b""
@@ -88,16 +91,6 @@ class Link(AbstractContextManager["Link"]):
         """How long the first byte of the last read had waited on this host, s."""
         return self._fetched.waited if self._fetched else 0.0
 
-    @property
-    def counters(self) -> Counters:
-        """What the stream has held: messages and dropped bytes."""
-        return self._decoder.counters
-
-    @property
-    def frames(self) -> FrameCounters:
-        """Frames passed, lost, foreign and stale."""
-        return self._session.frames.counters
-
     def poll(self, timeout: float) -> list[Frame | Event]:
         """Frames and events, waiting at most ``timeout`` s for bytes.
 
@@ -115,8 +108,12 @@ class Link(AbstractContextManager["Link"]):
             raise self.diagnosis or error from None
         if self.counters.messages:
             self.diagnosis = None
-        elif self.diagnosis is None and self._session.stage is Stage.SETTING_UP:
-            self.diagnosis = _diagnosis(self.transport, self._heard)
+        elif (
+            self.diagnosis is None
+            and self._session.stage is Stage.SETTING_UP
+            and isinstance(self.transport, Diagnosable)
+        ):
+            self.diagnosis = self.transport.diagnose(self._heard)
         self._flush()
         patience = min(timeout, self._session.deadline() - now)
         items += self._listen(max(patience, 0.0))
@@ -167,7 +164,10 @@ class Link(AbstractContextManager["Link"]):
         items = []
         for message in self._decoder.feed(data, now):
             items += self._session.receive(message, now)
-        items += _doubts(self._watch, self.info, items)
+        if (info := self._session.info) is not None:
+            frames = [item for item in items if isinstance(item, Frame)]
+            doubts = [self._watch.push(frame, info.tick_rate) for frame in frames]
+            items += filter(None, doubts)
         if self._rate:
             self._rate.follow(self._session.take_rate(), silent=self._session.is_silent)
             slower = self._rate.slower(self.counters, running=self.running)
@@ -179,16 +179,3 @@ class Link(AbstractContextManager["Link"]):
         data = self._session.commands.take()
         if data:
             self.transport.write(data)
-
-
-def _diagnosis(transport: Transport, heard: bytes) -> SourceError | None:
-    """The likeliest cause of nobody's having spoken, where the transport can tell."""
-    return transport.diagnose(heard) if isinstance(transport, Diagnosable) else None
-
-
-def _doubts(watch: ClockWatch, info: Info | None, items: list[Frame | Event]) -> list[Event]:
-    """What the times of frames say against the clock that the board states."""
-    if info is None:
-        return []
-    pushed = (watch.push(item, info.tick_rate) for item in items if isinstance(item, Frame))
-    return [event for event in pushed if event is not None]

@@ -191,7 +191,7 @@ class ProtocolSession:
         if self.stage is Stage.WAITING:
             self._set_up(now)
         passed = self.frames.take(frame)
-        if not any(isinstance(item, Frame) for item in passed):
+        if not passed or passed[-1] is not frame:
             return passed
         quiet, was_silent = now - self._last_frame, self.is_silent
         self._last_frame, self.is_silent = now, False

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from tomoskin.board.source.boards import BOARDS
-from tomoskin.board.source.read_ahead import ReadAhead
-from tomoskin.board.source.transport import read_options
+from tomoskin.board.source.transport import ReadAhead, read_options
 from tomoskin.core import SourceError
 
 if TYPE_CHECKING:

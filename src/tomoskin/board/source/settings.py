@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Self
 
 from tomoskin.board.source.boards import BOARDS, DEFAULT_BOARD, board_named
-from tomoskin.board.wire import BoardLimits
+from tomoskin.board.wire import BoardLimits, Format
 from tomoskin.core import SourceError
 
 if TYPE_CHECKING:
@@ -65,9 +65,10 @@ class ScanSettings:
             raise SourceError(f"expected a prescaler of {PRESCALERS}, got {self.prescaler}")
 
     @property
-    def packs(self) -> bool:
-        """Whether samples fit ten bits, so that frames can be sent packed."""
-        return self.oversampling == 1 and self.adc_bits == _PACKED_BITS
+    def format(self) -> Format:
+        """How samples are sent: one conversion of ten bits is shorter on the line when packed."""
+        packs = self.oversampling == 1 and self.adc_bits == _PACKED_BITS
+        return Format.PACKED if packs else Format.SIXTEEN
 
     def on_board(self, adc_bits: int) -> Self | None:
         """The settings that give samples of the same scale on a converter of ``adc_bits``.

@@ -1,7 +1,6 @@
 """Bytes ↔ messages, from one schema that the firmware shares. Sans-IO."""
 
 from tomoskin.board.wire.codec import (
-    Counters,
     Decoder,
     decode_payload,
     encode,
@@ -9,7 +8,7 @@ from tomoskin.board.wire.codec import (
     is_command,
     type_byte,
 )
-from tomoskin.board.wire.framing import Deframer, crc16
+from tomoskin.board.wire.framing import Counters, Deframer, crc16
 from tomoskin.board.wire.messages import (
     Ack,
     BoardLimits,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from binascii import crc_hqx
-from collections import Counter
+from dataclasses import dataclass
 
 _FULL = 254
 """Longest run of data bytes behind one COBS code byte."""
@@ -59,6 +59,39 @@ def enclose(payload: bytes) -> bytes:
     return cobs_encode(payload + crc16(payload).to_bytes(2, "big")) + b"\0"
 
 
+@dataclass(slots=True)
+class Counters:
+    """What a stream has held so far.
+
+    Attributes
+    ----------
+    messages
+        Whole messages passed on.
+    overlong
+        Blocks longer than any message: a line without 0x00, or another device.
+    torn
+        Blocks whose COBS code bytes do not add up.
+    checksum
+        Blocks whose CRC is wrong.
+    foreign
+        Blocks with a right CRC that are no message of this schema in this direction.
+    bytes_dropped
+        Bytes in the blocks that were not passed on.
+    """
+
+    messages: int = 0
+    overlong: int = 0
+    torn: int = 0
+    checksum: int = 0
+    foreign: int = 0
+    bytes_dropped: int = 0
+
+    @property
+    def corrupt(self) -> int:
+        """Blocks that were dropped, for whatever reason."""
+        return self.overlong + self.torn + self.checksum + self.foreign
+
+
 class Deframer:
     """Bytes → payloads with a right checksum. Holds at most one message; never raises."""
 
@@ -67,7 +100,7 @@ class Deframer:
         self._limit = limit + 1 + limit // _FULL  # before the 0x00
         self._partial = b""
         self._skipping = False
-        self.counts: Counter[str] = Counter()
+        self.counters = Counters()
 
     def feed(self, data: bytes) -> list[bytes]:
         """Payloads that ``data`` completes, in order."""
@@ -88,14 +121,14 @@ class Deframer:
         self._partial, self._skipping = b"", False
 
     def drop(self, reason: str, size: int) -> None:
-        """Count a block of ``size`` bytes that is not passed on."""
-        self.counts[reason] += 1
-        self.counts["bytes_dropped"] += size
+        """Count a block of ``size`` bytes that is not passed on; ``reason`` is its counter."""
+        setattr(self.counters, reason, getattr(self.counters, reason) + 1)
+        self.counters.bytes_dropped += size
 
     def _open(self, block: bytes) -> bytes | None:
         if self._skipping:
             self._skipping = False
-            self.counts["bytes_dropped"] += len(block)
+            self.counters.bytes_dropped += len(block)
             return None
         if not block:
             return None
@@ -113,7 +146,7 @@ class Deframer:
 
     def _keep(self, rest: bytes) -> None:
         if self._skipping:
-            self.counts["bytes_dropped"] += len(rest)
+            self.counters.bytes_dropped += len(rest)
         elif len(self._partial) + len(rest) > self._limit:
             self.drop("overlong", len(self._partial) + len(rest))
             self._partial, self._skipping = b"", True

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tomoskin.core import AMOUNT, FloatArray, StrPath, written
-from tomoskin.files.exports.picture import dress, new_figure, save_figure
+from tomoskin.files.exports.picture import dress, new_figure, panel_axes, save_figure
 from tomoskin.imaging import AlphaChoice, Curve, Merit, Picard
 from tomoskin.model.skin import Skin
 from tomoskin.sensing.fit import ResolutionBounds
@@ -46,13 +46,11 @@ def write_choices(
     rows = max(-(-count // columns), 1)
     figure = new_figure(path, 4.4 * columns, 3.4 * rows + 0.4)
     figure.suptitle(title, fontsize=11)
-    axes = np.atleast_1d(figure.subplots(rows, columns)).ravel()
+    axes = panel_axes(figure, count, columns)
     for ax, (choice, curve) in zip(axes, drawn, strict=False):
         _draw(ax, choice, curve)
     if picard is not None:
         _draw_picard(axes[len(drawn)], picard)
-    for ax in axes[count:]:
-        ax.set_visible(False)
     save_figure(path, figure, overwrite=overwrite)
 
 
@@ -82,25 +80,18 @@ def _draw_picard(ax: Axes, picard: Picard) -> None:
 
 
 _FIGURES = (
-    ("amplitude", "amplitude response", 1.0),
-    ("position_error", "position error (mm, inwards above 0)", 1e3),
-    ("offset", "distance from the target (mm)", 1e3),
-    ("resolution", "resolution (fraction of the extent)", 1.0),
-    ("deformation", "shape deformation", 1.0),
-    ("ringing", "ringing", 1.0),
+    ("amplitude", "", "amplitude response", 1.0),
+    ("position_error", "_m", "position error (mm, inwards above 0)", 1e3),
+    ("offset", "_m", "distance from the target (mm)", 1e3),
+    ("resolution", "", "resolution (fraction of the extent)", 1.0),
+    ("deformation", "", "shape deformation", 1.0),
+    ("ringing", "", "ringing", 1.0),
 )
-"""Name in :class:`Merit`, label, and factor to the label's unit."""
+"""Name in :class:`Merit`, ending in a table, label of a plot, and factor to the label's unit."""
 
 COLUMNS = (
-    "operator",
-    "noise_figure",
-    "distance_m",
-    "amplitude",
-    "position_error_m",
-    "offset_m",
-    "resolution",
-    "deformation",
-    "ringing",
+    *("operator", "noise_figure", "distance_m"),
+    *(name + ending for name, ending, _, _ in _FIGURES),
 )
 
 
@@ -113,7 +104,7 @@ def write_merit(path: StrPath, merits: Mapping[str, Merit], *, overwrite: bool =
         When matplotlib is not installed, and as :func:`written` does.
     """
     figure = new_figure(path, 10.5, 6.0)
-    for ax, (name, label, factor) in zip(figure.subplots(2, 3).ravel(), _FIGURES, strict=True):
+    for ax, (name, _, label, factor) in zip(figure.subplots(2, 3).ravel(), _FIGURES, strict=True):
         for operator, merit in merits.items():
             shown = f"{operator} (noise figure {merit.noise_figure:.2g})"
             ax.plot(1e3 * merit.distance, factor * getattr(merit, name), ".-", label=shown)
@@ -138,7 +129,7 @@ def write_merit_table(
         writer = csv.writer(file)
         writer.writerow(COLUMNS)
         for operator, merit in merits.items():
-            table = (merit.distance, *(getattr(merit, name) for name, _, _ in _FIGURES))
+            table = (merit.distance, *(getattr(merit, name) for name, *_ in _FIGURES))
             for row in zip(*table, strict=True):
                 numbers = (merit.noise_figure, *row)
                 writer.writerow([operator, *(f"{number:.6g}" for number in numbers)])

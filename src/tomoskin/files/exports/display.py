@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csr_array
-from scipy.spatial import cKDTree
 
 from tomoskin.core import DataError, FloatArray, Image
+from tomoskin.imaging import disc_means
 from tomoskin.model.mesh import Mesh
 
 _LARGEST = 0.25
@@ -86,9 +86,4 @@ def circular_average(mesh: Mesh, radius: float) -> csr_array:
             f"expected a radius above 0 and up to {1e3 * most:.3g} mm, got {1e3 * radius:.3g} mm",
             where="circular average",
         )
-    pairs = cKDTree(mesh.centroids).query_pairs(radius, output_type="ndarray")
-    own = np.arange(len(mesh.cells))
-    row = np.concatenate([own, pairs[:, 0], pairs[:, 1]])
-    column = np.concatenate([own, pairs[:, 1], pairs[:, 0]])
-    weight = mesh.volumes[column] / np.bincount(row, mesh.volumes[column])[row]
-    return csr_array((weight, (row, column)), shape=(len(own), len(own)))
+    return disc_means(mesh, radius)

@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import shutil
 import subprocess
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +37,14 @@ def new_figure(path: StrPath, width: float, height: float) -> Figure:
     figure: Figure = plain.Figure(figsize=(width, height), layout=layout)
     canvas.FigureCanvasAgg(figure)
     return figure
+
+
+def panel_axes(figure: Figure, count: int, columns: int) -> list[Axes]:
+    """So many axes in rows of that many ``columns``."""
+    axes = np.atleast_1d(figure.subplots(-(-count // columns), columns)).ravel().tolist()
+    for ax in axes[count:]:
+        ax.set_visible(False)
+    return axes[:count]
 
 
 def dress(ax: Any, title: str, x: str, y: str) -> None:
@@ -188,12 +196,10 @@ class _Sheet:
         columns = min(len(panels), 4)
         rows = -(-len(panels) // columns)
         figure = new_figure(self.name, 3.2 * columns + 1.1, 3.3 * rows)
-        axes = np.atleast_1d(figure.subplots(rows, columns)).ravel()
-        for ax, panel in zip(axes, panels, strict=False):
+        axes = panel_axes(figure, len(panels), columns)
+        for ax, panel in zip(axes, panels, strict=True):
             drawn = self.draw(ax, panel)
-        for ax in axes[len(panels) :]:
-            ax.set_visible(False)
-        figure.colorbar(drawn, ax=list(axes), **self.bar)
+        figure.colorbar(drawn, ax=figure.axes, **self.bar)
         return figure
 
     def draw(self, ax: Axes, panel: Panel) -> Any:
@@ -273,16 +279,7 @@ def write_mp4(path: StrPath, pictures: Pictures, fps: float, *, overwrite: bool 
             raise DataError(f"cannot be written: {reason}", where=str(path))
 
 
-class Film(Protocol):
-    """What writes pictures (h, w, 3) as a film."""
-
-    def __call__(
-        self, path: StrPath, pictures: Pictures, fps: float, *, overwrite: bool = False
-    ) -> None:
-        """Write the film. Raises DataError."""
-
-
-FILMS: dict[str, Film] = {".gif": write_gif, ".mp4": write_mp4}
+FILMS: dict[str, Callable[..., None]] = {".gif": write_gif, ".mp4": write_mp4}
 """What writes a film, by the ending of its name."""
 
 

@@ -17,7 +17,6 @@ from tomoskin.files.exports.export import Export
 from tomoskin.files.imports import column_names
 from tomoskin.files.session import (
     Block,
-    Rows,
     SessionReader,
     all_blocks,
     idle_count,
@@ -33,8 +32,8 @@ Column = NDArray[Any]
 class _FrameColumns:
     """Columns beside the voltages; ``x_m`` and ``y_m`` where the file holds truth."""
 
-    def __init__(self, session: SessionReader, rows: Rows) -> None:
-        self._idle = idle_count(session, rows.readout.scan)
+    def __init__(self, session: SessionReader) -> None:
+        self._idle = idle_count(session)
         self._positions = press_positions(session)
         place = ("x_m", "y_m") if self._positions else ()
         self.names = ("frame", "time_s", "sequence", "ticks", "mark", "idle", *place)
@@ -54,15 +53,14 @@ def write_csv(job: Export, path: StrPath) -> None:
     DataError
         When the session is damaged, and as :func:`written` does.
     """
-    rows = Rows.of(job.session)
-    names = column_names(rows.pattern.drive, rows.pattern.measure)
-    columns_of = _FrameColumns(job.session, rows)
+    pattern, columns_of = job.session.skin.pattern(), _FrameColumns(job.session)
+    names = column_names(pattern.drive, pattern.measure)
     with (
         written(path, overwrite=job.overwrite) as part,
         part.open("w", encoding="utf-8", newline="") as file,
     ):
         file.write(",".join([*columns_of.names, *names]) + "\n")
-        for block in all_blocks(job.session, rows, job.advance):
+        for block in all_blocks(job.session, job.advance):
             columns = [column.tolist() for column in columns_of(block)]
             for *first, voltages in zip(*columns, block.voltages.tolist(), strict=True):
                 file.write(",".join(map(_text, [*first, *voltages])) + "\n")
@@ -79,19 +77,18 @@ def write_parquet(job: Export, path: StrPath) -> None:
         When pyarrow is missing or the session is damaged, and as :func:`written` does.
     """
     pa, pq = (needed(name, "parquet", path) for name in ("pyarrow", "pyarrow.parquet"))
-    rows = Rows.of(job.session)
-    n = rows.pattern.n_meas
-    columns_of = _FrameColumns(job.session, rows)
+    pattern, columns_of = job.session.skin.pattern(), _FrameColumns(job.session)
     kinds = {"time_s": pa.float64(), "ticks": pa.uint64(), "x_m": pa.float64(), "y_m": pa.float64()}
     fields = [pa.field(name, kinds.get(name, pa.int64())) for name in columns_of.names]
-    fields.append(pa.field("voltages", pa.list_(pa.float64(), n)))
-    schema = pa.schema(fields, metadata=_about(job.session, rows))
+    fields.append(pa.field("voltages", pa.list_(pa.float64(), pattern.n_meas)))
+    schema = pa.schema(fields, metadata=_about(job.session))
     with (
         written(path, overwrite=job.overwrite) as part,
         pq.ParquetWriter(part, schema, compression="zstd") as file,
     ):
-        for block in all_blocks(job.session, rows, job.advance):
-            values = pa.FixedSizeListArray.from_arrays(pa.array(block.voltages.reshape(-1)), n)
+        for block in all_blocks(job.session, job.advance):
+            flat = pa.array(block.voltages.reshape(-1))
+            values = pa.FixedSizeListArray.from_arrays(flat, pattern.n_meas)
             arrays = [pa.array(column) for column in columns_of(block)]
             file.write_batch(pa.record_batch([*arrays, values], schema=schema))
 
@@ -100,8 +97,8 @@ def _text(value: float) -> str:
     return "" if math.isnan(value) else repr(value)
 
 
-def _about(session: SessionReader, rows: Rows) -> dict[str, str]:
-    pattern = rows.pattern
+def _about(session: SessionReader) -> dict[str, str]:
+    pattern = session.skin.pattern()
     tables = {"drive": pattern.drive.tolist(), "measure": pattern.measure.tolist()}
     written = {name: msgspec.json.encode(table).decode() for name, table in tables.items()}
     return written | {"skin": session.skin.to_toml(), "epoch_s": repr(session.epoch)}
@@ -171,15 +168,15 @@ def write_hdf5(job: Export, path: StrPath) -> None:
     """
     session = job.session
     h5py = needed("h5py", "hdf5", path)
-    rows = Rows.of(session)
     with written(path, overwrite=job.overwrite) as part, h5py.File(part, "w") as file:
         file.attrs["skin"] = session.skin.to_toml()
         file.attrs["epoch_s"] = session.epoch
         file.attrs["device"] = _json(session.device())
         file.attrs["settings"] = _json(session.settings())
-        file["drive"], file["measure"] = rows.pattern.drive, rows.pattern.measure
+        pattern = session.skin.pattern()
+        file["drive"], file["measure"] = pattern.drive, pattern.measure
         group = file.create_group("frames")
-        for block in all_blocks(session, rows, job.advance):
+        for block in all_blocks(session, job.advance):
             _append(group, block)
         file["touches"] = _touches(session)
         text = h5py.string_dtype()

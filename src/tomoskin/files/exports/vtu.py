@@ -74,8 +74,7 @@ def write_series(
 
 def _document(mesh: Mesh, fields: Mapping[str, FloatArray]) -> str:
     n_points, n_cells, corners = len(mesh.points), *mesh.cells.shape
-    points = np.zeros((n_points, 3))
-    points[:, : mesh.points.shape[1]] = mesh.points
+    points = np.pad(mesh.points, ((0, 0), (0, 3 - mesh.points.shape[1])))
     types = np.full(n_cells, _VTK_TYPE[corners], dtype=np.uint8)
     return _GRID.format(
         n_points=n_points,

@@ -85,10 +85,10 @@ def parse(lines: Iterable[str], source: str) -> Recording:
     return replace(recording, idle=idle, board_known=OWN in by_name)
 
 
-def column_names(drive: IntArray, measure: IntArray, kind: str = "v") -> list[str]:
+def column_names(drive: IntArray, measure: IntArray) -> list[str]:
     """Names of the columns of a table of rows."""
     tables = np.hstack([drive, measure]).tolist()
-    return ["_".join([kind, *map(str, row)]) for row in tables]
+    return ["_".join(["v", *map(str, row)]) for row in tables]
 
 
 def _idle(marks: FloatArray, source: str) -> int:

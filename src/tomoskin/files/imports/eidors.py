@@ -21,7 +21,7 @@ from scipy.sparse import issparse
 
 from tomoskin.core import DataError, FloatArray, IntArray
 from tomoskin.files.imports.interchange import OWN
-from tomoskin.files.imports.tables import pairs_of, voltages_of
+from tomoskin.files.imports.tables import drives_of, pairs_of, voltages_of
 from tomoskin.sensing.signal import Recording
 
 _DATA = ("vi", "vv", "v", "data", "meas")
@@ -87,19 +87,20 @@ def _stimulation(variables: Any) -> list[Mapping[str, Any]] | None:
     return next((item for item in inner if item is not None), None)
 
 
-def _rows(stimulation: list[Mapping[str, Any]], source: str) -> tuple[IntArray, IntArray]:
-    drives, measures = [], []
+def _rows(stimulation: list[Mapping[str, Any]], source: str) -> tuple[NDArray[Any], IntArray]:
+    currents, measures = [], []
     for number, item in enumerate(stimulation, start=1):
         where = f"{source}, stimulation {number}"
-        currents = _dense(item["stim_pattern"], where).reshape(1, -1)
+        current = _dense(item["stim_pattern"], where).reshape(1, -1)
         patterns = np.atleast_2d(_dense(item.get("meas_pattern"), where))
         measures.append(pairs_of(patterns, "measurement", where))
-        drives.append(np.repeat(pairs_of(currents, "drive", where), len(patterns), axis=0))
-    return np.concatenate(drives), np.concatenate(measures)
+        currents.append(np.repeat(current, len(patterns), axis=0))
+    drive = drives_of(np.concatenate(currents), "drive of row", source)
+    return drive, np.concatenate(measures)
 
 
-def _flat_rows(variables: Mapping[str, Any], source: str) -> tuple[IntArray, IntArray]:
-    drives = pairs_of(np.atleast_2d(_dense(variables["stim"], source)), "drive", source)
+def _flat_rows(variables: Mapping[str, Any], source: str) -> tuple[NDArray[Any], IntArray]:
+    drives = drives_of(np.atleast_2d(_dense(variables["stim"], source)), "drive", source)
     measure = pairs_of(np.atleast_2d(_dense(variables["meas"], source)), "measurement", source)
     index = _dense(variables["meas_stim"], source).reshape(-1)
     is_number = (index == np.round(index)) & (index >= 1) & (index <= len(drives))

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tomoskin.core import DataError
-from tomoskin.files.imports.tables import adjacent_scan, touches_drive, voltages_of
+from tomoskin.files.imports.tables import adjacent_scan, voltages_of
 from tomoskin.files.imports.text_log import Skipped, numbers_in
 from tomoskin.sensing.signal import Recording
 
@@ -54,10 +54,8 @@ def parse(lines: Iterable[str], source: str) -> Recording:
     if not frames:
         held = f"{len(blocks[0].values)} in the first" if blocks else "no frame"
         raise DataError(f"expected frames of 64, 256 or 1024 values, got {held}", where=source)
-    drive, measure = adjacent_scan(_SIZES[n_values])
-    used = ~touches_drive(drive, measure)
+    rows, used = adjacent_scan(_SIZES[n_values])
     origin = next((np.array(block.values)[used] for block in kept if block.is_origin), None)
-    rows = drive[used], measure[used]
     voltages = np.array(frames)[:, used]
     return voltages_of(source, voltages, rows, reference=origin, notes=skipped.notes())
 

@@ -1,9 +1,10 @@
 """The interchange file: a plain .npz that any tool can write.
 
-Keys: ``voltages`` (n_frames, n_meas) V, or ``dv``; ``drive`` (n_meas, 2) source, sink;
-``measure`` (n_meas, 2) plus, minus; optional ``time_s`` (n_frames,), ``reference`` (n_meas,),
-``xy_m`` (n_frames, 2), ``idle`` frames at the beginning that show the untouched skin;
-``board_known`` where the skin's own read-out recorded the frames.
+Keys: ``voltages`` (n_frames, n_meas) V, or ``dv``; ``drive`` (n_meas, 2) source, sink, or
+(n_meas, n_electrodes) currents into many electrodes; ``measure`` (n_meas, 2) plus, minus; optional
+``time_s`` (n_frames,), ``reference`` (n_meas,), ``xy_m`` (n_frames, 2), ``idle`` frames at the
+beginning that show the untouched skin; ``board_known`` where the skin's own read-out recorded the
+frames.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from tomoskin.core import (
     save_arrays,
     whole_number,
 )
-from tomoskin.files.imports.tables import voltages_of
+from tomoskin.files.imports.tables import checked_currents, voltages_of
 from tomoskin.sensing.signal import Recording
 
 OWN = "board_known"
@@ -49,7 +50,7 @@ def parse(arrays: Arrays, source: str) -> Recording:
     if "voltages" in arrays and "dv" in arrays:
         raise DataError("holds both voltages and dv", where=source, hint="keep one of them")
     key = "voltages" if "voltages" in arrays else "dv"
-    drive, measure = (electrode_table(arrays, name, source) for name in ("drive", "measure"))
+    drive, measure = _drives(arrays, source), electrode_table(arrays, "measure", source)
     recording = voltages_of(
         source,
         np.atleast_2d(numbers(arrays, key, source)),
@@ -61,6 +62,15 @@ def parse(arrays: Arrays, source: str) -> Recording:
     )
     idle = whole_number(arrays, "idle", source) if "idle" in arrays else 1
     return replace(recording, idle=idle, board_known=OWN in arrays)
+
+
+def _drives(arrays: Arrays, source: str) -> NDArray[Any]:
+    """(n_meas, 2) source and sink, or (n_meas, n_electrodes) currents."""
+    table = real_numbers(arrays, "drive", source)
+    if table.ndim != 2 or table.shape[1] <= 2 or len(table) != len(arrays["measure"]):
+        return electrode_table(arrays, "drive", source)
+    checked_currents(table, "drive row", source)
+    return table
 
 
 def write_interchange(path: StrPath, recording: Recording, *, overwrite: bool = False) -> None:

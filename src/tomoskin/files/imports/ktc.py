@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from tomoskin.core import Arrays, DataError, FloatArray, real_numbers
-from tomoskin.files.imports.tables import clockwise, pairs_of, voltages_of
+from tomoskin.files.imports.tables import clockwise, drives_of, pairs_of, voltages_of
 from tomoskin.sensing.signal import Recording
 
 _NAMES = (
@@ -38,7 +38,7 @@ def parse(arrays: Arrays, source: str) -> Recording:
         When the shapes do not belong together or a pattern is no pair.
     """
     inj, mpat, voltages, reference = next(n for n in _NAMES if set(arrays) >= set(n[:3]))
-    injections = pairs_of(real_numbers(arrays, inj, source).T, "injection", source)
+    injections = drives_of(real_numbers(arrays, inj, source).T, "injection", source)
     pairs = pairs_of(real_numbers(arrays, mpat, source).T, "measuring pair", source)
     n_electrodes = arrays[inj].shape[0]
     n_rows = len(injections) * len(pairs)
@@ -55,7 +55,10 @@ def parse(arrays: Arrays, source: str) -> Recording:
             raise DataError(f"expected {reference} ({n_rows},), got {len(water)}", where=source)
     rows = np.repeat(injections, len(pairs), axis=0), np.tile(pairs, (len(injections), 1))
     if inj != "CurrentPattern":
-        rows = clockwise(rows[0], n_electrodes), clockwise(rows[1], n_electrodes)
+        turned = clockwise(rows[0], n_electrodes)
+        if rows[0].shape[1] > 2:
+            turned = rows[0][:, clockwise(np.arange(n_electrodes), n_electrodes)]
+        rows = turned, clockwise(rows[1], n_electrodes)
     return voltages_of(source, frames, rows, reference=water).without_repeats()
 
 

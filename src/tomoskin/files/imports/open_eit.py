@@ -15,7 +15,7 @@ from itertools import combinations
 import numpy as np
 
 from tomoskin.core import DataError, IntArray
-from tomoskin.files.imports.tables import for_magnitudes, touches_drive, voltages_of
+from tomoskin.files.imports.tables import for_magnitudes, neighbours, scan_of, voltages_of
 from tomoskin.files.imports.text_log import Skipped, numbers_in
 from tomoskin.sensing.signal import Recording
 
@@ -77,8 +77,7 @@ def rows_of(count: int) -> tuple[IntArray, IntArray]:
         pairs = np.array(list(combinations(range(8), 2)), dtype=np.int64)
         return pairs, pairs
     n, spread = _SCANS[count]
-    k, j = np.divmod(np.arange(n * n), n)
-    drive = np.column_stack([k, (k + spread) % n])
-    measure = np.column_stack([(j + 1) % n, j])
-    kept = ~touches_drive(drive, measure)
-    return drive[kept], for_magnitudes(drive[kept], measure[kept], n)
+    e = np.arange(n)
+    drives = np.column_stack([e, (e + spread) % n])
+    (drive, measure), _ = scan_of(drives, neighbours(n)[:, ::-1])
+    return drive, for_magnitudes(drive, measure, n)

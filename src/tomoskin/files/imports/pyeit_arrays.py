@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from tomoskin.core import Arrays, DataError, IntArray, electrode_table, numbers, real_numbers
-from tomoskin.files.imports.tables import touches_drive, voltages_of
+from tomoskin.files.imports.tables import neighbours, scan_of, voltages_of
 from tomoskin.sensing.signal import Recording
 
 
@@ -43,13 +43,8 @@ def parse(arrays: Arrays, source: str) -> Recording:
 def _rows(arrays: Arrays, source: str) -> tuple[IntArray, IntArray]:
     excitations = electrode_table(arrays, "ex_mat", source)
     if "meas_mat" not in arrays:
-        n = 1 + int(excitations.max())
-        j = np.arange(n)
-        pairs = np.column_stack([(j + 1) % n, j])
-        drive = np.repeat(excitations, n, axis=0)
-        measure = np.tile(pairs, (len(excitations), 1))
-        kept = ~touches_drive(drive, measure)
-        return drive[kept], measure[kept]
+        pairs = neighbours(1 + int(excitations.max()))
+        return scan_of(excitations, pairs[:, ::-1])[0]
     table = real_numbers(arrays, "meas_mat", source)
     if table.ndim != 3 or table.shape[0] != len(excitations) or table.shape[2] != 2:
         raise DataError(

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
 from itertools import islice
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -25,32 +25,14 @@ from tomoskin.files.imports import (
     sixteen,
 )
 from tomoskin.files.imports.matlab import is_matlab, load_matlab
-from tomoskin.files.imports.text_log import text_lines
+from tomoskin.files.imports.text_log import bytes_lines, text_lines
 from tomoskin.files.session import read_session
 from tomoskin.sensing.signal import Recording
 
-Detect = Callable[[Arrays], bool]
-Parse = Callable[[Arrays, str], Recording]
+ARRAY_FORMATS = (interchange, sixteen, eskin, ktc, pyeit_arrays)
+"""Modules of formats: ``detects`` recognises one by its arrays, ``parse`` reads it."""
 
-FORMATS: tuple[tuple[Detect, Parse], ...] = (
-    (interchange.detects, interchange.parse),
-    (sixteen.detects, sixteen.parse),
-    (eskin.detects, eskin.parse),
-    (ktc.detects, ktc.parse),
-    (pyeit_arrays.detects, pyeit_arrays.parse),
-    (serial_log.detects_arrays, serial_log.parse_arrays),
-)
-"""What recognises a format by its arrays, and what reads it."""
-
-TEXT_FORMATS: tuple[
-    tuple[Callable[[list[str]], bool], Callable[[Iterable[str], str], Recording]], ...
-] = (
-    (csv_table.detects, csv_table.parse),
-    (open_eit.detects, open_eit.parse),
-    (eit_kit.detects, eit_kit.parse),
-    (sciospec.detects, sciospec.parse),
-    (serial_log.detects, serial_log.parse),
-)
+TEXT_FORMATS = (csv_table, open_eit, eit_kit, sciospec, serial_log)
 """The same for text, by its first lines."""
 
 _HEAD = 128
@@ -90,9 +72,12 @@ def is_session(path: StrPath) -> bool:
 
 
 def _from_arrays(arrays: Arrays, path: Path) -> Recording:
-    for detects, parse in FORMATS:
-        if detects(arrays):
-            return parse(arrays, str(path))
+    recording = _parsed(ARRAY_FORMATS, arrays, arrays, str(path))
+    if recording is None and set(arrays) == {"raw"} and arrays["raw"].dtype == np.uint8:
+        lines = list(bytes_lines(arrays["raw"].tobytes()))
+        recording = _parsed(TEXT_FORMATS, lines[:_FIRST_LINES], lines, str(path))
+    if recording is not None:
+        return recording
     raise DataError(
         f"expected an interchange file (voltages or dv, drive, measure), got the keys "
         f"{', '.join(sorted(arrays)) or 'of an empty archive'}",
@@ -132,14 +117,22 @@ def _from_text(head: bytes, path: Path) -> Recording:
             hint="save plain arrays as .npz",
         )
     first = list(islice(text_lines(path), _FIRST_LINES))
-    for detects, parse in TEXT_FORMATS:
-        if detects(first):
-            return parse(text_lines(path), str(path))
+    recording = _parsed(TEXT_FORMATS, first, text_lines(path), str(path))
+    if recording is not None:
+        return recording
     raise DataError(
         "is not a complete .npz archive, a session, a MATLAB file or a known text log",
         where=str(path),
         hint="docs/interchange.md lists what can be read",
     )
+
+
+def _parsed(
+    formats: tuple[ModuleType, ...], head: object, content: object, source: str
+) -> Recording | None:
+    """What the first of the ``formats`` that knows the ``head`` makes of the content."""
+    reader = next((one for one in formats if one.detects(head)), None)
+    return None if reader is None else reader.parse(content, source)
 
 
 def _beginning(path: Path) -> bytes:

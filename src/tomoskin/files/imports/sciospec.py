@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import DataError, IntArray
-from tomoskin.files.imports.tables import touches_drive, voltages_of
+from tomoskin.files.imports.tables import neighbours, scan_of, voltages_of
 from tomoskin.files.imports.text_log import numbers_in
 from tomoskin.sensing.signal import Recording
 
@@ -88,9 +88,6 @@ def _potentials(
 
 
 def _recording(drives: IntArray, potentials: NDArray[np.complex128], source: str) -> Recording:
-    n = potentials.shape[1]
-    pairs = np.column_stack([np.arange(n), (np.arange(n) + 1) % n])
-    values = potentials[:, pairs[:, 0]] - potentials[:, pairs[:, 1]]
-    drive, measure = np.repeat(drives, n, axis=0), np.tile(pairs, (len(drives), 1))
-    kept = ~touches_drive(drive, measure)
-    return voltages_of(source, values.reshape(1, -1)[:, kept], (drive[kept], measure[kept]))
+    rows, kept = scan_of(drives, neighbours(potentials.shape[1]))
+    values = potentials - np.roll(potentials, -1, axis=1)
+    return voltages_of(source, values.reshape(1, -1)[:, kept], rows)

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tomoskin.core import Arrays, DataError
-from tomoskin.files.imports.tables import adjacent_scan, touches_drive, voltages_of
-from tomoskin.files.imports.text_log import Skipped, bytes_lines, numbers_in
+from tomoskin.core import DataError
+from tomoskin.files.imports.tables import adjacent_scan, voltages_of
+from tomoskin.files.imports.text_log import Skipped, numbers_in
 from tomoskin.sensing.signal import Recording
 
 _N = 16
@@ -38,16 +38,6 @@ class _Row:
 def detects(lines: list[str]) -> bool:
     """Whether the header is there."""
     return any(line.strip().startswith(_HEADER) for line in lines)
-
-
-def detects_arrays(arrays: Arrays) -> bool:
-    """Whether an archive holds nothing but the bytes of such a log."""
-    return set(arrays) == {"raw"} and arrays["raw"].dtype == np.uint8
-
-
-def parse_arrays(arrays: Arrays, source: str) -> Recording:
-    """As :func:`parse`, of the bytes in ``raw``."""
-    return parse(bytes_lines(arrays["raw"].tobytes()), source)
 
 
 def parse(lines: Iterable[str], source: str) -> Recording:
@@ -87,13 +77,12 @@ def parse(lines: Iterable[str], source: str) -> Recording:
 
 
 def _recording(frames: list[list[_Row]], skipped: Skipped, source: str) -> Recording:
-    drive, measure = adjacent_scan(_N)
-    used = ~touches_drive(drive, measure)
+    rows, used = adjacent_scan(_N)
     values = np.array([[value for row in frame for value in row.values] for frame in frames])
     return voltages_of(
         source,
         _MILLI * values[:, used],
-        (drive[used], measure[used]),
+        rows,
         time=np.array([frame[0].pc_time for frame in frames]),
         notes=skipped.notes(),
     )

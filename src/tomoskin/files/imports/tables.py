@@ -8,14 +8,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import DataError, FloatArray, IntArray
+from tomoskin.core import DataError, FloatArray, IntArray, PatternError
+from tomoskin.model.pattern import check_drives
 from tomoskin.sensing.signal import Recording, frame_times
 
 
 def voltages_of(
     source: str,
     voltages: NDArray[Any],
-    rows: tuple[IntArray, IntArray],
+    rows: tuple[NDArray[Any], IntArray],
     *,
     time: FloatArray | None = None,
     reference: NDArray[Any] | None = None,
@@ -43,6 +44,26 @@ def voltages_of(
     )
 
 
+def drives_of(patterns: NDArray[Any], what: str, source: str) -> NDArray[Any]:
+    """(n, 2) source and sink of (n, n_electrodes) patterns, or these currents as they are.
+
+    Raises DataError for what does not sum to zero.
+    """
+    if ((patterns != 0.0).sum(axis=1) == 2).all() or patterns.shape[1] <= 2:
+        return pairs_of(patterns, what, source)
+    checked_currents(patterns, what, source)
+    return patterns
+
+
+def checked_currents(currents: NDArray[Any], what: str, source: str) -> None:
+    """Raise DataError unless currents (n, n_electrodes) sum to zero and are not all zero."""
+    try:
+        check_drives(currents, currents.shape[1])
+    except PatternError as error:
+        where = (error.where or "").replace("drive row", what)
+        raise DataError(error.message, where=f"{source}, {where}") from error
+
+
 def pairs_of(patterns: NDArray[Any], what: str, source: str) -> IntArray:
     """(n, 2) positive and negative electrode of each of (n, n_electrodes) patterns.
 
@@ -65,20 +86,25 @@ def pairs_of(patterns: NDArray[Any], what: str, source: str) -> IntArray:
     return np.column_stack([signs.argmax(axis=1), signs.argmin(axis=1)])
 
 
-def adjacent_scan(n: int, step: int = 1) -> tuple[IntArray, IntArray]:
-    """Drive (n², 2) and measure of a full scan of neighbouring pairs, drive by drive.
-
-    Drive k has one end at k and the other at k + ``step``; the pair read is j, j + 1. The ends
-    are named as in the built-in patterns: sink k, source k + step, plus j, minus j + 1.
-    """
-    k, j = np.divmod(np.arange(n * n), n)
-    drive = np.column_stack([(k + step) % n, k])
-    return drive, np.column_stack([j, (j + 1) % n])
+def neighbours(n: int) -> IntArray:
+    """(n, 2) each electrode and the next."""
+    e = np.arange(n)
+    return np.column_stack([e, (e + 1) % n])
 
 
-def touches_drive(drive: IntArray, measure: IntArray) -> NDArray[np.bool_]:
-    """(n,) whether a row's measuring pair touches its drive."""
-    return np.asarray((drive[:, :, None] == measure[:, None, :]).any(axis=(1, 2)))
+def scan_of(
+    drives: IntArray, pairs: IntArray
+) -> tuple[tuple[IntArray, IntArray], NDArray[np.bool_]]:
+    """Rows of a scan of all ``pairs`` (m, 2) under each of ``drives`` (k, 2) that touch no driven
+    electrode, drive and measure; and (k·m,) which of its values these are."""
+    drive, measure = np.repeat(drives, len(pairs), axis=0), np.tile(pairs, (len(drives), 1))
+    kept = ~(drive[:, :, None] == measure[:, None, :]).any(axis=(1, 2))
+    return (drive[kept], measure[kept]), kept
+
+
+def adjacent_scan(n: int) -> tuple[tuple[IntArray, IntArray], NDArray[np.bool_]]:
+    """The scan of neighbouring pairs as built-in patterns name their ends: sink k, source k + 1."""
+    return scan_of(neighbours(n)[:, ::-1], neighbours(n))
 
 
 def for_magnitudes(drive: IntArray, measure: IntArray, n: int) -> IntArray:

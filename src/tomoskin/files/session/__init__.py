@@ -27,7 +27,6 @@ from tomoskin.files.session.replayed import (
 from tomoskin.files.session.scanned import (
     Advance,
     Block,
-    Rows,
     all_blocks,
     first_scan,
     idle_count,
@@ -50,7 +49,6 @@ __all__ = [
     "Recorder",
     "Repaired",
     "ReplayTransport",
-    "Rows",
     "RunMessage",
     "RunSettings",
     "Session",

@@ -133,21 +133,15 @@ def repair(
     return result
 
 
-def split_names(source: StrPath) -> tuple[str, ...]:
-    """Names of the skins in a robot's recording. DataError where it is none."""
+def split_targets(source: StrPath) -> dict[str, Path]:
+    """The files that a split makes, by the names of the skins; DataError where there is one."""
     source = Path(source)
     about: dict[str, str] = next(
         (r.metadata for r in _about(source) if isinstance(r, Metadata) and r.name == ABOUT), {}
     )
     if SKINS not in about:
         raise DataError("is not a recording of several skins", where=str(source))
-    return tuple(about[SKINS].split())
-
-
-def split_targets(source: StrPath) -> dict[str, Path]:
-    """The files that a split makes, by the names of the skins."""
-    source = Path(source)
-    return {name: source.with_stem(f"{source.stem}-{name}") for name in split_names(source)}
+    return {name: source.with_stem(f"{source.stem}-{name}") for name in about[SKINS].split()}
 
 
 def split(source: StrPath, advance: Advance = no_report) -> dict[str, int]:

@@ -24,6 +24,7 @@ from tomoskin.files.session.session_reader import (
     SessionReader,
     end_time,
     reference_frames,
+    start_time,
     touches_before,
 )
 from tomoskin.model.pattern import Scan
@@ -97,9 +98,7 @@ class ReplayTransport:
         self._wall = self._clock.now()
         self._steps = 0
         self._closed = self._after_seek = False
-        own = (item.frame for item in session.frames() if not item.mark & Mark.EARLIER)
-        first = next(own, None)
-        self.start = self._head.now if first is None else first.host_time
+        self.start = start_time(session) or self._head.now
 
     @property
     def ended(self) -> bool:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from tomoskin.board import wire
 from tomoskin.files.session.session_reader import stated_rate
-from tomoskin.twin import Board, HeldScanning
+from tomoskin.twin import Board, HeldScanning, Question, Setting
 
 if TYPE_CHECKING:
     from tomoskin.model.skin import Skin
@@ -23,8 +22,7 @@ class ReplayBoard:
 
     def __init__(self, skin: Skin, device: dict[str, Any]) -> None:
         """``device`` is what the session holds of the board, perhaps nothing."""
-        self._board = _board(skin, device)
-        self._held = HeldScanning(self._board)
+        self._held = HeldScanning(_board(skin, device))
         self._deframer = wire.Deframer(wire.SCHEMA.to_device_bytes)
         self._out = bytearray(
             wire.encode(wire.Hello(wire.SCHEMA.major, wire.SCHEMA.minor, wire.SCHEMA.hash))
@@ -45,17 +43,12 @@ class ReplayBoard:
         return data
 
     def _answer(self, command: wire.Command) -> wire.Message:
-        match command:
-            case wire.GetInfo():
-                return self._board.info(command.request)
-            case wire.GetBoard():
-                return replace(self._board.limits, request=command.request)
-            case wire.GetScan() | wire.GetPattern() | wire.GetMode():
-                return self._held.answer(command)
-            case wire.SetScan() | wire.SetPattern() | wire.SetFormat() | wire.SetMode():
-                self._held.set(command)
-            case wire.Start() | wire.Stop():
-                self.scanning = isinstance(command, wire.Start)
+        if isinstance(command, Question):
+            return self._held.answer(command)
+        if isinstance(command, Setting):
+            self._held.set(command)
+        elif isinstance(command, wire.Start | wire.Stop):
+            self.scanning = isinstance(command, wire.Start)
         return wire.Ack(command.request, wire.type_byte(type(command)), wire.Result.OK, 0)
 
 

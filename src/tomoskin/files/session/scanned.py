@@ -3,7 +3,7 @@ voltages, a block at a time, so that memory does not grow, or all."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from itertools import islice
 from typing import NamedTuple
@@ -18,7 +18,7 @@ from tomoskin.files.session.session_reader import (
     reference_frames,
     tick_rate,
 )
-from tomoskin.model.pattern import Pattern, Scan
+from tomoskin.model.pattern import Scan
 from tomoskin.sensing.signal import Readout, Recording
 from tomoskin.sensing.track import TouchedFrame
 
@@ -71,27 +71,14 @@ def scanned_frames(session: SessionReader, scan: Scan) -> Iterator[ScannedFrame]
         )
 
 
-FrameKey = tuple[float, int]
-"""Host time and sequence: they name a frame of a session."""
-
-
-def frame_numbers(
-    session: SessionReader, keys: Collection[FrameKey]
-) -> dict[FrameKey, tuple[int, float]]:
-    """Number and time of the frames of those ``keys``; without those that are not in the file."""
-    numbers: dict[FrameKey, tuple[int, float]] = {}
-    scan = Scan.of(session.skin.pattern())
-    for number, time, item in scanned_frames(session, scan) if keys else ():
-        key = item.frame.host_time, item.frame.sequence
-        if key in keys:
-            numbers.setdefault(key, (number, time))
-    return numbers
-
-
 def scanned_touches(session: SessionReader) -> Iterator[TouchedFrame]:
     """(frame, time, touches) of the recorded touches; None and host time without their frame."""
     keys = {(item.host_time, item.sequence) for item in session.touches()}
-    numbers = frame_numbers(session, keys)
+    numbers: dict[tuple[float, int], tuple[int, float]] = {}
+    for number, time, item in scanned_frames(session, _own_scan(session)) if keys else ():
+        key = item.frame.host_time, item.frame.sequence  # they name a frame of a session
+        if key in keys:
+            numbers.setdefault(key, (number, time))
     for touched in session.touches():
         key = touched.host_time, touched.sequence
         yield *numbers.get(key, (None, touched.host_time)), touched.touches
@@ -102,13 +89,17 @@ def first_scan(session: SessionReader) -> float:
 
     The host's time of that frame differs by how late the host read it.
     """
-    frames = scanned_frames(session, Scan.of(session.skin.pattern()))
+    frames = scanned_frames(session, _own_scan(session))
     return next((frame.time for frame in frames if not frame.item.mark & Mark.EARLIER), 0.0)
 
 
-def idle_count(session: SessionReader, scan: Scan) -> int:
+def _own_scan(session: SessionReader) -> Scan:
+    return Scan.of(session.skin.pattern())
+
+
+def idle_count(session: SessionReader) -> int:
     """Frames of the first reference where the recording begins with it; 1 where it does not."""
-    first = next(scanned_frames(session, scan), None)
+    first = next(scanned_frames(session, _own_scan(session)), None)
     begins = first is not None and first.item.mark & Mark.REFERENCE
     return reference_frames(session.settings()) if begins else 1
 
@@ -148,32 +139,7 @@ class Block:
     voltages: FloatArray
 
 
-@dataclass(frozen=True, eq=False)
-class Rows:
-    """What the columns of the voltages are: the pattern, and how counts become volts."""
-
-    pattern: Pattern
-    readout: Readout
-
-    @classmethod
-    def of(cls, session: SessionReader) -> Rows:
-        """Rows of a session's own skin."""
-        pattern = session.skin.pattern()
-        return cls(pattern, Readout.of(Scan.of(pattern), session.skin.readout))
-
-    def voltages(
-        self, samples: NDArray[np.uint16], sums: NDArray[np.uint16] | None = None
-    ) -> FloatArray:
-        """(n, n_meas) V of (n, n_samples) counts, as the read-out gives them frame by frame.
-
-        NaN where a sample stood at a rail; ``sums``, if any, as in a frame.
-        """
-        volts, railed = self.readout.rows(samples, sums)
-        volts[railed] = np.nan
-        return volts
-
-
-def all_blocks(session: SessionReader, rows: Rows, advance: Advance = no_report) -> Iterator[Block]:
+def all_blocks(session: SessionReader, advance: Advance = no_report) -> Iterator[Block]:
     """Every frame of the session's scan, in blocks; frames of another scan are left out.
 
     ``advance`` is called with how many frames of how many are done.
@@ -183,10 +149,11 @@ def all_blocks(session: SessionReader, rows: Rows, advance: Advance = no_report)
     DataError
         When the file is damaged, frames that were written are missing, or there is none.
     """
-    done, total = 0, indexed_frames(session)
-    for block in _blocks(session, rows):
-        yield block
-        done += len(block.number)
+    done, total, scan = 0, indexed_frames(session), _own_scan(session)
+    readout, frames = Readout.of(scan, session.skin.readout), scanned_frames(session, scan)
+    while some := list(islice(frames, MOST_FRAMES)):
+        yield _block(some, readout)
+        done += len(some)
         advance(done, max(done, total))
     if not done:
         but = f"; it {session.torn}" if session.torn else ""
@@ -211,21 +178,20 @@ def recording_of(session: SessionReader) -> Recording:
     DataError
         When the file is damaged, no frame is in it, or some that were written are missing.
     """
-    rows = Rows.of(session)
-    blocks = list(all_blocks(session, rows))
+    blocks, pattern = list(all_blocks(session)), session.skin.pattern()
     positions = press_positions(session)
     n_frames = sum(len(block.number) for block in blocks)
     return Recording(
         voltages=np.concatenate([block.voltages for block in blocks]),
-        drive=rows.pattern.drive,
-        measure=rows.pattern.measure,
+        drive=pattern.drive,
+        measure=pattern.measure,
         time=np.concatenate([block.time for block in blocks]),
         reference=None,
         labels=None if positions is None else np.concatenate(list(map(positions, blocks))),
         is_change=False,
         source=str(session.path),
         notes=_notes(session, blocks),
-        idle=min(idle_count(session, rows.readout.scan), n_frames),
+        idle=min(idle_count(session), n_frames),
     )
 
 
@@ -261,17 +227,13 @@ def press_positions(session: SessionReader) -> Callable[[Block], FloatArray] | N
     return lambda block: positions[np.searchsorted(changes, block.host_time, side="right")]
 
 
-def _blocks(session: SessionReader, rows: Rows) -> Iterator[Block]:
-    frames = scanned_frames(session, rows.readout.scan)
-    while some := list(islice(frames, MOST_FRAMES)):
-        yield _block(some, rows)
-
-
-def _block(items: list[ScannedFrame], rows: Rows) -> Block:
+def _block(items: list[ScannedFrame], readout: Readout) -> Block:
     frames = [item.frame for _, _, item in items]
     samples = np.stack([frame.samples for frame in frames])
     given = [frame.sums for frame in frames if frame.sums is not None]
     sums = np.stack(given) if len(given) == len(frames) else None
+    volts, railed = readout.rows(samples, sums)
+    volts[railed] = np.nan
     return Block(
         number=np.array([number for number, _, _ in items]),
         time=np.array([time for _, time, _ in items]),
@@ -280,5 +242,5 @@ def _block(items: list[ScannedFrame], rows: Rows) -> Block:
         ticks=np.array([frame.ticks for frame in frames], dtype=np.uint64),
         mark=np.array([int(item.mark) for _, _, item in items]),
         samples=samples,
-        voltages=rows.voltages(samples, sums),
+        voltages=volts,
     )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from scipy.optimize import brentq
@@ -141,49 +140,38 @@ def _refuse_not_finite(values: FloatArray, name: str) -> None:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class Explanation:
-    """What a choice reports: its criterion, its reason, and what its curve shows."""
+def crossing(
+    spectrum: Spectrum,
+    quantity: Quantity,
+    level: float,
+    *,
+    rising: bool,
+    rule: str,
+    reason: str,
+    label: str,
+    hints: tuple[str, str],
+) -> AlphaChoice:
+    """The largest alpha at which ``quantity``, called ``label``, comes to ``level``.
 
-    rule: str
-    reason: str
-    quantity: str
-
-
-@dataclass(frozen=True, slots=True)
-class Level:
-    """What a quantity is to reach, and which way it comes there as alpha grows.
-
-    Where it turns back further on, and so has the level once more, is no answer. ``hints`` say
-    what to do where it is too large throughout, and where too small.
-    """
-
-    value: float
-    way: Literal["falling", "rising"]
-    hints: tuple[str, str]
-
-
-def crossing(spectrum: Spectrum, quantity: Quantity, level: Level, why: Explanation) -> AlphaChoice:
-    """The largest alpha at which ``quantity`` comes to ``level`` the way that it should.
-
-    Raises ModelError where it never does, with one of the level's hints.
+    It must come there ``rising`` as alpha grows, or falling. Where it turns back further on, and so
+    has the level once more, is no answer. Raises ModelError where it never does, with one of the
+    ``hints``: what to do where it is too large throughout, and where too small.
     """
     alphas = spectrum.alphas[::_STRIDE]
     values = np.array([quantity(float(a)) for a in alphas])
-    above = values > level.value
+    above = values > level
     steps = np.diff(above.astype(int))
-    crossed = np.flatnonzero(steps == (-1 if level.way == "falling" else 1))
+    crossed = np.flatnonzero(steps == (1 if rising else -1))
     if not len(crossed):
-        where, hint = ("above", level.hints[0]) if above[0] else ("below", level.hints[1])
+        where, hint = ("above", hints[0]) if above[0] else ("below", hints[1])
         raise ModelError(
-            f"{why.quantity} {'starts' if steps.any() else 'stays'} {where} {level.value:g}: "
+            f"{label} {'starts' if steps.any() else 'stays'} {where} {level:g}: "
             f"{values.min():.3g} to {values.max():.3g}",
-            where=f"rule {why.rule}",
+            where=f"rule {rule}",
             hint=hint,
         )
     at = int(crossed[-1])
     low, high = (float(a) for a in alphas[[at, at + 1]])
-    root = float(brentq(lambda a: quantity(a) - level.value, low, high, xtol=1e-12 * low))
+    root = float(brentq(lambda a: quantity(a) - level, low, high, xtol=1e-12 * low))
     nearest = int(np.abs(np.log(alphas / root)).argmin())
-    curve = Curve(alphas, values, "alpha", why.quantity, nearest)
-    return AlphaChoice(root, why.rule, why.reason, curve)
+    return AlphaChoice(root, rule, reason, Curve(alphas, values, "alpha", label, nearest))

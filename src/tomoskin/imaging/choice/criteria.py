@@ -11,8 +11,6 @@ from tomoskin.imaging.choice.alpha_choice import (
     AlphaChoice,
     Curve,
     Evidence,
-    Explanation,
-    Level,
     Locate,
     crossing,
 )
@@ -152,13 +150,19 @@ def discrepancy(spectrum: Spectrum, evidence: Evidence) -> AlphaChoice:
     def excess(alpha: float) -> float:
         return float(np.sqrt(np.mean(spectrum.residual(alpha, frames) ** 2))) / level
 
-    hints = (
-        "the model does not explain these frames to within their noise: choose another rule",
-        "these frames hold little more than noise: give frames with touches",
+    return crossing(
+        spectrum,
+        excess,
+        1.0,
+        rising=True,
+        rule="discrepancy",
+        reason=f"the residual of {_frames(frames)} is as large as the noise",
+        label="residual / noise",
+        hints=(
+            "the model does not explain these frames to within their noise: choose another rule",
+            "these frames hold little more than noise: give frames with touches",
+        ),
     )
-    reason = f"the residual of {_frames(frames)} is as large as the noise"
-    explanation = Explanation("discrepancy", reason, "residual / noise")
-    return crossing(spectrum, excess, Level(1.0, "rising", hints), explanation)
 
 
 def _frames(frames: FloatArray) -> str:
@@ -181,13 +185,19 @@ def by_noise_figure(spectrum: Spectrum, evidence: Evidence, target: float = TARG
     def figure(alpha: float) -> float:
         return noise_figure(spectrum.operator(alpha).matrix, volumes, change, noise)
 
-    reason = f"the noise figure is {target:g} for a contrast in the middle"
-    hints = (
-        "choose a larger noise figure, or another rule",
-        "choose a smaller noise figure, or another rule",
+    return crossing(
+        spectrum,
+        figure,
+        target,
+        rising=False,
+        rule="noise-figure",
+        reason=f"the noise figure is {target:g} for a contrast in the middle",
+        label="noise figure",
+        hints=(
+            "choose a larger noise figure, or another rule",
+            "choose a smaller noise figure, or another rule",
+        ),
     )
-    explanation = Explanation("noise-figure", reason, "noise figure")
-    return crossing(spectrum, figure, Level(target, "falling", hints), explanation)
 
 
 def in_the_middle(spectrum: Spectrum) -> FloatArray:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, Image, ModelError
-from tomoskin.imaging.iterative.newton import Descent, Goal, Iteration, descend, table
+from tomoskin.imaging.iterative.newton import Descent, Goal, descend
 from tomoskin.imaging.iterative.observation import Observation, Whitened
 from tomoskin.imaging.iterative.unknowns import (
     Cells,
@@ -50,12 +50,8 @@ class Absolute:
         (n_meas,) V of the model there.
     n_values
         Different values that were measured: a misfit near it explains them to their noise.
-    steps
-        The start and each iteration.
-    reason
-        Why it stopped.
-    converged
-        Whether that is because there was nothing left to gain.
+    descent
+        The iterations, why they stopped, and whether there was nothing left to gain.
     """
 
     conductivity: Image
@@ -63,9 +59,7 @@ class Absolute:
     contact_impedance: FloatArray
     voltages: FloatArray
     n_values: int
-    steps: tuple[Iteration, ...] = field(repr=False)
-    reason: str
-    converged: bool
+    descent: Descent = field(repr=False)
 
     @classmethod
     def of(cls, point: ModelPoint, descent: Descent) -> Absolute:
@@ -78,22 +72,17 @@ class Absolute:
             contact_impedance=point.contact_impedance,
             voltages=point.state.voltages,
             n_values=len(point.of.rows),
-            steps=descent.steps,
-            reason=descent.reason,
-            converged=descent.converged,
+            descent=descent,
         )
 
     @property
     def misfit(self) -> float:
         """Square sum of the residuals, each over its noise."""
-        return self.steps[-1].misfit
+        return self.descent.steps[-1].misfit
 
     def __str__(self) -> str:
         """The iterations, and why they ended."""
-        return (
-            f"{table(self.steps)}\nstopped: {self.reason}; "
-            f"misfit {self.misfit:.4g} of {self.n_values} values"
-        )
+        return f"{self.descent}; misfit {self.misfit:.4g} of {self.n_values} values"
 
 
 class AbsoluteImaging:

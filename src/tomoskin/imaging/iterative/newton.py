@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Protocol
@@ -23,12 +23,10 @@ class Point(Protocol):
     @property
     def predicted(self) -> FloatArray:
         """Predicted values (m,) of unit noise."""
-        ...
 
     @property
     def jacobian(self) -> FloatArray:
         """(m, n) their derivative by the unknowns."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -71,6 +69,15 @@ class Descent:
     def begin(cls, n: int) -> Descent:
         """The state before the first step, at zero."""
         return cls(np.zeros(n), np.zeros(n), (), "not begun", False)
+
+    def __str__(self) -> str:
+        """The steps as a table, and why they ended."""
+        lines = ["step  objective     misfit     energy  length"]
+        lines += [
+            f"{i:4d} {s.objective:10.4g} {s.misfit:10.4g} {s.energy:10.4g} {s.length:7.3g}"
+            for i, s in enumerate(self.steps)
+        ]
+        return "\n".join([*lines, f"stopped: {self.reason}"])
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,13 +188,3 @@ def minimiser(
     part = np.linalg.lstsq(response.T @ half, half.T @ rhs, rcond=None)[0]
     dual = cho_solve(factor, rhs - response @ part, check_finite=False)
     return spread @ dual + free @ part, jacobian.T @ dual
-
-
-def table(steps: Sequence[Iteration]) -> str:
-    """Steps as lines of text: number, objective, misfit, energy and length."""
-    lines = ["step  objective     misfit     energy  length"]
-    lines += [
-        f"{i:4d} {s.objective:10.4g} {s.misfit:10.4g} {s.energy:10.4g} {s.length:7.3g}"
-        for i, s in enumerate(steps)
-    ]
-    return "\n".join(lines)

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from tomoskin.core import FloatArray, Image, ModelError
 from tomoskin.imaging.iterative.absolute import STEPS, TOLERANCE, Sharp
-from tomoskin.imaging.iterative.newton import Descent, Goal, Iteration, descend, table
+from tomoskin.imaging.iterative.newton import Descent, Goal, descend
 from tomoskin.imaging.iterative.observation import Observation
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.prior import Diagonal, SharpPrior
@@ -17,16 +17,14 @@ from tomoskin.model.prior import Diagonal, SharpPrior
 
 @dataclass(frozen=True, eq=False)
 class SharpImage:
-    """An image, and how it was found; see :class:`Absolute` for the fields."""
+    """An image, and how it was found, as of :class:`Absolute`."""
 
     image: Image
-    steps: tuple[Iteration, ...] = field(repr=False)
-    reason: str
-    converged: bool
+    descent: Descent = field(repr=False)
 
     def __str__(self) -> str:
         """The iterations, and why they ended."""
-        return f"{table(self.steps)}\nstopped: {self.reason}"
+        return str(self.descent)
 
 
 class SharpDifference:
@@ -45,8 +43,6 @@ class SharpDifference:
         Hyper-parameter; it enters squared.
     conductivity
         Where to linearise: (n_cells,) or one number, S or S/m.
-    steps, tolerance
-        It stops after so many steps, or when one gains less than this part of the objective.
 
     Raises
     ------
@@ -61,8 +57,6 @@ class SharpDifference:
         *,
         alpha: float,
         conductivity: ArrayLike = 1.0,
-        steps: int = STEPS,
-        tolerance: float = TOLERANCE,
     ) -> None:
         if not (np.isfinite(alpha) and alpha > 0):
             raise ModelError(f"expected alpha above 0, got {alpha}")
@@ -74,8 +68,6 @@ class SharpDifference:
         self.model = model
         self.prior = prior
         self.alpha = alpha
-        self.steps = steps
-        self.tolerance = tolerance
         self.conductivity = state.conductivity
         self.jacobian = state.jacobian * state.conductivity
 
@@ -93,12 +85,12 @@ class SharpDifference:
                 cost.energy,
             ),
             Descent.begin(len(mesh.cells)),
-            most=self.steps,
-            tolerance=self.tolerance,
+            most=STEPS,
+            tolerance=TOLERANCE,
         )
         unit = "S" if mesh.dimension == 2 else "S/m"
         image = Image(descent.unknowns * self.conductivity, unit, mesh.identity)
-        return SharpImage(image, descent.steps, descent.reason, descent.converged)
+        return SharpImage(image, descent)
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,15 +28,12 @@ class ImageMap(Protocol):
     @property
     def size(self) -> int:
         """The number of latent values of an image."""
-        ...
 
     def contrast(self, latent: FloatArray) -> FloatArray:
         """(n_cells,) log of conductivity over background."""
-        ...
 
     def chain(self, latent: FloatArray, jacobian: FloatArray) -> FloatArray:
         """(m, size) derivative by the latent image, from (m, n_cells) by the contrast."""
-        ...
 
 
 @dataclass(frozen=True)

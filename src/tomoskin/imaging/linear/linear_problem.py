@@ -13,7 +13,6 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from tomoskin.core import DataError, FloatArray, ModelError
 from tomoskin.imaging.linear.operator import Operator
 from tomoskin.model.forward import ForwardModel
-from tomoskin.model.pattern import Pattern
 from tomoskin.model.prior import Carried, Penalty, PriorLike, penalty_of
 
 _ZERO = 1e-9
@@ -95,9 +94,7 @@ class LinearProblem:
         if not len(kept):
             raise DataError("expected at least one row that is not left out, got none")
         full = self.model
-        pattern = Pattern.from_tables(
-            full.pattern.drive[kept], full.pattern.measure[kept], full.pattern.n_electrodes
-        )
+        pattern = full.pattern.part(kept)
         current = np.empty(pattern.n_drive)
         current[pattern.drive_index] = full.current[full.pattern.drive_index[kept]]
         return replace(
@@ -145,12 +142,13 @@ class LinearProblem:
             response = self.jacobian @ free
             precision, fitted = _fitted(precision, response)
             matrix += (free - matrix @ response) @ fitted
+        return self.operator_of(matrix, precision)
+
+    def operator_of(self, matrix: NDArray[Any], precision: NDArray[Any]) -> Operator:
+        """The operator of that matrix (n_cells, n_meas) and precision (n_meas, n_meas)."""
+        reference, difference = self.reference, self.difference
         return Operator(
-            self.model,
-            matrix,
-            precision=precision,
-            reference=self.reference,
-            difference=self.difference,
+            self.model, matrix, precision=precision, reference=reference, difference=difference
         )
 
 
@@ -162,7 +160,7 @@ class OneStep(Operator):
     model
         The forward model to linearise.
     prior
-        A name from :data:`tomoskin.imaging.PRIORS`, a prior such as ``Noser(exponent=1.0)``, or
+        A name from :data:`tomoskin.model.prior.PRIORS`, a prior such as ``Noser(exponent=1.0)``, or
         a symmetric (n_cells, n_cells) matrix Q, dense or sparse, or its diagonal.
     alpha
         Hyper-parameter; it enters squared.

@@ -205,6 +205,15 @@ class Operator:
         if left_out.all():
             raise DataError("expected at least one row that is not left out, got none")
         matrix, precision = downdated(self.matrix, self.precision, lost, left_out)
+        return self.remade(matrix, precision, left_out)
+
+    def remade(
+        self,
+        matrix: NDArray[Any],
+        precision: NDArray[Any],
+        left_out: NDArray[np.bool_] | None = None,
+    ) -> Operator:
+        """An operator for the same data with another matrix and precision."""
         return Operator(
             self.model,
             matrix,

@@ -113,10 +113,6 @@ class Spectrum:
         """(n_meas,) filter factors λ/(λ + α²): the part of each coefficient that is believed."""
         return 1.0 - _complement(self, alpha)
 
-    def freedom(self, alpha: float) -> float:
-        """Effective degrees of freedom: the sum of the filter factors."""
-        return float(self.filters(alpha).sum())
-
     def operator(self, alpha: float) -> Operator:
         """The operator of ``alpha``, the same as ``problem.operator(alpha)``, by one product."""
         return _operator(self, alpha, np.asarray(self.modes @ _filtered(self, alpha)))
@@ -141,14 +137,6 @@ class Spectrum:
         """(n_meas, n_meas) covariance of β for independent ``noise`` (n_meas,) of the data."""
         spread = self.analysis * noise
         return np.asarray(spread @ spread.conj().T)
-
-    def image_noise(self, alpha: float, covariance: NDArray[Any]) -> float:
-        """Root mean square over the area of the image's noise.
-
-        ``covariance`` from :meth:`noise_coefficients`.
-        """
-        area = float(self.problem.model.mesh.volumes.sum())
-        return float(np.sqrt(self.energies(np.array([alpha]), covariance)[0] / area))
 
     def energies(self, alphas: FloatArray, covariance: NDArray[Any]) -> FloatArray:
         """(k,) expected ∫x² over the sheet, for coefficients of that covariance."""
@@ -177,10 +165,7 @@ def _operator(spectrum: Spectrum, alpha: float, matrix: NDArray[Any]) -> Operato
     """The operator of ``alpha``, given its ``matrix``."""
     weighed = np.isfinite(spectrum.values)
     precision = spectrum.analysis[weighed].conj().T @ _filtered(spectrum, alpha)[weighed]
-    p = spectrum.problem
-    return Operator(
-        p.model, matrix, precision=precision, reference=p.reference, difference=p.difference
-    )
+    return spectrum.problem.operator_of(matrix, precision)
 
 
 def _eigen(system: NDArray[Any]) -> tuple[FloatArray, NDArray[Any]]:

@@ -86,20 +86,6 @@ class Belief:
     variance: FloatArray
 
 
-@dataclass(frozen=True, eq=False)
-class Steady:
-    """The filter for frames at one interval, long after its start: one pole per mode.
-
-    Attributes
-    ----------
-    gain, pole
-        (k,) mode ← pole · mode + gain · data.
-    """
-
-    gain: FloatArray
-    pole: FloatArray
-
-
 class Temporal:
     """Kalman filter over frames of difference data.
 
@@ -164,15 +150,17 @@ class Temporal:
         """Forget every frame, for instance with a new reference."""
         self.belief = None
 
-    def steady(self, interval: float) -> Steady:
-        """Gains, poles and noise for frames every ``interval`` s. Raises DataError."""
+    def steady(self, interval: float) -> tuple[FloatArray, FloatArray]:
+        """Gains and poles (k,) for frames every ``interval`` s, long after the start.
+
+        Then each mode ← pole · mode + gain · data. Raises DataError.
+        """
         if not (np.isfinite(interval) and interval > 0):
             raise DataError(f"expected an interval above 0 s, got {interval}")
         kept = _kept(interval, self.time_constant)
         trust = self.modes.trust
         gain = _gain(_steady_variance(trust, 1.0 - kept**2), trust)
-        pole = kept * (1.0 - trust * gain)
-        return Steady(gain, pole)
+        return gain, kept * (1.0 - trust * gain)
 
     def spread(self, noise: FloatArray, interval: float) -> FloatArray:
         """(n_cells, k) S with S·Sᵀ the covariance of the image, frames every ``interval`` s.
@@ -182,11 +170,11 @@ class Temporal:
         modes have in common is Σ over the past of
         gᵢpᵢⁿ cᵢⱼ gⱼpⱼⁿ, with gain g, pole p and their covariance c in one frame.
         """
-        steady = self.steady(interval)
+        gain, pole = self.steady(interval)
         root = np.diag(noise) if noise.ndim == 1 else noise
         analysis = self.modes.analysis @ root
-        shared = (analysis @ analysis.conj().T) / (1.0 - np.outer(steady.pole, steady.pole))
-        values, vectors = np.linalg.eigh(shared * np.outer(steady.gain, steady.gain))
+        shared = (analysis @ analysis.conj().T) / (1.0 - np.outer(pole, pole))
+        values, vectors = np.linalg.eigh(shared * np.outer(gain, gain))
         return np.asarray(self.modes.synthesis @ (vectors * np.sqrt(np.maximum(values, 0.0))))
 
 

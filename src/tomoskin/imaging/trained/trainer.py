@@ -194,14 +194,7 @@ class Greit(Operator):
 
     def weighed(self, noise: ArrayLike, weight: float) -> Operator:
         """The operator trained on the same targets for another noise and its weight μ."""
-        matrix, precision = Trainer.of(self.model.mesh, self.training, noise).matrix(weight)
-        return Operator(
-            self.model,
-            matrix,
-            precision=precision,
-            reference=self.reference,
-            difference=self.difference,
-        )
+        return self.remade(*Trainer.of(self.model.mesh, self.training, noise).matrix(weight))
 
 
 def _target_radius(mesh: Mesh) -> float:

@@ -317,17 +317,13 @@ class ClassesApplied(Applied):
     """Classifies each frame against the reference as it was taken: a class that lasts is not to be
     learnt as the skin's rest."""
 
-    def __init__(self, classifier: Classifier) -> None:
+    def __init__(self, classifier: Classifier, _conditions: Conditions) -> None:
         self._classifier = classifier
 
     def read(self, view: FrameView, detections: list[Detection], *, touched: bool) -> ClassReading:
         """Read the class of this frame from its change since the reference."""
         del detections, touched
         return self._classifier.read(view.differences.since_reference)
-
-
-def _apply(classifier: Classifier, _conditions: Conditions) -> Applied:
-    return ClassesApplied(classifier)
 
 
 CLASSES: Kind[Classifier] = Kind(
@@ -337,7 +333,7 @@ CLASSES: Kind[Classifier] = Kind(
     attachment="states.npz",
     learn=Classifier.learn,
     exclude=Classifier.without,
-    apply=_apply,
+    apply=ClassesApplied,
     own_settings=True,
 )
 """Classes of frames; its model is a :class:`Classifier`."""

@@ -66,20 +66,15 @@ class ChannelMapping:
 
     def text(self, ring: tuple[int, ...]) -> str:
         """In words: what differs from the skin file."""
-        plain = ChannelMapping.as_drawn(len(ring))
-        turns = [
-            (sum(a != b for a, b in zip(self.electrodes, base.electrodes, strict=True)), m, k, base)
-            for m in (False, True)
-            for k in range(len(ring))
-            for base in [plain.turned(ring, k, mirrored=m)]
-        ]
-        _, mirrored, steps, base = min(turns, key=lambda turn: turn[:3])
+        bases = np.array([base.electrodes for base in turns(ring)])
+        nearest = int((bases != self.electrodes).sum(axis=1).argmin())
+        mirrored, steps = divmod(nearest, len(ring))
         said = []
         if mirrored:
             said.append("mirrored")
         if steps:
             said.append(f"turned by {steps} electrode{'s' if steps > 1 else ''}")
-        odd = [k for k, place in enumerate(self.electrodes) if place != base.electrodes[k]]
+        odd = np.flatnonzero(bases[nearest] != self.electrodes).tolist()
         said += [f"E{k + 1} at the position of E{self.electrodes[k] + 1}" for k in odd]
         if self.reversed:
             said.append("polarity reversed")

@@ -11,6 +11,7 @@ from tomoskin.core import FloatArray, IntArray, ModelError
 from tomoskin.model.forward.assembly import electrode_forms
 from tomoskin.model.forward.element import barycentric_gradients
 from tomoskin.model.forward.solution import Solution
+from tomoskin.model.pattern import Pattern
 
 
 def by_conductivity(solution: Solution) -> NDArray[Any]:
@@ -18,7 +19,14 @@ def by_conductivity(solution: Solution) -> NDArray[Any]:
     if solution.conductivity.ndim > 1:
         return _by_tensor(solution)
     model = solution.model
-    return model.engine.jacobian(solution.gradient, model.pattern, model.current)
+    gradient, pattern = solution.gradient, model.pattern
+    if pattern.spread:
+        # A drive's field is that of one more electrode, against the last one's, which is zero.
+        n, more = len(gradient), pattern.n_drive
+        drives = np.column_stack([n + np.arange(more), np.full(more, n - 1)])
+        gradient = np.concatenate([gradient, np.tensordot(pattern.currents, gradient, 1)])
+        pattern = Pattern(n + more, drives, pattern.drive_index, pattern.measure)
+    return model.engine.jacobian(gradient, pattern, model.current)
 
 
 def along(solution: Solution, change: ArrayLike) -> NDArray[Any]:
@@ -36,13 +44,9 @@ def against(solution: Solution, weights: ArrayLike) -> NDArray[Any]:
     model, pattern = solution.model, solution.model.pattern
     weight = _checked(solution, weights, pattern.n_meas, "weights")
     field, out = solution.gradient, []
-    (source, sink), (plus, minus) = pattern.drive.T, pattern.measure.T
-    for one in weight.reshape(-1, pattern.n_meas) * model.current[pattern.drive_index]:
-        pairs = np.zeros((len(field), len(field)), one.dtype)
-        for driven, read, sign in (
-            (source, plus, 1), (source, minus, -1), (sink, plus, -1), (sink, minus, 1)
-        ):  # fmt: skip
-            np.add.at(pairs, (driven, read), sign * one)
+    driven = model.drive_currents[pattern.drive_index].T
+    for one in weight.reshape(-1, pattern.n_meas):
+        pairs = (driven * one) @ pattern.readers
         out.append(-np.einsum("eqc,eqc->c", field, np.tensordot(pairs, field, 1)))
     return np.array(out).reshape(*weight.shape[:-1], field.shape[2])
 
@@ -68,11 +72,10 @@ def _by_tensor(solution: Solution) -> NDArray[Any]:
     pattern = solution.model.pattern
     n_cells, d, _ = solution.conductivity.shape
     gradient = solution.gradient.reshape(pattern.n_electrodes, d, -1, n_cells)
-    driven = gradient[pattern.drive[:, 1]] - gradient[pattern.drive[:, 0]]
-    read = gradient[pattern.measure[:, 0]] - gradient[pattern.measure[:, 1]]
+    driven = np.tensordot(-solution.model.drive_currents, gradient, 1)[pattern.drive_index]
+    read = np.tensordot(pattern.readers, gradient, 1)
     product = np.einsum("maqc,mbqc->mcab", driven, read)
-    current = solution.model.current[pattern.drive_index][:, None, None, None]
-    return np.asarray(current * (product + product.swapaxes(-1, -2)) / 2.0)
+    return np.asarray((product + product.swapaxes(-1, -2)) / 2.0)
 
 
 def by_contact_impedance(solution: Solution) -> NDArray[Any]:

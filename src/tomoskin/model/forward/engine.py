@@ -35,7 +35,6 @@ class Factor(Protocol):
 
     def columns(self, rows: IntArray) -> NDArray[Any]:
         """Columns X of the inverse, (n_unknowns, n_rows)."""
-        ...
 
     def checked_columns(
         self, values: NDArray[Any], rows: IntArray
@@ -45,7 +44,6 @@ class Factor(Protocol):
         With E the columns of the identity, Xᵀ (E − A X) and the largest entry of E − A X; NaN
         where X is no number.
         """
-        ...
 
 
 Factorise = Callable[[NDArray[Any]], Factor]
@@ -85,11 +83,9 @@ class Patches(Protocol):
 
     def keep(self, nodes: IntArray, columns: NDArray[Any]) -> None:
         """Store columns (n_nodes, n) of the base system's inverse, those of ``nodes`` (n,)."""
-        ...
 
     def forget(self) -> None:
         """Drop all columns that were stored."""
-        ...
 
     def change(
         self, starts: IntArray, cells: IntArray, conductivity: NDArray[Any]
@@ -111,7 +107,6 @@ class Patches(Protocol):
             For a cell that does not exist or stands twice in a touch, a conductivity that is not
             positive, or a singular system.
         """
-        ...
 
 
 class Engine(Protocol):
@@ -143,21 +138,17 @@ class Engine(Protocol):
 
     def analyse(self, indptr: NDArray[np.int32], indices: NDArray[np.int32]) -> Factorise:
         """Return what factorises symmetric matrices of this structure, given their values."""
-        ...
 
     def fields(self, operator: csr_array, vectors: NDArray[Any], out: NDArray[Any]) -> None:
         """Write ``operator`` times ``vectors`` (n, k) to ``out`` (k, n_rows)."""
-        ...
 
     def jacobian(
         self, gradient: NDArray[Any], pattern: Pattern, current: FloatArray
     ) -> NDArray[Any]:
         """(n_meas, n_cells) from scaled gradients (n_electrodes, components, n_cells)."""
-        ...
 
     def patches(self, base: BaseState) -> Patches:
         """What computes the changes of a state by a touch."""
-        ...
 
 
 def singular() -> ModelError:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -9,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tomoskin.core import FloatArray
+from tomoskin.core import FloatArray, ModelError
 from tomoskin.model.forward import derivatives
-from tomoskin.model.forward.conductivity import checked_conductivity
+from tomoskin.model.forward.arguments import checked_conductivity
 from tomoskin.model.forward.engine import Compressed, Factor, singular
 from tomoskin.model.forward.solution import (
     Solution,
@@ -58,17 +59,45 @@ class ForwardModel(System):
         """Voltages and potentials; see :meth:`at`."""
         return self.at(conductivity).solution
 
+    def solve_many(self, conductivities: ArrayLike) -> NDArray[Any]:
+        """(…, n_meas) V of many conductivities (…, n_cells), one per cell each; see :meth:`at`."""
+        return self._each(conductivities, lambda state: state.voltages)
+
     def jacobian(self, conductivity: ArrayLike) -> NDArray[Any]:
         """(n_meas, n_cells) dV/dσ, V/S; see :meth:`at`."""
         return self.at(conductivity).jacobian
 
     def jvp(self, conductivity: ArrayLike, change: ArrayLike) -> NDArray[Any]:
-        """(…, n_meas) V: how the voltages change along ``change``; see :meth:`State.jvp`."""
-        return self.at(conductivity).jvp(change)
+        """(…, n_meas) V: how the voltages change along ``change``; see :meth:`State.jvp`.
+
+        Each of many conductivities (…, n_cells) has changes of the same shape of its own.
+        """
+        return self._each(conductivity, State.jvp, change)
 
     def vjp(self, conductivity: ArrayLike, weights: ArrayLike) -> NDArray[Any]:
-        """(…, n_cells): the gradient of weighted voltages; see :meth:`State.vjp`."""
-        return self.at(conductivity).vjp(weights)
+        """(…, n_cells): the gradient of weighted voltages; see :meth:`State.vjp`.
+
+        Each of many conductivities (…, n_cells) has weights (…, n_meas) of its own.
+        """
+        return self._each(conductivity, State.vjp, weights)
+
+    def _each(
+        self, given: ArrayLike, product: Callable[..., NDArray[Any]], *others: ArrayLike
+    ) -> NDArray[Any]:
+        """Products of one state, or of one after the other for many conductivities."""
+        many = np.asarray(given)
+        if many.ndim < 2 or many.shape[-1] != len(self.mesh.cells):
+            return product(self.at(many), *others)
+        rows = [np.asarray(one) for one in others]
+        for row in rows:
+            if row.shape[:-1] != many.shape[:-1]:
+                raise ModelError(
+                    f"expected one vector for each of {many.shape[:-1]} conductivities, got shape "
+                    f"{row.shape}"
+                )
+        flat = [one.reshape(-1, one.shape[-1]) for one in (many, *rows)]
+        found = [product(self.at(sigma), *own) for sigma, *own in zip(*flat, strict=True)]
+        return np.array(found).reshape(*many.shape[:-1], -1)
 
     def transfer_resistance(self, conductivity: ArrayLike) -> NDArray[Any]:
         """(n_electrodes, n_electrodes) Ω; see :class:`State`."""
@@ -109,11 +138,6 @@ class State:
         return Solution(model, self.conductivity, basis, voltages, largest)
 
     @property
-    def basis(self) -> NDArray[Any]:
-        """(n_unknowns, n_electrodes − 1) V/A: the last electrode is at zero."""
-        return self.solution.basis
-
-    @property
     def voltages(self) -> NDArray[Any]:
         """The voltages (n_meas,) of the pattern, in V."""
         return self.solution.voltages
@@ -127,11 +151,6 @@ class State:
     def gradient(self) -> NDArray[Any]:
         """(n_electrodes, d·q, n_cells): scaled gradient of each basis field, see Element."""
         return self.solution.gradient
-
-    @property
-    def power(self) -> NDArray[Any]:
-        """(n_drive, n_cells) W: power turned to heat in each cell, its real part."""
-        return self.solution.power
 
     @cached_property
     def jacobian(self) -> NDArray[Any]:
@@ -179,7 +198,7 @@ class State:
         return LocalUpdate(
             self.solution,
             columns=self.factor.columns,
-            factorise=lambda changed: State(model, changed).basis,
+            factorise=lambda changed: State(model, changed).solution.basis,
         )
 
 

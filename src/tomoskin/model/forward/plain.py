@@ -11,6 +11,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.linalg import SuperLU, splu
 
 from tomoskin.core import FloatArray, IntArray
+from tomoskin.model.forward.arguments import Touches
 from tomoskin.model.forward.engine import (
     BaseState,
     Compressed,
@@ -19,7 +20,6 @@ from tomoskin.model.forward.engine import (
     Patches,
     singular,
 )
-from tomoskin.model.forward.touches import Touches, stack_change, stacks
 from tomoskin.model.pattern import Pattern
 
 
@@ -143,12 +143,41 @@ class PlainPatches:
         kind = np.result_type(base.fields, conductivity)
         grounded, lost = np.empty(shape, kind), np.zeros(shape, kind)
         grounded[:] = base.grounded
-        missing: list[IntArray] = []
-        for stack in stacks(base.cells, touches):
-            slots = self._slot[stack.nodes]
-            missing.append(stack.nodes[slots < 0])
-            if not len(missing[-1]):
-                between = self._columns[slots[:, :, None], stack.nodes[:, None]]
-                less, lost[stack.numbers] = stack_change(base, between, stack, touches)
-                grounded[stack.numbers] -= less
-        return grounded, lost, np.unique(np.concatenate([starts[:0], *missing]))
+        missing = [starts[:0]]
+        for number in range(len(touches)):
+            nodes, place = np.unique(base.cells[touches[number][0]], return_inverse=True)
+            slots = self._slot[nodes]
+            missing.append(nodes[slots < 0])
+            if len(nodes) and not len(missing[-1]):
+                between = self._columns[slots[:, None], nodes]
+                less, lost[number] = patch_change(base, between, nodes, place, touches[number])
+                grounded[number] -= less
+        return grounded, lost, np.unique(np.concatenate(missing))
+
+
+def patch_change(
+    base: BaseState,
+    between: NDArray[Any],
+    nodes: IntArray,
+    place: IntArray,
+    touch: tuple[IntArray, NDArray[Any]],
+) -> tuple[NDArray[Any], NDArray[Any]]:
+    """(e, e) Uᵀ (I + A C)⁻¹ A U of one touch, and what rounding may cost it.
+
+    ``between`` (n, n): the inverse of the base system, between the ``nodes`` of the patch;
+    ``place``: which of them each corner of its cells is.
+    """
+    (index, sigma), place = touch, place.reshape(-1, base.cells.shape[1])
+    moved = base.local[index] * (sigma - base.conductivity[index])[:, None, None]
+    change = np.zeros(between.shape, moved.dtype)
+    np.add.at(change, (place[:, :, None], place[:, None, :]), moved)
+    between = between[1:] - between[:1]
+    between = between[:, 1:] - between[:, :1]
+    fields = base.fields[nodes[1:]] - base.fields[nodes[:1]]
+    leak, change = change[1:].sum(axis=1, keepdims=True), change[1:, 1:]
+    system = change @ between
+    system[np.diag_indices_from(system)] += 1.0
+    current = np.linalg.solve(system, change @ fields)
+    changed = fields - between @ current
+    residual = change @ changed - current + leak * changed
+    return fields.T @ current, changed.T @ residual

@@ -87,7 +87,8 @@ def _confirm(
     pattern = model.pattern
     largest = np.zeros(pattern.n_drive)
     np.maximum.at(largest, pattern.drive_index, np.abs(voltages))
-    inner = _inner(model, resistance, pattern.drive) * _inner(model, resistance, pattern.measure)
+    driven = _inner(model, resistance, pattern.currents)[pattern.drive_index]
+    inner = driven * _inner(model, resistance, pattern.readers)
     floor = _FLOOR * np.abs(model.current[pattern.drive_index]) * np.sqrt(inner)
     allowed = np.maximum(MOST_RESIDUAL * largest[pattern.drive_index], floor)
     if (np.abs(model.voltages(padded(lost))) <= allowed).all():
@@ -96,13 +97,12 @@ def _confirm(
         raise singular()
 
 
-def _inner(model: System, resistance: NDArray[Any], pairs: IntArray) -> FloatArray:
-    """(n_pairs,) Ω between the electrodes of each pair, without what the contacts have at least."""
-    (a, b), r = pairs.T, resistance
+def _inner(model: System, resistance: NDArray[Any], currents: FloatArray) -> FloatArray:
+    """(n,) Ω that ``currents`` (n, n_electrodes) meet, without what the contacts have at least."""
     sizes = np.array([size.sum() for size in model.assembly.element.facet_sizes])
     contact = np.abs(model.contact_impedance) / sizes
-    between = np.abs(r[a, a] - r[a, b] - r[b, a] + r[b, b])
-    return np.asarray(np.maximum(between - contact[a] - contact[b], 0.0))
+    between = np.abs(np.einsum("ke,ef,kf->k", currents, resistance, currents))
+    return np.asarray(np.maximum(between - currents**2 @ contact, 0.0))
 
 
 def error_of_drives(model: System, matrix: Any, basis: NDArray[Any]) -> NDArray[Any]:
@@ -115,11 +115,9 @@ def error_of_drives(model: System, matrix: Any, basis: NDArray[Any]) -> NDArray[
     fields = np.zeros((len(basis), basis.shape[1] + 1), basis.dtype)
     fields[:, :-1] = basis
     error = np.empty(pattern.n_meas, basis.dtype)
-    for drive, (source, sink) in enumerate(pattern.drives):
-        residual = -(matrix @ (fields[:, source] - fields[:, sink]))
-        for electrode, current in ((source, 1.0), (sink, -1.0)):
-            if electrode < basis.shape[1]:
-                residual[n_points + electrode] += current
+    for drive, currents in enumerate(pattern.currents):
+        residual = -(matrix @ (fields @ currents))
+        residual[n_points:] += currents[:-1]
         rows = np.flatnonzero(pattern.drive_index == drive)
         plus, minus = pattern.measure[rows].T
         error[rows] = (fields[:, plus] - fields[:, minus]).T @ residual * model.current[drive]
@@ -188,8 +186,7 @@ class Solution:
     def power(self) -> NDArray[Any]:
         """(n_drive, n_cells) W: power turned to heat in each cell, its real part."""
         model, gradient = self.model, self.gradient
-        source, sink = model.pattern.drives.T
-        field = model.current[:, None, None] * (gradient[source] - gradient[sink])
+        field = model.current[:, None, None] * np.tensordot(model.pattern.currents, gradient, 1)
         if self.conductivity.ndim == 1:
             return np.asarray(np.sum(np.abs(field) ** 2, axis=1) * self.conductivity.real)
         n_cells, d, _ = self.conductivity.shape
@@ -199,8 +196,8 @@ class Solution:
 
     def _of_drives(self, fields: NDArray[Any]) -> NDArray[Any]:
         """(n_drive, …): fields (n_electrodes, …) of 1 A → those of each drive's current."""
-        source, sink = self.model.pattern.drives.T
-        return np.asarray(self.model.current[:, None] * (fields[source] - fields[sink]))
+        model = self.model
+        return np.asarray(model.current[:, None] * (model.pattern.currents @ fields))
 
 
 def centred(grounded: NDArray[Any]) -> NDArray[Any]:

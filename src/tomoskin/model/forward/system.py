@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array
 
 from tomoskin.core import FloatArray, IntArray, ModelError
+from tomoskin.model.forward.arguments import number_type, numbers
 from tomoskin.model.forward.assembly import SystemAssembly, gradient_operator
-from tomoskin.model.forward.conductivity import number_type, numbers
 from tomoskin.model.forward.element import Element
 from tomoskin.model.forward.engine import Factorise
 from tomoskin.model.forward.engine_choice import choose_engine
@@ -40,7 +40,7 @@ class System:
         self.pattern = pattern
         self.contact_impedance = _impedance(contact_impedance, pattern.n_electrodes)
         self.current = _current(current, pattern.n_drive)
-        self.most_current = float(np.abs(self.current).max())
+        self.most_current = float(np.abs(self.drive_currents).sum(axis=1).max() / 2.0)
         self.order = order
         self.engine = choose_engine()
         self.assembly = SystemAssembly.of(Element.of(mesh, order))
@@ -69,12 +69,21 @@ class System:
 
     def voltages(self, transfer_resistance: NDArray[Any]) -> NDArray[Any]:
         """(…, n_meas) V of the pattern, from (…, n_electrodes, n_electrodes) Ω."""
+        if self.pattern.spread:
+            potentials = transfer_resistance @ self.drive_currents.T
+            drive, (plus, minus) = self.pattern.drive_index, self.pattern.measure.T
+            return np.asarray(potentials[..., plus, drive] - potentials[..., minus, drive])
         entries, current = self._entries
         *many, n, _ = transfer_resistance.shape
         r = transfer_resistance.reshape(*many, n * n).take(entries, axis=-1)
         driven_plus = r[..., 0, :] - r[..., 1, :]
         driven_minus = r[..., 2, :] - r[..., 3, :]
         return np.asarray(current * (driven_plus - driven_minus))
+
+    @cached_property
+    def drive_currents(self) -> FloatArray:
+        """(n_drive, n_electrodes) A into every electrode."""
+        return self.current[:, None] * self.pattern.currents
 
     @cached_property
     def _entries(self) -> tuple[IntArray, FloatArray]:

@@ -25,9 +25,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tomoskin.core import IntArray, ModelError
+from tomoskin.model.forward.arguments import Touch, Touches
 from tomoskin.model.forward.engine import BaseState, Patches, singular
 from tomoskin.model.forward.solution import Solution, centred, checked_voltages
-from tomoskin.model.forward.touches import Touch, Touches
 
 MOST_BYTES = 1 << 30
 """Columns of the inverse are kept up to this size, then they go."""

@@ -1,10 +1,8 @@
 """Outlines, electrodes and the triangles or tetrahedra between them."""
 
 from tomoskin.model.mesh.boundary import ElectrodeArc, check_arcs
-from tomoskin.model.mesh.box import BoxPatch, box
-from tomoskin.model.mesh.choose import Places
 from tomoskin.model.mesh.draped import Draped
-from tomoskin.model.mesh.extrude import cylinder, extrude
+from tomoskin.model.mesh.extrude import extrude
 from tomoskin.model.mesh.mesh import Mesh, MeshFile
 from tomoskin.model.mesh.outline import Disc, Ellipse, Outline
 from tomoskin.model.mesh.patch import FacePatch, Patch, WallPatch, ring
@@ -16,7 +14,6 @@ from tomoskin.model.mesh.wrapped import Arm, Cylinder, Hinge
 
 __all__ = [
     "Arm",
-    "BoxPatch",
     "Cap",
     "Cylinder",
     "Disc",
@@ -29,7 +26,6 @@ __all__ = [
     "MeshFile",
     "Outline",
     "Patch",
-    "Places",
     "Plane",
     "Polygon",
     "Quality",
@@ -37,9 +33,7 @@ __all__ = [
     "Saddle",
     "Surface",
     "WallPatch",
-    "box",
     "check_arcs",
-    "cylinder",
     "extrude",
     "laid_on",
     "quality",

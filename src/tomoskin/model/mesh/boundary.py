@@ -12,8 +12,8 @@ from scipy.spatial import cKDTree
 
 from tomoskin.core import FloatArray, GeometryError, IntArray
 from tomoskin.model.mesh.outline import Outline
-from tomoskin.model.mesh.polygon import inside
-from tomoskin.model.mesh.sizing import SizeField
+from tomoskin.model.mesh.polygon import inside, off_segment
+from tomoskin.model.mesh.sizing import SizeField, running
 
 MIN_GAP = 0.01
 """Two electrodes must stand at least this fraction of the narrower one apart."""
@@ -139,9 +139,8 @@ def breakpoints(
     ends = [(a.start % length, (a.start + a.width(outline)) % length) for a in arcs]
     exact = np.array(ends).ravel()
     corners = corners % length
-    if len(corners):  # an electrode that ends at a corner ends exactly there
-        gap = np.abs(corners[:, None] - exact[None])
-        corners = corners[np.minimum(gap, length - gap).min(axis=1) > _SAME * length]
+    # an electrode that ends at a corner ends exactly there
+    corners = corners[~among(corners, exact, length)]
     nodes = np.unique(np.concatenate([exact, corners]))
     middle = (nodes + (np.append(nodes[1:], nodes[0] + length) - nodes) / 2) % length
     owner = np.full(len(nodes), -1)
@@ -198,9 +197,7 @@ def _graded(
     """Arclengths from ``start`` (included) to its end (excluded), spaced as the field asks."""
     samples = 1 + max(16, math.ceil(3 * span / field.sizes.min()))
     s = np.linspace(0.0, span, min(samples, 20_001))
-    density = 1.0 / field(outline.point(start + s))
-    steps = np.diff(s) * (density[1:] + density[:-1]) / 2
-    count = np.concatenate([[0.0], np.cumsum(steps)])
+    count = running(1.0 / field(outline.point(start + s)), s)
     parts = max(least, round(float(count[-1])))
     target = np.arange(parts) * (count[-1] / parts)
     return np.asarray(start + np.interp(target, count, s))
@@ -240,18 +237,16 @@ def _cut(start: FloatArray, end: FloatArray, corners: FloatArray, length: float)
     """Where to cut each edge: its middle, or a power of two from the corner it begins at."""
     span = end - start
     shell = 2.0 ** np.round(np.log2(span / 2))
-    at_start = _among(start, corners, length)
-    at_end = _among(end, corners, length)
+    at_start, at_end = among(start, corners, length), among(end, corners, length)
     cut = start + span / 2
     cut = np.where(at_start & ~at_end, start + shell, cut)
     return np.where(at_end & ~at_start, end - shell, cut)
 
 
-def _among(s: FloatArray, corners: FloatArray, length: float) -> NDArray[np.bool_]:
-    if not len(corners):
-        return np.zeros(len(s), dtype=bool)
-    gap = np.abs((s[:, None] - corners[None] + length / 2) % length - length / 2)
-    return np.asarray(gap.min(axis=1) <= _SAME * length)
+def among(s: FloatArray, others: FloatArray, length: float) -> NDArray[np.bool_]:
+    """(n,) whether arclengths of an outline of that ``length`` are one of the ``others``."""
+    gap = np.abs((s[:, None] - others[None] + length / 2) % length - length / 2)
+    return np.asarray(gap.min(axis=1, initial=np.inf) <= _SAME * length)
 
 
 def rim_distance(rim: Boundary, xy: FloatArray) -> FloatArray:
@@ -261,11 +256,8 @@ def rim_distance(rim: Boundary, xy: FloatArray) -> FloatArray:
     count = len(rim.points)
     _, node = cKDTree(rim.points).query(xy, k=3)
     edge = np.concatenate([node, (node - 1) % count], axis=1)
-    step = np.roll(rim.points, -1, axis=0) - rim.points
-    offset = xy[:, None] - rim.points[edge]
-    along = (offset * step[edge]).sum(axis=2) / (step[edge] ** 2).sum(axis=2)
-    foot = offset - np.clip(along, 0, 1)[:, :, None] * step[edge]
-    return np.asarray(np.linalg.norm(foot, axis=2).min(axis=1))
+    ends = np.roll(rim.points, -1, axis=0)[edge]
+    return np.asarray(off_segment(xy[:, None], rim.points[edge], ends).min(axis=1))
 
 
 def keeps_clear(rim: Boundary, xy: FloatArray) -> NDArray[np.bool_]:

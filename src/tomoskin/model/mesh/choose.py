@@ -1,14 +1,12 @@
-"""Electrodes of a mesh that comes from elsewhere: by name, facets, a function or positions."""
+"""Electrodes of a mesh that comes from elsewhere: by name, facets or a function."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial import cKDTree
 
 from tomoskin.core import FloatArray, GeometryError, IntArray
 from tomoskin.model.mesh.triangles import boundary_facets
@@ -19,20 +17,9 @@ Chooser = Callable[[FloatArray], ArrayLike]
 """(n, d) centroids of boundary facets → (n,) electrode of each, −1 for none."""
 
 
-@dataclass(frozen=True, eq=False)
-class Places:
-    """One electrode at each of ``points`` (n, d) m: the facets with centroids within ``radius`` m.
-
-    A facet within reach of several points belongs to the nearest.
-    """
-
-    points: ArrayLike
-    radius: float
-
-
-Electrodes = Sequence[str] | Sequence[ArrayLike] | Chooser | Places | None
+Electrodes = Sequence[str] | Sequence[ArrayLike] | Chooser | None
 """How electrodes are given: names of groups in the file, in their order; facet arrays in the
-file's own point numbers; a function of centroids; positions; None for the groups named E1, E2, …"""
+file's own point numbers; a function of centroids; None for the groups named E1, E2, …"""
 
 
 def choose(
@@ -48,8 +35,6 @@ def choose(
     match electrodes:
         case None:
             chosen = _named(groups, _numbered(groups))
-        case Places():
-            chosen = _numbers(points, cells, lambda x: _nearest(x, electrodes))
         case _ if callable(electrodes):
             chosen = _numbers(points, cells, electrodes)
         case _ if any(isinstance(e, str) for e in electrodes):
@@ -95,25 +80,3 @@ def _numbers(points: FloatArray, cells: IntArray, chooser: Chooser) -> list[IntA
             f"got {number.dtype} of shape {number.shape}"
         )
     return [facets[number == n] for n in range(1 + int(number.max()))]
-
-
-def _nearest(centroids: FloatArray, places: Places) -> IntArray:
-    wanted = np.atleast_2d(np.asarray(places.points, dtype=np.float64))
-    if wanted.shape[1] != centroids.shape[1]:
-        raise GeometryError(
-            f"expected positions with {centroids.shape[1]} coordinates, got shape {wanted.shape}"
-        )
-    if not places.radius > 0:
-        raise GeometryError(f"expected a radius above 0 m, got {places.radius:g} m")
-    gap, nearest = cKDTree(wanted).query(centroids)
-    number = np.where(gap <= places.radius, nearest, -1)
-    missed = np.setdiff1d(np.arange(len(wanted)), number)
-    if len(missed):
-        first = int(missed[0])
-        off = float(np.linalg.norm(centroids - wanted[first], axis=1).min())
-        raise GeometryError(
-            f"no facet lies within {places.radius * 1e3:.4g} mm; "
-            f"the nearest is {off * 1e3:.4g} mm away",
-            where=f"E{first + 1}",
-        )
-    return number

@@ -81,8 +81,7 @@ class Draped(Surface):
         """
         file = MeshFile.read(path, scale=scale)
         used, compact = np.unique(file.cells, return_inverse=True)
-        points = np.zeros((len(used), 3))
-        points[:, : file.points.shape[1]] = file.points[used]
+        points = np.pad(file.points[used], ((0, 0), (0, 3 - file.points.shape[1])))
         try:
             return cls.of(points, compact.reshape(file.cells.shape))
         except GeometryError as error:

@@ -12,9 +12,9 @@ from scipy.optimize import brentq
 from tomoskin.core import FloatArray, GeometryError, IntArray
 from tomoskin.model.mesh.boundary import AT_ELECTRODE, MIN_FACETS
 from tomoskin.model.mesh.mesh import Mesh
-from tomoskin.model.mesh.outline import Disc, Outline, check_size
-from tomoskin.model.mesh.patch import FacePatch, Patch, WallPatch, check_patches, footprint, ring
-from tomoskin.model.mesh.sizing import SizeField
+from tomoskin.model.mesh.outline import Outline, check_size
+from tomoskin.model.mesh.patch import FacePatch, Patch, WallPatch, check_patches, footprint
+from tomoskin.model.mesh.sizing import SizeField, running
 from tomoskin.model.mesh.triangles import boundary_facets
 from tomoskin.model.mesh.triangulate import triangulate
 
@@ -78,8 +78,7 @@ def _running(stops: FloatArray, i: int, coarse: float) -> tuple[FloatArray, Floa
     z = np.linspace(stops[i], stops[i + 1], _SAMPLES)
     field = _field(stops, coarse)
     density = np.full(len(z), 1 / coarse) if field is None else 1 / field(z[:, None])
-    steps = np.diff(z) * (density[1:] + density[:-1]) / 2
-    return z, np.concatenate([[0.0], np.cumsum(steps)])
+    return z, running(density, z)
 
 
 def _steps(stops: FloatArray, coarse: float) -> list[float]:
@@ -221,29 +220,3 @@ def _check_planes(planes: Sequence[float], height: float) -> None:
                 f"expected a height from 0 to {height * 1e3:.4g} mm, got {z * 1e3:.4g} mm",
                 where=f"plane {number}",
             )
-
-
-def cylinder(
-    radius: float,
-    height: float,
-    *,
-    count: int,
-    width: float,
-    bottom: float,
-    top: float,
-    cells: int = 1600,
-    layers: int = 12,
-) -> Mesh:
-    """Cylinder from z = 0 to ``height`` with ``count`` equal electrodes in one plane; lengths in m.
-
-    They have the arclength ``width``, reach from ``bottom`` to ``top``, and are numbered as
-    :func:`ring` does. For other electrodes, give :func:`extrude` a ``Disc`` and their patches.
-
-    Raises
-    ------
-    GeometryError
-        When the electrodes do not fit.
-    """
-    disc = Disc(radius)
-    patches = ring(disc, count, width, bottom, top)
-    return extrude(disc, height, patches, cells=cells, layers=layers)

@@ -11,13 +11,11 @@ from scipy.sparse.csgraph import breadth_first_order
 from scipy.sparse.linalg import splu
 
 from tomoskin.core import FloatArray, GeometryError, IntArray
-from tomoskin.model.mesh.triangles import paired_facets
+from tomoskin.model.mesh.triangles import SIDES, paired_facets
 
 _ROUNDS = 100
 _SETTLED = 1e-6
 """Of the extent: a round that moves no point further is the last."""
-
-_TURNS = ((0, 1), (1, 2), (2, 0))
 
 
 def flattened(points: FloatArray, cells: IntArray) -> FloatArray:
@@ -55,7 +53,7 @@ def rim_of(cells: IntArray) -> IntArray:
     GeometryError
         When there is no rim, more than one, or a hole that makes it no disc.
     """
-    sides = np.concatenate([cells[:, turn] for turn in _TURNS])
+    sides = np.concatenate([cells[:, turn] for turn in SIDES])
     n = int(cells.max()) + 1
     forth = sides[:, 0] * n + sides[:, 1]
     back = sides[:, 1] * n + sides[:, 0]
@@ -106,8 +104,8 @@ def _turn_alike(cells: IntArray, pairs: IntArray) -> FloatArray:
     """(n_pairs,) whether two neighbours run along their common edge in opposite senses."""
     one, other = cells[pairs[:, 0]], cells[pairs[:, 1]]
     opposed = np.zeros(len(pairs), dtype=bool)
-    for a, b in _TURNS:
-        for c, d in _TURNS:
+    for a, b in SIDES:
+        for c, d in SIDES:
             opposed |= (one[:, a] == other[:, d]) & (one[:, b] == other[:, c])
     return opposed
 
@@ -130,7 +128,7 @@ def _on_disc(points: FloatArray, cells: IntArray, rim: IntArray) -> FloatArray:
 
 def _laplacian(cells: IntArray, weight: FloatArray, n: int) -> csr_array:
     """(n, n) Σ over the sides of all cells of weight · (uᵢ − uⱼ)²; weight (n_cells, 3) by side."""
-    start, end = (np.concatenate([cells[:, turn[k]] for turn in _TURNS]) for k in (0, 1))
+    start, end = (np.concatenate([cells[:, turn[k]] for turn in SIDES]) for k in (0, 1))
     w = weight.T.reshape(-1)
     rows = np.concatenate([start, end, start, end])
     columns = np.concatenate([start, end, end, start])
@@ -140,7 +138,7 @@ def _laplacian(cells: IntArray, weight: FloatArray, n: int) -> csr_array:
 def _cotangents(shape: FloatArray) -> FloatArray:
     """(n_cells, 3): of the angle opposite to each side."""
     out = np.empty(shape.shape[:2])
-    for side, (a, b) in enumerate(_TURNS):
+    for side, (a, b) in enumerate(SIDES):
         tip = shape[:, 3 - a - b]
         one, other = shape[:, a] - tip, shape[:, b] - tip
         cross = one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]
@@ -153,17 +151,17 @@ def _rigid(shape: FloatArray, cells: IntArray, n: int) -> Callable[[FloatArray],
     weight = _cotangents(shape)
     matrix = csc_array(_laplacian(cells, weight, n)[1:][:, 1:])  # the first point stands still
     factor = splu(matrix)
-    own = np.stack([shape[:, b] - shape[:, a] for a, b in _TURNS], axis=1)
+    own = np.stack([shape[:, b] - shape[:, a] for a, b in SIDES], axis=1)
 
     def turned(flat: FloatArray) -> FloatArray:
-        lies = np.stack([flat[cells[:, b]] - flat[cells[:, a]] for a, b in _TURNS], axis=1)
+        lies = np.stack([flat[cells[:, b]] - flat[cells[:, a]] for a, b in SIDES], axis=1)
         both = np.einsum("ns,nsi,nsj->nij", weight, own, lies)
         c, s = both[:, 0, 0] + both[:, 1, 1], both[:, 0, 1] - both[:, 1, 0]
         size = np.maximum(np.hypot(c, s), np.finfo(float).tiny)
         turn = np.stack([np.stack([c, s], -1), np.stack([-s, c], -1)], axis=1)
         pull = weight[:, :, None] * (own @ (turn / size[:, None, None]))
         load = np.zeros((n, 2))
-        for side, (a, b) in enumerate(_TURNS):
+        for side, (a, b) in enumerate(SIDES):
             np.add.at(load, cells[:, b], pull[:, side])
             np.subtract.at(load, cells[:, a], pull[:, side])
         moved = np.vstack([np.zeros((1, 2)), factor.solve(load[1:])])

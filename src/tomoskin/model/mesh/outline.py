@@ -32,14 +32,14 @@ class Outline(Protocol):
         """The area inside the curve, in m²."""
 
     @property
-    @abstractmethod
     def centre(self) -> FloatArray:
-        """(2,) centroid of the area, m; directions are seen from here."""
+        """(2,) centroid of the area, m; directions are seen from here. The origin, for a curve."""
+        return np.zeros(2)
 
     @property
-    @abstractmethod
     def corners(self) -> FloatArray:
-        """(k,) arclengths at which the direction jumps, ascending, m."""
+        """(k,) arclengths at which the direction jumps, ascending, m. A curve has none."""
+        return np.zeros(0)
 
     @abstractmethod
     def point(self, s: ArrayLike) -> FloatArray:
@@ -94,16 +94,6 @@ class Ellipse(Outline):
     def area(self) -> float:
         """The area inside the ellipse, in m²."""
         return math.pi * self.semi_x * self.semi_y
-
-    @property
-    def centre(self) -> FloatArray:
-        """The middle, which is the origin."""
-        return np.zeros(2)
-
-    @property
-    def corners(self) -> FloatArray:
-        """The corners of the curve: an ellipse has none."""
-        return np.zeros(0)
 
     def point(self, s: ArrayLike) -> FloatArray:
         """(n, 2) points at arclengths ``s``, m."""
@@ -179,16 +169,6 @@ class Disc(Outline):
     def area(self) -> float:
         """The area inside the circle, in m²."""
         return math.pi * self.radius**2
-
-    @property
-    def centre(self) -> FloatArray:
-        """The middle, which is the origin."""
-        return np.zeros(2)
-
-    @property
-    def corners(self) -> FloatArray:
-        """The corners of the curve: a disc has none."""
-        return np.zeros(0)
 
     def point(self, s: ArrayLike) -> FloatArray:
         """(n, 2) points at arclengths ``s``, m."""

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, GeometryError
-from tomoskin.model.mesh.boundary import MIN_GAP, ElectrodeArc, check_arcs
+from tomoskin.model.mesh.boundary import MIN_GAP, ElectrodeArc, among, check_arcs
 from tomoskin.model.mesh.outline import Outline
 
 _SAME = 1e-7
@@ -154,8 +154,8 @@ def footprint(outline: Outline, patches: Sequence[Patch]) -> tuple[list[Electrod
     covered |= span < MIN_GAP * length  # leave no gap that check_arcs could refuse
     if covered.all():
         covered[np.argmax(span)] = False
-    marks = _clear_of(outline.corners, ends[covered & np.roll(covered, 1)], length)
-    return _runs(ends, span, covered), marks
+    marks = ends[covered & np.roll(covered, 1)]
+    return _runs(ends, span, covered), marks[~among(marks, outline.corners, length)]
 
 
 def _distinct(s: FloatArray, length: float) -> FloatArray:
@@ -163,14 +163,6 @@ def _distinct(s: FloatArray, length: float) -> FloatArray:
     order = np.sort(s)
     gap = np.append(np.diff(order), order[0] + length - order[-1])
     return np.asarray(order[gap > _SAME * length])
-
-
-def _clear_of(corners: FloatArray, marks: FloatArray, length: float) -> FloatArray:
-    """Marks that are not at a corner."""
-    if not len(corners):
-        return marks
-    gap = np.abs((marks[:, None] - corners + length / 2) % length - length / 2)
-    return np.asarray(marks[gap.min(axis=1) > _SAME * length])
 
 
 def _runs(ends: FloatArray, span: FloatArray, covered: NDArray[np.bool_]) -> list[ElectrodeArc]:

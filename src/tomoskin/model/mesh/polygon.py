@@ -221,7 +221,7 @@ def _check_crossings(vertices: FloatArray, size: float) -> None:
 def _separation(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> FloatArray:
     """(n,) distance between segment ab and each segment cd; 0 where they cross."""
     crossing = (_side(a, b, c) * _side(a, b, d) < 0) & (_side(c, d, a) * _side(c, d, b) < 0)
-    gaps = [_gap(c, a, b), _gap(d, a, b), _gap(a, c, d), _gap(b, c, d)]
+    gaps = [off_segment(c, a, b), off_segment(d, a, b), off_segment(a, c, d), off_segment(b, c, d)]
     return np.where(crossing, 0.0, np.min(gaps, axis=0))
 
 
@@ -230,7 +230,7 @@ def _side(a: FloatArray, b: FloatArray, p: FloatArray) -> FloatArray:
     return np.asarray(u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0])
 
 
-def _gap(p: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:
+def off_segment(p: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:
     """Distance from points ``p`` to segments ``ab``."""
     step = b - a
     along = np.clip(((p - a) * step).sum(axis=-1) / (step**2).sum(axis=-1), 0.0, 1.0)

@@ -46,3 +46,9 @@ class SizeField:
     @cached_property
     def _tree(self) -> cKDTree:
         return cKDTree(self.points)
+
+
+def running(density: FloatArray, at: FloatArray) -> FloatArray:
+    """(n,) integral of a density (n,) from the first of the places ``at`` (n,) to each."""
+    steps = np.diff(at) * (density[1:] + density[:-1]) / 2
+    return np.concatenate([[0.0], np.cumsum(steps)])

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from tomoskin.core import FloatArray, GeometryError
 from tomoskin.model.mesh.mesh import Mesh
+from tomoskin.model.mesh.triangles import SIDES
 
 _ISOMETRIC = 1e-12
 """A metric that differs from that of the plane by less is rounding."""
@@ -25,8 +26,6 @@ _STEP = 1e-5
 
 _GAUSS = np.polynomial.legendre.leggauss(4)
 """Places and weights along a side, from −1 to 1."""
-
-_SIDES = ((0, 1), (1, 2), (2, 0))
 
 
 class Surface(ABC):
@@ -100,7 +99,7 @@ def _of_lengths(mesh: Mesh, surface: Surface) -> FloatArray:
     """
     corner = mesh.points[mesh.cells]
     squares, terms = [], []
-    for a, b in _SIDES:
+    for a, b in SIDES:
         step, middle = corner[:, b] - corner[:, a], (corner[:, a] + corner[:, b]) / 2
         length = np.zeros(len(corner))
         for node, weight in zip(*_GAUSS, strict=True):

@@ -68,8 +68,8 @@ def paired_facets(cells: IntArray) -> tuple[IntArray, IntArray]:
     return np.column_stack([owner[:-1][same], owner[1:][same]]), np.asarray(facet[single])
 
 
-_EDGES = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
-"""Ends of each edge, and the corner opposite to it."""
+SIDES = ((0, 1), (1, 2), (2, 0))
+"""Corners at the ends of each side of a triangle."""
 
 _CLEAR = 1e-9
 """An edge that ends this near to a triangle, as a part of its length, only touches it."""
@@ -106,7 +106,7 @@ def closest(corner: FloatArray, position: FloatArray) -> FloatArray:
     pq = np.linalg.solve(gram, right[..., None])[..., 0]
     foot = np.concatenate([1.0 - pq.sum(-1, keepdims=True), pq], axis=-1)
     shares = [foot]
-    for a, b in ((0, 1), (1, 2), (2, 0)):
+    for a, b in SIDES:
         side = corner[..., b, :] - corner[..., a, :]
         t = ((position - corner[..., a, :]) * side).sum(-1) / (side * side).sum(-1)
         t = np.clip(t, 0.0, 1.0)
@@ -165,7 +165,7 @@ def _near(points: FloatArray, cells: IntArray) -> list[IntArray]:
 def _cuts(points: FloatArray, one: IntArray, other: IntArray) -> NDArray[np.bool_]:
     """(n,) whether an edge of triangle ``one`` passes through the inside of ``other``."""
     cut = np.zeros(len(one), dtype=bool)
-    for a, b, _ in _EDGES:
+    for a, b in SIDES:
         ends = one[:, [a, b]]
         apart = (ends[:, :, None] != other[:, None, :]).all(axis=(1, 2))
         cut[apart] |= _pierces(points[ends[apart]], points[other[apart]])

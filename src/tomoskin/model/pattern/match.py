@@ -4,29 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from tomoskin.core import FloatArray, IntArray, PatternError
-from tomoskin.model.pattern.pattern import Pattern
+from tomoskin.model.pattern.pattern import Pattern, check_drives, drive_table
 
 _LISTED = 5
+
+_SPAN = 1e-3
+"""Currents combine into a drive to within this part of it; weaker parts of them do not count."""
 
 
 @dataclass(frozen=True, eq=False)
 class RowMatch:
     """Where each row of a pattern is found in a foreign table.
 
-    ``rows`` (n_meas,) index into the foreign table; ``signs`` (n_meas,) ±1;
-    ``unused`` foreign rows that the pattern does not ask for.
+    ``rows`` (n_meas,) index into the foreign table; ``signs`` (n_meas,) ±1.
     """
 
     rows: IntArray
     signs: FloatArray
-    unused: IntArray
 
-    def apply(self, values: FloatArray) -> FloatArray:
+    def apply(self, values: NDArray[Any]) -> NDArray[Any]:
         """(…, n_foreign) → (…, n_meas) in the pattern's order and sign; itself where it is so."""
         if np.array_equal(self.rows, np.arange(values.shape[-1])) and (self.signs == 1.0).all():
             return values
@@ -60,8 +62,67 @@ def match_rows(pattern: Pattern, drive: ArrayLike, measure: ArrayLike) -> RowMat
         )
     hits = [hit for hit in located if hit is not None]
     rows = np.array([row for row, _ in hits], dtype=np.int64)
-    unused = np.setdiff1d(np.arange(foreign.n_meas), rows)
-    return RowMatch(rows, np.array([sign for _, sign in hits]), unused)
+    return RowMatch(rows, np.array([sign for _, sign in hits]))
+
+
+@dataclass(frozen=True, eq=False)
+class RowSums:
+    """Rows of a pattern as sums of foreign rows, whose drives were currents into many electrodes.
+
+    ``parts``: for each measuring pair the rows of the pattern, the foreign rows, and the weights
+    (rows, foreign rows) of the sums.
+    """
+
+    n_meas: int
+    parts: tuple[tuple[IntArray, IntArray, FloatArray], ...]
+
+    def apply(self, values: NDArray[Any]) -> NDArray[Any]:
+        """(…, n_foreign) → (…, n_meas) in the pattern's order and sign."""
+        out = np.empty((*values.shape[:-1], self.n_meas), values.dtype)
+        for rows, foreign, weights in self.parts:
+            out[..., rows] = values[..., foreign] @ weights.T
+        return out
+
+
+def sum_rows(pattern: Pattern, currents: ArrayLike, measure: ArrayLike) -> RowSums:
+    """Rows of ``pattern`` by superposition of rows with ``currents`` (n, n_electrodes).
+
+    What a drive reads is linear in its currents. So rows of one measuring pair combine into any
+    drive that is a sum of theirs; the smallest weights are taken.
+
+    Raises
+    ------
+    PatternError
+        When currents do not sum to zero, or rows of the pattern are no such sums; the message
+        lists them.
+    """
+    table, pairs = drive_table(currents), np.asarray(measure)
+    check_drives(table, table.shape[1])
+    given = np.zeros((len(table), pattern.n_electrodes))
+    given[:, : table.shape[1]] = table * _way(pairs)[:, None]
+    target = pattern.currents[pattern.drive_index] * _way(pattern.measure)[:, None]
+    own, foreign = np.sort(pattern.measure, axis=1), np.sort(pairs, axis=1)
+    parts, missing = [], list[int]()
+    for pair in np.unique(own, axis=0):
+        rows = np.flatnonzero((own == pair).all(axis=1))
+        some = np.flatnonzero((foreign == pair).all(axis=1))
+        weights = target[rows] @ np.linalg.pinv(given[some], rcond=_SPAN)
+        rest = np.abs(weights @ given[some] - target[rows]).max(axis=1)
+        missing += rows[rest > _SPAN * np.abs(target[rows]).max(axis=1)].tolist()
+        parts.append((rows, some, weights))
+    if missing:
+        raise PatternError(
+            f"{_describe(pattern, sorted(missing))}, also not as sums of its drives of several "
+            "electrodes",
+            hint="name the skin of this recording with --skin; n electrodes need n - 1 drives "
+            "that differ, each with the measuring pairs of the pattern",
+        )
+    return RowSums(pattern.n_meas, tuple(parts))
+
+
+def _way(pairs: IntArray) -> FloatArray:
+    """(n,) 1 where a pair ascends, else −1."""
+    return np.where(pairs[:, 0] < pairs[:, 1], 1.0, -1.0)
 
 
 def _rows(pattern: Pattern) -> Iterator[tuple[list[int], list[int]]]:

@@ -6,12 +6,18 @@ import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from tomoskin.core import IntArray, PatternError, meant
+from tomoskin.core import FloatArray, IntArray, PatternError, meant
+
+_BALANCE = 1e-3
+"""Currents of a drive sum to zero, up to this part of the largest of them."""
+
+_PAIR = 2
+"""Columns of a table of pairs; a table of currents has more."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,14 +25,15 @@ class Pattern:
     """A table of drives and measurements on ``n_electrodes`` electrodes, counted from 0.
 
     Current +I enters at the source and leaves at the sink; a row's voltage is
-    φ[plus] − φ[minus]. Build one with a named constructor or :meth:`from_tables`.
+    φ[plus] − φ[minus]. A drive may also be a current into every electrode, in parts of I. Build
+    one with a named constructor, :meth:`from_tables` or :meth:`from_pairs`.
 
     Attributes
     ----------
     n_electrodes
         Number of electrodes.
     drives
-        (n_drive, 2) source, sink of each drive, in scan order.
+        (n_drive, 2) source, sink of each drive, in scan order; or (n_drive, n_electrodes) currents.
     drive_index
         (n_meas,) the drive that each row belongs to.
     measure
@@ -35,22 +42,24 @@ class Pattern:
     Raises
     ------
     PatternError
-        When an electrode does not exist, source = sink, plus = minus, a row stands twice
-        (reversed rows included), or there is no row at all.
+        When an electrode does not exist, source = sink, plus = minus, the currents of a drive do
+        not sum to zero, a row stands twice (reversed rows included), or there is no row at all.
     """
 
     n_electrodes: int
-    drives: IntArray
+    drives: NDArray[Any]
     drive_index: IntArray
     measure: IntArray
 
     def __post_init__(self) -> None:
         """Freeze the tables and check every row."""
         for name in ("drives", "drive_index", "measure"):
-            table = np.array(getattr(self, name), dtype=np.int64)
+            table = np.array(getattr(self, name))
+            spread = name == "drives" and table.ndim == _PAIR and table.shape[1] > _PAIR
+            table = table.astype(np.float64 if spread else np.int64)
             table.flags.writeable = False
             object.__setattr__(self, name, table)
-        _check_pairs(self.drives, self.n_electrodes, "drive", ("source", "sink"))
+        check_drives(self.drives, self.n_electrodes)
         _check_pairs(self.measure, self.n_electrodes, "measurement", ("plus", "minus"))
         if len(self.drive_index) != len(self.measure):
             raise PatternError(
@@ -75,7 +84,7 @@ class Pattern:
         Parameters
         ----------
         drive
-            (n_meas, 2) source, sink of each row.
+            (n_meas, 2) source, sink of each row; or (n_meas, n_electrodes) currents.
         measure
             (n_meas, 2) plus, minus of each row.
         n_electrodes
@@ -83,14 +92,14 @@ class Pattern:
 
         The rows keep their order; drives are numbered as they first appear.
         """
-        drive_rows, measure_rows = _table(drive, "drive"), _table(measure, "measure")
+        drive_rows, measure_rows = drive_table(drive), _table(measure, "measure")
         if len(drive_rows) != len(measure_rows):
             raise PatternError(
                 f"expected as many drive rows as measurement rows, "
                 f"got {len(drive_rows)} and {len(measure_rows)}"
             )
-        count = n_electrodes or 1 + int(max(drive_rows.max(), measure_rows.max()))
-        _check_pairs(drive_rows, count, "drive", ("source", "sink"))
+        count = n_electrodes or electrodes_of(drive_rows, measure_rows)
+        check_drives(drive_rows, count)
         unique, first, inverse = np.unique(
             drive_rows, axis=0, return_index=True, return_inverse=True
         )
@@ -109,17 +118,22 @@ class Pattern:
     ) -> Self:
         """Every measuring pair under every drive, drive by drive.
 
-        Rows whose pair touches a driven electrode are omitted unless ``include_driven``.
+        A drive is a pair, or a current into every electrode. Rows whose pair touches a driven
+        electrode are omitted unless ``include_driven``.
         """
-        drive_table, pair_table = _table(drives, "drive"), _table(pairs, "measure")
-        index = np.repeat(np.arange(len(drive_table)), len(pair_table))
-        measure = np.tile(pair_table, (len(drive_table), 1))
-        if not include_driven:
-            touched = (measure[:, :, None] == drive_table[index][:, None, :]).any(axis=(1, 2))
-            index, measure = index[~touched], measure[~touched]
-        if not len(index):
-            raise PatternError("every measuring pair touches a driven electrode")
-        return cls(n_electrodes, drive_table, index, measure)
+        table, pair_table = drive_table(drives), _table(pairs, "measure")
+        index = np.repeat(np.arange(len(table)), len(pair_table))
+        measure = np.tile(pair_table, (len(table), 1))
+        full = cls(n_electrodes, table, index, measure)
+        if include_driven:
+            return full
+        kept = ~(full.currents[index[:, None], measure] != 0.0).any(axis=1)
+        if not kept.any():
+            raise PatternError(
+                "every measuring pair touches a driven electrode",
+                hint="keep these rows with include_driven=True",
+            )
+        return cls(n_electrodes, table, index[kept], measure[kept])
 
     @classmethod
     def adjacent(cls, n: int, *, include_driven: bool = False) -> Self:
@@ -164,6 +178,10 @@ class Pattern:
 
         A row with a pair reversed is not new: it would measure the same voltage again.
         """
+        if self.spread or other.spread:
+            raise PatternError(
+                "drives of several electrodes cannot be joined", hint="make one table of them"
+            )
         drive = np.vstack([self.drive, other.drive])
         measure = np.vstack([self.measure, other.measure])
         _, first = np.unique(undirected(drive, measure), axis=0, return_index=True)
@@ -182,9 +200,30 @@ class Pattern:
         return len(self.drives)
 
     @property
-    def drive(self) -> IntArray:
-        """(n_meas, 2) source, sink of each row."""
+    def spread(self) -> bool:
+        """Whether a drive is a current into every electrode, not a pair."""
+        return bool(self.drives.shape[1] > _PAIR)
+
+    @property
+    def drive(self) -> NDArray[Any]:
+        """(n_meas, 2) source, sink of each row; or (n_meas, n_electrodes) currents."""
         return self.drives[self.drive_index]
+
+    @cached_property
+    def currents(self) -> FloatArray:
+        """(n_drive, n_electrodes) current into every electrode, in parts of the model's current."""
+        if self.spread:
+            return self.drives
+        return signed(self.drives, self.n_electrodes)
+
+    @cached_property
+    def readers(self) -> FloatArray:
+        """(n_meas, n_electrodes) 1 at plus and −1 at minus of each row."""
+        return signed(self.measure, self.n_electrodes)
+
+    def part(self, rows: IntArray) -> Self:
+        """The pattern of these rows alone, on as many electrodes."""
+        return type(self).from_tables(self.drive[rows], self.measure[rows], self.n_electrodes)
 
     def rows_of(self, electrode: int) -> IntArray:
         """(k,) rows that drive or read ``electrode``. Raises PatternError where it is none."""
@@ -192,18 +231,23 @@ class Pattern:
             raise PatternError(
                 f"expected an electrode from 0 (E1) to {self.n_electrodes - 1}, got {electrode}"
             )
-        return np.flatnonzero((np.hstack([self.drive, self.measure]) == electrode).any(axis=1))
+        driven = self.currents[self.drive_index, electrode] != 0.0
+        return np.flatnonzero(driven | (self.measure == electrode).any(axis=1))
 
     def row_text(self, row: int) -> str:
         """The row in words, for messages."""
-        source, sink, plus, minus = np.hstack([self.drive[row], self.measure[row]]) + 1
-        return f"row {row}: source E{source}, sink E{sink}, plus E{plus}, minus E{minus}"
+        plus, minus = self.measure[row] + 1
+        drive = f"drive {self.drive_index[row]}"
+        if not self.spread:
+            source, sink = self.drive[row] + 1
+            drive = f"source E{source}, sink E{sink}"
+        return f"row {row}: {drive}, plus E{plus}, minus E{minus}"
 
     @cached_property
     def identity(self) -> str:
         """Short hash of the tables: operators and recordings are matched by it."""
         digest = hashlib.sha256(str(self.n_electrodes).encode())
-        digest.update(self.drive.astype("<i4").tobytes())
+        digest.update(self.drive.astype("<f8" if self.spread else "<i4").tobytes())
         digest.update(self.measure.astype("<i4").tobytes())
         return digest.hexdigest()[:16]
 
@@ -225,6 +269,54 @@ def _table(value: ArrayLike, name: str) -> IntArray:
     if raw.dtype.kind not in "iu" and not np.array_equal(raw, np.round(raw)):
         raise PatternError(f"expected whole electrode numbers in the {name} table, got others")
     return raw.astype(np.int64)
+
+
+def drive_table(value: ArrayLike) -> NDArray[Any]:
+    """(rows, 2) source and sink, or (rows, n_electrodes) currents.
+
+    Raises PatternError for another shape, or what are no numbers.
+    """
+    raw = np.asarray(value)
+    if raw.ndim != 2 or raw.shape[1] <= _PAIR:
+        return _table(raw, "drive")
+    if raw.dtype.kind not in "iuf":
+        raise PatternError(f"expected real currents in the drive table, got {raw.dtype}")
+    return raw.astype(np.float64)
+
+
+def electrodes_of(drive: NDArray[Any], measure: IntArray) -> int:
+    """The number of electrodes that two tables are about."""
+    driven = drive.shape[1] if drive.shape[1] > _PAIR else 1 + int(drive.max())
+    return max(driven, 1 + int(measure.max()))
+
+
+def signed(pairs: IntArray, n: int) -> FloatArray:
+    """(rows, n): 1 at the first electrode of each pair (rows, 2), −1 at the second."""
+    table = np.zeros((len(pairs), n))
+    table[np.arange(len(pairs)), pairs[:, 0]] = 1.0
+    table[np.arange(len(pairs)), pairs[:, 1]] = -1.0
+    return table
+
+
+def check_drives(drives: NDArray[Any], n: int) -> None:
+    """Raise PatternError unless they are pairs, or currents (rows, ``n``) that sum to zero."""
+    if drives.ndim != 2 or drives.shape[1] <= _PAIR:
+        return _check_pairs(drives, n, "drive", ("source", "sink"))
+    if drives.shape[1] != n:
+        raise PatternError(
+            f"expected a drive table of shape (rows, 2), or currents (rows, {n}) into every "
+            f"electrode, got {drives.shape}"
+        )
+    most = np.abs(drives).max(axis=1)
+    good = np.isfinite(most) & (most > 0) & (np.abs(drives.sum(axis=1)) <= _BALANCE * most)
+    if not good.all():
+        row = int(np.argmin(good))
+        raise PatternError(
+            f"expected currents that are not all zero and sum to zero, got a sum of "
+            f"{drives[row].sum():.3g} where the largest is {most[row]:.3g}",
+            where=f"drive row {row}",
+        )
+    return None
 
 
 def _check_pairs(pairs: IntArray, n: int, kind: str, ends: tuple[str, str]) -> None:

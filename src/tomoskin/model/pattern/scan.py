@@ -44,8 +44,11 @@ class Scan:
     def of(cls, pattern: Pattern) -> Self:
         """Smallest scan that holds every row of ``pattern``.
 
-        Raises PatternError when there are more electrodes than a mask has bits.
+        Raises PatternError when there are more electrodes than a mask has bits, or a drive is a
+        current into many of them.
         """
+        if pattern.spread:
+            raise PatternError("a board drives a pair at a time, not several electrodes")
         n = pattern.n_electrodes
         if n > _MOST:
             raise PatternError(f"expected at most {_MOST} electrodes to scan, got {n}")

@@ -13,10 +13,11 @@ from tomoskin.model.prior.priors import (
     Noser,
     Prior,
     PriorLike,
+    SharpPrior,
+    Sparse,
+    TotalVariation,
     penalty_of,
-    prior_matrix,
 )
-from tomoskin.model.prior.sharp import SharpPrior, Sparse, TotalVariation
 from tomoskin.model.prior.smooth import (
     GaussianHighPass,
     Laplace,
@@ -44,6 +45,5 @@ __all__ = [
     "dense_penalty",
     "matern_correlation",
     "penalty_of",
-    "prior_matrix",
     "sparse_penalty",
 ]

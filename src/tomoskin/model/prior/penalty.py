@@ -41,16 +41,13 @@ class Penalty(Protocol):
     @property
     def free(self) -> FloatArray:
         """(n_cells, k) orthonormal basis of the images that cost nothing; k is 0 for regular Q."""
-        ...
 
     @property
     def matrix(self) -> FloatArray:
         """Q: (n_cells,) where it is diagonal, else dense (n_cells, n_cells)."""
-        ...
 
     def carry(self, jacobian: NDArray[Any]) -> Carried:
         """Q⁻¹Jᴴ, in new memory, and JQ⁻¹Jᴴ."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)

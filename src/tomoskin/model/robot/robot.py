@@ -19,12 +19,10 @@ from tomoskin.model.section import (
     Row,
     Section,
     Text,
-    check_names,
     key,
     literal,
-    show,
+    toml_tables,
 )
-from tomoskin.model.section import toml_tables as tables_of
 from tomoskin.model.skin import read_text
 
 FORMAT = 1
@@ -126,18 +124,17 @@ class Robot:
             that the URDF does not have; the message says where.
         """
         path = Path(path)
-        tables = tables_of(read_text(path, "a robot file"), str(path), FORMAT)
+        text = read_text(path, "a robot file")
+        tables = toml_tables(text, str(path), FORMAT, SECTIONS)
         return cls.of(tables, str(path), path.parent)
 
     @classmethod
     def of(cls, tables: Mapping[str, Any], source: str, folder: StrPath) -> Self:
         """From the tables of a file: ``source`` for errors, ``folder`` of its paths; SkinError."""
-        check_names(tables, list(SECTIONS), "section", source)
         robot = RobotSection.read(tables.get("robot", {}), f"{source}: [robot]")
         urdf = None if robot.urdf is None else Urdf.read(Path(folder) / robot.urdf)
-        skins = tuple(
-            _placed(given, where, Path(folder), urdf) for given, where in _each(tables, source)
-        )
+        each = SkinSection.each(tables, source)
+        skins = tuple(_placed(given, where, Path(folder), urdf) for given, where in each)
         if not 0 < len(skins) <= MOST_SKINS:
             raise SkinError(
                 f"expected 1 to {MOST_SKINS} sections [[skin]], got {len(skins)}", where=source
@@ -158,7 +155,7 @@ def add_skin(path: StrPath, given: Mapping[str, Any], urdf: str | None = None) -
     path = Path(path)
     if path.exists():
         text = read_text(path, "a robot file").rstrip("\n")
-        tables = tables_of(text, str(path), FORMAT)
+        tables = toml_tables(text, str(path), FORMAT, SECTIONS)
         known = tables.get("robot", {}).get("urdf")
         if urdf is not None and known != urdf:
             raise SkinError(f"belongs to the URDF {known}, not to {urdf}", where=str(path))
@@ -168,20 +165,6 @@ def add_skin(path: StrPath, given: Mapping[str, Any], urdf: str | None = None) -
     SkinSection.complete(given, f"{path}: new [[skin]]")
     entry = [f"{name} = {literal(value)}" for name, value in given.items()]
     return "\n".join([text, "", "[[skin]]", *entry]) + "\n"
-
-
-def _each(tables: Mapping[str, Any], source: str) -> list[tuple[SkinSection, str]]:
-    given = tables.get("skin", [])
-    if not isinstance(given, list):
-        raise SkinError(
-            f"expected a list of tables, got {show(given)}", where=source, hint="write [[skin]]"
-        )
-    sections = []
-    for number, table in enumerate(given, 1):
-        title = table.get("name") if isinstance(table, Mapping) else None
-        where = f"{source}: skin {number}" + (f' "{title}"' if title else "")
-        sections.append((SkinSection.read(table, where), where))
-    return sections
 
 
 def _placed(given: SkinSection, where: str, folder: Path, urdf: Urdf | None) -> PlacedSkin:

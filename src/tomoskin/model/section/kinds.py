@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -167,30 +168,27 @@ class Quantity(ValueKind[float]):
 
 @dataclass(frozen=True)
 class OneOrMore(ValueKind[tuple[Any, ...]]):
-    """One value, or a list; comes back as a tuple."""
+    """One value, or a list; comes back as a tuple.
+
+    ``note``: what more is said of the list. ``different``: it holds one at least, and none twice.
+    """
 
     inner: ValueKind[Any]
+    note: str = ""
+    different: bool = False
 
     @property
     def expected(self) -> str:
         """What a value must be, for messages."""
-        return f"{self.inner.expected}, or a list of these"
+        these = "different ones" if self.different else "these"
+        return f"{self.inner.expected}, or a list of {these}{self.note}"
 
-    def accept(self, value: object) -> tuple[Any, ...]:
-        """A tuple, of one for one value."""
+    def accept(self, value: object) -> tuple[Any, ...] | None:
+        """A tuple, of one for one value; None where there are not as many as there should be."""
         if not isinstance(value, list):
             return (self.inner.read(value),)
-        return tuple(_entry(f"entry {i}", self.inner, item) for i, item in enumerate(value))
-
-
-@dataclass(frozen=True)
-class OneOrEach(OneOrMore):
-    """One value for all electrodes, or a list with one for each; comes back as a tuple."""
-
-    @property
-    def expected(self) -> str:
-        """What a value must be, for messages."""
-        return f"{super().expected}, one per electrode"
+        values = tuple(_entry(f"entry {i}", self.inner, item) for i, item in enumerate(value))
+        return None if self.different and not 0 < len(set(values)) == len(values) else values
 
 
 @dataclass(frozen=True)
@@ -213,25 +211,6 @@ class OneOrSpan(ValueKind[tuple[Any, Any]]):
         if low > high:
             raise ValueError(f"expected low before high, got {show(value)}")
         return low, high
-
-
-@dataclass(frozen=True)
-class Words(ValueKind[tuple[str, ...]]):
-    """One word out of a few, or a list of different ones; comes back as a tuple."""
-
-    words: Choice
-
-    @property
-    def expected(self) -> str:
-        """What a value must be, for messages."""
-        return f"{self.words.expected}, or a list of different ones"
-
-    def accept(self, value: object) -> tuple[str, ...] | None:
-        """The words, or None where the value is no list of them."""
-        given = value if isinstance(value, list) else [value]
-        accepted = [word for item in given if (word := self.words.accept(item))]
-        different = len(set(accepted)) == len(given) > 0
-        return tuple(accepted) if different else None
 
 
 @dataclass(frozen=True)
@@ -307,18 +286,12 @@ def show(value: object) -> str:
 
 
 def literal(value: object) -> str:
-    """The ``value`` as TOML writes it."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        return f'"{"".join(_ESCAPES.get(c, c) for c in value)}"'
+    """The ``value`` as TOML writes it; its texts are those of JSON but for one character."""
+    if isinstance(value, bool | str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007F")
     if isinstance(value, Sequence):
         return f"[{', '.join(literal(item) for item in value)}]"
     return str(value)
-
-
-_ESCAPES = {chr(code): f"\\u{code:04X}" for code in [*range(32), 127]}
-_ESCAPES |= {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\t": "\\t"}
 
 
 class _EntryError(ValueError):

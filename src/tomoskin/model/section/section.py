@@ -181,6 +181,25 @@ class Section:
             **{k.name: k.read(written[k.name], where) for k in cls.keys if k.name in written}
         )
 
+    @classmethod
+    def each(cls, tables: Mapping[str, Any], source: str) -> list[tuple[Self, str]]:
+        """The record of each table of a list, and where that stands; SkinError as :meth:`read`."""
+        given = tables.get(cls.section, [])
+        if not isinstance(given, list):
+            raise SkinError(
+                f"expected a list of tables, got {show(given)}",
+                where=f"{source}: [{cls.section}]",
+                hint=f"write {cls.heading}, because there may be several",
+            )
+        records = []
+        for number, table in enumerate(given, start=1):
+            named = table if isinstance(table, Mapping) else {}
+            title = named.get("id", named.get("name"))
+            name = f' "{title}"' if isinstance(title, str) else ""
+            where = f"{source}: {cls.heading} {number}{name}"
+            records.append((cls.read(table, where), where))
+        return records
+
     def record(self, name: str) -> Any:
         """The record that the word of the key ``name`` stands for, with its parameters."""
         options = next(key.options for key in self.keys if key.name == name)
@@ -236,10 +255,10 @@ def _key_near(text: str, error: str) -> str:
     return f" near {f'{heading} {key}'.strip()}" if heading or key else ""
 
 
-def toml_tables(text: str, source: str, version: int) -> dict[str, Any]:
+def toml_tables(text: str, source: str, version: int, sections: Iterable[str]) -> dict[str, Any]:
     """Tables of a TOML file whose first key is ``format = version``, as written.
 
-    Raises SkinError that names ``source``.
+    Raises SkinError that names ``source``, also for a table that is none of the ``sections``.
     """
     try:
         tables = tomllib.loads(text)
@@ -259,6 +278,7 @@ def toml_tables(text: str, source: str, version: int) -> dict[str, Any]:
             where=where,
             hint=f"this tomoskin reads files of format {version}",
         )
+    check_names(tables, list(sections), "section", source)
     return tables
 
 

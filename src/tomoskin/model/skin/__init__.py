@@ -4,7 +4,6 @@ from tomoskin.model.skin.body import ReadoutSettings
 from tomoskin.model.skin.build import SECTIONS
 from tomoskin.model.skin.find import read_text
 from tomoskin.model.skin.hysteresis import (
-    SCALAR,
     MaterialMemory,
     MemoryState,
     Metric,
@@ -13,30 +12,24 @@ from tomoskin.model.skin.hysteresis import (
     check_step,
     followed,
     load_of,
-    response,
     responses,
 )
 from tomoskin.model.skin.lay import lay
 from tomoskin.model.skin.processing import (
     InverseSettings,
-    SignalSettings,
     TouchSettings,
-    TwinChoice,
 )
 from tomoskin.model.skin.skin import Skin
 
 __all__ = [
-    "SCALAR",
     "SECTIONS",
     "InverseSettings",
     "MaterialMemory",
     "MemoryState",
     "Metric",
     "ReadoutSettings",
-    "SignalSettings",
     "Skin",
     "TouchSettings",
-    "TwinChoice",
     "advanced",
     "broken_down",
     "check_step",
@@ -44,6 +37,5 @@ __all__ = [
     "lay",
     "load_of",
     "read_text",
-    "response",
     "responses",
 ]

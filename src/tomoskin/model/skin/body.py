@@ -7,7 +7,7 @@ from typing import Any
 from tomoskin.model.section import (
     Choice,
     Number,
-    OneOrEach,
+    OneOrMore,
     Quantity,
     Row,
     Section,
@@ -122,7 +122,7 @@ class ElectrodesSection(Section, section="electrodes"):
     )
     width: float = key(Quantity("length", "mm", 0.1, 1000), "Width of an electrode along the rim.")
     contact_impedance: tuple[float, ...] = key(
-        OneOrEach(Quantity("resistivity", "ohm*m", 1e-9, 1e6)),
+        OneOrMore(Quantity("resistivity", "ohm*m", 1e-9, 1e6), ", one per electrode"),
         "Contact resistance times electrode width; one value or one per electrode.",
     )
 

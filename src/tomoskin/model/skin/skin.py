@@ -102,8 +102,7 @@ class Skin:
     @classmethod
     def from_toml(cls, text: str, *, source: str = "skin") -> Self:
         """Skin from the text of a skin file; ``source`` names it in errors."""
-        written = toml_tables(text, source, FORMAT)
-        check_names(written, list(SECTIONS), "section", source)
+        written = toml_tables(text, source, FORMAT, SECTIONS)
         document, records = _read({name: written.get(name, {}) for name in SECTIONS}, source)
         sections = SkinSections(**records)
         return cls._of(document, sections, SkinBody.of(sections, source), source)

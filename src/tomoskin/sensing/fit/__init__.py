@@ -7,12 +7,17 @@ from tomoskin.sensing.fit.bounds import (
     resolution_bounds,
     variants,
 )
-from tomoskin.sensing.fit.covariance import common_mode_variance, idle_covariance
 from tomoskin.sensing.fit.finder import SpotFinder
-from tomoskin.sensing.fit.noise import Whitener, measured_covariance, row_covariance
+from tomoskin.sensing.fit.noise import (
+    Whitener,
+    common_mode_variance,
+    idle_covariance,
+    measured_covariance,
+    row_covariance,
+)
 from tomoskin.sensing.fit.policy import EXHAUSTIVE, LIVE, Pace
-from tomoskin.sensing.fit.prior import SpotPrior
-from tomoskin.sensing.fit.spot import Response, Spots, depth_of, spots_of
+from tomoskin.sensing.fit.spot import Response, Spots, spots_of
+from tomoskin.sensing.fit.spot_fit import SpotPrior
 from tomoskin.sensing.fit.spot_model import SpotModel
 
 __all__ = [
@@ -28,7 +33,6 @@ __all__ = [
     "Spots",
     "Whitener",
     "common_mode_variance",
-    "depth_of",
     "idle_covariance",
     "measured_covariance",
     "position_bound",

@@ -255,7 +255,7 @@ def variants(skin: Skin, electrodes: Sequence[int], patterns: Sequence[str]) -> 
 
     Electrodes are spread evenly and cover together as much of the rim as those of ``skin``.
     """
-    cover = skin.n_electrodes * _width(skin)
+    cover = skin.n_electrodes * float(skin.arcs[0].width(skin.outline))
     evenly = {"first": "90 deg", "order": "clockwise"}
     kept = {key: skin.document["electrodes"].get(key, word) for key, word in evenly.items()}
     for count in electrodes:
@@ -271,7 +271,3 @@ def variants(skin: Skin, electrodes: Sequence[int], patterns: Sequence[str]) -> 
                 yield Variant(count, pattern, skin.altered({"electrodes": layout, "drive": drive}))
             except TomoskinError as error:
                 yield Variant(count, pattern, None, error.message)
-
-
-def _width(skin: Skin) -> float:
-    return float(skin.arcs[0].width(skin.outline))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from typing import Self
@@ -10,9 +9,10 @@ from typing import Self
 import numpy as np
 
 from tomoskin.core import FloatArray, IntArray
-from tomoskin.sensing.fit.prior import SpotPrior
 from tomoskin.sensing.fit.problem import Matched, WhitenedTable
 from tomoskin.sensing.fit.spot import CONTENT, FILLING, LOG_RADIUS, Footprints, Response, spots_of
+from tomoskin.sensing.fit.spot_fit import SpotPrior
+from tomoskin.sensing.segment import hexagonal_grid
 
 _SPACING = 0.7
 """Between candidates, in median radii."""
@@ -91,13 +91,7 @@ def footprints_of(response: Response, prior: SpotPrior) -> tuple[Footprints, ...
 def _positions(response: Response, prior: SpotPrior) -> FloatArray:
     """(n, 2) m of a hexagonal grid of positions near the cells."""
     inside, step = response.spots.mesh.centroids, _SPACING * prior.radius
-    low, high = inside.min(axis=0), inside.max(axis=0)
-    rows = np.arange(low[1], high[1] + step, step * math.sqrt(3) / 2)
-    x = np.arange(low[0], high[0] + step, step)
-    grid = np.concatenate([
-        np.column_stack([x + (number % 2) * step / 2, np.full(len(x), y)])
-        for number, y in enumerate(rows)
-    ])  # fmt: skip
+    grid = hexagonal_grid(inside, step)
     apart = np.linalg.norm(grid[:, None] - inside, axis=2).min(axis=1)
     return np.asarray(grid[apart < step / 2])
 

@@ -27,7 +27,6 @@ from scipy.spatial import cKDTree
 
 from tomoskin.core import Arrays, FloatArray, IntArray, finished, reach
 from tomoskin.model.forward import State
-from tomoskin.sensing.fit.prior import SpotPrior
 from tomoskin.sensing.fit.spot import (
     CONTENT,
     FILLING,
@@ -38,6 +37,7 @@ from tomoskin.sensing.fit.spot import (
     Response,
     profile,
 )
+from tomoskin.sensing.fit.spot_fit import SpotPrior
 from tomoskin.sensing.fit.table import ResponseTable
 
 _PATCHES = 120

@@ -241,11 +241,12 @@ class Excess:
         parts = channels.parts[own > 0]
         return np.asarray(self.level * (noise + (parts.T * own[own > 0]) @ parts))
 
-    def text(self, channels: Channels, usual: FloatArray) -> str | None:
-        """What someone should see to, or None; ``usual`` (n_channels,) V² without the excess."""
-        if self.level > _SAID**2:
+    def text(self, channels: Channels, usual: FloatArray, louder: float = 1.0) -> str | None:
+        """What someone should see to, or None; ``usual`` (n_channels,) V² without the excess, and
+        in the newest frame so many times the noise's variance, ``louder``."""
+        if (level := max(self.level, louder)) > _SAID**2:
             return (
-                f"the voltages change by {np.sqrt(self.level):.0f} times the noise of the idle "
+                f"the voltages change by {np.sqrt(level):.0f} times the noise of the idle "
                 "skin, and no touch explains it: check cables and supply, or take a new reference"
             )
         times = np.sqrt(1 + self.variance / np.maximum(usual, np.finfo(float).tiny))

@@ -3,24 +3,33 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Generator
-from dataclasses import replace
-from functools import partial
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
 from operator import is_
+from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
-from tomoskin.core import Detection, FloatArray, reach
+from tomoskin.core import Detection, FloatArray, IntArray, reach
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.skin import Skin
-from tomoskin.sensing.fit.detections import CellDiscs, SpotDetections, joined, judged
 from tomoskin.sensing.fit.expectation import Expectation, ResidualResponse
 from tomoskin.sensing.fit.hypotheses import CommonModeJump, Explained, Jumps, Rival, challenged
-from tomoskin.sensing.fit.policy import EXHAUSTIVE, DetectionPolicy, Pace, favours, rises_beside
+from tomoskin.sensing.fit.policy import (
+    EXHAUSTIVE,
+    DetectionPolicy,
+    Pace,
+    are_distinct,
+    favours,
+    rises_beside,
+)
 from tomoskin.sensing.fit.problem import Matched, Problem
-from tomoskin.sensing.fit.selection import ForwardSelection
+from tomoskin.sensing.fit.selection import ForwardSelection, SpotDetections, judged
 from tomoskin.sensing.fit.sight import Sight
-from tomoskin.sensing.fit.spot import FILLING, N_PARAMETERS
+from tomoskin.sensing.fit.spot import CONTENT, FILLING, LOG_RADIUS, N_PARAMETERS
 from tomoskin.sensing.fit.spot_fit import Deficit
 from tomoskin.sensing.fit.spot_model import SpotModel
 from tomoskin.sensing.fit.unexplained import FrameWatch
@@ -155,7 +164,8 @@ class SpotFinder:
     ) -> tuple[Explained, CommonModeJump, Matched]:
         """Touches of ``data`` (n_meas,) in so many times the noise that is known; and whether the
         common mode has jumped."""
-        seen, matched, _, jumps = self._sight.of(self.watch.excess).louder(times)
+        sight = self._sight.of(self.watch.excess)
+        seen, matched, _, jumps = sight if times == 1.0 else sight.louder(times)
         whitened, rest = seen.whitened(data)
         left = self._residual.directions(seen.matrix)
         problem = Problem(
@@ -198,7 +208,7 @@ class SpotFinder:
             if not favours(problem.gain(pressed.fit, detected.fit)):
                 detected = pressed
         rival: Rival | None = None
-        if self._reach and sign != "both":
+        if self._reach and sign != "both" and len(detected.fit.spots):
             reach("one touch more")
             detected, rival = challenged(selection, detected, self._rival, self._going_on)
         if self.watch.puzzled(problem, detected.fit):
@@ -236,7 +246,7 @@ class SpotFinder:
     def _detections(self, detected: SpotDetections) -> list[Detection]:
         """The touches as detections, strongest first."""
         spots = detected.fit.spots
-        shown = np.flatnonzero(~self.watch.wrong(spots))
+        shown = np.flatnonzero(~self._policy.is_wrong(spots[:, CONTENT]))
         found = [self._detection(detected, k, spots[k].tolist()) for k in shown.tolist()]
         order = sorted(range(len(found)), key=lambda k: -abs(found[k].peak))
         self._shown = spots[shown[order]]
@@ -262,3 +272,89 @@ class SpotFinder:
             weak=bool(detected.fresh[k] < self._policy.least),
             close=bool(detected.close[k]),
         )
+
+
+def joined(detected: SpotDetections) -> SpotDetections:
+    """The same with each two touches as one whose positions are not distinct."""
+    places = detected.fit.spots[:, :2].tolist()
+    variance = detected.covariance.diagonal().tolist()
+    for i in range(len(places)):
+        for j in range(i + 1, len(places)):
+            x, y = (one - other for one, other in zip(places[i], places[j], strict=True))
+            both = sum(variance[4 * k] + variance[4 * k + 1] for k in (i, j))
+            if are_distinct(x * x + y * y, 2 * both):  # no direction has more than all
+                continue
+            away = np.array([x, y])
+            pick = [4 * i, 4 * i + 1, 4 * j, 4 * j + 1]
+            block = detected.covariance[np.ix_(pick, pick)]
+            turn = np.concatenate([away, -away])
+            if not are_distinct((away @ away) ** 2, turn @ block @ turn):
+                return joined(_merged(detected, i, j))
+    return detected
+
+
+def _merged(detected: SpotDetections, i: int, j: int) -> SpotDetections:
+    """Touches i and j as one, at the middle of their contents."""
+    fit, keep = detected.fit, np.delete(np.arange(len(detected.fit.spots)), j)
+    share = np.abs(fit.spots[[i, j], CONTENT])
+    share = share / share.sum()
+    one = fit.spots[i].copy()
+    one[:2] = share @ fit.spots[[i, j], :2]
+    one[LOG_RADIUS] = share @ fit.spots[[i, j], LOG_RADIUS]
+    one[CONTENT] = fit.spots[[i, j], CONTENT].sum()
+    spots = fit.spots.copy()
+    spots[i] = one
+    mix = np.eye(4 * len(fit.spots))
+    for column, part in ((i, share[0]), (j, share[1])):
+        mix[4 * i : 4 * i + 2, 4 * column : 4 * column + 2] = part * np.eye(2)
+    rows = (4 * keep[:, None] + np.arange(N_PARAMETERS)).ravel()
+    covariance = (mix @ detected.covariance @ mix.T)[np.ix_(rows, rows)]
+    ratio, fresh = detected.ratio.copy(), detected.fresh.copy()
+    for each in (ratio, fresh):
+        each[i] = np.hypot(*each[[i, j]])
+    close = detected.close.copy()
+    close[i] = True
+    kept = replace(fit, spots=spots[keep])
+    return SpotDetections(kept, ratio[keep], fresh[keep], covariance, close[keep])
+
+
+_MARGIN = 1 + 1e-9
+"""Rounding of a radius."""
+
+
+@dataclass(frozen=True, eq=False)
+class CellDiscs:
+    """Cells along the x axis: a disc meets few of them.
+
+    Attributes
+    ----------
+    cells
+        (n,) their numbers.
+    middles
+        (n,) m, x + iy.
+    """
+
+    cells: IntArray
+    middles: NDArray[np.complex128]
+
+    @classmethod
+    def of(cls, mesh: Mesh) -> Self:
+        """The cells of a mesh, along its x axis."""
+        x, y = mesh.centroids.T
+        order = np.argsort(x, kind="stable")
+        return cls(order, (x + 1j * y)[order])
+
+    def within(self, x: float, y: float, radius: float) -> IntArray:
+        """(m,) those whose middles are no farther than ``radius`` m from ``x``, ``y`` m, or the
+        nearest one."""
+        along, reach = self._along, radius * _MARGIN
+        near = slice(bisect_left(along, x - reach), bisect_left(along, x + reach))
+        found = np.abs(self.middles[near] - complex(x, y)) <= radius
+        if found.any():
+            return np.asarray(self.cells[near].compress(found))
+        away = np.abs(self.middles - complex(x, y))
+        return np.asarray(self.cells[away == away.min()])
+
+    @cached_property
+    def _along(self) -> list[float]:
+        return list(map(float, self.middles.real))

@@ -11,13 +11,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
 from tomoskin.core import FloatArray
-from tomoskin.sensing.fit.detections import SpotDetections, judged
 from tomoskin.sensing.fit.expectation import Expectation, newcomers
 from tomoskin.sensing.fit.policy import (
     ELSEWHERE,
@@ -31,7 +30,7 @@ from tomoskin.sensing.fit.policy import (
     may_have_jumped,
 )
 from tomoskin.sensing.fit.problem import Problem
-from tomoskin.sensing.fit.selection import ForwardSelection
+from tomoskin.sensing.fit.selection import ForwardSelection, SpotDetections, judged
 from tomoskin.sensing.fit.spot_fit import Fit
 
 GoingOn = Callable[[SpotDetections], Expectation]
@@ -111,8 +110,8 @@ def _proposed(selection: ForwardSelection, found: Fit) -> tuple[Fit | None, floa
 def _beside_expected(selection: ForwardSelection, found: Fit) -> Fit | None:
     """One spot beside those that are expected, where these may have left their places in vain."""
     expected = selection.problem.expected
-    away = expected.away(found.spots, found.known)
-    if len(found.spots) != len(expected.spots) or away < ELSEWHERE:
+    goes_on = len(found.spots) == len(expected.spots)
+    if not goes_on or expected.away(found.spots, found.known) < ELSEWHERE:
         return None
     known = tuple(range(len(expected.spots)))
     return selection.proposed(
@@ -143,6 +142,10 @@ class Jumps:
 
     rows: FloatArray
     left: FloatArray
+    _walked: dict[int | None, FloatArray] = field(default_factory=dict, init=False)
+    """What :meth:`wandered` has said, by steps of the root of two."""
+    _kept: list[Jumps] = field(default_factory=list, init=False)
+    """The jumps that :meth:`beside` gave last."""
 
     def beside(self, left: FloatArray) -> Jumps:
         """The same where these residual responses (k, c) are. The last is kept: they stay, as a
@@ -181,16 +184,6 @@ class Jumps:
     @cached_property
     def _size(self) -> float:
         return float(np.linalg.norm(self.rows[0]))
-
-    @cached_property
-    def _walked(self) -> dict[int | None, FloatArray]:
-        """What :meth:`wandered` has said, by steps of the root of two."""
-        return {}
-
-    @cached_property
-    def _kept(self) -> list[Jumps]:
-        """The jumps that :meth:`beside` gave last."""
-        return []
 
     @cached_property
     def _weighed(self) -> FloatArray:

@@ -15,9 +15,8 @@ from tomoskin.sensing.fit.certificate import Reduced
 from tomoskin.sensing.fit.expectation import Expectation, Known
 from tomoskin.sensing.fit.noise import Whitener
 from tomoskin.sensing.fit.policy import FAINTEST, USEFUL, DetectionPolicy, Pace
-from tomoskin.sensing.fit.prior import SpotPrior
-from tomoskin.sensing.fit.spot import CONTENT, N_PARAMETERS, Response
-from tomoskin.sensing.fit.spot_fit import Deficit, Fit
+from tomoskin.sensing.fit.spot import CONTENT, N_PARAMETERS, Response, bounds_of
+from tomoskin.sensing.fit.spot_fit import Deficit, Fit, SpotPrior
 from tomoskin.sensing.fit.table import ABREAST, ResponseTable
 
 _CERTAIN = 10.0
@@ -231,8 +230,7 @@ class Limits:
     @classmethod
     def of(cls, sign: str) -> Self:
         """For touches of this ``sign``."""
-        low = 0.0 if sign == "increase" else -math.inf
-        return cls(low, 0.0 if sign == "decrease" else math.inf)
+        return cls(*bounds_of(sign, math.inf))
 
 
 @dataclass(frozen=True, eq=False)

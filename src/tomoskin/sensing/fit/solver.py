@@ -13,10 +13,9 @@ from tomoskin.core import FloatArray
 from tomoskin.model.mesh import Mesh
 from tomoskin.sensing.fit.expectation import Expectation, Known, newcomers
 from tomoskin.sensing.fit.policy import DetectionPolicy
-from tomoskin.sensing.fit.prior import SpotPrior
 from tomoskin.sensing.fit.problem import RIDGE, Limits, Matched, Problem
 from tomoskin.sensing.fit.spot import CONTENT, N_PARAMETERS, X, Y
-from tomoskin.sensing.fit.spot_fit import Deficit, Fit
+from tomoskin.sensing.fit.spot_fit import Deficit, Fit, SpotPrior
 from tomoskin.sensing.fit.table import ResponseTable
 
 _SETTLED = 0.05

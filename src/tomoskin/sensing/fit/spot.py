@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -115,6 +115,12 @@ def spots_of(
         )
     content = FILLING * radius**2 * depth
     return np.column_stack([places, np.log(radius), content])
+
+
+@cache
+def bounds_of(sign: str, most: float) -> tuple[float, float]:
+    """Least and largest change by a touch of that ``sign``, as a skin has it, up to ``most``."""
+    return 0.0 if sign == "increase" else -most, 0.0 if sign == "decrease" else most
 
 
 def depth_of(spots: FloatArray) -> FloatArray:

@@ -21,8 +21,8 @@ from scipy.spatial import cKDTree
 
 from tomoskin.core import Arrays, FloatArray, IntArray, kept, reach
 from tomoskin.sensing.fit.certificate import Certificate
-from tomoskin.sensing.fit.prior import SpotPrior
 from tomoskin.sensing.fit.spot import Footprints, Response, Spots
+from tomoskin.sensing.fit.spot_fit import SpotPrior
 from tomoskin.sensing.fit.table import ABREAST, N_DIRECTIONS, PADDING, PositionGrid, ResponseTable
 
 FORMAT = 2

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
-from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray
 from tomoskin.model.pattern import Pattern
@@ -45,12 +42,14 @@ class FrameWatch:
     like_touch
         Whether the newest frame is such as a touch makes, one that presses or one that has been
         lifted, though it may be too faint to be found: it is no noise to be learnt.
+    rises
+        Whether the newest frames show a change of the sign that touches do not have.
     """
 
     def __init__(self, pattern: Pattern, policy: DetectionPolicy) -> None:
         self.channels = Channels.of(pattern)
         self.excess = Excess.none(self.channels)
-        self.like_touch = False
+        self.like_touch = self.rises = False
         self._policy = policy
         self._usual = np.full(len(self.channels.names), np.inf)
         self._last: FloatArray | None = None
@@ -121,24 +120,16 @@ class FrameWatch:
         self._before, self._times = fit.spots, times
         self._in_vain, self._astray = self._in_vain + 1 if self._astray else 0, False
         self._age = self._age + 1 if len(fit.spots) else 0
-        wrong, self._lifted = self.wrong(fit.spots), None
+        wrong, self._lifted = self._policy.is_wrong(fit.spots[:, CONTENT]), None
         if wrong.any():
             spots = fit.spots[wrong]
             self._lifted = spots[np.abs(spots[:, CONTENT]).argmax(), :2]
         self._raised = 0 if self._lifted is None else self._raised + 1
+        self.rises = stands_as_rise(self._raised)
         self.like_touch = bool(len(fit.spots))
         if fit.beyond > 0 and not self.like_touch:
             ratio, _ = matched.ratios(solver, fit, "both")
             self.like_touch = is_like_touch(self._policy, fit, ratio.max())
-
-    def wrong(self, spots: FloatArray) -> NDArray[np.bool_]:
-        """(k,) whether each of ``spots`` (k, 4) is not of the skin's sign."""
-        return self._policy.is_wrong(spots[:, CONTENT])
-
-    @property
-    def rises(self) -> bool:
-        """Whether the newest frames show a change of the sign that touches do not have."""
-        return stands_as_rise(self._raised)
 
     @property
     def problem(self) -> str | None:
@@ -151,5 +142,4 @@ class FrameWatch:
             )
         if len(self._before):  # what they do not explain is their model's as a rule
             return None
-        louder = max(self.excess.level, self._times)
-        return replace(self.excess, level=louder).text(self.channels, self._usual)
+        return self.excess.text(self.channels, self._usual, self._times)

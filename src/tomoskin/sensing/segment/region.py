@@ -117,14 +117,18 @@ class Region:
     def lattice(self, n_places: int) -> FloatArray:
         """The same with about so many positions."""
         step = np.sqrt(2 * np.pi / (np.sqrt(3) * n_places))
-        corners = self.scaled(self.outline)
-        low, high = corners.min(axis=0), corners.max(axis=0)
-        x = np.arange(low[0], high[0] + step, step)
-        y = np.arange(low[1], high[1] + step, step * np.sqrt(3) / 2)
-        across, up = np.meshgrid(x, y)
-        across[1::2] += step / 2
-        positions = np.column_stack([across.ravel(), up.ravel()])
+        positions = hexagonal_grid(self.scaled(self.outline), step)
         return positions[self.holds(self.metres(positions))]
+
+
+def hexagonal_grid(points: FloatArray, step: float) -> FloatArray:
+    """(n, 2) of a hexagonal lattice over ``points`` (k, 2), ``step`` from each to the next."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    x = np.arange(low[0], high[0] + step, step)
+    y = np.arange(low[1], high[1] + step, step * np.sqrt(3) / 2)
+    across, up = np.meshgrid(x, y)
+    across[1::2] += step / 2
+    return np.column_stack([across.ravel(), up.ravel()])
 
 
 def _area(corners: FloatArray) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -39,7 +40,7 @@ class ElectrodeHealth:
         return f"E{self.electrode + 1} is {self.state}: {self.reason}"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Health:
     """All electrodes in one frame.
 
@@ -58,7 +59,7 @@ class Health:
     lost: NDArray[np.bool_]
     floating: NDArray[np.bool_]
 
-    @property
+    @cached_property
     def sick(self) -> tuple[ElectrodeHealth, ...]:
         """The electrodes that are not good."""
         return tuple(e for e in self.electrodes if e.state != "good")

@@ -218,6 +218,7 @@ class CommonMode:
         self._idle = Idle(np.array([deviation]), frames, _SLOWEST)
         self._level, self._variance = 1.0, deviation**2 / frames
         self._held, self._walks = 0.0, [_WORTH * _WALKS**2, float(_WORTH)]
+        self._walk = self._walks[0] / self._walks[1]  # 1/s, variance of the level under a touch
         self._apart: list[float] = []
         self._mean = mean
         self._weights: tuple[FloatArray, Mask | None, FloatArray] = noise, None, mean
@@ -242,27 +243,25 @@ class CommonMode:
             self._walked(part**2 - self._variance - noise)
         total = self._variance + noise
         if part**2 > _JUMPS**2 * total:
-            return self._moved(self._jumped(part, noise))
-        self._apart.clear()
-        gain = self._variance / total
-        self._variance *= 1 - gain
-        return self._moved(gain * part)
+            moved = self._jumped(part, noise)
+        else:
+            self._apart.clear()
+            gain = self._variance / total
+            self._variance *= 1 - gain
+            moved = gain * part
+        self._level *= 1 + moved
+        return moved
 
     @property
     def deviation(self) -> float:
         """What the level may have walked by since it was followed, as a part of it."""
         return math.sqrt(self._variance + self._walk * self._held)
 
-    @property
-    def _walk(self) -> float:
-        """1/s, variance of the level under a touch."""
-        total, count = self._walks
-        return total / count
-
     def _walked(self, square: float) -> None:
         """Take by how much beyond the noise, squared, the level is elsewhere after a touch."""
         total, count = self._walks
         self._walks = [total + max(square, 0.0) / self._held, count + 1]
+        self._walk = self._walks[0] / self._walks[1]
         self._variance += self._walk * self._held
         self._held = 0.0
 
@@ -284,7 +283,3 @@ class CommonMode:
         self._apart.clear()
         self._variance = noise / _STANDS
         return middle
-
-    def _moved(self, part: float) -> float:
-        self._level *= 1 + part
-        return part

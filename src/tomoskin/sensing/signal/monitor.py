@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, IntArray
 from tomoskin.model.pattern import Pattern, Scan
+from tomoskin.sensing.signal.baseline import Reference
 from tomoskin.sensing.signal.evidence import (
     EqualReadings,
     Groups,
@@ -17,7 +18,6 @@ from tomoskin.sensing.signal.evidence import (
     sign_limit,
 )
 from tomoskin.sensing.signal.health import ElectrodeHealth, Health, Mask, Roles
-from tomoskin.sensing.signal.reference import Reference
 
 ENTER = 2
 """Frames in a row that must blame an electrode before it is called sick."""
@@ -249,7 +249,9 @@ class Monitor:
         off = railed | self._unusable
         bad = off | (self._sign * values < self._least)
         dead = self._groups.dead(values, off)
-        causes = self._offset(own) | self._reciprocity.push(values, off | self._silent)
+        causes = dict(self._reciprocity.push(values, off | self._silent))
+        if own is not None:
+            causes = self._offset(own) | causes
         if self._samples is not None:
             causes |= self._samples.push(samples)
         if samples is not None and self._equal and self._reciprocity.looks % _ALIKE == 1:
@@ -302,10 +304,8 @@ class Monitor:
             return at_rail
         return f"no current in any of its {int(drives.sum())} driven rows, and {at_rail}"
 
-    def _offset(self, own: FloatArray | None) -> dict[int, ElectrodeHealth]:
+    def _offset(self, own: FloatArray) -> dict[int, ElectrodeHealth]:
         """Electrodes with a voltage of their own that takes up much of the converter's range."""
-        if own is None:
-            return {}
         away = own - np.median(own)
         return {
             e: ElectrodeHealth(

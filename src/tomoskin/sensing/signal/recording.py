@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import DataError, FloatArray, IntArray, PatternError
-from tomoskin.model.pattern import Pattern, match_rows
+from tomoskin.model.pattern import Pattern, electrodes_of, match_rows, sum_rows
 from tomoskin.sensing.signal.repeats import RepeatedRows
 
 _MOST = 1e12
@@ -38,7 +38,8 @@ class Recording:
     voltages
         (n_frames, n_rows) V or instrument units, real or complex; differences when ``is_change``.
     drive, measure
-        (n_rows, 2) source, sink; plus, minus.
+        (n_rows, 2) source, sink; plus, minus. A drive may also be currents into many electrodes,
+        (n_rows, n_electrodes), in parts of the skin's current.
     time
         (n_frames,) s.
     reference
@@ -61,7 +62,7 @@ class Recording:
     """
 
     voltages: NDArray[Any]
-    drive: IntArray
+    drive: NDArray[Any]
     measure: IntArray
     time: FloatArray
     reference: NDArray[Any] | None
@@ -86,7 +87,8 @@ class Recording:
             raise DataError(
                 f"expected idle from 1 to {n_frames}, got {self.idle}", where=self.source
             )
-        _check(self.drive.shape, (n_rows, 2), "drive", self.source)
+        if len(self.drive) != n_rows or not self.spread:
+            _check(self.drive.shape, (n_rows, 2), "drive", self.source)
         _check(self.measure.shape, (n_rows, 2), "measure", self.source)
         _check(self.time.shape, (n_frames,), "time_s", self.source)
         if self.reference is not None:
@@ -97,6 +99,11 @@ class Recording:
     def __len__(self) -> int:
         """How many frames there are in it."""
         return len(self.voltages)
+
+    @property
+    def spread(self) -> bool:
+        """Whether the drives are currents into many electrodes."""
+        return self.drive.ndim == 2 and self.drive.shape[1] > 2
 
     def part(self, start: int, stop: int) -> Recording:
         """Frames ``start`` to ``stop`` − 1."""
@@ -118,7 +125,10 @@ class Recording:
         notes = []
         for key, limit in limits.items():
             values = getattr(self, key)
-            if values is None or not (absurd := _beyond(values, limit)).any():
+            if values is None:
+                continue
+            absurd = np.isfinite(values) & (np.abs(values) > limit)  # infinite is not finite
+            if not absurd.any():
                 continue
             changes[key] = np.where(absurd, np.nan, values)
             notes.append(_absurd(key, absurd, limit))
@@ -150,7 +160,11 @@ class Recording:
 
     def without_repeats(self, pattern: Pattern | None = None) -> Recording:
         """The recording with each measurement once: see :class:`RepeatedRows`; a note says so."""
-        repeats = RepeatedRows.of(self.drive, self.measure, self.voltages, pattern)
+        repeats = (
+            None
+            if self.spread
+            else RepeatedRows.of(self.drive, self.measure, self.voltages, pattern)
+        )
         if repeats is None:
             return self
         return replace(
@@ -165,7 +179,8 @@ class Recording:
     def in_order_of(self, pattern: Pattern) -> Recording:
         """Return the recording with exactly the pattern's rows, in its order and signs.
 
-        Rows that measure the same are merged into their mean first.
+        Rows that measure the same are merged into their mean first. Drives of several electrodes
+        are summed to the pattern's.
 
         Raises
         ------
@@ -174,7 +189,7 @@ class Recording:
         PatternError
             When rows are missing or impossible; the message lists them.
         """
-        electrodes = 1 + int(max(self.drive.max(), self.measure.max()))
+        electrodes = electrodes_of(self.drive, self.measure)
         if electrodes > pattern.n_electrodes:
             raise DataError(
                 f"the recording uses electrodes E1 to E{electrodes}, "
@@ -183,14 +198,17 @@ class Recording:
                 hint="choose the skin that it was recorded with: --skin",
             )
         once = self.without_repeats(pattern)
+        match_own = sum_rows if self.spread else match_rows
         try:
-            match = match_rows(pattern, once.drive, once.measure)
+            match = match_own(pattern, once.drive, once.measure)
         except PatternError as error:
             where = f"{self.source}, {error.where}" if error.where else self.source
             raise PatternError(error.message, where=where, hint=error.hint) from error
         reference = once.reference
+        summed = f"{len(self.drive)} rows with drives of several electrodes were summed to pairs"
         return replace(
             once,
+            notes=(*once.notes, summed) if self.spread else once.notes,
             voltages=match.apply(once.voltages),
             drive=pattern.drive,
             measure=pattern.measure,
@@ -213,11 +231,6 @@ def time_notes(time: FloatArray) -> list[str]:
         )
         if len(at)
     ]
-
-
-def _beyond(values: NDArray[Any], most: float) -> NDArray[np.bool_]:
-    """Infinite values are excluded as what is not finite."""
-    return np.asarray(np.isfinite(values) & (np.abs(values) > most))
 
 
 def _absurd(key: str, absurd: NDArray[np.bool_], most: float) -> str:

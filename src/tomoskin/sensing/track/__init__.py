@@ -1,9 +1,7 @@
 """Detections of successive frames → touches that keep their identity, and what happens to them."""
 
-from tomoskin.sensing.track.event import TouchEvent
-from tomoskin.sensing.track.motion import STILL, TrackSettings
+from tomoskin.sensing.track.motion import SlideCorrection, TrackSettings
 from tomoskin.sensing.track.policy import HELD, RESIDUAL
-from tomoskin.sensing.track.sliding import FingerTracker, SlideCorrection
 from tomoskin.sensing.track.touch_table import (
     ELAPSED,
     Span,
@@ -15,14 +13,13 @@ from tomoskin.sensing.track.touch_table import (
     touch_rows,
     touch_spans,
 )
+from tomoskin.sensing.track.trace import TouchEvent
 from tomoskin.sensing.track.tracker import Tracker
 
 __all__ = [
     "ELAPSED",
     "HELD",
     "RESIDUAL",
-    "STILL",
-    "FingerTracker",
     "SlideCorrection",
     "Span",
     "TouchEvent",

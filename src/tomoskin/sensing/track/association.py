@@ -10,7 +10,6 @@ from typing import NamedTuple, Self
 from scipy.optimize import linear_sum_assignment
 
 from tomoskin.core import Detection
-from tomoskin.sensing.track.event import TrackClock
 from tomoskin.sensing.track.motion import (
     TrackObservation,
     TrackSettings,
@@ -31,7 +30,7 @@ from tomoskin.sensing.track.policy import (
     missed,
 )
 from tomoskin.sensing.track.position import ELSEWHERE, NOISE, TouchStrength, log_content
-from tomoskin.sensing.track.trace import Alone, Trace, sign_of
+from tomoskin.sensing.track.trace import Alone, Trace, TrackClock, sign_of
 
 _PARTED = 0.02
 """How far from the middle of two, along each axis, what is seen of them may be, m."""

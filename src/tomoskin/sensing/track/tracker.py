@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from tomoskin.core import Detection, Touch
 from tomoskin.sensing.track import policy
@@ -12,7 +13,6 @@ from tomoskin.sensing.track.association import (
     associate,
     follow,
 )
-from tomoskin.sensing.track.event import Happening, TouchEvent, TrackClock
 from tomoskin.sensing.track.identity import IdentityLedger
 from tomoskin.sensing.track.merging import (
     divide,
@@ -22,9 +22,16 @@ from tomoskin.sensing.track.merging import (
     sibling_of,
     weigh_meetings,
 )
-from tomoskin.sensing.track.motion import TrackSettings, begin
+from tomoskin.sensing.track.motion import SlideCorrection, TrackSettings, begin
 from tomoskin.sensing.track.residual import ResidualResponses, is_residual
-from tomoskin.sensing.track.trace import Alone, MergedFinger, Trace
+from tomoskin.sensing.track.trace import (
+    Alone,
+    Happening,
+    MergedFinger,
+    TouchEvent,
+    Trace,
+    TrackClock,
+)
 
 
 class Tracker:
@@ -38,6 +45,10 @@ class Tracker:
         Touches, and what may become one.
     residuals
         Where touches were, of which something may still show.
+    slides
+        Moves touches that slide to the finger; what is held still is not moved.
+    ledger
+        Who is who.
     """
 
     def __init__(self, settings: TrackSettings | None = None) -> None:
@@ -45,19 +56,10 @@ class Tracker:
         self.events: tuple[TouchEvent, ...] = ()
         self.traces: list[Trace] = []
         self.residuals = ResidualResponses()
+        self.slides, self.ledger = SlideCorrection(0.0), IdentityLedger()
         self._clock = TrackClock()
         self._happened: list[TouchEvent] = []
         self._keys = 0
-        self._ledger = IdentityLedger()
-
-    @property
-    def numbered(self) -> int:
-        """The last identity that was given."""
-        return self._ledger.numbered
-
-    @numbered.setter
-    def numbered(self, last: int) -> None:
-        self._ledger.numbered = last
 
     def update(
         self, detections: Sequence[Detection], time: float, host_time: float
@@ -74,9 +76,13 @@ class Tracker:
         if detections or self.traces:
             self._follow(FrameOfTouches.of(detections, self._clock, self.settings))
         self.residuals.note(self._clock.now, quiet=not detections)
-        touches = self._touches()
-        self.events, self._happened = tuple(self._happened), []
-        return touches
+        touches = self._touches() if self.traces else ()
+        happened, self._happened = self._happened, []
+        if not self.settings.still:
+            self.slides = self.slides.after(touches, time)
+        finger = self.slides.of_finger
+        self.events = tuple([replace(event, touch=finger(event.touch)) for event in happened])
+        return tuple(map(finger, touches))
 
     def reset(self) -> None:
         """Release every touch and forget all else; identities go on counting.
@@ -87,7 +93,7 @@ class Tracker:
         for trace in [trace for trace in self.traces if trace.reported]:
             self._end(trace)
         self.traces = []
-        self._ledger.forget()
+        self.ledger.forget()
         self.residuals.forget()
         self.events = ()
         self._clock = TrackClock()
@@ -110,11 +116,11 @@ class Tracker:
             one, other = traces[i], traces[k]
             if one.reported and other.reported and not self.settings.still:
                 for trace in (one, other):
-                    if self._ledger.sure:
+                    if self.ledger.sure:
                         trace.change(now)
-                self._ledger.exchange(one.key, other.key, odds)
+                self.ledger.exchange(one.key, other.key, odds)
         self._settle()
-        self._ledger.judge(self.traces)
+        self.ledger.judge(self.traces)
 
     def _begin(
         self, observed: ObservedDetection, frame: FrameOfTouches, beside: dict[int, Alone]
@@ -167,17 +173,17 @@ class Tracker:
 
     def _report_onset(self, trace: Trace) -> None:
         trace.reported = True
-        self._ledger.begin(trace.key, trace.host_since)
+        self.ledger.begin(trace.key, trace.host_since)
         self._report("onset", trace)
 
     def _split(self, carrier: Trace, branch: Trace) -> None:
         """Divide the fingers of ``carrier``."""
         for one, other, odds in divide(carrier, branch, self._clock.now):
-            self._ledger.exchange(one, other, odds)
+            self.ledger.exchange(one, other, odds)
         branch.reported = True
         for trace in (carrier, branch):
             trace.change(self._clock.now)
-        for trace in sorted((carrier, branch), key=lambda t: self._ledger.name(t.key)):
+        for trace in sorted((carrier, branch), key=lambda t: self.ledger.name(t.key)):
             self._report("split", trace)
 
     def _lose(self, trace: Trace) -> None:
@@ -194,20 +200,20 @@ class Tracker:
     def _end(self, trace: Trace) -> None:
         self.traces.remove(trace)
         self.residuals.leave(trace, self._clock.now)
-        for touch in self._ledger.end(trace):
+        for touch in self.ledger.end(trace):
             self._happened.append(TouchEvent("release", touch, self._clock.host))
 
     def _touches(self) -> tuple[Touch, ...]:
         shown = [trace for trace in self.traces if trace.reported]
-        touches = self._ledger.touches(shown, self.traces)
+        touches = self.ledger.touches(shown, self.traces)
         pairs = sorted(zip(touches, shown, strict=True), key=lambda pair: pair[0].id)
         for touch, trace in pairs:
-            if self._ledger.moved(touch, trace.held.wavers):
+            if self.ledger.moved(touch, trace.held.wavers):
                 self._happened.append(TouchEvent("move", touch, self._clock.host))
-                self._ledger.place(touch)
+                self.ledger.place(touch)
         return tuple([touch for touch, _ in pairs])
 
     def _report(self, kind: Happening, trace: Trace) -> None:
-        (touch,) = self._ledger.touches([trace], self.traces)
-        self._ledger.place(touch)
+        (touch,) = self.ledger.touches([trace], self.traces)
+        self.ledger.place(touch)
         self._happened.append(TouchEvent(kind, touch, self._clock.host))

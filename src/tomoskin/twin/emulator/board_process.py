@@ -7,7 +7,7 @@ import secrets
 import struct
 import subprocess
 import tempfile
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import astuple, dataclass, field, replace
 from pathlib import Path
 from typing import IO, Protocol, Self
@@ -23,8 +23,7 @@ _HEAD = struct.Struct("<QII7d")
 _SEQUENCE = struct.Struct("<I")
 _SEQUENCE_AT = 8
 _FAULTS_AT = _HEAD.size + 8 * MOST_ELECTRODES**2
-_FAULTS = struct.Struct(f"<4I{MOST_ELECTRODES}s{MOST_ELECTRODES}s{MOST_ELECTRODES}s")
-_POTENTIALS_AT = _FAULTS_AT + _FAULTS.size
+_POTENTIALS_AT = _FAULTS_AT + 4 * 4 + 3 * MOST_ELECTRODES
 _OFFSETS_AT = _POTENTIALS_AT + 8 * MOST_ELECTRODES
 _LAYER = struct.Struct("<2d")
 _LAYER_AT = _OFFSETS_AT + 8 * MOST_ELECTRODES
@@ -46,33 +45,6 @@ class Front:
     reference: float
     levels: float
     noise: float
-
-
-@dataclass(frozen=True, slots=True)
-class BoardFaults:
-    """What is wrong with an emulated board; the Pico's emulator knows ``reading`` alone.
-
-    ``high_open``, ``low_open``: channels whose switch never connects them to the current, or to
-    ground; ``high_stuck``, ``low_stuck``: always; of the stuck ones the lowest counts, on one side.
-    ``source``, ``sink``, ``reading``: the channel that is connected, or read, instead of another.
-    """
-
-    high_open: Collection[int] = ()
-    low_open: Collection[int] = ()
-    high_stuck: Collection[int] = ()
-    low_stuck: Collection[int] = ()
-    source: Mapping[int, int] = field(default_factory=dict)
-    sink: Mapping[int, int] = field(default_factory=dict)
-    reading: Mapping[int, int] = field(default_factory=dict)
-
-    def pack(self) -> bytes:
-        """As ``firmware/host/skin.h`` has it."""
-        masks = (self.high_open, self.low_open, self.high_stuck, self.low_stuck)
-        maps = (self.source, self.sink, self.reading)
-        return _FAULTS.pack(
-            *(sum(1 << channel for channel in mask) for mask in masks),
-            *(bytes(1 + one[e] if e in one else 0 for e in range(MOST_ELECTRODES)) for one in maps),
-        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,10 +70,13 @@ class SkinMemory:
         path: StrPath,
         front: Front,
         resistance: FloatArray,
-        faults: BoardFaults | None = None,
         own: OwnVoltages | None = None,
+        faults: bytes = b"",
     ) -> None:
-        """Make the file; ``resistance`` as in :meth:`write`. Without ``faults``, ``own``: none."""
+        """Make the file; ``resistance`` as in :meth:`write`. Without ``own``: none.
+
+        ``faults`` of the board, as ``firmware/host/skin.h`` has them; zeros are none.
+        """
         self.path = Path(path)
         self._n = len(resistance)
         if self._n > MOST_ELECTRODES:
@@ -113,7 +88,7 @@ class SkinMemory:
             self._map = mmap.mmap(file.fileno(), _SIZE)
         self._sequence = 0
         _HEAD.pack_into(self._map, 0, _MAGIC, 0, self._n, *astuple(front))
-        self._map[_FAULTS_AT:_POTENTIALS_AT] = (faults or BoardFaults()).pack()
+        self._map[_FAULTS_AT : _FAULTS_AT + len(faults)] = faults
         own = own or OwnVoltages()
         _LAYER.pack_into(self._map, _LAYER_AT, own.double_layer, own.leak)
         self._put(_OFFSETS_AT, own.offsets)

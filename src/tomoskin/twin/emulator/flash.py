@@ -17,7 +17,7 @@ from tomoskin.board.source import (
 from tomoskin.board.wire import BoardLimits, GetBoard, GetInfo, Info
 from tomoskin.core import SourceError
 from tomoskin.twin.emulator.board_process import BoardIdentity
-from tomoskin.twin.emulator.program import firmware_image
+from tomoskin.twin.emulator.program import firmware_image, run_tool
 from tomoskin.twin.emulator.uf2 import find_boot_drive, uf2_of, write_uf2
 
 _REFERENCE = 1.225
@@ -148,13 +148,8 @@ def _avrdude(record: BoardRecord, port: str, *words: str) -> None:
     SerialTransport(port).close()  # before one that is absent, avrdude waits for ever
     where = f"avrdude, {port}"
     try:
-        done = subprocess.run(
-            ["avrdude", "-q", "-q", *record.avrdude.split(), "-D", "-P", port, *words],
-            capture_output=True,
-            text=True,
-            check=False,
-            timeout=_LONGEST,
-        )
+        options = ("-q", "-q", *record.avrdude.split(), "-D", "-P", port)
+        done = run_tool(["avrdude", *options, *words], _LONGEST)
     except subprocess.TimeoutExpired:
         raise SourceError(f"nothing after {_LONGEST:.0f} s", where=where, hint=_HINT) from None
     if done.returncode:

@@ -103,13 +103,7 @@ def _rp2040js(uf2: Path) -> PicoPrograms:
     """Node, with the emulator's package installed beside it."""
     if not _NODE_SET_UP.is_file():
         raise SourceError(_NO_SOURCES, where="firmware", hint="use a git checkout")
-    done = subprocess.run(
-        [sys.executable, _NODE_SET_UP],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=_LONGEST,
-    )
+    done = run_tool([sys.executable, _NODE_SET_UP], _LONGEST)
     if done.returncode:
         lines = done.stderr.strip().splitlines() or ["it did not say why"]
         raise SourceError(lines[0], where="firmware", hint="on Debian: apt-get install nodejs npm")
@@ -171,6 +165,11 @@ def _make(record: BoardRecord, target: str, channels: int) -> None:
     make_firmware(needed, packages, target, f"CHANNELS={channels}")
 
 
+def run_tool(words: Sequence[str | Path], longest: float) -> subprocess.CompletedProcess[str]:
+    """Run a program for at most ``longest`` s; what it said and its exit status."""
+    return subprocess.run(words, capture_output=True, text=True, check=False, timeout=longest)
+
+
 @contextmanager
 def build_alone() -> Iterator[None]:
     """Wait until no other process builds the firmware: two would write over each other."""
@@ -196,13 +195,7 @@ def make_firmware(needed: Sequence[str], packages: str, *arguments: str) -> None
     if absent:
         raise SourceError(f"{', '.join(absent)} missing", where="firmware", hint=hint)
     with build_alone():
-        made = subprocess.run(
-            ["make", "--silent", "-C", str(FOLDER), *arguments],
-            capture_output=True,
-            text=True,
-            check=False,
-            timeout=_LONGEST,
-        )
+        made = run_tool(["make", "--silent", "-C", FOLDER, *arguments], _LONGEST)
     if made.returncode:
         lines = [line for line in made.stderr.splitlines() if "error" in line] or ["make failed"]
         raise SourceError(f"the build failed: {lines[0]}", where="firmware", hint=hint)

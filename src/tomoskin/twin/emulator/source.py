@@ -21,8 +21,7 @@ from tomoskin.board.source import (
 )
 from tomoskin.core import FloatArray, SourceError
 from tomoskin.twin import (
-    Contact,
-    Pose,
+    SheetTransport,
     ThermalVoltages,
     TwinSettings,
     TwinSkin,
@@ -31,7 +30,6 @@ from tomoskin.twin import (
     read_settings,
 )
 from tomoskin.twin.emulator.board_process import (
-    BoardFaults,
     BoardProcess,
     BoardPrograms,
     Front,
@@ -47,7 +45,7 @@ _STEP = 0.01
 """Between two looks at the sheet, s."""
 
 
-class EmulatorTransport:
+class EmulatorTransport(SheetTransport):
     """Bytes of a board that is simulated down to its processor."""
 
     def __init__(
@@ -64,8 +62,8 @@ class EmulatorTransport:
 
         ``own``: without it, none; ``thermal`` takes the place of its potentials.
         """
+        super().__init__(sheet)
         self.name = "emulator"
-        self.sheet = sheet
         self._clock = clock
         self._stood = clock()
         self._closed = False
@@ -78,19 +76,6 @@ class EmulatorTransport:
                 self._memory.write_potentials(thermal.volts)
             self._serial = stack.enter_context(closing(SerialTransport(self._board.port)))
             self._stack = stack.pop_all()
-
-    @property
-    def presses(self) -> tuple[Contact, ...]:
-        """What presses on the sheet now."""
-        return self.sheet.presses
-
-    def set_presses(self, presses: tuple[Contact, ...]) -> None:
-        """Replace all presses; GeometryError when one is off the skin."""
-        self.sheet.set_presses(presses)
-
-    def set_pose(self, pose: Pose) -> None:
-        """Bend and stretch the sheet; GeometryError for a shape that it cannot take."""
-        self.sheet.set_pose(pose)
 
     def read(self, timeout: float) -> bytes:
         """What has come, waiting at most ``timeout`` s for the first byte."""
@@ -170,12 +155,12 @@ def powered(
     resistance: FloatArray,
     *,
     own: OwnVoltages | None = None,
-    faults: BoardFaults | None = None,
+    faults: bytes = b"",
 ) -> Iterator[tuple[BoardProcess, SkinMemory]]:
     """A board on a sheet of (n, n) Ω transfer ``resistance``, and the memory that holds that."""
     with (
         tempfile.TemporaryDirectory(prefix="tomoskin-") as folder,
-        closing(SkinMemory(Path(folder) / "skin", front, resistance, faults, own)) as memory,
+        closing(SkinMemory(Path(folder) / "skin", front, resistance, own, faults)) as memory,
         closing(BoardProcess(programs, memory.path, front.current)) as process,
     ):
         yield process, memory
@@ -196,12 +181,12 @@ def emulate_load(
     resistance: FloatArray,
     current: float,
     board: str = DEFAULT_BOARD,
-    faults: BoardFaults | None = None,
+    faults: bytes = b"",
 ) -> Iterator[Transport]:
     """A board on a network of resistors, of (n, n) Ω transfer resistance; SourceError.
 
-    ``current`` A; ``faults`` of a Mega's board: without it, none. The converter is as noisy as the
-    decks say, and has the scale of the board's record.
+    ``current`` A; ``faults`` of a Mega's board, as of :class:`SkinMemory`. The converter is as
+    noisy as the decks say, and has the scale of the board's record.
     """
     record = BOARDS[board]
     levels, figures = float(1 << record.adc_bits), record.electronics
