@@ -11,8 +11,7 @@ from mcap.reader import make_reader
 
 from run.board import Board, samples_of
 from tomoskin.core import DataError, OutputError, SourceError
-from tomoskin.files.session import SessionReader, repair, split
-from tomoskin.files.session.repair import split_names
+from tomoskin.files.session import SessionReader, repair, split, split_targets
 from tomoskin.model.robot import Place, Pose
 from tomoskin.run import Member, RobotRun
 from tomoskin.run.publisher import Turns
@@ -176,7 +175,7 @@ def test_one_file_holds_all_and_is_split(prepared, boards, tmp_path):
         assert run.recording is None
         with pytest.raises(OutputError):
             run.record(path)
-    assert split_names(path) == ("left", "right", "hand")
+    assert tuple(split_targets(path)) == ("left", "right", "hand")
     with pytest.raises(DataError, match="several skins: left right hand"):
         SessionReader(path)
     with pytest.raises(DataError, match="several skins"):

@@ -496,20 +496,3 @@ def test_a_message_of_another_program_is_an_error_that_says_where(tmp_path, name
         session._log.put(TOUCHES, 0.2, encode_json(message))
     with SessionReader(path) as session, pytest.raises(DataError, match="/touches cannot be"):
         list(session.touches())
-
-
-def test_a_repair_says_how_far_it_is_in_long_damage_too(small, tmp_path):
-    """Of a file that is mostly zeros, in both looks at it."""
-    torn = tmp_path / "torn.mcap"
-    data = small.read_bytes()
-    torn.write_bytes(data[: 2 * len(data) // 3] + bytes(20_000_000))
-    parts = []
-    repair(torn, tmp_path / "mended.mcap", advance=lambda done, total: parts.append(done / total))
-    assert parts == sorted(parts)
-    assert max(b - a for a, b in zip([0.0, *parts], parts, strict=False)) < 0.1
-    assert parts[-1] == pytest.approx(1.0)
-    torn.write_bytes(bytes(8_000_000))
-    seen = len(parts)
-    with pytest.raises(DataError, match="nothing can be recovered"):
-        repair(torn, tmp_path / "none.mcap", advance=lambda done, total: parts.append(done / total))
-    assert len(parts) > seen + 5
