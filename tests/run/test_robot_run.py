@@ -117,7 +117,7 @@ def test_a_board_that_was_missing_from_the_start_is_told_to_its_sinks(prepared, 
         assert lost.wait(PATIENCE)
         assert told[0][0] is False
         assert "the port is gone" in told[0][1]
-        assert not run.runners["left"].running
+        assert not run.statuses()["left"].running
         boards["left"].lost = False
         Watch(run).until(grown(run, ["left"]))
         assert len(run.runners["left"].status().sinks) == 1

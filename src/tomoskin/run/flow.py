@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import suppress
@@ -199,7 +200,9 @@ class Flow:
         replay = self.marker.replay
         if replay is None:
             return self.twin.truth
-        return tuple(chain.from_iterable(map(_recorded, replay.pressed(frame.host_time))))
+        number = bisect_right(replay.truth, frame.host_time, key=lambda truth: truth.host_time)
+        presses = replay.truth[number - 1].presses if number else ()
+        return tuple(chain.from_iterable(map(_recorded, presses)))
 
     def _note_board(self, info: Info | None, name: str) -> None:
         self.board, self.board_name = info, name

@@ -181,11 +181,6 @@ class Runner:
         return self._loop.flow.status(self._loop.trouble)
 
     @property
-    def running(self) -> bool:
-        """Whether frames come."""
-        return self._loop.trouble is None and self._loop.flow.intake.standstill is None
-
-    @property
     def prepared(self) -> Prepared:
         """The prepared skin of this moment."""
         return self._loop.flow.prepared

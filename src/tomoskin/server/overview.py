@@ -126,7 +126,7 @@ class Overview(Host):
 
     def _on(self, name: str, runner: Runner) -> TouchesOfSkin:
         assert runner.newest is not None
-        if not runner.running:  # what touched last may touch no more
+        if not runner.status().running:  # what touched last may touch no more
             return TouchesOfSkin(valid=False, touches=[])
         contacts = Contacts.of(self._streams[name], runner.newest.result)
         pose = self._poses[name]

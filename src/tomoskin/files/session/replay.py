@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 import re
 import threading
-from bisect import bisect_right
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from tomoskin.board.source import Configuration, ScanSettings
 from tomoskin.board.wire import OLDER, SCHEMA
@@ -118,11 +117,6 @@ class ReplayTransport:
     def now(self) -> float:
         """The time in the recording, host monotonic s: exactly that of what was read last."""
         return self._head.now
-
-    def pressed(self, host_time: float) -> tuple[Mapping[str, Any], ...]:
-        """What pressed on the twin at ``host_time``, by the fields of each press."""
-        number = bisect_right(self.truth, host_time, key=lambda truth: truth.host_time)
-        return self.truth[number - 1].presses if number else ()
 
     def after_seek(self) -> bool:
         """Whether what was read last does not follow what was read before it."""
