@@ -20,14 +20,14 @@ from tomoskin.imaging import (
     figures,
     noise_figure,
 )
-from tomoskin.imaging.choice.alpha_choice import Explanation, Level, crossing
+from tomoskin.imaging.choice.alpha_choice import crossing
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.skin import Skin
 
 SKINS = ("textile-disc-8", "textile-disc-16", "textile-square-16", "tank-16")
 FIGURES = (1.0, 1.5)  # below 1.2 no NOSER of the tank has one
 CELLS, TRAINED_ON, TESTED_ON = 900, 3600, 6000
-WHY = Explanation("noise-figure", "as large as GREIT's", "noise figure")
+WHY = {"rule": "noise-figure", "reason": "as large as GREIT's", "label": "noise figure"}
 
 
 def run() -> Iterator[Report]:
@@ -74,7 +74,8 @@ def _pair(name: str, figure: float) -> list[dict[str, Any]]:
 
     rows = [_row(name, "greit", trained, taken)]
     try:
-        chosen = crossing(spectrum, reached, Level(trained.noise_figure, "falling", ("", "")), WHY)
+        level = trained.noise_figure
+        chosen = crossing(spectrum, reached, level, rising=False, hints=("", ""), **WHY)
     except ModelError:
         return [*rows, {"skin": name, "operator": "noser: no alpha"}]
     noser = figures(spectrum.operator(chosen.alpha), targets)

@@ -135,9 +135,9 @@ WRITERS: dict[str, Callable[..., None]] = {
     "x.pvd": writes(exports.write_series, SKIN.mesh, ()),
     "x.mat": writes(exports.write_matlab, recording, 1.0, 8),
     "x.gif": lambda path, _, **options: exports.FILMS[".gif"](path, frames(), 10.0, **options),
-    "x.csv": of_session(exports.write_csv),
+    "x.csv": of_session(exports.WRITERS[".csv"]),
     "x.parquet": of_session(exports.write_parquet),
-    "x.h5": of_session(exports.write_hdf5),
+    "x.h5": of_session(exports.WRITERS[".h5"]),
 }
 
 

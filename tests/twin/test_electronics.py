@@ -114,7 +114,7 @@ def test_time_goes_on_by_as_much_whether_presses_move_or_not(skin, table):
         sheet = TwinSkin.of(skin, chosen)
         electronics = TwinElectronics(sheet, FINE, skin.current, QUIET, 0)
         still = Press(0.01, 0.02, 3.0, 0.012)
-        electronics.follow(lambda since: (replace(still, x=0.01 + 1e-9 * since * moves),))
+        electronics.follow(lambda since: (Press(0.01 + 1e-9 * since * moves, 0.02, 3.0, 0.012),))
         for k in range(4):
             electronics.sample(table, 0.5 * k)
         electronics.follow(lambda _: (still,))
@@ -191,10 +191,11 @@ def test_faults_show_in_the_counts(sheet, skin, table):
     full = (2**16 - 0.5) * LSB - 0.5 / 40
     cut = volts(sheet, skin, QUIET, table, faults=Faults(cut=frozenset({5})))
     assert cut[table.channel == 5] == pytest.approx(full)
-    assert np.abs(cut[(table.source == 5) & (table.channel != 5)]).max() <= LSB
+    source = table.drives[table.drive, 0]
+    assert np.abs(cut[(source == 5) & (table.channel != 5)]).max() <= LSB
     ideal = volts(sheet, skin, QUIET, table)
     short = volts(sheet, skin, QUIET, table, faults=Faults(shorts=frozenset({(3, 4)})))
-    drive_3_4 = (table.source == 4) & (table.sink == 3)
+    drive_3_4 = (source == 4) & (table.sink == 3)
     assert np.ptp(short[drive_3_4]) < 0.1 * np.ptp(ideal[drive_3_4])
 
 

@@ -48,7 +48,7 @@ def test_rails():
 
 def test_samples_are_drive_major_with_channels_ascending():
     table = sample_table([Drive(1, 0, 0b1100), Drive(2, 1, 0b1001)], 4)
-    assert table.source.tolist() == [1, 1, 2, 2]
+    assert table.drives[table.drive, 0].tolist() == [1, 1, 2, 2]
     assert table.sink.tolist() == [0, 0, 1, 1]
     assert table.channel.tolist() == [2, 3, 0, 3]
 

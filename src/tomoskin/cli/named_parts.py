@@ -33,37 +33,26 @@ _SHOWN = 20
 
 @dataclass(frozen=True, eq=False)
 class Recorded:
-    """A file that a command reads: the ``skin`` that it is of, where that is known, the ``pattern``
-    of its rows, and which frames are untouched (``reference``)."""
+    """A file that a command reads: the ``skin`` that it is of, where that is known; which frames
+    are untouched (``reference``); the ``rows`` of an older calibration, where there is one."""
 
     path: Path
     recording: Recording
     skin: Skin | None
-    pattern: Pattern
     reference: str | None
+    rows: Pattern | None = None
 
     @classmethod
     def of(
         cls, path: Path, skin: str | None, reference: str | None, *, needs_skin: bool = False
     ) -> Self:
-        """Read the file; without a skin its rows are as they stand there."""
+        """Read the file, and say what of it was left out."""
         from tomoskin.files.imports import read_recording
-        from tomoskin.model.pattern import Pattern
 
         recording = read_recording(path)
         say_notes(recording)
         chosen = skin_for_file(skin, path) if needs_skin else skin_if_any(skin, path)
-        if chosen is None:
-            if recording.spread:
-                raise DataError(
-                    "has drives of several electrodes",
-                    where=str(path),
-                    hint="give --skin, to whose pattern they are summed",
-                )
-            pattern = Pattern.from_tables(recording.drive, recording.measure)
-        else:
-            pattern = chosen.pattern()
-        return cls(path, recording, chosen, pattern, reference)
+        return cls(path, recording, chosen, reference)
 
     def onto(self, old: Calibration[Any] | None) -> Self:
         """The same with the rows of an older calibration, where there is one, of the same skin."""
@@ -71,7 +60,24 @@ class Recorded:
             return self
         if self.skin is not None:
             old.check_skin(self.skin)
-        return replace(self, pattern=old.pattern)
+        return replace(self, rows=old.pattern)
+
+    @cached_property
+    def pattern(self) -> Pattern:
+        """The rows that are read; without a skin they are as they stand in the file."""
+        from tomoskin.model.pattern import Pattern
+
+        if self.rows is not None:
+            return self.rows
+        if self.skin is not None:
+            return self.skin.pattern()
+        if self.recording.spread:
+            raise DataError(
+                "has drives of several electrodes",
+                where=str(self.path),
+                hint="give --skin, to whose pattern they are summed",
+            )
+        return Pattern.from_tables(self.recording.drive, self.recording.measure)
 
     @property
     def drawn(self) -> Skin:

@@ -12,7 +12,7 @@ from tomoskin.files.exports.matlab_file import write_matlab
 from tomoskin.files.exports.picture import FILMS, MOST_PANELS, Panel, plot, write_picture
 from tomoskin.files.exports.published import RerunView, rerun_recording
 from tomoskin.files.exports.session_export import WRITERS, export_touches, omitted
-from tomoskin.files.exports.session_table import write_parquet, write_touches
+from tomoskin.files.exports.session_table import write_csv, write_hdf5, write_parquet, write_touches
 from tomoskin.files.exports.vtu import series_files, write_series, write_vtu
 from tomoskin.files.imports import write_interchange
 
@@ -30,6 +30,8 @@ __all__ = [
     "rerun_recording",
     "series_files",
     "write_choices",
+    "write_csv",
+    "write_hdf5",
     "write_interchange",
     "write_matlab",
     "write_merit",

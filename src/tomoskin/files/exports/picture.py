@@ -40,8 +40,9 @@ def new_figure(path: StrPath, width: float, height: float) -> Figure:
 
 
 def panel_axes(figure: Figure, count: int, columns: int) -> list[Axes]:
-    """So many axes in rows of that many ``columns``."""
-    axes = np.atleast_1d(figure.subplots(-(-count // columns), columns)).ravel().tolist()
+    """So many axes in rows of that many ``columns``; there may be none."""
+    rows = max(-(-count // columns), 1)
+    axes: list[Axes] = np.atleast_1d(figure.subplots(rows, columns)).ravel().tolist()
     for ax in axes[count:]:
         ax.set_visible(False)
     return axes[:count]

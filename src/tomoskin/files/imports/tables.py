@@ -98,8 +98,13 @@ def scan_of(
     """Rows of a scan of all ``pairs`` (m, 2) under each of ``drives`` (k, 2) that touch no driven
     electrode, drive and measure; and (k·m,) which of its values these are."""
     drive, measure = np.repeat(drives, len(pairs), axis=0), np.tile(pairs, (len(drives), 1))
-    kept = ~(drive[:, :, None] == measure[:, None, :]).any(axis=(1, 2))
+    kept = ~touches_drive(drive, measure)
     return (drive[kept], measure[kept]), kept
+
+
+def touches_drive(drive: IntArray, measure: IntArray) -> NDArray[np.bool_]:
+    """(n,) whether a row's measuring pair touches its drive."""
+    return np.asarray((drive[:, :, None] == measure[:, None, :]).any(axis=(1, 2)))
 
 
 def adjacent_scan(n: int) -> tuple[tuple[IntArray, IntArray], NDArray[np.bool_]]:

@@ -7,7 +7,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from tomoskin.core import FloatArray, GeometryError, IntArray
-from tomoskin.model.mesh.triangles import facets, paired_facets, simplex_measure
+from tomoskin.model.mesh.triangles import check_finite, facets, paired_facets, simplex_measure
 
 _FLAT = 1e-12
 """A cell is degenerate below this fraction of (its longest edge)^dimension."""
@@ -44,12 +44,7 @@ def _check_shapes(points: FloatArray, cells: IntArray) -> None:
             f"expected points in {corners - 1}D (or triangles in space), "
             f"got {points.shape[1]} coordinates for cells with {corners} corners"
         )
-    finite = np.isfinite(points).all(axis=1)
-    if not finite.all():
-        bad = int(np.argmin(finite))
-        raise GeometryError(
-            f"expected finite coordinates, got {points[bad].tolist()}", where=f"point {bad}"
-        )
+    check_finite(points, "point")
 
 
 def _check_indices(points: FloatArray, cells: IntArray, electrodes: tuple[IntArray, ...]) -> None:

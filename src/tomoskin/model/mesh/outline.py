@@ -191,7 +191,8 @@ class Disc(Outline):
         return self.radius * (angle % (2 * math.pi))
 
 
-def check_size(name: str, value: float) -> None:
-    """Raise GeometryError unless ``value`` is a finite length above 0."""
-    if not (math.isfinite(value) and value > 0):
+def check_size(name: str, value: float, *, straight: bool = False) -> None:
+    """Raise GeometryError unless ``value`` is a length above 0; infinite only where that means
+    ``straight``."""
+    if not (0 < value < math.inf or (straight and value == math.inf)):
         raise GeometryError(f"expected a {name} above 0 m, got {value:g} m")

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tomoskin.core import FloatArray, GeometryError
 from tomoskin.model.mesh.outline import Outline, check_size
+from tomoskin.model.mesh.triangles import check_finite
 
 _TOUCH = 1e-9
 """Two points nearer than this fraction of the polygon's size count as one."""
@@ -176,12 +177,7 @@ def _check_table(vertices: FloatArray) -> None:
         raise GeometryError(
             f"expected at least 3 vertices of 2 coordinates, got shape {vertices.shape}"
         )
-    finite = np.isfinite(vertices).all(axis=1)
-    if not finite.all():
-        bad = int(np.argmin(finite))
-        raise GeometryError(
-            f"expected finite coordinates, got {vertices[bad].tolist()}", where=f"vertex {bad}"
-        )
+    check_finite(vertices, "vertex")
 
 
 def _check_repeats(vertices: FloatArray, size: float) -> None:

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from tomoskin.core import FloatArray, GeometryError
 from tomoskin.model.mesh.mesh import Mesh
+from tomoskin.model.mesh.outline import check_size
 from tomoskin.model.mesh.triangles import SIDES
 
 _ISOMETRIC = 1e-12
@@ -138,7 +139,7 @@ class Cap(Surface):
 
     def __post_init__(self) -> None:
         """Refuse an impossible radius."""
-        positive("radius", self.radius)
+        check_size("radius", self.radius)
 
     def point(self, uv: ArrayLike) -> FloatArray:
         """Points (n, 3) m of the surface."""
@@ -185,8 +186,8 @@ class Saddle(Surface):
 
     def __post_init__(self) -> None:
         """Check that the radii are possible."""
-        positive("radius_u", self.radius_u)
-        positive("radius_v", self.radius_v)
+        check_size("radius_u", self.radius_u, straight=True)
+        check_size("radius_v", self.radius_v, straight=True)
 
     def point(self, uv: ArrayLike) -> FloatArray:
         """Points (n, 3) m of the surface."""
@@ -207,12 +208,6 @@ def _sinc_slope(x: FloatArray) -> FloatArray:
     safe = np.where(small, 1.0, x)
     exact = (safe * np.cos(safe) - np.sin(safe)) / safe**3
     return np.where(small, -1 / 3 + x**2 / 30 - x**4 / 840, exact)
-
-
-def positive(name: str, value: float) -> None:
-    """Raise GeometryError for a ``value``, m, that is no size."""
-    if not value > 0:
-        raise GeometryError(f"expected a {name} above 0 m, got {value:g} m")
 
 
 def rows_of(uv: ArrayLike) -> FloatArray:

@@ -11,6 +11,16 @@ from scipy.spatial import cKDTree
 from tomoskin.core import FloatArray, GeometryError, IntArray
 
 
+def check_finite(points: FloatArray, what: str) -> None:
+    """Raise GeometryError that names the first of ``points`` (n, d) that is not finite."""
+    finite = np.isfinite(points).all(axis=1)
+    if not finite.all():
+        bad = int(np.argmin(finite))
+        raise GeometryError(
+            f"expected finite coordinates, got {points[bad].tolist()}", where=f"{what} {bad}"
+        )
+
+
 def simplex_measure(points: FloatArray, simplices: IntArray) -> FloatArray:
     """Length (m), area (m²) or volume (m³) of each simplex, (n,), in the plane or in space."""
     corner = points[simplices]

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tomoskin.core import FloatArray, GeometryError
-from tomoskin.model.mesh.surface import Surface, positive, rows_of
+from tomoskin.model.mesh.outline import check_size
+from tomoskin.model.mesh.surface import Surface, rows_of
 
 _ROUNDING = 1e-12
 
@@ -31,7 +32,7 @@ class Cylinder(Surface):
 
     def __post_init__(self) -> None:
         """Refuse an impossible radius."""
-        positive("radius", self.radius)
+        check_size("radius", self.radius)
 
     def point(self, uv: ArrayLike) -> FloatArray:
         """Points (n, 3) m of the surface."""
@@ -77,8 +78,8 @@ class Arm(Surface):
 
     def __post_init__(self) -> None:
         """Refuse a joint so sharp that the skin would fold."""
-        positive("radius", self.radius)
-        positive("joint", self.joint)
+        check_size("radius", self.radius)
+        check_size("joint", self.joint)
         if abs(self.angle) * self.radius >= 0.95 * self.joint:
             raise GeometryError(
                 f"a limb of radius {1e3 * self.radius:.4g} mm folds when it bends by "
@@ -144,7 +145,7 @@ class Hinge(Surface):
 
     def __post_init__(self) -> None:
         """Check that the strip is possible."""
-        positive("length", self.length)
+        check_size("length", self.length)
         if not abs(self.angle) <= 2 * math.pi:
             raise GeometryError(
                 f"expected an angle of at most 360°, got {math.degrees(self.angle):.4g}°"
