@@ -20,6 +20,7 @@ from tomoskin.board.source import (
     ScanSettings,
     list_ports,
     open_source,
+    read_options,
 )
 from tomoskin.board.source.boards import read_boards
 from tomoskin.core import Frame, SourceError, WallClock
@@ -33,6 +34,7 @@ from tomoskin.twin.device import TwinDevice
 from tomoskin.twin.electronics import convert
 from tomoskin.twin.emulator import build_firmware
 from tomoskin.twin.emulator.program import programs_of
+from tomoskin.twin.source import read_board
 
 TEXT = files("tomoskin.board.source").joinpath("boards.toml").read_text(encoding="utf-8")
 THIRD = """
@@ -161,6 +163,23 @@ def test_what_it_has_not_is_said(third: BoardRecord) -> None:
         programs_of("third")
     with pytest.raises(SourceError, match=r'expected a board of mega, .*third, got "fourth"'):
         open_source("twin:board=fourth", Skin.load("textile-disc-8"))
+
+
+@pytest.mark.usefixtures("third")
+def test_twin_and_emulator_name_a_board_in_one_way() -> None:
+    for given in ("board=third", "third", "seed=3,board=third"):
+        assert read_board(read_options(given, ("seed", "board", *BOARDS), "a"), "a") == "third"
+    assert read_board({}, "a") is None
+    with pytest.raises(SourceError, match="one board, got mega and third"):
+        read_board({"third": "", "board": "mega"}, "a")
+    skin = Skin.load("textile-disc-8")
+    for name in ("twin", "emulator"):
+        with pytest.raises(SourceError, match='got "pcio"; did you mean "pico"'):
+            open_source(f"{name}:board=pcio", skin)
+    for given in ("board=third", "third"):  # it has no emulator, and is a twin
+        with pytest.raises(SourceError, match="no emulator of the Third board"):
+            open_source(f"emulator:{given}", skin)
+        open_source(f"twin:{given}", skin).close()
 
 
 def test_its_port_is_known(third: BoardRecord, monkeypatch: pytest.MonkeyPatch) -> None:

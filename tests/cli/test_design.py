@@ -33,6 +33,16 @@ def test_a_map_and_a_comparison(tomoskin: Run, tmp_path: Path) -> None:
     assert "8 electrodes, skip:3: " in out
 
 
+def test_designs_that_saturate_are_marked_in_the_table_and_explained_once(tomoskin: Run) -> None:
+    asked = ("design", "--electrodes", "16", "--patterns", "adjacent,opposite,skip:2,skip:3")
+    code, out, err = tomoskin(*asked)
+    assert (code, err) == (0, "")
+    marked = [line for line in out.splitlines() if line.endswith("yes")]
+    rows = json.loads(tomoskin(*asked, "--json")[1])["compared"]
+    assert len(marked) == sum("saturated" in row for row in rows) > 1
+    assert out.count("saturate") == 2, "in the heading, and in one sentence"
+
+
 def test_without_matplotlib_it_says_so_before_the_work(
     tomoskin: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

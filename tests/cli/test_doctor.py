@@ -9,6 +9,7 @@ import pytest
 from tomoskin import __version__
 from tomoskin.cli import app as commands
 from tomoskin.cli import main
+from tomoskin.core import SinkError
 from tomoskin.server import check_page
 
 
@@ -25,8 +26,21 @@ def test_doctor(tomoskin):
     assert len(found["skin"]) == 5
     assert all(skin["ok"] for skin in found["skin"])
     assert len(found["sink"]) >= 5
-    assert all(sink["ok"] for sink in found["sink"])  # none of them is needed
+    assert all(sink["optional"] for sink in found["sink"])  # none of them is needed
     assert "8765" in found["port"][0]["text"]
+
+
+def test_a_sink_without_its_package_is_not_ok_and_no_fault(tomoskin, monkeypatch):
+    def missing(spec):
+        raise SinkError("needs the package", where=f"sink {spec}")
+
+    healthy = tomoskin("doctor")[0]
+    monkeypatch.setattr("tomoskin.run.sinks.make_sink", missing)
+    code, out, _ = tomoskin("doctor")
+    assert code == healthy
+    lines = [line for line in out.splitlines() if "needs the package" in line]
+    assert len(lines) >= 5
+    assert all(line.startswith("-     sink ") for line in lines)
 
 
 def test_doctor_for_people(tomoskin):

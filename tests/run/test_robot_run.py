@@ -102,6 +102,28 @@ def test_a_missing_board_and_a_lost_one_disturb_no_other(prepared, boards):
         assert run.statuses()["hand"].problem is None
 
 
+def test_a_board_that_was_missing_from_the_start_is_told_to_its_sinks(prepared, boards):
+    boards["left"].lost = True
+    told, lost = [], threading.Event()
+
+    def react(contacts):
+        if contacts.skin == "left":
+            told.append((contacts.valid, contacts.problem))
+            lost.set()
+
+    sinks = [ContactListener(react)]
+    left = member(prepared, "left", boards["left"], sinks=sinks)
+    with running([left, member(prepared, "right", boards["right"])]) as run:
+        assert lost.wait(PATIENCE)
+        assert told[0][0] is False
+        assert "the port is gone" in told[0][1]
+        assert not run.statuses()["left"].running
+        boards["left"].lost = False
+        Watch(run).until(grown(run, ["left"]))
+        assert len(run.runners["left"].status().sinks) == 1
+    assert told[-1] == (True, None)
+
+
 def test_without_any_board_it_says_so(prepared, boards):
     for board in boards.values():
         board.lost = True

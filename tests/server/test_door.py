@@ -47,7 +47,21 @@ def test_half_a_request_has_an_end(site, monkeypatch, caplog):
     assert said == ["page: connections from 127.0.0.1 that ask for nothing are closed"]
 
 
-def test_half_requests_keep_nobody_out(site):
+def test_a_spare_connection_of_a_browser_is_closed_without_a_word(site, monkeypatch, caplog):
+    monkeypatch.setattr(door, "PATIENCE", 0.1)
+    monkeypatch.setattr(door.Door, "_quiet_until", 0.0)
+    address = ("127.0.0.1", site.port)
+    with socket.create_connection(address, timeout=PATIENCE) as spare:
+        assert closed(spare)
+    with socket.create_connection(address, timeout=PATIENCE) as kept:  # asked once, then kept
+        kept.sendall(b"GET /status HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
+        while kept.recv(4096):
+            pass
+    assert not [record for record in caplog.records if "ask for nothing" in record.message]
+
+
+def test_half_requests_keep_nobody_out(site, monkeypatch, caplog):
+    monkeypatch.setattr(door.Door, "_quiet_until", 0.0)
     with ExitStack() as stack:
         connections = [half_open(site, stack) for _ in range(door.MOST_WAITING + 20)]
         assert all(map(closed, connections[:20]))
@@ -55,3 +69,4 @@ def test_half_requests_keep_nobody_out(site):
             assert client.get("/status").status_code == 200
         page = stack.enter_context(site.connect())
         assert json.loads(page.recv(PATIENCE))
+    assert len([r for r in caplog.records if "ask for nothing" in r.message]) == 1

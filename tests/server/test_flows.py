@@ -230,7 +230,11 @@ def test_a_session_is_recorded_listed_exported_played_and_left(flows, tmp_path):
     assert 0 <= float(rows[0]["elapsed_s"]) < length
     assert float(rows[0]["time_s"]) - float(rows[0]["elapsed_s"]) == pytest.approx(start, abs=1e-5)
     page.ask("open", name="run.mcap")
-    assert page.told("scene")["source"] == "textile-disc-8 on replay:run.mcap"
+    scene = page.told("scene")
+    assert scene["source"] == "textile-disc-8 on replay:run.mcap"
+    assert (scene["pressable"], scene["truth"]) == (False, True)
+    until(lambda: runner.newest and runner.newest.truth)
+    assert runner.newest.truth == (Press(0.03, 0.02, 5.0, 0.015),), "as it was recorded"
     assert page.told("timeline")["touches"]
     page.ask("files")
     told = page.told("files")
@@ -418,6 +422,30 @@ def test_a_flow_that_no_page_shows_records_nothing(flows):
         told = page.told("flow", lambda m: not m["paused"])
         assert (told["phase"], len(told["presses"])) == ("rest", 1)
     page.told("flow", lambda m: m["paused"])  # the page that showed it has gone
+
+
+def test_a_flow_takes_nothing_from_a_recording_that_is_played(flows, tmp_path):
+    site, page = flows
+    runner = site.runner
+    until = Watch(runner).until
+    until(lambda: runner.newest and runner.newest.result.ready)
+    path = tmp_path / "sessions" / "run.mcap"
+    runner.ask(commands.Record(path))
+    runner.ask(commands.HoldPresses(page, (Press(0.03, 0.02, FORCE, RADIUS),)))
+    until(lambda: runner.newest.result.touches)
+    before = runner.status().frames
+    until(lambda: runner.status().frames > before + 40)
+    runner.ask(commands.HoldPresses(page, ()))
+    until(lambda: not runner.newest.result.touches)
+    runner.ask(commands.StopRecording())
+    page.ask("flow_begin", kind="touch")
+    page.told("flow", lambda m: m["phase"] == "press")
+    page.ask("open", name="run.mcap")
+    assert page.told("flow", lambda m: m["paused"])["presses"] == []
+    page.ask("flow_show", on=True)
+    page.told("state", lambda m: m["replay"] and m["replay"]["ended"])
+    page.ask("live")
+    assert page.told("flow", lambda m: not m["paused"])["presses"] == []
 
 
 def test_a_press_is_taken_back_and_the_flow_left(flows):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from contextlib import closing
 from functools import partial
 
 import numpy as np
@@ -76,12 +77,22 @@ def guided(opened, kind, count):
     )
 
 
+def in_sight(opened, *names):
+    """Each is seen in the drawer without scrolling."""
+    drawer = opened.page.locator(".drawn").bounding_box()
+    for name in names:
+        box = opened.test_id(name).bounding_box()
+        assert box["y"] + box["height"] <= drawer["y"] + drawer["height"], name
+
+
 def test_touch_is_taught_by_pressing_dots(opened, folder):
     guided(opened, "touch", 6)
     opened.test_id("flow-text").filter(has_text="Median error").wait_for()
+    in_sight(opened, "phase", "flow-undo", "flow-end", "flow-keep")
     looks_right(opened, "touch")
     opened.test_id("flow-keep").click()
     opened.test_id("calibration").filter(has_text="touch.npz").wait_for()
+    in_sight(opened, "calibration", "flow-begin")
     assert len(TOUCH.read(folder / "touch.npz").model.presses) == 6
     opened.press(0.03, 0.03)
     looks_right(opened, "calibrated")
@@ -140,6 +151,7 @@ def test_weights_are_laid_on_and_forces_are_shown(opened, folder):
     for done, (newtons, place) in enumerate(zip((2, 8, 4, 6, 3), places, strict=True)):
         lay(opened, newtons, place, done)
     opened.test_id("flow-text").filter(has_text="forces are missed by").wait_for()
+    in_sight(opened, "phase", "weight-set", "flow-end", "flow-keep")
     looks_right(opened, "force")
     opened.test_id("flow-keep").click()
     opened.test_id("calibration").filter(has_text="force.npz").wait_for()
@@ -233,6 +245,10 @@ def test_a_flow_whose_drawer_is_closed_is_paused_and_named(opened):
     opened.test_id("weight-unit").select_option("N")
     lay(opened, 2, (0.03, 0.03), 0)
     opened.test_id("state").filter(has_text="Teaching forces").wait_for()
+    opened.test_id("weight").fill("0")
+    opened.page.keyboard.press("Enter")
+    opened.test_id("remark").filter(has_text="expected a weight").wait_for()
+    opened.test_id("remark").filter(has_text="Teaching forces: 1 recorded").wait_for()
     opened.test_id("open-setup").click()
     opened.test_id("state").filter(has_text="Teaching paused").wait_for()
     opened.test_id("remark").filter(has_text="Teaching forces is paused, 1 recorded").wait_for()
@@ -253,3 +269,23 @@ def test_a_flow_whose_drawer_is_closed_is_paused_and_named(opened):
     opened.test_id("flow-end").click()
     opened.test_id("flow-end").filter(has_text="Forget all of it").click()
     opened.test_id("state").filter(has_text="Live").wait_for()
+
+
+def test_on_a_telephone_a_drawer_leaves_the_touch_in_sight(browser, site, prepared):
+    phone = Watched(browser, site, prepared.mesh, (390, 844), touch=True)
+    with closing(phone.context):
+        phone.open()
+        phone.page.keyboard.down("Shift")
+        phone.press(0.03, 0.03)
+        phone.page.mouse.up()
+        phone.page.keyboard.up("Shift")
+        phone.test_id("open-setup").click()
+        drawer = phone.test_id("drawer-setup").bounding_box()
+        row = phone.test_id("touch-row").bounding_box()
+        side = phone.page.locator(".side").bounding_box()
+        assert side["y"] <= row["y"] < row["y"] + row["height"] <= drawer["y"] + 1
+        looks_right(phone, "phone-drawer")
+        phone.page.keyboard.press("Escape")
+        phone.page.keyboard.press("Escape")
+        phone.lifted()
+        assert phone.wrong == []

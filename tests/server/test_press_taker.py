@@ -22,9 +22,11 @@ class Skin:
         self.taker = PressTaker(0.1 * NOISE)
         self._rng, self._time = np.random.default_rng(seed), 0.0
 
-    def frames(self, count: int, noises: float = 0.0, shape: Floats = SHAPE) -> list[Floats]:
+    def frames(
+        self, count: int, noises: float = 0.0, shape: Floats = SHAPE, *, touched: bool = False
+    ) -> list[Floats]:
         """What was taken in the next frames."""
-        found = (self._frame(noises * shape) for _ in range(count))
+        found = (self._frame(noises * shape, touched=touched) for _ in range(count))
         return [dv for dv in found if dv is not None]
 
     @property
@@ -32,10 +34,10 @@ class Skin:
         """What whoever presses is to do."""
         return self.taker.phase
 
-    def _frame(self, noises: Floats) -> Floats | None:
+    def _frame(self, noises: Floats, *, touched: bool) -> Floats | None:
         self._time += PERIOD
         volts = 1 + NOISE * (noises + self._rng.normal(size=ROWS))
-        return self.taker.push(self._time, volts)
+        return self.taker.push(self._time, volts, touched=touched)
 
 
 @pytest.fixture(params=range(5))
@@ -77,13 +79,38 @@ def test_the_end_of_a_press_that_was_not_seen_is_none(skin: Skin) -> None:
     assert len(skin.frames(12, 20)) == 1
 
 
+def test_a_touch_that_shows_does_not_pass_for_the_untouched_skin(skin: Skin) -> None:
+    """Who holds on when the flow begins, or presses again too soon, is asked to let go."""
+    skin.taker = PressTaker(0.1 * NOISE, sign=1)
+    skin.frames(100, 20, touched=True)
+    assert skin.phase == "rest"
+    assert "Let go" in skin.taker.hint
+    skin.frames(30)
+    assert skin.phase == "press"
+    assert not skin.taker.hint
+    assert len(skin.frames(12, 20, touched=True)) == 1
+
+
+def test_a_touch_that_never_ends_may_be_none(skin: Skin) -> None:
+    skin.taker = PressTaker(0.1 * NOISE, sign=1)
+    skin.frames(300, 20, touched=True)
+    assert skin.phase == "press"
+    assert "take the reference again" in skin.taker.hint
+    assert len(skin.frames(12, 40, touched=True)) == 1, "a press beside it"
+    skin.taker = PressTaker(0.1 * NOISE, sign=1)
+    skin.frames(300, 20, touched=True)
+    skin.frames(30)
+    assert skin.phase == "press"
+    assert "faint" not in skin.taker.hint, "it was a touch, and has ended"
+
+
 def test_nothing_is_taken_of_an_untouched_skin(skin: Skin) -> None:
     assert skin.frames(1000) == []
 
 
 def test_a_press_that_shows_nothing_is_said(skin: Skin) -> None:
     assert skin.frames(150, 0.1) == []
-    assert "then press harder" in skin.taker.hint
+    assert "then press a little harder" in skin.taker.hint
 
 
 def test_a_press_that_moves_is_said(skin: Skin) -> None:

@@ -6,6 +6,7 @@ import json
 import re
 import threading
 from contextlib import closing
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from server.watching import Watched
 from tomoskin.core import WallClock
 from tomoskin.files.session import split_targets
 from tomoskin.model.robot import Robot
-from tomoskin.run import Member, RobotRun
+from tomoskin.run import Member, RobotRun, Runner
 from tomoskin.server import Hub, Overview, Server, listen, robot_application, serve_requests
 from tomoskin.server.access import AccessPolicy
 from tomoskin.server.server import STATIC
@@ -131,6 +132,17 @@ def test_touches_are_told_in_the_frame_of_the_robot(site, pressed):
     x, y = PLACE
     assert touch["position"] == pytest.approx([0.3 + x, -y, 0.05], abs=0.015)
     assert touch["normal"] == pytest.approx([0, 0, -1], abs=1e-5)
+
+
+def test_of_a_board_that_is_lost_no_touch_is_shown(site, pressed, monkeypatch):
+    """The last ones may be over."""
+    del pressed
+    now = Runner.status
+    monkeypatch.setattr(Runner, "status", lambda runner: replace(now(runner), running=False))
+    with site.connect() as page:
+        while not isinstance(told := page.recv(PATIENCE), bytes):
+            pass
+    assert json.loads(told)["skins"]["right"] == {"valid": False, "touches": []}
 
 
 def test_below_it_each_skin_has_its_own_page(site):

@@ -10,7 +10,7 @@ import pytest
 
 from tomoskin.core import DataError, Detection, Touch, WireError
 from tomoskin.learning import FORCE, Weight
-from tomoskin.server.requests import DeletePress, SetWeight
+from tomoskin.server.requests import DeletePress, SetWeight, decode_request
 from tomoskin.server.weigh_flow import PlacementTaker, WeighFlow, weighed_presses
 
 RATE = 0.04
@@ -198,6 +198,18 @@ def test_grams_taken_for_newtons_are_asked_about(flow):
     assert flow.weight.newtons == 30.0
     set_weight(flow, 0.5, "g")
     assert flow.now().meant.text == "0.5 kg (4.9 N)"
+
+
+@pytest.mark.parametrize("value", ["0", "-3", "1e9"])
+@pytest.mark.parametrize("unit", ["g", "kg", "N"])
+def test_a_weight_that_cannot_be_is_refused_in_words(flow, value, unit):
+    """Not as a message that is not understood: a person typed it."""
+    flow, _ = flow
+    asked = f'{{"type": "flow_weight", "value": {value}, "unit": "{unit}", "sure": true}}'
+    request = decode_request(asked)
+    with pytest.raises(WireError, match="expected a weight above 0 and up to 100 N"):
+        flow.answers[type(request)](request)
+    assert float(value) > 0 or Weight(float(value), unit).meant is None
 
 
 def test_a_weight_that_is_named_after_it_lay_there_is_recorded_then(flow):

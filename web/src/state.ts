@@ -13,6 +13,8 @@ export const status = signal<RunState | null>(null);
 export const link = signal<LinkState>({ phase: "connecting" });
 /** A sentence that the server just said, cleared after some seconds. */
 export const notice = signal<string | null>(null);
+/** Whether it answers what was just done here: then it is shown before anything else. */
+export const answered = signal(false);
 
 /** How the page shows things; nothing of it leaves the page. */
 export const smoothed = signal(true);
@@ -51,11 +53,16 @@ export const requestRepaint = (): void => repaint();
 const NOTICE_SECONDS = 6;
 let noticeTimer = 0;
 
-/** Show a sentence in the line of state for some seconds. */
-export function say(text: string): void {
-  notice.value = text;
+/** Show a sentence in the line of state for some seconds; an ``answer`` is not lost behind others. */
+export function say(text: string, answer = true): void {
+  if (!answer && answered.peek()) return;
   window.clearTimeout(noticeTimer);
-  noticeTimer = window.setTimeout(() => (notice.value = null), NOTICE_SECONDS * 1e3);
+  batch(() => {
+    notice.value = text;
+    answered.value = answer;
+  });
+  const clear = () => batch(() => ((notice.value = null), (answered.value = false)));
+  noticeTimer = window.setTimeout(clear, NOTICE_SECONDS * 1e3);
 }
 
 function setScene(next: Scene): void {
@@ -93,7 +100,7 @@ onMessage("scale", ({ limit, unit }) => {
   if (scene.value) scene.value = { ...scene.value, limit, unit };
 });
 onMessage("state", (message) => (status.value = message));
-onMessage("event", ({ text }) => say(text));
+onMessage("event", ({ text }) => say(text, false));
 onMessage("error", ({ message }) => say(message));
 
 const frameReceivers: ((frame: Frame) => void)[] = [];

@@ -18,6 +18,7 @@ export interface Scene {
   readonly pattern: PatternRows;
   readonly source: string;
   readonly pressable: boolean;
+  readonly truth: boolean;
   readonly probe: ProbeSizes;
   readonly version: string;
 }
@@ -752,6 +753,7 @@ export interface SpaceTouch {
   readonly normal: readonly [number, number, number];
   readonly peak: number;
   readonly force: number | null;
+  readonly more_than: number | null;
 }
 
 export type ServerMessage =

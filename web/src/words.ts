@@ -74,18 +74,23 @@ function warningsOf(status: RunState, age: number | null): Warning[] {
 const TEACHING = { touch: "touch", rub: "touch", force: "forces", mapping: "channels" } as const;
 
 /** A guided flow, in place of the calm word of a live skin; any other word stays. */
-function withFlow(word: string, remark: string, flow: FlowNow | null): readonly [word: string, remark: string] {
+function withFlow(
+  [word, remark]: readonly [word: string, remark: string],
+  flow: FlowNow | null,
+  live: boolean,
+): readonly [word: string, remark: string] {
   if (!flow?.kind) return [word, remark];
   const name = TEACHING[flow.kind];
   const count = flow.rubbed ? `${flow.rubbed.touches} touches` : `${flow.presses.length} recorded`;
   const said = flow.paused
-    ? `Teaching ${name} is paused, ${count}: open Set up to go on or to leave it`
+    ? `Teaching ${name} is paused, ${count}: ${live ? "open Set up to go on or to leave it" : "go back to live to go on"}`
     : `Teaching ${name}: ${count}`;
   if (word !== "Live") return [word, remark || said];
   return [flow.paused ? "Teaching paused" : `Teaching ${name}`, said];
 }
 
-/** What the top line says. `age`: seconds since the last frame, null before the first. */
+/** What the top line says. `age`: seconds since the last frame, null before the first; `opening`:
+ * the recording that is about to be played. */
 export function headline(
   link: LinkState,
   scene: Scene | null,
@@ -93,10 +98,12 @@ export function headline(
   now: number,
   age: number | null,
   flow: FlowNow | null = null,
+  opening: string | null = null,
 ): Headline {
   if (link.phase === "lost") return disconnected(link, now, age);
   if (link.phase === "connecting" || !scene || !status) return calm("Connecting");
-  const [word, remark] = withFlow(...stateOf(status, age !== null && age > OLD), flow);
+  if (opening !== null) return { ...calm("Opening", opening), warnings: warningsOf(status, age) };
+  const [word, remark] = withFlow(stateOf(status, age !== null && age > OLD), flow, !status.replay);
   return { word, remark, warnings: warningsOf(status, age) };
 }
 

@@ -1,5 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { duration, fixed, inScale, millimetres, niceAbove, scaleFor } from "../src/format";
+import { nameProblem } from "../src/flows/format";
 
 it("writes a true minus, never minus zero, and a dash for nothing", () => {
   expect(fixed(-1.25, 1)).toBe("−1.3");
@@ -33,4 +34,13 @@ it("rounds limits up to figures that people like", () => {
 
 it("says durations at a glance", () => {
   expect([0.4, 59, 150, 7200].map(duration)).toEqual(["0 s", "59 s", "3 min", "2 h"]);
+});
+
+describe("names of files", () => {
+  it("say which letters cannot be in one", () => {
+    expect(nameProblem("run-2_a")).toBeNull();
+    expect(nameProblem("Prüfung ß")).toMatch(/; not ü, a space, ß\.$/);
+    expect(nameProblem("-a")).toMatch(/begins with a letter or a digit\.$/);
+    expect(nameProblem("")).not.toBeNull();
+  });
 });

@@ -2,6 +2,7 @@
 
 import { describe, expect, it } from "vitest";
 import { cameraOf, isFacing, toPicture } from "../src/robot/model";
+import { touchLines } from "../src/robot/Skins";
 import { parts } from "../src/robot/solids";
 
 const ENDS = [-1, -1, -1, 1, 1, 1];
@@ -47,5 +48,23 @@ describe("a colour", () => {
     expect(parts("#ffffff")).toEqual([1, 1, 1]);
     expect(parts("#fff")).toEqual([1, 1, 1]);
     expect(parts("#0f8")).toEqual(parts("#00ff88"));
+  });
+});
+
+describe("the row of a skin", () => {
+  const touch = { id: 3, position: [0.3, -0.02, 0.05], normal: [0, 0, 1], peak: 0.1 } as const;
+
+  it("says where each touch is, and how hard where that is known", () => {
+    const found = (force: number | null, more_than: number | null = null) =>
+      ({ valid: true, touches: [{ ...touch, force, more_than }] }) as never;
+    expect(touchLines(found(4.56))).toEqual(["touch 3 at 300, \u221220, 50 mm, 4.6 N"]);
+    expect(touchLines(found(null))).toEqual(["touch 3 at 300, \u221220, 50 mm"]);
+    expect(touchLines(found(9.1, 8))).toEqual(["touch 3 at 300, \u221220, 50 mm, > 8.0 N"]);
+    expect(touchLines({ valid: true, touches: [] })).toEqual(["no touch"]);
+  });
+
+  it("never says that nothing touches a skin that is not read", () => {
+    expect(touchLines({ valid: false, touches: [] })).toEqual(["not known"]);
+    expect(touchLines(undefined)).toEqual(["not known"]);
   });
 });

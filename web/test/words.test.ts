@@ -47,6 +47,11 @@ describe("the headline", () => {
     expect(headline({ phase: "connecting" }, null, null, 0, null).word).toBe("Connecting");
   });
 
+  it("says that a recording is opened, until it is", () => {
+    const line = headline(open, scene, status, 10, 0.1, null, "run.mcap");
+    expect(line).toEqual({ word: "Opening", remark: "run.mcap", warnings: [] });
+  });
+
   it("names a guided flow, and says when it is paused", () => {
     const flow = { kind: "force", paused: false, presses: [[0, 0]], rubbed: null } as unknown as FlowNow;
     const line = (next: Partial<RunState>, given: FlowNow) =>
@@ -55,6 +60,11 @@ describe("the headline", () => {
     expect(line({}, { ...flow, paused: true })).toMatchObject({ word: "Teaching paused" });
     expect(line({}, { ...flow, paused: true }).remark).toContain("open Set up");
     expect(line({ recording: "run.mcap" }, flow)).toMatchObject({ word: "Recording", remark: "Teaching forces: 1 recorded" });
+    const replay = { now_s: 0, end_s: 9, ended: false, speed: 1, loop: false };
+    expect(line({ replay }, { ...flow, paused: true })).toMatchObject({
+      word: "Playing",
+      remark: "Teaching forces is paused, 1 recorded: go back to live to go on",
+    });
     expect(line({}, { ...flow, kind: null })).toMatchObject({ word: "Live", remark: "" });
   });
 

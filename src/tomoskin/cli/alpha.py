@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tomoskin.cli.choices import meant
 from tomoskin.cli.named_files import FIGURE, ForceFlag, Reads, Writes
 from tomoskin.cli.named_parts import Recorded, frame_range
 from tomoskin.cli.options import FramesOption, ReferenceOption, SkinArgument
 from tomoskin.cli.output import JsonFlag, tell
-from tomoskin.core import TomoskinError
+from tomoskin.core import TomoskinError, meant
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

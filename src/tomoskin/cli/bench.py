@@ -13,10 +13,9 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from tomoskin.cli.choices import meant
 from tomoskin.cli.named_files import Otherwise, Reads
 from tomoskin.cli.output import JsonFlag, tables, tell
-from tomoskin.core import DataError
+from tomoskin.core import DataError, meant
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -67,12 +66,6 @@ def say_headroom(headroom: Headroom) -> None:
     """Say on stderr what is beyond the board, where something is."""
     if headroom.problem is not None:
         remark(headroom.problem)
-
-
-def meant(given: str, known: Iterable[str]) -> str:
-    """A question after the one of the ``known`` words that was probably meant; "" for none."""
-    close = get_close_matches(given, list(known), n=1)
-    return f'; did you mean "{close[0]}"?' if close else ""
 
 
 def quantity(text: str, dimension: str, option: str) -> float:

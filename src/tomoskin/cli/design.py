@@ -31,7 +31,11 @@ _PLACES = 500
 
 _HEADINGS = (
     *("pattern", "electrodes", "rows", "samples"),
-    *("best mm", "median mm", "p95 mm", "faintest % p95"),
+    *("best mm", "median mm", "p95 mm", "faintest % p95", "saturates"),
+)
+
+_SATURATES = (
+    "where it saturates, measurements are lost at this current and gain: --json says what would fit"
 )
 
 
@@ -187,12 +191,15 @@ def _lines(document: dict[str, Any]) -> Iterator[str | Table]:
             *(row["pattern"], row["electrodes"], row["rows"], row["samples"]),
             *(f"{1e3 * row[key]:.2g}" for key in ("least_m", "median_m", "p95_m")),
             f"{100 * row['faintest_p95']:.2g}",
+            "yes" if "saturated" in row else "",
         )
         for row in document["compared"]
         if "fault" not in row
     ]
     if shown:
         yield from tables("the same sheet with another design", _HEADINGS, shown)
+    if any("saturated" in row for row in document["compared"]):
+        yield _SATURATES
     for row in document["compared"]:
-        if (words := row.get("fault") or row.get("saturated")) is not None:
-            yield f"{row['electrodes']} electrodes, {row['pattern']}: {words}"
+        if "fault" in row:
+            yield f"{row['electrodes']} electrodes, {row['pattern']}: {row['fault']}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import platform
 import sys
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import partial
 from typing import TypeVar
 
@@ -61,7 +62,7 @@ def _sinks() -> Iterator[CheckFinding]:
     for name in sink_names():
         spec = _EXAMPLES.get(name, name)
         tried = _tried("sink", partial(make_sink, spec), lambda _: "installed")
-        yield CheckFinding("sink", True, f"{name}: {tried.text}")
+        yield replace(tried, text=f"{name}: {tried.text}", optional=True)
 
 
 def _skins() -> Iterator[CheckFinding]:

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tomoskin.cli.choices import (
-    meant,
     quantity,
     skin_for_file,
     with_calibrations,
@@ -29,7 +28,7 @@ from tomoskin.cli.options import (
     TouchesOut,
 )
 from tomoskin.cli.output import Bar, JsonFlag, remark, tell
-from tomoskin.core import DataError
+from tomoskin.core import DataError, meant
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -16,6 +16,7 @@ from tomoskin.core.errors import (
     SourceError,
     TomoskinError,
     WireError,
+    meant,
 )
 from tomoskin.core.inputs import check_fits, check_is_file, most_bytes, open_input
 from tomoskin.core.outputs import (
@@ -126,6 +127,7 @@ __all__ = [
     "install_hint",
     "kept",
     "load_arrays",
+    "meant",
     "most_bytes",
     "needed",
     "numbers",

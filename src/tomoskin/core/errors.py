@@ -2,8 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from difflib import get_close_matches
+
 EMPTY = "is an empty file"
 """What is wrong with such a file, whatever it should hold."""
+
+
+def meant(given: str, known: Iterable[str]) -> str:
+    """A question after the one of the ``known`` words that was probably meant; "" for none."""
+    close = get_close_matches(given, list(known), n=1)
+    return f'; did you mean "{close[0]}"?' if close else ""
 
 
 class TomoskinError(Exception):

@@ -61,11 +61,19 @@ _AT_ONCE = Timing(hello=0.05)
 
 @dataclass(frozen=True, slots=True)
 class CheckFinding:
-    """One thing that was looked at: whether it is as expected, and a sentence."""
+    """What was looked at: whether it is as expected, a sentence; ``optional``: it need not be."""
 
     name: str
     ok: bool
     text: str
+    optional: bool = False
+
+    @property
+    def mark(self) -> str:
+        """What stands before it."""
+        if self.ok:
+            return "ok"
+        return "-" if self.optional else "FAIL"
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from bisect import bisect_right
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future
+from contextlib import suppress
 from dataclasses import dataclass
+from itertools import chain
+from typing import Any
 
 from tomoskin.board.source import Link, ScanSettings, Transport
 from tomoskin.board.wire import Info
@@ -17,13 +21,13 @@ from tomoskin.run.intake import Intake, Marker, replay_status
 from tomoskin.run.publisher import Audience, Publisher
 from tomoskin.run.status import CostMeter, Latency, Status
 from tomoskin.run.twin_control import TwinControl, described
-from tomoskin.twin import Probe
+from tomoskin.twin import Press, Probe
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Snapshot:
-    """A result, the presses on the twin when it was read, its latency in s, and when it was
-    ready, host monotonic s."""
+    """A result, the presses on the twin when it was read (of a replay those that it recorded), its
+    latency in s, and when it was ready, host monotonic s."""
 
     result: FrameResult
     truth: tuple[Probe, ...]
@@ -191,6 +195,15 @@ class Flow:
         if self._recall.is_due(self._clock(), at_end=True):
             self._recall.keep(self.prepared, self.out)
 
+    def _truth(self, frame: Frame) -> tuple[Probe, ...]:
+        """What pressed when the frame was read."""
+        replay = self.marker.replay
+        if replay is None:
+            return self.twin.truth
+        number = bisect_right(replay.truth, frame.host_time, key=lambda truth: truth.host_time)
+        presses = replay.truth[number - 1].presses if number else ()
+        return tuple(chain.from_iterable(map(_recorded, presses)))
+
     def _note_board(self, info: Info | None, name: str) -> None:
         self.board, self.board_name = info, name
         if info is None:
@@ -223,9 +236,15 @@ class Flow:
             return
         ready, decode = self._clock(), begun - read + intake.waited
         self.latency.add_result(decode, ready - begun)
-        self.newest = Snapshot(result, self.twin.truth, decode + ready - begun, ready)
+        self.newest = Snapshot(result, self._truth(frame), decode + ready - begun, ready)
         self._recall.see(result, self)
         self.out.put(result)
+
+
+def _recorded(press: Mapping[str, Any]) -> Iterator[Press]:
+    """A press of a recording; nothing where it describes none."""
+    with suppress(KeyError, TypeError, ValueError, TomoskinError):
+        yield Press(*(float(press[name]) for name in ("x", "y", "force", "radius")))
 
 
 def _doubt(prepared: Prepared, reference: ReferenceState) -> str | None:

@@ -204,8 +204,13 @@ class Publisher:
         self.recordings = Recordings(prepared, self.say, audience.clock, numbered)
 
     def begin(self, prepared: Prepared, source: str, recorded: float | None = None) -> None:
-        """A source has been opened, and this is what it is called; a replay's epoch."""
+        """A source is followed, and this is what it is called; a replay's epoch.
+
+        Sinks that run already, because it could not be opened at first, go on.
+        """
         self.recordings.name_source(source)
+        if self._sinks:
+            return
         stream = Stream.of(prepared, source, recorded, self._audience.place)
         self._sinks = tuple(sink_worker(sink, stream, self.say) for sink in self._audience.sinks)
         for worker in self._sinks:

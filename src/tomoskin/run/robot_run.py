@@ -82,10 +82,9 @@ class RobotRun:
                 runner.start()
             except SourceError as error:
                 errors.append(error)
-                runner.say(
-                    "source-lost", f"the source cannot be opened, and tomoskin tries again: {error}"
+                runner.start_without_source(
+                    f"the source cannot be opened, and tomoskin tries again: {error}"
                 )
-                runner.start_without_source()
         if len(errors) == len(self.runners):
             self.stop()
             raise errors[0]

@@ -121,8 +121,14 @@ class Runner:
         self._loop.flow.begin(transport)
         self._begin(transport)
 
-    def start_without_source(self) -> None:
-        """Begin, and go on trying to open the source: one of several boards may be missing."""
+    def start_without_source(self, why: str) -> None:
+        """Begin, and go on trying to open the source: one of several boards may be missing.
+
+        Sinks are given ``why`` as they are given the loss of a board.
+        """
+        out, prepared = self._loop.flow.out, self._loop.flow.prepared
+        out.begin(prepared, prepared.skin.name)
+        out.say("source-lost", why)
         self._begin(None)
 
     def _begin(self, transport: Transport | None) -> None:

@@ -30,7 +30,7 @@ class Door(H11Protocol):
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         self._limit: asyncio.TimerHandle | None = None
-        self._upgraded = False
+        self._upgraded = self._begun = False
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Begin to wait for a request, and close the oldest where too many wait."""
@@ -38,7 +38,8 @@ class Door(H11Protocol):
         self._mind()
         waiting = [c for c in self.connections if isinstance(c, Door) and c._limit is not None]
         if len(waiting) > MOST_WAITING:
-            min(waiting, key=lambda door: door._limit.when() if door._limit else 0.0)._refuse()
+            oldest = min(waiting, key=lambda door: door._limit.when() if door._limit else 0.0)
+            oldest._refuse(crowded=True)
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Stop the clock of a connection that has ended."""
@@ -47,12 +48,14 @@ class Door(H11Protocol):
 
     def data_received(self, data: bytes) -> None:
         """Take what may be part of a request."""
+        self._begun = True
         super().data_received(data)
         self._mind()
 
     def on_response_complete(self) -> None:
         """Start the clock for the next request."""
         super().on_response_complete()
+        self._begun = False
         self._mind()
 
     def handle_websocket_upgrade(self, event: h11.Request) -> None:
@@ -73,12 +76,13 @@ class Door(H11Protocol):
             self._limit.cancel()
             self._limit = None
 
-    def _refuse(self) -> None:
-        """Close it; that is said once a minute."""
+    def _refuse(self, *, crowded: bool = False) -> None:
+        """Close it; that is said once a minute, but of no connection that a browser had to spare:
+        one without a single byte, where there are few."""
         self._stop_waiting()
         self.transport.abort()
         now = time.monotonic()
-        if now >= Door._quiet_until:
+        if (self._begun or crowded) and now >= Door._quiet_until:
             Door._quiet_until = now + _QUIET
             where = f"{self.client[0]}" if self.client else "somewhere"
             _log.warning("page: connections from %s that ask for nothing are closed", where)

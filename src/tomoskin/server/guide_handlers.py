@@ -80,7 +80,16 @@ class GuideHandlers:
         mesh = self._hub.runner.prepared.mesh
         if self._flow is not None and self._flow.prepared.mesh.identity != mesh.identity:
             self._leave()
+        self._pause()
         return (self._flow.now() if self._flow else FlowNow(),)
+
+    def _pause(self) -> bool:
+        """Have the flow wait while no page shows it or a recording is played; True for a change."""
+        flow, on = self._flow, bool(self._shown_by) and self._hub.runner.replay is None
+        if flow is None or flow.paused != on:
+            return False
+        flow.show(on=on)
+        return True
 
     def _begin(self, page: Page, kind: FlowKind) -> None:
         if self._hub.runner.replay is not None:
@@ -98,8 +107,7 @@ class GuideHandlers:
             self._shown_by.add(page)
         else:
             self._shown_by.discard(page)
-        if self._flow is not None and self._flow.paused == bool(self._shown_by):
-            self._flow.show(on=bool(self._shown_by))
+        if self._pause():
             self._tell()
 
     def _leave(self) -> None:
@@ -115,7 +123,8 @@ class GuideHandlers:
     def _look(self, flow: GuidedFlow, loop: asyncio.AbstractEventLoop, result: FrameResult) -> None:
         """Hand over a frame; in a thread of its own."""
         with flow.lock:
-            news = None if flow.paused else flow.see(result)
+            played = self._hub.runner.replay is not None  # its presses were on no dot
+            news = None if flow.paused or played else flow.see(result)
         if news is not None:
             with contextlib.suppress(RuntimeError):  # the loop has ended
                 loop.call_soon_threadsafe(self._advance, flow, news)

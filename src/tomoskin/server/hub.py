@@ -233,7 +233,11 @@ class Hub(Host):
         runner, status = self.runner, self.runner.status()
         if self._scene is None:
             self._scene = views.scene(
-                runner.prepared, status.source, limit=self._limit, pressable=runner.twin.pressable
+                runner.prepared,
+                status.source,
+                limit=self._limit,
+                pressable=runner.twin.pressable,
+                truth=runner.replay is not None and bool(runner.replay.truth),
             )
         return self._scene, views.state(status)
 

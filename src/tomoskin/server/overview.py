@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import math
 import time
 from collections.abc import AsyncIterator, Callable, Mapping
 from pathlib import Path
@@ -12,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from tomoskin import __version__
-from tomoskin.core import FloatArray, WireError, encode_json
+from tomoskin.core import FloatArray, Force, WireError, encode_json
 from tomoskin.files.messages import Contacts, Stream
 from tomoskin.model.robot import PlacedSkin, Pose, Robot
 from tomoskin.run import RobotRun, Runner, StrictRequest, commands
@@ -125,6 +126,8 @@ class Overview(Host):
 
     def _on(self, name: str, runner: Runner) -> TouchesOfSkin:
         assert runner.newest is not None
+        if not runner.status().running:  # what touched last may touch no more
+            return TouchesOfSkin(valid=False, touches=[])
         contacts = Contacts.of(self._streams[name], runner.newest.result)
         pose = self._poses[name]
         touches = [
@@ -134,6 +137,7 @@ class Overview(Host):
                 normal=_rounded(pose.rotation @ contact.normal),
                 peak=contact.touch.detection.peak,
                 force=contact.force,
+                more_than=_more_than(contact.touch.detection.force),
             )
             for contact in contacts.touches
         ]
@@ -180,6 +184,10 @@ def states(run: RobotRun) -> RobotState:
     }
     recording = None if run.recording is None else run.recording.name
     return RobotState(skins=skins, recording=recording)
+
+
+def _more_than(force: Force | None) -> float | None:
+    return force.low if force is not None and math.isinf(force.high) else None
 
 
 def _rounded(values: FloatArray) -> Any:

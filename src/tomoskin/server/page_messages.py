@@ -86,6 +86,7 @@ class Scene(Message, frozen=True, tag="scene"):
 
     ``limit`` is the end of the fixed symmetric colour scale, in ``unit``; ``solid`` holds the
     points in space, x0, y0, z0, …, of a sheet on a surface; null: the sheet lies flat.
+    ``truth``: what really presses is known, because it can be pressed or was when it was recorded.
     """
 
     skin: SkinName
@@ -99,6 +100,7 @@ class Scene(Message, frozen=True, tag="scene"):
     pattern: PatternRows
     source: str
     pressable: bool
+    truth: bool
     probe: ProbeSizes
     version: str
 
@@ -418,13 +420,17 @@ class RobotState(Message, frozen=True, tag="robot-state"):
 
 
 class SpaceTouch(MessagePart, frozen=True):
-    """A touch in the frame of the robot's root; ``force`` N, null where nothing gives it."""
+    """A touch in the frame of the robot's root; ``force`` N, null where nothing gives it.
+
+    ``more_than``: N that it is more than, where it is beyond what was taught; else null.
+    """
 
     id: int
     position: tuple[float, float, float]
     normal: tuple[float, float, float]
     peak: float
     force: float | None
+    more_than: float | None = None
 
 
 class TouchesOfSkin(MessagePart, frozen=True):

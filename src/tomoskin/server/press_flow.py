@@ -138,7 +138,7 @@ class DotFlow(GuidedFlow):
         if self._undone and taker.phase == "release":  # it may have been no press
             taker.restart()
         self._undone = False
-        dv = taker.push(result.host_time, result.voltages)
+        dv = taker.push(result.host_time, result.voltages, touched=bool(result.touches))
         if dv is None:
             return None if before == (taker.phase, taker.hint) else False
         away = [math.dist((t.detection.x, t.detection.y), dot) for t in result.touches]

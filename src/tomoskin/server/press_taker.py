@@ -42,7 +42,18 @@ _PATIENCE = 5.0
 """Seconds in a phase after which it is said what is wrong."""
 
 _EARLY = "The last press ended too early: hold still until it is recorded."
-_UNSEEN = "The last press was too faint to be seen: press harder."
+_UNSEEN = "The last press was too faint to be seen: press a little harder."
+_TOUCHED = (
+    "Something touches the skin already. Let go, and wait until you are asked to press; if nothing "
+    "touches it, take the reference again."
+)
+
+_BELIEVED = 8.0
+"""Seconds for which a touch that shows keeps a frame from passing for the untouched skin: one that
+stays may be none."""
+
+_LIFTING = 1.0
+"""Seconds for which a touch may still show after a press has been let go."""
 
 OFTEN = 0.02
 """Frames are taken no more often than this, s: a hand is not faster."""
@@ -119,12 +130,13 @@ class PressTaker:
 
     def __init__(self, least: float, sign: int = 0) -> None:
         self._least, self._sign = least, sign
-        self._last = self._now = -np.inf
+        self._last = self._now = self._since = -np.inf
         self._rest, self._window = _UNKNOWN, 1
         self._frames: deque[FloatArray] = deque(maxlen=_MOST_REST + _LAG + max(_WINDOWS))
         self._pressed: deque[FloatArray] = deque(maxlen=_LONGEST)
         self._largest = self._clear = 0.0
         self._remark = ""
+        self._touched = False
         self._enter("rest")
 
     def restart(self) -> None:
@@ -151,8 +163,13 @@ class PressTaker:
                 "The skin is not as it was before this press. Let go; if nothing touches it, undo "
                 "this press."
             )
+        if self._touched and (late or self._now - self._since > _LIFTING):
+            return _TOUCHED
         if self.phase == "press" and late:
-            return "No press shows in the voltages. If you are pressing, let go, then press harder."
+            return (
+                "No press shows in the voltages. If you are pressing, let go, then press a little "
+                "harder."
+            )
         if self.phase in {"rest", "press"}:
             return self._remark
         if self.phase == "hold" and late:
@@ -166,14 +183,26 @@ class PressTaker:
             return "A faint press: hold still, more frames are averaged."
         return (
             f"This press is too faint: expected {_FAINTEST:g} noises in the mean of {_LONGEST} "
-            f"frames, found {self._clear:.1f}. Press harder."
+            f"frames, found {self._clear:.1f}. Press a little harder."
         )
 
-    def push(self, host_time: float, voltages: FloatArray) -> FloatArray | None:
-        """Take a frame (n_meas,) V; (n_meas,) V, the change, when a press has stood still."""
+    def push(
+        self, host_time: float, voltages: FloatArray, *, touched: bool = False
+    ) -> FloatArray | None:
+        """Take a frame (n_meas,) V; (n_meas,) V, the change, when a press has stood still.
+
+        ``touched``: the run shows a touch in it.
+        """
         if 0 <= host_time - self._last < OFTEN:
             return None
         self._last = self._now = host_time
+        if np.isinf(self._since):
+            self._since = host_time
+        if self.phase == "rest":
+            self._touched = touched
+            if touched and self._now - self._since < _BELIEVED:
+                self._frames.clear()
+                return None
         if self.phase in {"rest", "press"}:
             self._wait(voltages)
             return None
@@ -206,7 +235,8 @@ class PressTaker:
             apart = frames[-window:].mean(axis=0) - rest.mean
             if rest.noises(apart) > present * rest.deviation(window):
                 if self._sign * float(np.nansum(np.sign(rest.mean) * apart)) < 0:
-                    self._remark = _UNSEEN  # and has ended: it passed for the untouched skin
+                    # it has ended, and had passed for the untouched skin
+                    self._remark = "" if self._touched else _UNSEEN
                     self.restart()
                 else:
                     self._press(frames[-window:], window)
@@ -214,7 +244,7 @@ class PressTaker:
 
     def _press(self, newest: FloatArray, window: int) -> None:
         self._enter("hold")
-        self._window, self._remark = window, ""
+        self._window, self._remark, self._touched = window, "", False
         self._largest, self._clear = self._rest.size(newest), 0.0
         self._pressed.clear()
         self._pressed.extend(newest[-max(1, window // 4) :])

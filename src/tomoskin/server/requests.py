@@ -177,9 +177,12 @@ class DeletePress(StrictRequest, frozen=True, tag="flow_delete"):
 
 
 class SetWeight(StrictRequest, frozen=True, tag="flow_weight"):
-    """What lies on the skin, or comes next; ``sure``: an unusual weight is meant as it is said."""
+    """What lies on the skin, or comes next; ``sure``: an unusual weight is meant as it is said.
 
-    value: Annotated[float, Meta(gt=0, le=1e6)]
+    What a person types is judged by the flow, which says what is wrong with it.
+    """
+
+    value: float
     unit: Unit
     sure: bool = False
 

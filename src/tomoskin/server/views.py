@@ -23,8 +23,13 @@ _SLOWEST = 10
 """Of the slowest frames, those that a page is told."""
 
 
-def scene(prepared: Prepared, source: str, *, limit: float, pressable: bool) -> to_page.Scene:
-    """What ``limit`` ends the colour scale of, in the image's unit."""
+def scene(
+    prepared: Prepared, source: str, *, limit: float, pressable: bool, truth: bool = False
+) -> to_page.Scene:
+    """What ``limit`` ends the colour scale of, in the image's unit.
+
+    ``truth``: a replay knows what pressed.
+    """
     skin, mesh, pattern = prepared.skin, prepared.mesh, prepared.pattern
     return to_page.Scene(
         skin=to_page.SkinName.of(skin, source=str(skin.source)),
@@ -48,6 +53,7 @@ def scene(prepared: Prepared, source: str, *, limit: float, pressable: bool) -> 
         ),
         source=source,
         pressable=pressable,
+        truth=pressable or truth,
         probe=PROBE,
         version=__version__,
     )

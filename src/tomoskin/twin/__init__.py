@@ -26,6 +26,7 @@ from tomoskin.twin.source import (
     make_electronics,
     make_twin,
     on_converter,
+    read_board,
     read_settings,
 )
 from tomoskin.twin.stepped import SteppedSkin
@@ -80,6 +81,7 @@ __all__ = [
     "make_twin",
     "on_converter",
     "pressed",
+    "read_board",
     "read_settings",
     "reboots",
     "sample_table",

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tomoskin.board.source import BOARDS, BoardRecord, ScanSettings, read_options
-from tomoskin.core import Clock, Frame, SourceError, WallClock
+from tomoskin.core import Clock, Frame, SourceError, WallClock, meant
 from tomoskin.model.pattern import Scan
 from tomoskin.twin.bend import Pose
 from tomoskin.twin.device import TwinDevice
@@ -156,20 +156,21 @@ def open_twin(argument: str, skin: Skin) -> TwinTransport:
     """``twin``, or with options, joined by commas: ``twin:seed=3,noise=2``.
 
     ``seed=N``: of noise, spread and temperature. ``fast``: no waiting. ``preset=NAME``: another
-    material and board than the skin file's. ``noise=LSB``: of one conversion. ``board=NAME``: the
-    speed, the limits and the converter of a board of the table.
+    material and board than the skin file's. ``noise=LSB``: of one conversion. ``board=NAME``, or
+    the name alone: the speed, the limits and the converter of a board of the table.
 
     Raises
     ------
     SourceError
         For an unknown option or value.
     """
-    options = read_options(argument, ("seed", "fast", "preset", "noise", "board"), "twin")
+    options = read_options(argument, ("seed", "fast", "preset", "noise", "board", *BOARDS), "twin")
     settings = read_settings(options, skin, "twin")
     if "noise" in options:
         settings = settings.with_noise(_noise(options["noise"]))
     pace = 0.0 if "fast" in options else 1.0
-    return make_twin(skin, settings, WallClock(), pace, _record(options.get("board")))
+    board = read_board(options, "twin")
+    return make_twin(skin, settings, WallClock(), pace, None if board is None else BOARDS[board])
 
 
 def read_settings(options: Mapping[str, str], skin: Skin, where: str) -> TwinSettings:
@@ -183,8 +184,25 @@ def read_settings(options: Mapping[str, str], skin: Skin, where: str) -> TwinSet
     preset = options.get("preset", skin.twin.preset)
     if preset not in PRESETS:
         names = ", ".join(PRESETS)
-        raise SourceError(f'expected a preset of {names}, got "{preset}"', where=where)
+        guess = meant(preset, PRESETS)
+        raise SourceError(f'expected a preset of {names}, got "{preset}"{guess}', where=where)
     return TwinSettings.preset(preset, int(seed))
+
+
+def read_board(options: Mapping[str, str], where: str) -> str | None:
+    """The board that ``board=NAME``, or its name alone, stands for; None where there is none.
+
+    Raises SourceError that names ``where``.
+    """
+    names = {options["board"]} if "board" in options else set()
+    names |= {name for name in BOARDS if name in options}
+    if len(names) > 1:
+        raise SourceError(f"expected one board, got {' and '.join(sorted(names))}", where=where)
+    for name in names - BOARDS.keys():
+        known = ", ".join(BOARDS)
+        guess = meant(name, BOARDS)
+        raise SourceError(f'expected a board of {known}, got "{name}"{guess}', where=where)
+    return next(iter(names), None)
 
 
 def make_twin(
@@ -256,12 +274,6 @@ def on_converter(
     """The read-out and its ``noise``, LSB, with a finer converter: as noisy in volts."""
     bits = max(adc_bits, readout.adc_bits)
     return replace(readout, adc_bits=bits), noise * (1 << bits - readout.adc_bits)
-
-
-def _record(name: str | None) -> BoardRecord | None:
-    if name is None or name in BOARDS:
-        return BOARDS[name] if name else None
-    raise SourceError(f'expected a board of {", ".join(BOARDS)}, got "{name}"', where="twin")
 
 
 def _noise(text: str) -> float:

@@ -119,3 +119,23 @@ def test_a_scan_is_stamped_with_its_middle_however_late_the_frame_came(wander):
 def test_without_a_clock_a_scan_is_stamped_by_its_arrival():
     frame = framed(0, 0, 7.0)
     assert ScanTimer().middle(frame, 0.06, 16e6) == (pytest.approx(6.97), 0.06)
+
+
+@pytest.mark.parametrize(
+    "glitch",
+    [
+        lambda ticks: np.where(np.arange(len(ticks)) < 500, ticks, ticks + 2**33),
+        lambda ticks: np.where(np.arange(len(ticks)) == 500, ticks + 2**40, ticks),
+        lambda ticks: np.where(np.arange(len(ticks)) == 500, ticks - 6_000_000, ticks),
+        lambda ticks: np.where(np.arange(len(ticks)) == 501, ticks - 12_499, ticks),
+        lambda ticks: np.where(np.arange(len(ticks)) < 500, ticks, ticks - ticks[500]),
+    ],
+    ids=["set ahead", "ahead once", "back once", "too soon once", "started again"],
+)
+def test_a_clock_that_stumbles_spoils_a_few_stamps_at_most(glitch):
+    clock, spoilt = ScanTimer(), []
+    for k, ticks in enumerate(glitch(7 + 12_500 * np.arange(2000)).tolist()):
+        middle, duration = clock.middle(framed(k, ticks, 100 + 0.05 * k), 0.045, 250e3)
+        if abs(middle - (100 + 0.05 * k - 0.0225)) > 1e-3 or duration != pytest.approx(0.045):
+            spoilt.append(k)
+    assert len(spoilt) <= 1

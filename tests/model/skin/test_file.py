@@ -139,7 +139,9 @@ BAD = {
         "[outline] width",
         'needs shape = "ellipse" or "rectangle", got shape = "disc"',
     ),
-    "unknown shape": ('"disc"', '"disk"', "[outline]", '"disk"'),
+    "unknown shape": ('"disc"', '"disk"', "[outline] shape", 'got "disk"; did you mean "disc"?'),
+    "value left out": ('"20 cm"', "", "", "is not valid TOML near [outline] diameter: "),
+    "quote left out": ('"20 cm"', '"20 cm', "", "is not valid TOML near [outline] diameter: "),
     "bare number": ('"20 cm"', "200", "[outline] diameter", 'write it as "200 mm"'),
     "boolean": ('"20 cm"', "true", "[outline] diameter", "got true"),
     "wrong unit": ('"20 cm"', '"20 s"', "[outline] diameter", 'got unit "s"'),
@@ -190,7 +192,7 @@ ADDED = {
     "alpha as text": ('[inverse]\nalpha = "1"', "[inverse] alpha", 'got "1"'),
     "alpha of zero": ("[inverse]\nalpha = 0", "[inverse] alpha", "a number from 1e-09"),
     "unknown prior": ('[inverse]\nprior = "tv"', "[inverse] prior", 'or "matern", got "tv"'),
-    "unknown pattern": ('pattern = "adjacnt"', "[drive]", "expected a pattern among adjacent"),
+    "unknown pattern": ('pattern = "adjacnt"', "[drive]", '"adjacnt"; did you mean "adjacent"?'),
     "pattern that cannot be": ('pattern = "skip:9"', "[drive]", "expected k from 0 to 6"),
     "pattern and tables": (
         'pattern = "adjacent"\ndrive = [[1, 0]]\nmeasure = [[2, 3]]',
@@ -228,6 +230,7 @@ ADDED = {
         "expected at most 1 at 16 bits, got 2",
     ),
     "section twice": ("[skin]", "", "is not valid TOML"),
+    "unknown word": ('[inverse]\nprior = "nosr"', "[inverse] prior", 'did you mean "noser"?'),
 }
 
 

@@ -63,4 +63,6 @@ def test_a_row_that_stands_twice_is_meant_where_a_pattern_would_refuse_it() -> N
     drive, measure = np.vstack(2 * [ONCE.drive]), np.vstack([ONCE.measure, ONCE.measure[:, ::-1]])
     values = np.hstack([VALUES, -3.0 * VALUES])
     recording = Recording(values, drive, measure, np.arange(5.0), None, None, False, "here")
-    assert recording.in_order_of(ONCE).voltages == pytest.approx(2.0 * VALUES)
+    found = recording.in_order_of(ONCE)
+    assert found.voltages == pytest.approx(2.0 * VALUES)
+    assert found.notes[0].endswith("counts, though the repeated ones are 3 times as large")

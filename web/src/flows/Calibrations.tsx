@@ -31,7 +31,6 @@ export function InUse({ of }: { of: Of }) {
   const kept = (files.value?.files ?? []).filter(({ name }) => name.endsWith(".npz"));
   return (
     <>
-      <h3>In use</h3>
       <p data-testid="calibration">
         {known === null
           ? WITHOUT[of]

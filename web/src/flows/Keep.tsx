@@ -2,6 +2,7 @@
 
 import { type Signal, signal } from "@preact/signals";
 import { send } from "../state";
+import { nameProblem } from "./format";
 import { flow, type FlowKind } from "./model";
 
 const names: Readonly<Record<FlowKind, Signal<string>>> = {
@@ -32,6 +33,7 @@ export function Leave() {
 
 export function Keep({ kind }: { kind: FlowKind }) {
   const name = names[kind];
+  const problem = nameProblem(name.value);
   return (
     <form
       class="row"
@@ -46,14 +48,17 @@ export function Keep({ kind }: { kind: FlowKind }) {
       <input
         id="keep-name"
         type="text"
-        pattern="[A-Za-z0-9][A-Za-z0-9_\-]{0,63}"
-        required
         value={name.value}
         onInput={({ currentTarget }) => (name.value = currentTarget.value)}
       />
-      <button type="submit" class="main" data-testid="flow-keep" disabled={!flow.value.ready}>
+      <button type="submit" class="main" data-testid="flow-keep" disabled={!flow.value.ready || problem !== null}>
         Save and use
       </button>
+      {problem && (
+        <p class="wrong" role="alert">
+          {problem}
+        </p>
+      )}
     </form>
   );
 }

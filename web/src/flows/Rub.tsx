@@ -62,13 +62,13 @@ function Learn({ needed, thinking }: { needed: number; thinking: boolean }) {
 }
 
 export function Rub() {
-  const { phase, presses, rubbed, text, thinking, dot, ready } = flow.value;
+  const { phase, presses, rubbed, text, thinking, dot, ready, paused } = flow.value;
   if (!rubbed) return null;
   const { touches, needed } = rubbed;
   return (
     <>
       <p class="lead" role="status" data-testid="phase">
-        {PHASES[phase]}
+        {paused ? "Paused while a recording is played" : PHASES[phase]}
       </p>
       <progress
         value={Math.min(touches, needed)}

@@ -2,10 +2,10 @@
 
 import { signal, useSignal } from "@preact/signals";
 import { addDrawer, whileOpened } from "../drawers";
-import { say, send, status } from "../state";
-import { bytes, day } from "./format";
+import { send, status } from "../state";
+import { bytes, day, nameProblem } from "./format";
 import type { ExportSession, FileEntry } from "../wire";
-import { askFiles, calibrations, exported, files } from "./model";
+import { askFiles, calibrations, exported, files, opening } from "./model";
 
 type Format = ExportSession["format"];
 
@@ -49,6 +49,7 @@ function Change({ file, busy }: { file: FileEntry; busy: boolean }) {
   const to = useSignal(stemOf(name));
   const notes = useSignal(file.notes);
   const id = `of-${stemOf(name)}`;
+  const problem = nameProblem(to.value);
   return (
     <div class="changing" data-testid="session-change">
       <form
@@ -65,16 +66,18 @@ function Change({ file, busy }: { file: FileEntry; busy: boolean }) {
           data-testid="session-name"
           type="text"
           autocomplete="off"
-          required
-          pattern="[A-Za-z0-9][A-Za-z0-9_\-]{0,63}"
-          title="Letters, digits, dash and underscore"
           disabled={busy}
           value={to.value}
           onInput={({ currentTarget }) => (to.value = currentTarget.value)}
         />
-        <button type="submit" disabled={busy}>
+        <button type="submit" disabled={busy || problem !== null}>
           Rename
         </button>
+        {problem && (
+          <p class="wrong" role="alert" data-testid="name-problem">
+            {problem}
+          </p>
+        )}
       </form>
       <form
         class="row"
@@ -138,7 +141,7 @@ function Session({ file }: { file: FileEntry }) {
           type="button"
           disabled={recorded}
           onClick={() => {
-            say(`Opening ${name}`);
+            opening.value = name;
             send({ type: "open", name });
           }}
         >

@@ -1,8 +1,10 @@
 /** The drawer that sets a skin up: the board, the reference, the wires, the touch, the force. */
 
+import { useEffect } from "preact/hooks";
 import { takeReference } from "../commands";
 import { addDrawer, whileOpened } from "../drawers";
 import { duration, millimetres } from "../format";
+import { narrow } from "../screen";
 import { send, status } from "../state";
 import type { FlowNow } from "../wire";
 import { InUse } from "./Calibrations";
@@ -153,7 +155,8 @@ const PHASES: Partial<Record<Phase, string>> = {
 };
 
 /** What is to be done now. */
-function lead({ phase, effort, ready }: FlowNow): string | undefined {
+function lead({ phase, effort, ready, paused }: FlowNow): string | undefined {
+  if (paused) return "Paused while a recording is played";
   if (phase !== "press") return PHASES[phase];
   if (effort) return `Press ${effort} where the dot is`;
   return ready ? "Save it, or press where the dot is" : PHASES.press;
@@ -172,16 +175,6 @@ function Going({ kind }: { kind: FlowKind }) {
         {taken}
         {thinking ? ", computing…" : ""}
       </p>
-      <p data-testid="flow-text">{text}</p>
-      {kind === "mapping" && figures.probability !== undefined && (
-        <progress value={figures.probability} max={1} aria-label="How sure the answer is" />
-      )}
-      {doubtful.length > 0 && (
-        <p class="wrong">
-          {doubtful.length === 1 ? "Press " : "Presses "}
-          {doubtful.map((row) => row + 1).join(", ")} do not fit the others: the position may be wrong.
-        </p>
-      )}
       <div class="does">
         <button
           type="button"
@@ -194,6 +187,16 @@ function Going({ kind }: { kind: FlowKind }) {
         <Leave />
       </div>
       <Keep kind={kind} />
+      <p data-testid="flow-text">{text}</p>
+      {kind === "mapping" && figures.probability !== undefined && (
+        <progress value={figures.probability} max={1} aria-label="How sure the answer is" />
+      )}
+      {doubtful.length > 0 && (
+        <p class="wrong">
+          {doubtful.length === 1 ? "Press " : "Presses "}
+          {doubtful.map((row) => row + 1).join(", ")} do not fit the others: the position may be wrong.
+        </p>
+      )}
       <ol class="presses" aria-label="Presses recorded">
         {presses.map(([x, y], k) => (
           <li key={k} class={doubtful.includes(k) ? "doubtful" : ""}>
@@ -238,6 +241,12 @@ function Guided({ kinds }: { kinds: readonly Teaching[] }) {
 function View() {
   const shown = step.value;
   const going = flow.value.kind && stepOf(flow.value.kind);
+  useEffect(() => {
+    // What is to be done stands at the top.
+    const drawer = document.getElementById("drawer");
+    drawer?.querySelector(".drawn")?.scrollTo(0, 0);
+    if (narrow.peek()) drawer?.scrollIntoView();
+  }, [shown, going]);
   return (
     <div class="flow">
       <div class="steps" role="group" aria-label="Steps">
@@ -253,8 +262,8 @@ function View() {
           </button>
         ))}
       </div>
-      {shown === "board" ? <Board /> : <Guided kinds={TEACHING[shown]} />}
       {(shown === "touch" || shown === "force") && going !== shown && <InUse of={shown} />}
+      {shown === "board" ? <Board /> : <Guided kinds={TEACHING[shown]} />}
     </div>
   );
 }

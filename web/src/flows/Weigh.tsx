@@ -4,7 +4,7 @@ import { effect, signal } from "@preact/signals";
 import { fixed, millimetres } from "../format";
 import { hand, scene, send } from "../state";
 import { Keep, Leave, Remarks } from "./Keep";
-import type { WeightNow } from "../wire";
+import type { FlowNow, WeightNow } from "../wire";
 import { flow, type Phase } from "./model";
 
 type Unit = WeightNow["unit"];
@@ -144,13 +144,19 @@ function Recorded() {
   );
 }
 
+/** What is to be done now. */
+function lead({ phase, weight, paused }: FlowNow): string | undefined {
+  if (paused) return "Paused while a recording is played";
+  return !weight && phase === "press" ? "Say what you will put on" : PHASES[phase];
+}
+
 export function Weigh() {
-  const { phase, presses, weight, text, thinking } = flow.value;
+  const { presses, weight, text, thinking } = flow.value;
   const heavy = weight && tooHeavy(weight);
   return (
     <>
       <p class="lead" role="status" data-testid="phase">
-        {!weight && phase === "press" ? "Say what you will put on" : PHASES[phase]}
+        {lead(flow.value)}
       </p>
       <WeightForm />
       <Asked />
@@ -160,15 +166,15 @@ export function Weigh() {
         </p>
       )}
       {heavy && <p class="wrong">{heavy}</p>}
+      <div class="does">
+        <Leave />
+      </div>
+      <Keep kind="force" />
       <p data-testid="taken">
         {presses.length} placement{presses.length === 1 ? "" : "s"} recorded{thinking ? ", computing…" : ""}
       </p>
       <p data-testid="flow-text">{text}</p>
       <Remarks />
-      <Keep kind="force" />
-      <div class="does">
-        <Leave />
-      </div>
       <Recorded />
     </>
   );

@@ -26,3 +26,11 @@ export function day(seconds: number): string {
     minute: "2-digit",
   });
 }
+
+/** Why no file can be called so, in words; null where one can. */
+export function nameProblem(name: string): string | null {
+  if (/^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$/.test(name)) return null;
+  const odd = [...new Set([...name].filter((letter) => !/[A-Za-z0-9_-]/.test(letter)))];
+  const not = odd.length > 0 ? `; not ${odd.map((letter) => (letter === " " ? "a space" : letter)).join(", ")}` : "";
+  return `A name has letters from a to z, digits, dashes and underscores, and begins with a letter or a digit${not}.`;
+}

@@ -40,6 +40,9 @@ export type Tick = Pick<EventNote, "time_s" | "text">;
 export const marks = signal<readonly Tick[]>([]);
 export const gaps = signal<readonly Tick[]>([]);
 export const spans = signal<readonly Pick<Span, "id" | "kind" | "begin" | "end">[]>([]);
+/** The recording that was asked for, until its first frame can be shown; a skin is made for it. */
+export const opening = signal<string | null>(null);
+onMessage("error", () => (opening.value = null));
 /** The last file that an export wrote. */
 export const exported = signal<string | null>(null);
 
@@ -58,7 +61,7 @@ let version: string | null = null;
 onMessage("scene", (message) => {
   if (version !== null && version !== message.version) window.location.reload();
   version = message.version;
-  timeline.value = null;
+  timeline.value = opening.value = null;
   restart();
 });
 

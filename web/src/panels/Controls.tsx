@@ -98,7 +98,7 @@ export function Controls() {
       <div role="group" aria-label="View" class="views">
         <Button command={space} pressed={inSpace.value} />
         <Button command={commands.flat} label={smoothed.value ? "Show cells" : "Smooth"} />
-        {pressable && <Button command={commands.truth} pressed={showTruth.value} />}
+        {scene.value?.truth && <Button command={commands.truth} pressed={showTruth.value} />}
       </div>
     </footer>
   );

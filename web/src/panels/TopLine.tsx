@@ -1,9 +1,9 @@
 /** The top line: the state as a word, the skin, what happens or what to act on, the figures. */
 
 import { signal } from "@preact/signals";
-import { flow } from "../flows/model";
+import { flow, opening } from "../flows/model";
 import { doing, progress, settings } from "../settings/model";
-import { connection, link, newest, notice, now, scene, send, status } from "../state";
+import { answered, connection, link, newest, notice, now, scene, send, status } from "../state";
 import { facts, headline, type Warning } from "../words";
 
 const unfolded = signal(false);
@@ -63,10 +63,11 @@ function Warnings({ warnings }: { readonly warnings: readonly Warning[] }) {
   );
 }
 
-/** What happens, where nobody has to act. */
+/** What happens, where nobody has to act; or the answer to what was just done. */
 function Remark({ text }: { readonly text: string }) {
   const change = settings.value?.busy && progress.value ? `Changing the skin: ${doing(progress.value)}` : "";
-  const shown = text || change || notice.value || scene.value?.source || "";
+  const said = notice.value ?? "";
+  const shown = (answered.value && said) || text || change || said || scene.value?.source || "";
   return (
     <span class="remarked" data-testid="remark" title={shown}>
       {shown}
@@ -75,7 +76,9 @@ function Remark({ text }: { readonly text: string }) {
 }
 
 export function TopLine() {
-  const { word, remark, warnings } = headline(link.value, scene.value, status.value, now.value, age(), flow.value);
+  const { word, remark, warnings } = headline(
+    link.value, scene.value, status.value, now.value, age(), flow.value, opening.value,
+  );
   const lost = link.value.phase === "lost";
   const act = warnings.length > 0;
   return (
@@ -94,7 +97,7 @@ export function TopLine() {
         </a>
       )}
       <Skin />
-      {act ? <Warnings warnings={warnings} /> : <Remark text={remark} />}
+      {act && !answered.value ? <Warnings warnings={warnings} /> : <Remark text={remark} />}
       {lost && (
         <button type="button" onClick={() => connection.open()}>
           Try now

@@ -1,14 +1,21 @@
 /** Each skin in a row: how it is doing, what touches it, and the way to its own page. */
 
-import { states, robot, touches } from "./model";
+import { fixed, millimetres } from "../format";
+import { states, robot, touches, type SkinTouches } from "./model";
 
-function strength(force: number | null): string {
-  return force === null ? "" : ` ${force.toFixed(1)} N`;
+/** What touches a skin, a line each: its number as in the picture, x, y, z, and newtons. */
+export function touchLines(found: SkinTouches[string] | undefined): string[] {
+  if (!found?.valid) return ["not known"];
+  if (found.touches.length === 0) return ["no touch"];
+  return found.touches.map(({ id, position, force, more_than: least }) => {
+    const place = position.map((value) => millimetres(value, 0)).join(", ");
+    const newtons = least === null ? fixed(force, 1) : `> ${fixed(least, 1)}`;
+    return `touch ${id} at ${place} mm${force === null ? "" : `, ${newtons} N`}`;
+  });
 }
 
 function Row({ name, frame }: { name: string; frame: string }) {
   const state = states.value?.skins[name];
-  const found = touches.value[name]?.touches ?? [];
   const trouble = state?.problem ?? (state && !state.ready ? "the untouched skin is being measured" : null);
   const rate = state ? `${state.fps.toFixed(0)} frames/s, ${state.lost} lost` : "";
   return (
@@ -17,7 +24,7 @@ function Row({ name, frame }: { name: string; frame: string }) {
       <span class="frame">{frame}</span>
       <span class="rate">{rate}</span>
       <span class="found" data-testid={`touches-${name}`}>
-        {found.length === 0 ? "no touch" : `touch ${found.map((t) => `${t.id}${strength(t.force)}`).join(", ")}`}
+        {touchLines(touches.value[name]).map((line) => <span key={line}>{line}</span>)}
       </span>
       {trouble && <p role="status">{trouble}</p>}
     </li>

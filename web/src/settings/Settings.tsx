@@ -2,6 +2,7 @@
 
 import { useSignal } from "@preact/signals";
 import { addDrawer } from "../drawers";
+import { nameProblem } from "../flows/format";
 import { PatternEditor } from "../pattern/PatternEditor";
 import { say, scene, send } from "../state";
 import { Field, isRefused, Refusal } from "./Field";
@@ -83,10 +84,8 @@ function Files() {
   const builtin = settings.value?.builtin ?? [];
   const save = () => {
     const wanted = name.value.trim();
-    if (!/^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$/.test(wanted)) {
-      say("A name has letters, digits, dashes and underscores only");
-      return;
-    }
+    const problem = nameProblem(wanted);
+    if (problem) return say(problem);
     send({ type: "save_skin", name: wanted, replace: again.value === wanted });
     again.value = files.includes(wanted) ? wanted : "";
   };

@@ -22,6 +22,10 @@ _WATCHED = 5.0
 _TURN = 60.0
 """s after which a newer fit of the clock takes over."""
 
+_LATEST = 1.0
+"""s by which a frame can be late, or its board's clock be ahead of it; beyond, the clock has been
+set."""
+
 _MOST_DRIFT = 0.05
 """Crystals and resonators are off by less than 1 %."""
 
@@ -121,26 +125,32 @@ class ScanTimer:
 
     def __init__(self) -> None:
         self._now, self._next, self._until = ClockFitter(), ClockFitter(), -math.inf
-        self._before: int | None = None
-        self._shortest = math.inf
+        self._before: Frame | None = None
+        self._shortest = (math.inf, math.inf)
 
     def middle(self, frame: Frame, longest: float, tick_rate: float) -> tuple[float, float]:
         """Host time of the middle of the frame's scan, and the scan's duration, s.
 
         A scan takes ``longest`` s at most, and no longer than from one frame to the next by a
-        clock of ``tick_rate`` Hz.
+        clock of ``tick_rate`` Hz; but for one time, since a clock can stumble.
         """
+        before, self._before = self._before, frame
+        ticked = (frame.ticks - before.ticks) / tick_rate if before else 0.0
+        if before and ticked - (frame.host_time - before.host_time) > _LATEST:
+            self._now, self._next = ClockFitter(), ClockFitter()
+        if ticked > 0:
+            second, first = sorted((*self._shortest, ticked), reverse=True)[1:]
+            self._shortest = second, first
         if frame.host_time > self._until:
             self._now, self._next = self._next, ClockFitter()
             self._until = frame.host_time + _TURN
         for fitter in (self._now, self._next):
             fitter.add(frame.ticks, frame.host_time)
-        if self._before is not None and frame.ticks > self._before:
-            self._shortest = min(self._shortest, (frame.ticks - self._before) / tick_rate)
-        self._before = frame.ticks
-        duration, fit, came = min(longest, self._shortest), self._now.fit, frame.host_time
+        duration, fit, came = min(longest, self._shortest[0]), self._now.fit, frame.host_time
         if fit is not None:
             came = min(came, fit.offset + frame.ticks / fit.tick_rate)
+        if came < frame.host_time - _LATEST:
+            self._now, self._next, came = ClockFitter(), ClockFitter(), frame.host_time
         return came - duration / 2, duration
 
 

@@ -10,7 +10,7 @@ from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Protocol, TypeVar, runtime_checkable
 
 from tomoskin.board.wire import Ack, Command, Decoder, Message, encode
-from tomoskin.core import SourceError
+from tomoskin.core import SourceError, meant
 
 if TYPE_CHECKING:
     from tomoskin.model.skin import Skin
@@ -97,7 +97,8 @@ def open_source(spec: str, skin: Skin) -> Transport:
         return opener(argument, skin)
     names = ", ".join(source_names()) or "none is installed"
     raise SourceError(
-        f'expected a source ({names}), got "{name}"', hint="for example twin or serial:PORT"
+        f'expected a source ({names}), got "{name}"{meant(name, source_names())}',
+        hint="for example twin or serial:PORT",
     )
 
 

@@ -122,12 +122,12 @@ def repair(
     if not source.exists():
         raise DataError("there is no such file", where=str(source))
     result = Repaired(target)
-    about, attachments = _front(source, skin)
+    about, attachments = _front(source, skin, lambda done, size: advance(done, 2 * size))
     with _new_file(target) as mended:
         mended.describe(ABOUT, about)
         for item in attachments:
             mended.attach(item.name, item.media_type, item.data)
-        _copy(source, mended, result, advance)
+        _copy(source, mended, result, lambda done, size: advance(size + done, 2 * size))
         if not result.chunks:
             raise DataError("holds no whole chunk, so nothing can be recovered", where=str(source))
     return result
@@ -168,13 +168,12 @@ def split(source: StrPath, advance: Advance = no_report) -> dict[str, int]:
                 parts[name].attach(rest, record.media_type, record.data, record.log_time)
             elif name in parts and isinstance(record, Metadata):
                 parts[name].describe(rest, record.metadata)
-        for stretch, size in _stretches(source):
+        for stretch in _stretches(source, advance):
             for message in _messages(stretch.record):
                 number, channel = divmod(message.channel, SPAN)
                 if number < len(names) and channel in TOPICS:
                     parts[names[number]].message(channel, message.log_time, message.data)
                     counts[names[number]] += 1
-            advance(stretch.stop, size)
     return counts
 
 
@@ -187,18 +186,19 @@ def _new_file(path: Path) -> Iterator[ContainerWriter]:
             yield container
 
 
-def _stretches(source: Path) -> Iterator[tuple[Stretch, int]]:
-    """Each stretch of a file, and the file's size."""
+def _stretches(source: Path, advance: Advance = no_report) -> Iterator[Stretch]:
+    """Each stretch of a file; says where it is in bytes, in long damage too."""
     with errors_of(source), open_input(source) as file:
         if not (size := file.seek(0, 2)):
             raise DataError(EMPTY, where=str(source))
-        for stretch in stretches(file, size):
-            yield stretch, size
+        for stretch in stretches(file, size, advance):
+            yield stretch
+            advance(stretch.stop, size)
 
 
 def _about(source: Path) -> Iterator[Any]:
     """The files inside and the named strings."""
-    for stretch, _ in _stretches(source):
+    for stretch in _stretches(source):
         if isinstance(stretch.record, Attachment | Metadata):
             yield stretch.record
 
@@ -209,7 +209,7 @@ def _messages(record: McapRecord | None) -> Iterator[LoggedMessage]:
         yield from messages_in(record, 0)
 
 
-def stretches(file: BinaryIO, size: int) -> Iterator[Stretch]:
+def stretches(file: BinaryIO, size: int, advance: Advance) -> Iterator[Stretch]:
     """The records of a file up to its DATA END, and what is lost between.
 
     It goes record by record, and where one is damaged on to the next whole one of data. That may
@@ -220,7 +220,7 @@ def stretches(file: BinaryIO, size: int) -> Iterator[Stretch]:
         opcode, stop = _head(file, place, size)
         record = _record(opcode, _read(file, place, stop - place))
         if record is None:
-            stop = _next_record(file, sure, place, size)
+            stop = _next_record(file, sure, place, size, advance)
             yield Stretch(place if stop > place else sure, stop, None)
         else:
             yield Stretch(place, stop, record)
@@ -231,7 +231,9 @@ def stretches(file: BinaryIO, size: int) -> Iterator[Stretch]:
         place = stop
 
 
-def _front(source: Path, skin: Skin | None) -> tuple[dict[str, str], list[Attachment]]:
+def _front(
+    source: Path, skin: Skin | None, advance: Advance
+) -> tuple[dict[str, str], list[Attachment]]:
     """The named strings and the attachments, wherever they are in the file.
 
     The strings have no CRC: they are made again of the skin, and of the clock as messages tell it.
@@ -240,7 +242,7 @@ def _front(source: Path, skin: Skin | None) -> tuple[dict[str, str], list[Attach
     attachments: dict[str, Attachment] = {}
     where = str(source)
     is_session, epoch = False, math.inf
-    for (_, _, record), _ in _stretches(source):
+    for _, _, record in _stretches(source, advance):
         is_session |= isinstance(record, Chunk | Attachment | Metadata)
         if isinstance(record, Attachment) and record.name != OLD_INDEX_FILE:
             attachments[record.name] = record
@@ -300,7 +302,7 @@ def _epoch(about: Mapping[str, str], told: float) -> float:
 def _copy(source: Path, container: ContainerWriter, result: Repaired, advance: Advance) -> None:
     """Write the messages of every chunk, and note what is lost."""
     after = 0
-    for (start, stop, record), size in _stretches(source):
+    for start, stop, record in _stretches(source, advance):
         if isinstance(record, Chunk):
             if result.lost and result.lost[-1].before is None:
                 result.lost[-1] = replace(result.lost[-1], before=record.message_start_time)
@@ -312,7 +314,6 @@ def _copy(source: Path, container: ContainerWriter, result: Repaired, advance: A
                 container.message(message.channel, message.log_time, message.data)
                 result.messages[TOPICS[message.channel]] += 1
         result.ended |= isinstance(record, DataEnd)
-        advance(stop, size)
 
 
 def _head(file: BinaryIO, place: int, size: int) -> tuple[int, int]:
@@ -338,7 +339,7 @@ def _record(opcode: int, data: bytes) -> McapRecord | None:
         return None
 
 
-def _next_record(file: BinaryIO, place: int, beyond: int, size: int) -> int:
+def _next_record(file: BinaryIO, place: int, beyond: int, size: int, advance: Advance) -> int:
     """Where from ``place`` on a whole record of data begins that ends ``beyond`` it, or the end."""
     while place < size:
         window = _read(file, place, _WINDOW + PREFIX.size)
@@ -348,6 +349,7 @@ def _next_record(file: BinaryIO, place: int, beyond: int, size: int) -> int:
             if stop > beyond and _record(opcode, _read(file, start, stop - start)) is not None:
                 return start
         place += _WINDOW
+        advance(min(place, size), size)
     return size
 
 

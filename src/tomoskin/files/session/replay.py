@@ -6,6 +6,7 @@ import math
 import re
 import threading
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -15,6 +16,7 @@ from tomoskin.board.source import Configuration, ScanSettings
 from tomoskin.board.wire import OLDER, SCHEMA
 from tomoskin.core import Clock, DataError, Mark, MarkedFrame, SourceError, WallClock
 from tomoskin.files.session.info import References
+from tomoskin.files.session.layout import Truth
 from tomoskin.files.session.playback import Item, Playhead
 from tomoskin.files.session.replay_board import ReplayBoard
 from tomoskin.files.session.session_reader import (
@@ -61,6 +63,9 @@ class ReplayTransport:
         Whether it stands still.
     touches_before, reference_frames
         The last identity that a touch had before it begins, and the frames that make a reference.
+    truth
+        What pressed on a twin, each time that it changed; nothing where the session has no index,
+        since all of it would have to be read.
 
     Raises
     ------
@@ -88,6 +93,7 @@ class ReplayTransport:
         self._references = References(session.path, session.settings())
         self._head = Playhead(partial(_items, session, self._stamp))
         self._end = end_time(session)
+        self.truth = () if self._end is None else _truth_of(session)
         self._wall = self._clock.now()
         self._steps = 0
         self._closed = self._after_seek = False
@@ -283,6 +289,14 @@ def _stamp_of(
         return MarkedFrame(frame, item.mark)
 
     return stamp
+
+
+def _truth_of(session: SessionReader) -> tuple[Truth, ...]:
+    """As far as it can be read: frames are played without it too."""
+    found: list[Truth] = []
+    with suppress(DataError):
+        found.extend(session.truth())
+    return tuple(sorted(found, key=lambda truth: truth.host_time))
 
 
 def _items(

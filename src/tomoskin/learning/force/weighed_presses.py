@@ -55,7 +55,7 @@ class Weight:
         """The weight that was probably meant, where this one is unusual; else None."""
         newtons = self.newtons
         unusual = newtons > _HEAVY if self.unit == "N" else newtons < _LIGHT
-        if not unusual or self.unit not in _MEANT:
+        if self.value <= 0 or not unusual or self.unit not in _MEANT:
             return None
         return Weight(self.value, _MEANT[self.unit])
 

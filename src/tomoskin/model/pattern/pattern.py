@@ -11,7 +11,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tomoskin.core import FloatArray, IntArray, PatternError
+from tomoskin.core import FloatArray, IntArray, PatternError, meant
 
 _BALANCE = 1e-3
 """Currents of a drive sum to zero, up to this part of the largest of them."""
@@ -376,4 +376,5 @@ def _one(name: str, n: int) -> Pattern:
         return Pattern.skip(n, int(k))
     raise PatternError(
         f'expected a pattern among {", ".join(NAMED)}, skip:K, or several joined by +, got "{name}"'
+        f"{meant(name, NAMED)}"
     )

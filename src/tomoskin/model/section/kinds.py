@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
-from tomoskin.core import DIMENSIONS, parse_quantity
+from tomoskin.core import DIMENSIONS, meant, parse_quantity
 
 T_co = TypeVar("T_co", covariant=True)
 
@@ -29,8 +29,12 @@ class ValueKind(ABC, Generic[T_co]):
         """``value`` in SI units. Raises ValueError with what was expected and what is there."""
         accepted = self.accept(value)
         if accepted is None:
-            raise ValueError(f"expected {self.expected}, got {show(value)}")
+            raise ValueError(f"expected {self.expected}, got {show(value)}{self.guess(value)}")
         return accepted
+
+    def guess(self, value: object) -> str:  # noqa: ARG002
+        """A question after what was probably meant; "" where nobody can know."""
+        return ""
 
 
 @dataclass(frozen=True)
@@ -70,6 +74,10 @@ class Choice(ValueKind[str]):
     def accept(self, value: object) -> str | None:
         """The word, or None where the value is none of them."""
         return value if isinstance(value, str) and value in self.words else None
+
+    def guess(self, value: object) -> str:
+        """The word that is like it, as a question."""
+        return meant(value, self.words) if isinstance(value, str) else ""
 
 
 @dataclass(frozen=True)

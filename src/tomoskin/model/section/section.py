@@ -150,6 +150,7 @@ class Section:
             place, conflict = f"{where} {key.name}", key.conflict(given, filled)
             if key.name in given:
                 if conflict:
+                    cls._check_cause(key, filled, where)
                     raise SkinError(
                         conflict, where=place, hint="remove this key, or change the other one"
                     )
@@ -161,6 +162,13 @@ class Section:
             elif key.default is not None and not conflict:
                 filled[key.name] = key.default
         return filled
+
+    @classmethod
+    def _check_cause(cls, refused: Key, filled: Mapping[str, Any], where: str) -> None:
+        """Raise SkinError where a key may not stand because another one's value is none at all."""
+        for key in cls.keys:
+            if refused.when and key.name == refused.when[0] and key.name in filled:
+                key.read(filled[key.name], where)
 
     @classmethod
     def read(cls, given: object, where: str) -> Self:
@@ -231,6 +239,22 @@ def _parameters(options: Mapping[str, Any]) -> dict[str, tuple[Any, tuple[str, .
 _COMMA = re.compile(r"=\s*[-+]?\d+,\d+\s*$", re.MULTILINE)
 
 
+_LINE = re.compile(r"\(at line (\d+), column \d+\)$")
+_KEY = re.compile(r"\s*(?P<heading>\[.*)|\s*(?P<key>[\w.-]+)\s*=")
+
+
+def _key_near(text: str, error: str) -> str:
+    """Section and key at the line that a parser's ``error`` names, or before it; "" for none."""
+    line = _LINE.search(error)
+    number = int(line[1]) if line else None
+    heading = key = ""
+    for match in filter(None, map(_KEY.match, text.splitlines()[:number])):
+        heading, key = (
+            (match["heading"].strip(), "") if match["heading"] else (heading, match["key"])
+        )
+    return f" near {f'{heading} {key}'.strip()}" if heading or key else ""
+
+
 def toml_tables(text: str, source: str, version: int, sections: Iterable[str]) -> dict[str, Any]:
     """Tables of a TOML file whose first key is ``format = version``, as written.
 
@@ -240,7 +264,8 @@ def toml_tables(text: str, source: str, version: int, sections: Iterable[str]) -
         tables = tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # also numbers or nesting beyond all bounds
         hint = "numbers need a decimal point, not a comma" if _COMMA.search(text) else ""
-        raise SkinError(f"is not valid TOML: {error}", where=source, hint=hint) from None
+        near = _key_near(text, str(error))
+        raise SkinError(f"is not valid TOML{near}: {error}", where=source, hint=hint) from None
     where = f"{source}: format"
     if "format" not in tables:
         raise SkinError(

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from importlib.metadata import entry_points
 from typing import Any
 
-from tomoskin.core import Capacity, Consumer, Event, Say, SinkError, TomoskinError, Worker
+from tomoskin.core import Capacity, Consumer, Event, Say, SinkError, TomoskinError, Worker, meant
 from tomoskin.files.messages import Contacts, Item, Naming, Reporter, Stream
 from tomoskin.pipeline import FrameResult
 
@@ -87,7 +87,8 @@ def make_sink(spec: str) -> Sink:
     entries = tuple(entry_points(group=GROUP, name=name))
     if not entries:
         raise SinkError(
-            f'there is no sink "{name}"', hint=f"sinks: {', '.join(sink_names()) or 'none'}"
+            f'there is no sink "{name}"{meant(name, sink_names())}',
+            hint=f"sinks: {', '.join(sink_names()) or 'none'}",
         )
     sink: Sink = entries[0].load()(argument)
     return sink

@@ -15,6 +15,10 @@ _AGREE = 0.5
 """Least correlation of rows that measure the same; others are no copies of each other."""
 
 
+_ALIKE = 1.25
+"""How many times as large repeated rows can be as the first ones without a word."""
+
+
 @dataclass(frozen=True, eq=False)
 class RepeatedRows:
     """Which rows measure the same: of n, m are others.
@@ -62,11 +66,13 @@ class RepeatedRows:
         first, group = first[order], np.argsort(order)[group.reshape(-1)]
         sign = _direction(drive, measure)
         sign = sign * sign[first][group]
-        correlation = _correlation(values, sign, first[group])
+        correlation, times = _correlation(values, sign, first[group])
         what, agree = "measurement", abs(correlation) >= _AGREE
         if correlation < 0:
             sign, what = np.ones(len(keys)), "size"
         said = "their mean counts" if agree else "they do not agree, so the first counts"
+        if agree and not 1 / _ALIKE <= times <= _ALIKE:
+            said += f", though the repeated ones are {times:.2g} times as large"
         note = f"{repeats} of {len(keys)} rows repeat another's {what}: {said}"
         return cls(first, group, sign, note, agree)
 
@@ -104,10 +110,13 @@ def _keys(drive: IntArray, measure: IntArray, two_ways: IntArray | None) -> IntA
     return np.column_stack([rows, way])
 
 
-def _correlation(values: NDArray[Any], sign: FloatArray, first: IntArray) -> float:
-    """Between repeated rows, ``sign`` times each, and the first of theirs, over all frames."""
+def _correlation(values: NDArray[Any], sign: FloatArray, first: IntArray) -> tuple[float, float]:
+    """Between repeated rows, ``sign`` times each, and the first of theirs, over all frames; and
+    how many times as large they are."""
     again = np.flatnonzero(first != np.arange(len(first)))
     one = np.nan_to_num(values[:, again] * sign[again], posinf=0.0, neginf=0.0)
     other = np.nan_to_num(values[:, first[again]], posinf=0.0, neginf=0.0)
-    size = float(np.linalg.norm(one) * np.linalg.norm(other))
-    return float(np.vdot(one, other).real) / size if size else 0.0
+    sizes = float(np.linalg.norm(one)), float(np.linalg.norm(other))
+    if not all(sizes):
+        return 0.0, 1.0
+    return float(np.vdot(one, other).real) / (sizes[0] * sizes[1]), sizes[0] / sizes[1]

@@ -26,6 +26,7 @@ from tomoskin.twin import (
     TwinSettings,
     TwinSkin,
     on_converter,
+    read_board,
     read_settings,
 )
 from tomoskin.twin.emulator.board_process import (
@@ -124,7 +125,7 @@ class EmulatorTransport(SheetTransport):
 
 
 def open_emulator(argument: str, skin: Skin) -> EmulatorTransport:
-    """``emulator``, ``emulator:pico``, or with options: ``emulator:pico,seed=3,preset=ideal``.
+    """``emulator``, ``emulator:board=pico``, or with options: ``emulator:pico,seed=3``.
 
     The sheet is the twin's; of the twin's electronics, current, compliance, gain and noise, the
     amplifiers' offsets, and electrodes that polarise and have thermoelectric voltages.
@@ -134,8 +135,8 @@ def open_emulator(argument: str, skin: Skin) -> EmulatorTransport:
     SourceError
         For an unknown option, or when firmware and emulator cannot be built here.
     """
-    options = read_options(argument, ("seed", "preset", *BOARDS), "emulator")
-    board = next((name for name in BOARDS if name in options), DEFAULT_BOARD)
+    options = read_options(argument, ("seed", "preset", "board", *BOARDS), "emulator")
+    board = read_board(options, "emulator") or DEFAULT_BOARD
     settings = read_settings(options, skin, "emulator").with_electrodes(skin.twin.electrodes)
     own, thermal = own_of(skin, settings)
     return EmulatorTransport(
