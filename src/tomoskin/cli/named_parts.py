@@ -237,7 +237,7 @@ def sharp(
     result: Reconstruction,
     advance: Advance,
 ) -> Reconstruction:
-    """The same with sharp images."""
+    """This reconstruction with sharp images in place of its own."""
     from tomoskin.pipeline import sharpened
 
     idle = _idle(recording, reference, prepared.pattern)

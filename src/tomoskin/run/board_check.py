@@ -70,7 +70,7 @@ class CheckFinding:
 
     @property
     def mark(self) -> str:
-        """What stands before it."""
+        """The word that stands before the finding on a terminal."""
         if self.ok:
             return "ok"
         return "-" if self.optional else "FAIL"
