@@ -33,7 +33,7 @@ from typing import Any
 from gallery import save_picture, written_gallery
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT / "benchmarks"))
+sys.path.append(str(ROOT / "benchmarks"))
 
 from report import Part, Report  # noqa: E402 - the benchmarks are no package
 

@@ -11,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from serial.tools.list_ports_common import ListPortInfo
 
+from board.source.boards import NOTHING
 from firmware.boards import FIRMWARE
 from tomoskin.board.source import (
     BOARDS,
@@ -98,7 +99,7 @@ def findings(board: Board, record: BoardRecord) -> dict[str, CheckFinding]:
     """What the check says of a ``board`` whose amplifiers are those of a ``record``."""
     ring, clock = LoadRing.for_current(8, CURRENT), WallClock()
     device = TwinDevice(OnRing(record, ring), board, clock.now())
-    transport = TwinTransport(None, device, clock)  # type: ignore[arg-type]
+    transport = TwinTransport(NOTHING, device, clock)
     return {one.name: one for one in check_board(transport, ring, CURRENT, frames=4)}
 
 

@@ -238,6 +238,9 @@ _ANSWER, _TRIES = 0.3, 5
 _HEARTBEAT, _USUAL = 300, 2000
 """ms of silence that the board tolerates: while this is tried, and after reset."""
 
+_HEARD = 10.0
+"""s until the board must have said that it stopped; an emulator's clock may be far behind."""
+
 
 def check_safe_off(
     transport: Transport, scan: Scan, settings: ScanSettings
@@ -264,7 +267,7 @@ def check_safe_off(
     text = "frames continue after STOP" if late else "no frame after STOP"
     yield CheckFinding("stop", not late, text)
     _accepted(_asked(board, start), start, transport)
-    heard = board.listen(5e-3 * _HEARTBEAT)
+    heard = board.listen(_HEARD)
     silent = any(isinstance(m, Fault) and m.code is FaultCode.HOST_SILENT for m in heard)
     since = f"{_HEARTBEAT} ms after the last message of the host"
     text = f"no frame {since}" if silent else f"frames continue {since}"

@@ -3,6 +3,7 @@
 import threading
 from collections import deque
 from dataclasses import astuple, replace
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -143,8 +144,12 @@ class Counting:
         return counts.astype(np.uint16)
 
 
+NOTHING = SimpleNamespace(sheet=None, settings=SimpleNamespace(noise=None))
+"""Electronics of a device that has a converter of its own, which nothing asks for anything."""
+
+
 def twin_transport(clock, pace=1.0, board=BOARD):
-    return TwinTransport(None, TwinDevice(Counting(), board, clock.now(), pace), clock)
+    return TwinTransport(NOTHING, TwinDevice(Counting(), board, clock.now(), pace), clock)
 
 
 def linked(transport, clock, **changes):
