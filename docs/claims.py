@@ -31,12 +31,10 @@ from pathlib import Path
 from typing import Any
 
 from gallery import save_picture, written_gallery
+from tomoskin.cli.bench import load_benchmark
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path.append(str(ROOT / "benchmarks"))
-
-from report import Part, Report  # noqa: E402 - the benchmarks are no package
-
+REPORT = load_benchmark("report")
 FILE, KEPT = ROOT / "docs" / "claims.toml", ROOT / "build" / "claims"
 RECORDINGS = ROOT.parent / "shared" / "data"
 CODE = ("src", "core-native", "examples", "benchmarks")
@@ -139,7 +137,7 @@ def figures(claim: Claim, document: Any) -> dict[str, float]:
 
 def on_page(claim: Claim) -> list[dict[str, Any]]:
     """The reports of a benchmark as they stand on its page."""
-    part = Part.of(ROOT / claim.page, claim.name)
+    part = REPORT.Part.of(ROOT / claim.page, claim.name)
     reports = []
     for text in part.text.split("\n### ")[1:]:
         title, _, rest = text.partition("\n")
@@ -238,8 +236,8 @@ def run(every: Sequence[Claim], part: str | None, *, accept: bool) -> Iterator[s
         if one.part == "gallery":
             save_picture(KEPT / f"{one.name}.png")
         if one.page:
-            reports = [Report(**report) for report in document]
-            Part.of(ROOT / one.page, one.name).write(reports)
+            reports = [REPORT.Report(**report) for report in document]
+            REPORT.Part.of(ROOT / one.page, one.name).write(reports)
         FILE.write_text(dumped(list(after.values())), encoding="utf-8")  # for what is cut off
     for page, text in pages(claims()):
         page.write_text(text, encoding="utf-8")

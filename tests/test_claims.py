@@ -12,7 +12,6 @@ import pytest
 import claims
 from claims import Claim, read, written
 from gallery import documented
-from report import Part, Report
 
 REPORTS: list[dict[str, Any]] = [
     {
@@ -75,7 +74,7 @@ def test_a_table_on_a_page_is_held_against_a_run_number_by_number(
         "tables", "one", "tomoskin bench one", datetime.date(2026, 1, 2), "abc", page=page.name
     )
     run = [{**one, "notes": ["a note"], "machine": {"cores": "1"}} for one in REPORTS]
-    Part.of(page, "one").write([Report(**one) for one in run])
+    claims.REPORT.Part.of(page, "one").write([claims.REPORT.Report(**one) for one in run])
     published = replace(table, values=claims.numbers(claims.on_page(table)))
     assert published.broken(claims.numbers(run)) == []
     assert len(published.values) == 8

@@ -72,13 +72,13 @@ def bench(
             f'expected {", ".join(benchmarks)}; got "{name}"{meant(name, benchmarks)}',
             param_hint="NAME",
         )
-    module = _load(benchmarks[name].module)
+    module = load_benchmark(benchmarks[name].module)
     usual: int = getattr(module, "CORES", 1)
     cores = cores or usual
     os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[-cores:])
     os.environ["RAYON_NUM_THREADS"] = str(cores)  # the native engine reads it at each call
     with threadpool_limits(cores):
-        part = into and _load("report").Part.of(into, name)
+        part = into and load_benchmark("report").Part.of(into, name)
         run = getattr(module, benchmarks[name].function)
         reports = tuple(run(data) if "data" in signature(run).parameters else run())
     if part:
@@ -114,7 +114,9 @@ def known_benchmarks() -> dict[str, Benchmark]:
     return benchmarks
 
 
-def _load(name: str) -> ModuleType:
+def load_benchmark(name: str) -> ModuleType:
+    """A module of the folder, which is on the path for as long as that takes: its names are short,
+    and would hide those of tests."""
     sys.path.insert(0, str(_FOLDER))
     try:
         return importlib.import_module(name)
