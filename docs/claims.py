@@ -107,7 +107,7 @@ def measured(claim: Claim) -> Any:
     """What its command prints; None where recordings are missing, empty where it fails."""
     if claim.needs and not (RECORDINGS / claim.needs).exists():
         return None
-    kept = KEPT / f"{shlex.split(claim.command)[-1].replace('/', '_')}.json"
+    kept = (KEPT / re.sub(r"\W+", "_", claim.command)).with_suffix(".json")
     if kept.is_file() and (before := json.loads(kept.read_text()))["code"] == code():
         return before["document"]
     print(claim.command, file=sys.stderr, flush=True)

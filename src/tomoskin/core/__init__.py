@@ -25,6 +25,7 @@ from tomoskin.core.outputs import (
     Output,
     StrPath,
     check_outputs,
+    disk_refusals,
     write_text,
     written,
 )
@@ -121,6 +122,7 @@ __all__ = [
     "check_is_file",
     "check_outputs",
     "clock_ahead",
+    "disk_refusals",
     "electrode_table",
     "encode_json",
     "finished",

@@ -179,6 +179,19 @@ def _is_recording(path: Path) -> bool:
 
 
 @contextmanager
+def disk_refusals(path: StrPath) -> Iterator[None]:
+    """What the disk refuses in the block is a DataError that names ``path``."""
+    try:
+        yield
+    except OSError as error:
+        raise DataError(
+            f"cannot be written: {error.strerror or error}",
+            where=str(path),
+            hint="check that the disk is connected and has space",
+        ) from error
+
+
+@contextmanager
 def written(path: StrPath, *, overwrite: bool = False) -> Iterator[Path]:
     """An empty file beside ``path``, of the same ending, that takes its place after the block.
 
@@ -196,7 +209,7 @@ def written(path: StrPath, *, overwrite: bool = False) -> Iterator[Path]:
     check_outputs([Output(path)], overwrite=overwrite)
     target = real_path(path)
     part = target.with_name(f".tomoskin-{secrets.token_hex(8)}{target.suffix}")
-    try:
+    with disk_refusals(path):
         try:
             os.close(os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
             yield part
@@ -205,12 +218,6 @@ def written(path: StrPath, *, overwrite: bool = False) -> Iterator[Path]:
             part.replace(target)
         finally:
             part.unlink(missing_ok=True)
-    except OSError as error:
-        raise DataError(
-            f"cannot be written: {error.strerror or error}",
-            where=str(path),
-            hint="check that the disk is connected and has space",
-        ) from error
 
 
 def write_text(path: StrPath, text: str, *, overwrite: bool = False) -> None:

@@ -119,8 +119,9 @@ def check_board(
     yield from _differences(first)
     second = _measure(transport, back, settings, frames, _AT_ONCE)
     record = first.record
-    guessed = record.reference == USB_VOLTS and five_volts is None
-    reference = five_volts if five_volts and record.reference == USB_VOLTS else record.reference
+    supplied = record.reference == USB_VOLTS
+    guessed = supplied and five_volts is None
+    reference = five_volts if supplied and five_volts is not None else record.reference
     scale = CountScale.of(record.gain, reference, BITS, measured=not guessed)
     found = diagnose(
         np.vstack([first.mean, second.mean]),

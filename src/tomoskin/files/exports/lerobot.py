@@ -22,6 +22,7 @@ from tomoskin.core import (
     Output,
     StrPath,
     check_outputs,
+    disk_refusals,
     encode_json,
     needed,
     write_text,
@@ -212,7 +213,7 @@ def _folder(path: Path) -> Iterator[Path]:
     """A new folder that takes its name when all of it is there."""
     check_outputs([Output(path)])
     part = path.with_name(f".tomoskin-{secrets.token_hex(8)}")
-    try:
+    with disk_refusals(path):
         try:
             part.mkdir()
             yield part
@@ -220,9 +221,3 @@ def _folder(path: Path) -> Iterator[Path]:
             part.rename(path)
         finally:
             shutil.rmtree(part, ignore_errors=True)
-    except OSError as error:
-        raise DataError(
-            f"cannot be written: {error.strerror or error}",
-            where=str(path),
-            hint="check that the disk is connected and has space",
-        ) from error
