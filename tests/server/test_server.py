@@ -485,4 +485,4 @@ def test_a_recording_that_cannot_begin_is_said_on_the_page(site, tmp_path, monke
         while (event := first(socket, "event"))["kind"] != "recording-stopped":
             pass
     assert "the recording did not start" in event["text"]
-    assert site.runner.status().running
+    Watch(site.runner).until(lambda: site.runner.status().running)
