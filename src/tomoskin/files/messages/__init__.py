@@ -1,6 +1,7 @@
 """One frame as it leaves the program, and the messages of other programs made of it."""
 
 from tomoskin.files.messages.contacts import (
+    NO_REFERENCE,
     Contact,
     Contacts,
     event_content,
@@ -30,6 +31,7 @@ from tomoskin.files.messages.stream import NAMES, Naming, Stream, epoch, raster,
 __all__ = [
     "KEPT",
     "NAMES",
+    "NO_REFERENCE",
     "TOPICS",
     "TYPES",
     "Contact",
