@@ -85,7 +85,7 @@ def markers(head: Value, frame: Contacts) -> Value:
 
 
 def diagnostics(head: Value, frame: Contacts) -> Value:
-    """``diagnostic_msgs/DiagnosticArray``: error where touches are not valid; of a run its board."""
+    """``diagnostic_msgs/DiagnosticArray``: an error where touches are not valid, and the board."""
     stream = frame.stream
     level = _ERROR if not frame.valid else _WARN if frame.problem else _OK
     values = {
