@@ -137,7 +137,7 @@ def test_the_report_of_a_run_says_how_its_board_is(program, domain, prepared, id
     assert 1 < float(told["frames_per_s"]) < 60
     assert (told["corrupt"], told["missing"], told["electrodes"]) == ("0", "0", "good")
     assert told["parent"].startswith("none")
-    assert 'where its frame "skin" is nobody publishes' in said[0]
+    assert 'no parent of its frame "skin" is published' in said[0]
 
 
 def test_a_sink_may_be_opened_again(sink, stream):

@@ -76,7 +76,7 @@ class Ros2Sink(Sink):
         self._stream = stream
         if not stream.parent:
             self.hint = (
-                f'where its frame "{stream.naming.frame_id}" is nobody publishes: choose it as '
+                f'no parent of its frame "{stream.naming.frame_id}" is published: choose it as '
                 "Fixed Frame in RViz, or give parent=LINK,at=X/Y/Z"
             )
 
