@@ -19,6 +19,8 @@ from tomoskin.learning import TOUCH, ChannelMapping
 from tomoskin.model.skin import Skin
 from tomoskin.run import commands
 from tomoskin.server.folder import Folder
+from tomoskin.server.guided_flow import GuidedPress
+from tomoskin.server.press_flow import estimate_touch
 from tomoskin.server.source_handlers import SourceSwitch
 from tomoskin.twin import Press
 
@@ -367,6 +369,21 @@ def test_presses_become_a_calibration(taught, prepared):
     x, y = told["presses"][0]
     assert np.hypot(touch.detection.x - x, touch.detection.y - y) < 0.015
     assert touch.detection.sd_x > 0.0005
+
+
+def test_it_is_said_when_newer_presses_do_not_fit_with_the_older_ones(prepared):
+    """Each of the newer ones was made on the dot before."""
+    mesh, sheet = prepared.mesh, -0.1 * prepared.skin.conductivity
+    random = np.random.default_rng(1)
+    away, turn = 0.08 * np.sqrt(random.uniform(size=40)), random.uniform(0, 2 * np.pi, 40)
+    dots = np.column_stack([away * np.cos(turn), away * np.sin(turn)])
+    far = np.linalg.norm(mesh.centroids - dots[:, None], axis=-1)
+    dv = sheet * np.exp(-((far / 0.015) ** 2)) @ prepared.problem.jacobian.T
+    right = [GuidedPress((x, y), one) for (x, y), one in zip(dots.tolist(), dv, strict=True)]
+    assert "do not fit" not in estimate_touch(prepared, right).text
+    late = np.vstack([dv[:20], np.roll(dv[20:], 1, axis=0)])
+    wrong = [GuidedPress((x, y), one) for (x, y), one in zip(dots.tolist(), late, strict=True)]
+    assert "the newer ones do not fit with them. Take back" in estimate_touch(prepared, wrong).text
 
 
 def test_a_run_with_a_calibration_replays_to_the_bit(taught):
