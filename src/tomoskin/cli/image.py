@@ -212,7 +212,7 @@ def image(
     if results.out is not None:
         write = WRITERS[results.out.suffix.lower()]
         write(results.out, prepared, result, display, overwrite=force)
-    _warn(given.data, result)
+    _warn(given.data, result, chosen)
     if located_alone(prepared, result.model_agreement):
         remark(f"{recording}: the calibration alone locates touches, one at a time")
     since = (result.time - first_time(given.data)).tolist()
@@ -267,9 +267,10 @@ def _say_order(recording: Recording, prepared: Prepared) -> None:
         )
 
 
-def _warn(recorded: Recording, result: Reconstruction) -> None:
+def _warn(recorded: Recording, result: Reconstruction, skin: Skin) -> None:
     """Say on stderr what was left out, and what looks wrong."""
     from tomoskin.files.imports import is_session
+    from tomoskin.model.skin import regions_doubt
 
     source = Path(recorded.source)
     for note in result.notes:
@@ -294,6 +295,8 @@ def _warn(recorded: Recording, result: Reconstruction) -> None:
         )
     if (doubt := result.model_agreement.doubt(volts=is_session(source))) is not None:
         remark(f"{source}: {doubt}")
+    if (doubt := regions_doubt(skin.inverse, skin.touch)) is not None:
+        remark(f"{skin.source}: {doubt}")
 
 
 def _document(
