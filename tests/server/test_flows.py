@@ -15,7 +15,7 @@ from tomoskin.board.source import open_source
 from tomoskin.core import DataError
 from tomoskin.files.session import SessionReader, as_recorded, first_scan, replayed
 from tomoskin.files.session.session_reader import end_time, start_time
-from tomoskin.learning import TOUCH, ChannelMapping
+from tomoskin.learning import TOUCH, ChannelMapping, Locator
 from tomoskin.model.skin import Skin
 from tomoskin.run import commands
 from tomoskin.server.folder import Folder
@@ -403,6 +403,23 @@ def test_a_run_with_a_calibration_replays_to_the_bit(taught):
             now.detection.sd_x,
             now.detection.cov_xy,
         )
+
+
+def test_what_a_recording_has_too_is_not_prepared_again_for_it(taught, prepared):
+    folder, told, _ = taught
+    with SessionReader(folder / "run.mcap") as session:
+        first = as_recorded(session)
+        second = as_recorded(session, first)
+        assert second.calibrations[TOUCH.name] is first.calibrations[TOUCH.name]
+        assert (second.problem, second.spots) == (first.problem, first.spots)
+        dv = first.calibrations[TOUCH.name].model.presses.dv
+        locator = Locator.fit(2 * dv, np.array(told["presses"]), pattern=prepared.pattern)
+        others = prepared.calibrated(TOUCH.of(locator, prepared.pattern, prepared.skin))
+        held = as_recorded(session, others).calibrations[TOUCH.name].model
+        assert held.presses.dv == pytest.approx(dv)
+    with SessionReader(folder / "run.mcap") as session:
+        session.attachments = dict
+        assert not as_recorded(session, first).calibrations
 
 
 def test_a_calibration_of_the_folder_is_switched_on_and_off(taught, prepared):

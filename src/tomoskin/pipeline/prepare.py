@@ -95,9 +95,10 @@ class Prepared:
         calibration.check(self.skin)
         return self._with({**self.calibrations, calibration.kind.name: calibration})
 
-    def uncalibrated(self, kind: Kind[Any]) -> Prepared:
-        """Without a calibration of that kind."""
-        return self._with({k: c for k, c in self.calibrations.items() if k != kind.name})
+    def uncalibrated(self, kind: Kind[Any] | None = None) -> Prepared:
+        """Without a calibration of that kind; None: without any."""
+        kept = {k: c for k, c in self.calibrations.items() if kind is not None and k != kind.name}
+        return self._with(kept)
 
     def _with(self, calibrations: Mapping[str, Calibration[Any]]) -> Prepared:
         spots = None
