@@ -10,6 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from cli.conftest import tomoskin
+from prose import ROOT
 from tomoskin.core import DataError
 from tomoskin.files.exports import Export
 from tomoskin.files.exports.lerobot import TIME, write_lerobot
@@ -207,7 +208,7 @@ def test_rows_like_those_of_a_robot(session, tomoskin):
     with pytest.raises(DataError, match="each of the 3 episodes"):
         exported(session, session.with_name("none.lerobot"), like=other)
     (other / "meta/info.json").write_text("{}")
-    with pytest.raises(DataError, match="no LeRobot dataset"):
+    with pytest.raises(DataError, match="as a LeRobot dataset"):
         exported(session, session.with_name("none.lerobot"), like=other)
 
 
@@ -342,22 +343,18 @@ def test_lerobot_merges_sessions(session, dataset, lerobot, tmp_path):
 
 @pytest.mark.slow
 def test_lerobot_joins_it_to_a_robots_dataset_and_merges_those(session, lerobot, tmp_path):
+    """As the documentation does."""
     dataset_class, tools = lerobot
-    joined = []
+    page = (ROOT / "docs/policies.md").read_text(encoding="utf-8")
+    program = page.partition("```python\nimport numpy")[2].partition("\nmonday = ")[0]
+    names = {}
+    exec("import numpy" + program, names)
+    with_skin, joined = names["with_skin"], []
     for day in range(2):
         robot = recorded_robot(dataset_class, tmp_path / f"robot{day}", lengths=(9, 12 + day))
         skin = exported(session, tmp_path / f"skin{day}.lerobot", like=robot.root)
         skin = dataset_class(f"tomoskin/skin{day}", root=skin)
-        held = skin.hf_dataset.with_format("numpy")
-        features = {
-            name: (np.stack(held[name]), about)
-            for name, about in skin.meta.features.items()
-            if "tactile" in name
-        }
-        with_skin = tools.add_features(
-            robot, features, output_dir=tmp_path / f"joined{day}", repo_id=f"arm/{day}"
-        )
-        joined.append(tools.recompute_stats(with_skin))
+        joined.append(with_skin(robot, skin, tmp_path / f"joined{day}"))
     merged = tools.merge_datasets(joined, "arm/all", output_dir=tmp_path / "all")
     assert (len(merged), merged.num_episodes) == (9 + 12 + 9 + 13, 4)
     row = merged[21 + 4]

@@ -97,7 +97,7 @@ def rows_like(pq: Any, folder: Path, sessions: Sequence[SessionReader]) -> Rows:
         }
     except (OSError, ValueError, KeyError, TypeError, msgspec.MsgspecError) as error:
         raise DataError(
-            f"is no LeRobot dataset of format 3.0: {error}", where=str(folder)
+            f"cannot be read as a LeRobot dataset of format 3.0: {error}", where=str(folder)
         ) from error
     starts = [start for start, _, _ in _marked(sessions)]
     if len(starts) != len(held):
