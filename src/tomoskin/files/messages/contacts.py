@@ -12,6 +12,7 @@ from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tomoskin.core import Detection, Event, FloatArray, Force, Image, Touch
 from tomoskin.files.messages.stream import Stream
@@ -146,8 +147,11 @@ class Contacts:
         The touches on the sheet, in the order of their identities.
     happened
         What happened to touches in this frame: onset, move, release, merge, split.
-    voltages, reference
-        (n_meas,) V; None where no frame came, or no reference stands.
+    voltages, reference, noise
+        (n_meas,) V, the last the standard deviation of one frame; None where no frame came, or no
+        reference stands.
+    excluded
+        (n_meas,) bool: measurements that do not count.
     image
         Change of conductivity; None where a newer frame waits, or one was sent a moment ago.
     scanned, scan_time
@@ -174,6 +178,8 @@ class Contacts:
     scan_time: float = math.nan
     is_due: bool = True
     reports: bool = True
+    noise: FloatArray | None = field(default=None, repr=False)
+    excluded: NDArray[np.bool_] | None = field(default=None, repr=False)
 
     @classmethod
     def of(cls, stream: Stream, result: FrameResult) -> Self:
@@ -193,7 +199,18 @@ class Contacts:
             image=result.image if valid else None,
             scanned=result.scanned,
             scan_time=result.scan_time,
+            noise=result.baseline.deviation if result.ready and result.baseline else None,
+            excluded=None if result.health is None else result.health.lost,
         )
+
+    @property
+    def change(self) -> FloatArray | None:
+        """(n_meas,) V against the reference; 0 of what is excluded, as in the image."""
+        if self.voltages is None or self.reference is None:
+            return None
+        change = self.voltages - self.reference
+        excluded = ~np.isfinite(change)
+        return np.where(excluded if self.excluded is None else excluded | self.excluded, 0, change)
 
     @property
     def skin(self) -> str:
