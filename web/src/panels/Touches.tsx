@@ -62,7 +62,7 @@ function StrengthTitle({ forces, scale }: { forces: boolean; scale: Scale }) {
       type="button"
       class="quiet"
       aria-pressed={asChange.value}
-      title={asChange.value ? "Show newtons" : "Estimated from the touch, with the interval that nine in ten lie in; again for the change of conductivity"}
+      title={asChange.value ? "Show newtons" : "Estimated from the touch, with the interval that nine in ten lie in for the tip that was taught; again for the change of conductivity"}
       onClick={() => (asChange.value = !asChange.value)}
     >
       {asChange.value ? change : forceState.value === "uncalibrated" ? "~felt, N" : "felt, N"}
