@@ -70,7 +70,7 @@ def _in_flow(given: Recorded, skin: Skin, loaded: Calibration[Locator]) -> Locat
     with Bar("preparing"):
         prepared = prepare(skin).calibrated(loaded)
     with Bar("locating") as bar:
-        result = reconstructed(given.data, prepared, given.reference, None, bar)
+        result = reconstructed(given, prepared, None, bar)
     return result.frames.tolist(), list(result.touches)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
@@ -14,6 +15,7 @@ from typing import Any
 from tomoskin.board.source import Link, ScanSettings, Transport
 from tomoskin.board.wire import Info
 from tomoskin.core import Event, Frame, Mark, MarkedFrame, TomoskinError
+from tomoskin.files.messages import NO_REFERENCE, Contacts
 from tomoskin.files.session import BoardInfo, RawRead, Truth
 from tomoskin.pipeline import FrameResult, Pipeline, Prepared, ReferenceState
 from tomoskin.run.board_memory import Recall
@@ -84,6 +86,11 @@ class Flow:
         if (saturated := self.prepared.headroom.problem) is not None:
             self.out.say("saturated", saturated)
 
+    def begin_without(self, why: str) -> None:
+        """Its source could not be opened yet."""
+        self.out.begin(self.prepared, self.prepared.skin.name)
+        self.out.say("source-lost", why)
+
     def link(self, transport: Transport) -> Link:
         """The protocol session with its source, which has just been opened, maybe again."""
         self.intake.open()
@@ -147,6 +154,20 @@ class Flow:
             if replay.ended and replay.damage is not None:
                 out.say("replay-damaged", f"the replay ends here: {replay.damage}")
             out.wake()
+
+    def contacts(self, trouble: str | None) -> Contacts:
+        """The newest result as it leaves the program; ``trouble``: why there is no source."""
+        stream, newest = self.out.stream, self.newest
+        trouble = trouble or self.intake.standstill
+        if newest is None:
+            return Contacts.without_frame(stream, trouble or NO_REFERENCE, self.now())
+        played = None
+        if stream.replayed:  # as if its scan had been read when it was played
+            scan_time = newest.result.scan_time
+            half = 0.0 if math.isnan(scan_time) else scan_time / 2
+            played = newest.ready - newest.latency - half
+        contacts = Contacts.of(stream, newest.result, played)
+        return contacts if trouble is None else contacts.outdated(trouble)
 
     def status(self, trouble: str | None) -> Status:
         """How it is doing now; ``trouble``: why there is no source, or None."""

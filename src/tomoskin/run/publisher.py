@@ -134,7 +134,7 @@ class Audience:
 
     @contextlib.contextmanager
     def watch(self, call: Callable[[], None]) -> Iterator[None]:
-        """While the block lasts, ``call`` is called from the run's thread at each result.
+        """While the block lasts, ``call`` is called at each result and event, in their thread.
 
         It must return at once. After the block it is not called again.
         """
@@ -168,14 +168,14 @@ class Audience:
         self.events.add(Event(self.clock(), kind, text))
 
     def put(self, message: RunMessage) -> None:
-        """Give ``message`` to those who subscribe; keep an event, and wake others at a result."""
+        """Give ``message`` to those who subscribe; keep an event; wake others at either."""
         if isinstance(message, Event):
             self.events.add(message)
         with self._lock:
             subscribers = tuple(self._subscribers)
         for worker in subscribers:
             worker.put(message)
-        if isinstance(message, FrameResult):
+        if isinstance(message, FrameResult | Event):
             self.wake()
 
     def wake(self) -> None:
@@ -196,7 +196,16 @@ class Publisher:
         Who listens.
     numbered
         The last identity that was given to a touch.
+
+    Attributes
+    ----------
+    stream
+        What will be published, once a source is followed.
+    recordings
+        The recording, and what it needs.
     """
+
+    stream: Stream
 
     def __init__(self, prepared: Prepared, audience: Audience, numbered: Callable[[], int]) -> None:
         self._audience = audience
@@ -209,9 +218,9 @@ class Publisher:
         Sinks that run already, because it could not be opened at first, go on.
         """
         self.recordings.name_source(source)
+        self.stream = stream = Stream.of(prepared, source, recorded, self._audience.place)
         if self._sinks:
             return
-        stream = Stream.of(prepared, source, recorded, self._audience.place)
         self._sinks = tuple(sink_worker(sink, stream, self.say) for sink in self._audience.sinks)
         for worker in self._sinks:
             worker.start()

@@ -1,6 +1,7 @@
 """One frame as it leaves the program, and the messages of other programs made of it."""
 
 from tomoskin.files.messages.contacts import (
+    NO_REFERENCE,
     Contact,
     Contacts,
     event_content,
@@ -40,6 +41,7 @@ __all__ = [
     "FIELDS",
     "KEPT",
     "NAMES",
+    "NO_REFERENCE",
     "SLOTS",
     "TOPICS",
     "TYPES",

@@ -6,8 +6,9 @@ Every message, table and file for other programs is made from :class:`Contacts`.
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Self
 
@@ -93,15 +94,15 @@ class Contact:
         return whole
 
     @property
-    def force(self) -> float | None:
-        """N, against the normal; None where nothing tells it."""
+    def force(self) -> float:
+        """N, against the normal; NaN where nothing tells it."""
         force = self.touch.detection.force
-        return None if force is None else force.newtons
+        return math.nan if force is None else force.newtons
 
     @property
     def push(self) -> FloatArray:
         """(3,) N, into the body; NaN where nothing tells it."""
-        return -(np.nan if self.force is None else self.force) * np.array(self.normal)
+        return -self.force * np.array(self.normal)
 
     @property
     def torque(self) -> FloatArray:
@@ -157,6 +158,9 @@ class Contacts:
     scanned, scan_time
         Middle of the scan on the same clock as ``host_time``, and how long it took, s; NaN where
         no frame came, or its board has no clock.
+    measured
+        Middle of the scan on this machine's monotonic clock, also of a replay that a run plays;
+        NaN where the frame is not of now, and minus infinity where none has come.
     is_due
         Whether the touches are worth a message.
     reports
@@ -176,22 +180,24 @@ class Contacts:
     image: Image | None = field(default=None, repr=False)
     scanned: float = math.nan
     scan_time: float = math.nan
+    measured: float = math.nan
     is_due: bool = True
     reports: bool = True
     noise: FloatArray | None = field(default=None, repr=False)
     excluded: NDArray[np.bool_] | None = field(default=None, repr=False)
 
     @classmethod
-    def of(cls, stream: Stream, result: FrameResult) -> Self:
-        """What ``result`` says of the skin."""
+    def of(cls, stream: Stream, result: FrameResult, measured: float | None = None) -> Self:
+        """What ``result`` says of the skin; of a replay that is played: as if ``measured`` then."""
         valid = result.ready and result.has_image
+        when = _when(result.scanned, result.host_time)
         return cls(
             stream=stream,
             sequence=result.sequence,
             host_time=result.host_time,
             valid=valid,
             problem=result.problem if result.ready else NO_REFERENCE,
-            latency=stream.latency(_when(result.scanned, result.host_time)),
+            latency=stream.latency(when),
             tracked=result.touches,
             happened=result.events,
             voltages=result.voltages,
@@ -201,7 +207,30 @@ class Contacts:
             scan_time=result.scan_time,
             noise=result.baseline.deviation if result.ready and result.baseline else None,
             excluded=None if result.health is None else result.health.lost,
+            measured=(math.nan if stream.replayed else when) if measured is None else measured,
         )
+
+    @classmethod
+    def without_frame(cls, stream: Stream, problem: str, host_time: float) -> Self:
+        """Of a skin of which no frame has come, and why."""
+        return cls(stream, -1, host_time, False, problem, None, measured=-math.inf)
+
+    def outdated(self, problem: str) -> Self:
+        """The same, but no touches, which are not true any more, and why."""
+        return replace(
+            self, valid=False, problem=problem, tracked=(), happened=(), voltages=None,
+            reference=None, image=None,
+        )  # fmt: skip
+
+    @property
+    def age_s(self) -> float:
+        """S since the middle of the scan, at this moment; NaN of a file, infinite of no frame."""
+        return time.monotonic() - self.measured
+
+    @property
+    def force(self) -> float:
+        """N, of all touches against their normals; NaN where one is not known, or none is valid."""
+        return sum((c.force for c in self.touches), start=0.0 if self.valid else math.nan)
 
     @property
     def change(self) -> FloatArray | None:

@@ -14,11 +14,10 @@ import numpy as np
 from tomoskin.core import FloatArray, GeometryError, PixelMap, SinkError, StrPath, clock_ahead
 from tomoskin.model.mesh import Mesh, Plane, Surface
 from tomoskin.model.pattern import Pattern
-from tomoskin.model.robot import Place, Pose, pose_numbers
+from tomoskin.model.robot import FRAME, Place, Pose, pose_numbers
 from tomoskin.pipeline import Prepared, colour_limit
 
 _NAMESPACE = re.compile(r"[A-Za-z]\w*(/[A-Za-z]\w*)*", re.ASCII)
-_FRAME = re.compile(r"[\w.-]+(/[\w.-]+)*", re.ASCII)
 
 NAMES = ("namespace", "frame", "parent", "at")
 """Options of a sink that can say where the skin is."""
@@ -44,7 +43,7 @@ class Naming:
     @classmethod
     def of(cls, options: Mapping[str, str], where: str) -> Self:
         """Read the options of :data:`NAMES`, as far as they are there. Raises SinkError."""
-        for key, form in (("namespace", _NAMESPACE), ("frame", _FRAME), ("parent", _FRAME)):
+        for key, form in (("namespace", _NAMESPACE), ("frame", FRAME), ("parent", FRAME)):
             text = options.get(key)
             if text is not None and not form.fullmatch(text):
                 raise SinkError(
