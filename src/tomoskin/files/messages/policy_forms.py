@@ -123,6 +123,8 @@ class PolicyView:
         Whether "no touch" means that nothing touches; where not, points and map are 0.
     time
         The moment on the host's clock, s.
+    slots
+        (SLOTS, len(FIELDS)) all that is known of each touch, see :class:`Slots`.
     points, point_mask
         (SLOTS, 9) position m, displacement m and force N in x, y, z; and (SLOTS, 2) whether there
         is a touch and whether its force is calibrated. Displacement is along the surface, since
@@ -139,6 +141,7 @@ class PolicyView:
 
     valid: bool
     time: float
+    slots: FloatArray
     points: FloatArray
     point_mask: _MASK
     map: FloatArray
@@ -227,6 +230,7 @@ class PolicyForms:
         return PolicyView(
             valid=valid,
             time=time,
+            slots=table,
             points=_points(table),
             point_mask=table[:, _KNOWN] > 0,
             map=drawn,

@@ -48,6 +48,8 @@ class ContainerReader:
         A sentence on what is missing at the end, or "".
     summary
         Totals and index of all messages; None in a file without its end.
+    first
+        What is taken off the numbers of channels: 0, but for a part of the file.
 
     Raises
     ------
@@ -57,7 +59,7 @@ class ContainerReader:
 
     def __init__(self, path: Path) -> None:
         self.where, self.torn = str(path), ""
-        self._prefix, self._first = "", 0
+        self._prefix, self.first = "", 0
         self.summary: Summary | None = None
         self._file = open_input(path, buffering=1 << 18)
         self.size = self._end = self._file.seek(0, io.SEEK_END)
@@ -74,13 +76,8 @@ class ContainerReader:
     def part(self, name: str, first: int) -> Self:
         """One of several sessions in this file: names that begin so, channels from ``first`` on."""
         part = copy(self)
-        part._prefix, part._first = f"{name}/", first
+        part._prefix, part.first = f"{name}/", first
         return part
-
-    def count(self, channel: int) -> int:
-        """Messages of a channel by the index; 0 where there is none."""
-        counts = self.summary.totals.channel_message_counts if self.summary else {}
-        return counts.get(self._first + channel, 0)
 
     def description(self, name: str) -> dict[str, str] | None:
         """The named strings of that name; those of the file itself are before the first chunk."""
@@ -133,7 +130,7 @@ class ContainerReader:
             yield from (place for opcode, place in self._records() if opcode == Opcode.CHUNK)
             return
         with self._damage_at(self._end):
-            own = frozenset(self._first + channel for channel in channels)
+            own = frozenset(self.first + channel for channel in channels)
             yield from self.summary.chunks(own, since)
 
     def _messages_at(self, offset: int) -> Iterator[LoggedMessage]:
@@ -147,7 +144,7 @@ class ContainerReader:
                 hint="decompress it first: mcap decompress",
             )
         with self._damage_at(offset):
-            yield from messages_in(chunk, offset, self._first)
+            yield from messages_in(chunk, offset, self.first)
 
     def _open(self) -> None:
         """Read the summary, where the file has its end."""

@@ -168,16 +168,23 @@ def reference_frames(settings: Mapping[str, Any]) -> int:
 
 def message_counts(session: SessionReader) -> dict[str, int]:
     """Messages by topic; goes through a file without its end."""
-    container = session.container
-    if container.summary is not None:
-        return {topic: container.count(number) for number, topic in channels.TOPICS.items()}
-    counts = Counter(m.channel for m in container.messages(frozenset(channels.TOPICS)))
-    return {topic: counts[number] for number, topic in channels.TOPICS.items()}
+    counts = _indexed(session)
+    if session.container.summary is None:
+        every = session.container.messages(frozenset(channels.TOPICS))
+        counts = Counter(message.channel for message in every)
+    return {topic: counts.get(number, 0) for number, topic in channels.TOPICS.items()}
 
 
 def indexed_frames(session: SessionReader) -> int:
     """Number of frames by the index; 0 where there is none."""
-    return session.container.count(channels.FRAMES)
+    return _indexed(session).get(channels.FRAMES, 0)
+
+
+def _indexed(session: SessionReader) -> dict[int, int]:
+    """Messages by channel, by the index."""
+    summary, first = session.container.summary, session.container.first
+    counts = summary.totals.channel_message_counts if summary else {}
+    return {channel - first: count for channel, count in counts.items()}
 
 
 def start_time(session: SessionReader) -> float:
