@@ -117,9 +117,10 @@ class Prepared:
             prepared = prepared.calibrated(calibration)
         return prepared
 
-    def uncalibrated(self, kind: Kind[Any]) -> Prepared:
-        """Without a calibration of that kind."""
-        return self._with({k: c for k, c in self.calibrations.items() if k != kind.name})
+    def uncalibrated(self, kind: Kind[Any] | None = None) -> Prepared:
+        """Without a calibration of that kind; None: without any."""
+        kept = {k: c for k, c in self.calibrations.items() if kind is not None and k != kind.name}
+        return self._with(kept)
 
     def _with(self, calibrations: Mapping[str, Calibration[Any]]) -> Prepared:
         spots = None

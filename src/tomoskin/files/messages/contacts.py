@@ -13,6 +13,7 @@ from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tomoskin.core import Detection, Event, FloatArray, Force, Image, Touch
 from tomoskin.files.messages.stream import Stream
@@ -154,8 +155,11 @@ class Contacts:
         The touches on the sheet, in the order of their identities.
     happened
         What happened to touches in this frame: onset, move, release, merge, split.
-    voltages, reference
-        (n_meas,) V; None where no frame came, or no reference stands.
+    voltages, reference, noise
+        (n_meas,) V, the last the standard deviation of one frame; None where no frame came, or no
+        reference stands.
+    excluded
+        (n_meas,) bool: measurements that do not count.
     image
         Change of conductivity; None where a newer frame waits, or one was sent a moment ago.
     scanned, scan_time
@@ -186,6 +190,8 @@ class Contacts:
     measured: float = math.nan
     is_due: bool = True
     reports: bool = True
+    noise: FloatArray | None = field(default=None, repr=False)
+    excluded: NDArray[np.bool_] | None = field(default=None, repr=False)
 
     @classmethod
     def of(cls, stream: Stream, result: FrameResult, measured: float | None = None) -> Self:
@@ -206,6 +212,8 @@ class Contacts:
             image=result.image if valid else None,
             scanned=result.scanned,
             scan_time=result.scan_time,
+            noise=result.baseline.deviation if result.ready and result.baseline else None,
+            excluded=None if result.health is None else result.health.lost,
             measured=(math.nan if stream.replayed else when) if measured is None else measured,
         )
 
@@ -230,6 +238,15 @@ class Contacts:
     def force(self) -> float:
         """N, of all touches against their normals; NaN where one is not known, or none is valid."""
         return sum((c.force for c in self.touches), start=0.0 if self.valid else math.nan)
+
+    @property
+    def change(self) -> FloatArray | None:
+        """(n_meas,) V against the reference; 0 of what is excluded, as in the image."""
+        if self.voltages is None or self.reference is None:
+            return None
+        change = self.voltages - self.reference
+        excluded = ~np.isfinite(change)
+        return np.where(excluded if self.excluded is None else excluded | self.excluded, 0, change)
 
     @property
     def skin(self) -> str:
