@@ -65,7 +65,7 @@ class Flow:
         self.board: Info | None = None
         self.board_name = ""
         self.pipeline, self.marker, self.twin = Pipeline(prepared), Marker(), TwinControl()
-        self.out = Publisher(prepared, audience, lambda: self.pipeline.numbered)
+        self.out = Publisher(prepared, audience, lambda: self.pipeline.numbered, self.board_report)
         self.latency, self.costs = Latency(), CostMeter(time.perf_counter)
         self._clock, self._turns = audience.clock, audience.turns
         self._recall, self.intake = Recall(audience.memory), Intake()
@@ -169,6 +169,25 @@ class Flow:
         contacts = Contacts.of(stream, newest.result, played)
         return contacts if trouble is None else contacts.outdated(trouble)
 
+    def board_report(self) -> dict[str, object]:
+        """How the board is doing now, by name; from any thread."""
+        info, losses, newest = self.board, self.intake.losses, self.newest
+        health = newest.result.health if newest else None
+        return {
+            "board": info.unique_id.hex() if info else "",
+            "board_name": self.board_name,
+            "firmware": ".".join(map(str, info.firmware)) if info else "",
+            "frames_per_s": round(self.latency.rate(self._clock()), 1),
+            "dropped": self._dropped(),
+            "corrupt": losses.corrupt,
+            "missing": losses.gaps,
+            "electrodes": (health.text if health else None) or "good",
+        }
+
+    def _dropped(self) -> int:
+        """Frames that the device or this host left out."""
+        return self.intake.losses.dropped + self.intake.skipped + self.pipeline.refused
+
     def status(self, trouble: str | None) -> Status:
         """How it is doing now; ``trouble``: why there is no source, or None."""
         now, replay = self._clock(), self.marker.replay
@@ -186,7 +205,7 @@ class Flow:
             replay=replay_status(replay, ended=self._ended) if replay else None,
             frames=self.latency.frames,
             fps=self.latency.rate(now),
-            dropped=losses.dropped + self.intake.skipped + self.pipeline.refused,
+            dropped=self._dropped(),
             corrupt=losses.corrupt,
             gaps=losses.gaps,
             p50=p50,

@@ -6,7 +6,8 @@ import contextlib
 import logging
 import threading
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from tomoskin.core import Capacity, Consumer, Event, Worker, stop_workers
@@ -196,6 +197,8 @@ class Publisher:
         Who listens.
     numbered
         The last identity that was given to a touch.
+    board
+        How the board is doing, by name.
 
     Attributes
     ----------
@@ -207,8 +210,14 @@ class Publisher:
 
     stream: Stream
 
-    def __init__(self, prepared: Prepared, audience: Audience, numbered: Callable[[], int]) -> None:
-        self._audience = audience
+    def __init__(
+        self,
+        prepared: Prepared,
+        audience: Audience,
+        numbered: Callable[[], int],
+        board: Callable[[], Mapping[str, object]],
+    ) -> None:
+        self._audience, self._board = audience, board
         self._sinks: tuple[Worker[SinkConsumer], ...] = ()
         self.recordings = Recordings(prepared, self.say, audience.clock, numbered)
 
@@ -218,7 +227,8 @@ class Publisher:
         Sinks that run already, because it could not be opened at first, go on.
         """
         self.recordings.name_source(source)
-        self.stream = stream = Stream.of(prepared, source, recorded, self._audience.place)
+        stream = Stream.of(prepared, source, recorded, self._audience.place)
+        self.stream = stream = replace(stream, board=self._board)
         if self._sinks:
             return
         self._sinks = tuple(sink_worker(sink, stream, self.say) for sink in self._audience.sinks)

@@ -23,8 +23,14 @@ from tomoskin.sensing.track import TouchEvent
 
 NO_REFERENCE = "the reference has not been taken yet: do not touch the skin for a moment"
 
-UNKNOWN = 1e6
-"""Variance of what is not measured, m² or rad²: what filters take for no knowledge."""
+_ANYWHERE = 1.0
+"""Variance of a position on a sheet whose noise is not known, m²: beyond any skin."""
+
+_DENT = 1e-4
+"""Variance of a position along the normal, m²: a press dents a skin by a centimetre at most."""
+
+_ANY_TURN = math.pi**2 / 3
+"""Variance of an angle of which nothing is known, rad²."""
 
 _NO_FORCE = {"force": None, "force_interval": None, "force_calibrated": False}
 """What a row says of a touch whose force nothing tells."""
@@ -84,12 +90,13 @@ class Contact:
     def pose_covariance(self) -> FloatArray:
         """(6, 6) of position and rotation, m² and rad².
 
-        Along the normal, and of rotations, it is :data:`UNKNOWN`.
+        What is not measured has the variance of what it can be: along the normal that of a dent,
+        and of a rotation that of any angle. So programs that draw it show the size of a skin.
         """
-        whole = UNKNOWN * np.eye(6)
+        whole = _ANY_TURN * np.eye(6)
         normal = np.array(self.normal)
         whole[:3, :3] = self._in_space(_on_sheet(self.touch.detection))
-        whole[:3, :3] += UNKNOWN * normal[:, None] * normal
+        whole[:3, :3] += _DENT * normal[:, None] * normal
         return whole
 
     @property
@@ -352,7 +359,7 @@ def _on_sheet(detection: Detection) -> FloatArray:
     variance = np.array([detection.sd_x**2, detection.sd_y**2])
     if np.isfinite(variance).all():
         return np.diag(variance) + detection.cov_xy * np.eye(2)[::-1]
-    return np.diag(np.where(np.isfinite(variance), variance, UNKNOWN))
+    return np.diag(np.where(np.isfinite(variance), variance, _ANYWHERE))
 
 
 def _cross(a: Vector, b: Vector) -> Vector:

@@ -110,6 +110,8 @@ class Stream:
         End of the symmetric scale of colours, in the image's unit.
     clock
         What host times are times of; None where they are those of a recording.
+    board
+        How the board is doing at this moment, by name; None where no run is going on.
     place
         Which of a robot's skins it is; None where there is no robot.
     naming
@@ -127,6 +129,7 @@ class Stream:
     corners: FloatArray | None = None
     limit: float = 1.0
     clock: Callable[[], float] | None = None
+    board: Callable[[], Mapping[str, object]] | None = None
     place: Place | None = None
     naming: Naming = field(default_factory=Naming)
 
@@ -156,6 +159,12 @@ class Stream:
             place=place,
             naming=Naming().of_skin(place),
         )
+
+    @property
+    def parent(self) -> str:
+        """The link that the skin is known to lie on; "" where none is."""
+        mount = self.naming.mount or self.place
+        return "" if mount is None else mount.link
 
     def named(self, naming: Naming) -> Self:
         """The same, called as ``naming`` says, and each of a robot's skins below it."""

@@ -32,11 +32,14 @@ class Sink(ABC):
         What it calls the skin; those of a robot have their own names below it.
     period
         Seconds between two messages of touches that go on.
+    hint
+        What someone should know of it once it has been opened.
     """
 
     name: str
     naming = Naming()
     period = 0.0
+    hint = ""
 
     def open(self, stream: Stream) -> None:
         """Get ready to publish; again after :meth:`close`."""
@@ -131,7 +134,7 @@ class SinkConsumer(Consumer):
     """
 
     kind = "sink"
-    slow, ready = "is too slow, and results are left out", "takes results"
+    slow = "is too slow, and results are left out"
 
     def __init__(self, sink: Sink, stream: Stream, say: Say) -> None:
         self.name = sink.name
@@ -155,6 +158,7 @@ class SinkConsumer(Consumer):
     def open(self) -> None:
         """Open the sink, which gets what comes next in full."""
         self._sink.open(self._stream)
+        self.ready = "; ".join(filter(None, ("takes results", self._sink.hint)))
         self.trouble = ""
         self._reporter.repeat()
 
