@@ -8,8 +8,8 @@ import pytest
 @pytest.mark.slow
 def test_a_policy_follows_a_finger_by_touch_alone(imported):
     servo = imported("servo")
-    found = servo.main(["--demonstrations", "8", "--episodes", "5"])
-    assert found["rows"] > 400
+    found = servo.main(["--demonstrations", "12", "--episodes", "5"])
+    assert found["rows"] > 800
     assert found["expert"] == 1
     assert found["touch"] >= 0.8
     assert found["masked"] <= 0.4
