@@ -14,7 +14,6 @@ import typer
 from tomoskin.cli.choices import (
     quantity,
     skin_for_file,
-    with_calibrations,
     with_recorded_calibrations,
 )
 from tomoskin.cli.named_files import TABLE, ForceFlag, Writes
@@ -189,7 +188,7 @@ def image(
     with Bar("preparing"):
         prepared = prepare(chosen)
         if tuned.calibration or skin is not None:
-            prepared = with_calibrations(prepared, tuned.calibration, own)
+            prepared = prepared.calibrated_by(tuned.calibration or (), own)
         else:
             prepared = with_recorded_calibrations(prepared, recording)
     given = Recorded(recording, data, prepared.skin, reference, prepared.pattern)
