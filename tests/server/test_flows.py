@@ -379,24 +379,21 @@ def test_a_run_with_a_calibration_replays_to_the_bit(taught):
     pressed = [number for number, touches in recorded.items() if touches]
     assert len(pressed) > 3
     for number in pressed:
-        was, now = ([t.detection for t in run[number]] for run in (recorded, again))
-        assert [(d.x, d.y, d.sd_x, d.cov_xy) for d in was] == [
-            (d.x, d.y, d.sd_x, d.cov_xy) for d in now
-        ]
+        one, two = (run[number][0].detection for run in (recorded, again))
+        assert (one.x, one.y, one.sd_x, one.cov_xy) == (two.x, two.y, two.sd_x, two.cov_xy)
 
 
 def test_what_a_recording_has_too_is_not_prepared_again_for_it(taught, prepared):
     folder, told, _ = taught
     with SessionReader(folder / "run.mcap") as session:
-        first = as_recorded(session)
-        second = as_recorded(session, first)
+        second = as_recorded(session, first := as_recorded(session))
         assert second.calibrations[TOUCH.name] is first.calibrations[TOUCH.name]
         assert (second.problem, second.spots) == (first.problem, first.spots)
         dv = first.calibrations[TOUCH.name].model.presses.dv
         locator = Locator.fit(2 * dv, np.array(told["presses"]), pattern=prepared.pattern)
         others = prepared.calibrated(TOUCH.of(locator, prepared.pattern, prepared.skin))
-        held = as_recorded(session, others).calibrations[TOUCH.name].model
-        assert held.presses.dv == pytest.approx(dv)
+        anew = as_recorded(session, others).calibrations[TOUCH.name]
+        assert anew.model.presses.dv == pytest.approx(dv)
 
 
 def test_a_calibration_of_the_folder_is_switched_on_and_off(taught, prepared):
