@@ -46,12 +46,12 @@ def run(data: Path | None) -> Iterator[Report]:
     yield table(
         "force of held-out presses on the twin's textile, 16 electrodes",
         (row for tips in SETS for row in _twin(tips)),
-        f"{LABELLED} labelled presses of {LIGHT:.0f} to {HEAVY:.0f} N, each weighed half-way "
-        f"up, at the top and half-way down; {HELD_OUT} single and {PAIRS} pairs of held-out "
-        f"presses, seven forces each on the way up and down, from {LIGHT:.0f} N to a top of 4 "
-        f"to {HEAVY:.0f} N; each stage is the mean of {FRAMES} frames",
-        "one tip: 8, 10 and 12 mm radius in the first three seeds, 10, 12 and 8 in the others, "
-        "which nothing was chosen by; given to nobody",
+        f"learnt: {LABELLED} presses of {LIGHT:.0f} to {HEAVY:.0f} N, each weighed half-way up, at "
+        "the top and half-way down",
+        f"asked: {HELD_OUT} other presses and {PAIRS} pairs, seven forces each on the way up and "
+        f"down, from {LIGHT:.0f} N to a top of 4 to {HEAVY:.0f} N; means of {FRAMES} frames",
+        "tips of 8, 10 and 12 mm radius in the first seeds, 10, 12 and 8 in the others; the method "
+        "knows neither, and was chosen on the first",
         "variation: of force over true force, over presses; cost: of a frame beyond the fit",
     )
     folder = available(data, "eskin_fingertip8", "strip_stretch")
@@ -60,8 +60,9 @@ def run(data: Path | None) -> Iterator[Report]:
     yield table(
         "a real fingertip",
         _fingertip(folder / "eskin_fingertip8" / "A2.npz"),
-        "ForceProcess, which only Python offers, on eskin_fingertip8/A2; newtons presumably; the labels have steps of 0.01. The components that count were "
-        "chosen by presses left out of the learning of fold 5",
+        "ForceProcess, which only Python offers, on eskin_fingertip8/A2; newtons presumably; the "
+        "labels have steps of 0.01. The components that count were chosen by presses left out of "
+        "the learning of fold 5",
     )
     yield table(
         "what real materials remember",
