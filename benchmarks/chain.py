@@ -23,8 +23,7 @@ from tomoskin.core import FloatArray
 from tomoskin.files.session import SessionReader
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, prepare
-from tomoskin.run import Runner, commands
-from tomoskin.run.sinks import ContactListener, Contacts
+from tomoskin.run import LiveSkin, Runner, commands
 from tomoskin.twin import Press, TwinSettings, TwinSkin
 from tomoskin.twin.emulator.board_process import SkinMemory
 from tomoskin.twin.emulator.program import BUILD, make_firmware
@@ -43,6 +42,9 @@ LEAD = 10.0
 
 STEPS, STEP = 60, 0.1
 """Places of the presses, and s at each: one press, two, none, twenty steps each."""
+
+WAIT = 0.1
+"""Seconds for which the control loop waits at most."""
 
 PROMISED = 5.0
 """ms from bytes to touches, 99 of 100."""
@@ -94,7 +96,7 @@ def measured(seconds: float) -> Report:
         f"{seconds:.0f} s of frames to touches, page and recording",
         [row],
         f"firmware with a Pico's timing on a pty; presses that go round; {SKIN}, seed {SEED}",
-        "read → touches: from a frame's bytes to the call of a function of the same program; "
+        "read → touches: from a frame's bytes to the control loop of the same program; "
         f"promised: 99 of 100 within {PROMISED:g} ms",
         f"{touches:,} touches; load of the machine {os.getloadavg()[0]:.0f}",
     )
@@ -104,21 +106,30 @@ def _ran(prepared: Prepared, folder: Path, seconds: float) -> tuple[dict[str, An
     """A row, and how many touches there were."""
     calls: list[tuple[int, float, float, int]] = []
 
-    def take(contacts: Contacts) -> None:
-        now, touches = time.monotonic(), len(contacts.touches)
-        calls.append((contacts.sequence, contacts.host_time, now, touches))
+    ended = threading.Event()
+
+    def control() -> None:
+        while not ended.is_set():
+            contacts = live.wait(WAIT)
+            now, touches = time.monotonic(), len(contacts.touches)
+            if contacts.sequence >= 0 and (not calls or contacts.host_time > calls[-1][1]):
+                calls.append((contacts.sequence, contacts.host_time, now, touches))
 
     file = folder / "chain.mcap"
     with board(prepared.skin, folder) as port:
-        runner = Runner(prepared, lambda: SerialTransport(port), sinks=[ContactListener(take)])
+        runner = Runner(prepared, lambda: SerialTransport(port))
         runner.ask(commands.Record(file))
         runner.start()
+        live, loop = LiveSkin(runner), threading.Thread(target=control)
+        loop.start()
         with page(runner):
             threading.Event().wait(LEAD)
             began, before = time.process_time(), time.monotonic()
             threading.Event().wait(seconds)
             used = (time.process_time() - began) / (time.monotonic() - before)
             status = runner.status()
+        ended.set()
+        loop.join()
         runner.stop()
     rate, rows = prepared.skin.readout.tick_rate, np.array(calls)
     frames = np.array(

@@ -24,8 +24,8 @@ import numpy as np
 from tomoskin.core import FloatArray, WallClock
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import prepare
-from tomoskin.run import Runner
-from tomoskin.run.sinks import ContactListener, Contacts
+from tomoskin.run import LiveSkin, Runner
+from tomoskin.run.sinks import Contacts
 from tomoskin.twin import Press, TwinSettings, TwinTransport, make_twin
 
 LINKS = (0.30, 0.25)
@@ -36,6 +36,9 @@ SPEED = 0.25
 
 AWAY = 0.010
 """How far a point goes before who presses lets go, m."""
+
+WAIT = 0.1
+"""Seconds after which the loop goes on without a new frame."""
 
 PATIENCE = 30.0
 """Seconds in which a press must be answered."""
@@ -119,26 +122,32 @@ def main(arguments: Sequence[str] | None = None) -> dict[str, float]:
 def measured(skin: Skin, presses: int, seed: int) -> dict[str, float]:
     """Times of so many presses, ms, and how many were answered."""
     twin = make_twin(skin, TwinSettings.preset("textile", seed), WallClock())
-    reflex, frames = Reflex(Arm()), []
+    reflex, frames, ended = Reflex(Arm()), [], threading.Event()
+    runner = Runner(prepare(skin), lambda: twin)
 
-    def listen(contacts: Contacts) -> None:
-        frames.append((contacts.host_time, contacts.latency or 0.0))
-        reflex.react(contacts)
+    def control() -> None:
+        while not ended.is_set():
+            contacts = live.wait(WAIT)
+            frames.append((contacts.host_time, contacts.age_s))
+            reflex.react(contacts)
 
-    runner = Runner(prepare(skin), lambda: twin, sinks=[ContactListener(listen)])
-    runner.start()
-    try:
-        reflex.ready.wait(PATIENCE)
-        times = [time_of(reflex, twin, where) for where in places_on(skin, presses, seed)]
-    finally:
-        runner.stop()
+    with LiveSkin(runner) as live:
+        runner.start()
+        loop = threading.Thread(target=control)
+        loop.start()
+        try:
+            reflex.ready.wait(PATIENCE)
+            times = [time_of(reflex, twin, where) for where in places_on(skin, presses, seed)]
+        finally:
+            ended.set()
+            loop.join()
     answered = [1e3 * value for value in times if value is not None]
-    host_times, latencies = np.array(frames).T
+    host_times, ages = np.array(frames[1:]).T
     return {
         "presses": presses,
         "answered": len(answered),
         "one scan, ms": 1e3 * float(np.median(np.diff(host_times))),
-        "bytes to contacts, ms": 1e3 * float(np.median(latencies)),
+        "age of contacts, ms": 1e3 * float(np.median(ages)),
         "contact to command, ms": statistics.median(answered),
         "the slowest, ms": max(answered),
     }

@@ -37,13 +37,13 @@ class Circuit:
             if reference.startswith(letter):
                 yield self.net_of[reference, "1"], self.net_of[reference, "2"]
 
-    def value(self, *pins: tuple[str, str]) -> str:
+    def value(self, *pins: tuple[str, str], kinds: str = "RC") -> str:
         """Value of the resistor or capacitor between the nets of two pins; there must be one."""
         wanted = sorted(self.net_of.get(pin, pin[0]) for pin in pins)
         found = {
             part.value
             for reference, part in self.parts.items()
-            if reference[0] in "RC" and sorted(self.net_of[reference, n] for n in "12") == wanted
+            if reference[0] in kinds and sorted(self.net_of[reference, n] for n in "12") == wanted
         }
         assert len(found) == 1, (wanted, found)
         return found.pop()

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from tomoskin.model.mesh import Mesh
     from tomoskin.model.pattern import Pattern
     from tomoskin.model.skin import Skin
+    from tomoskin.run import open_robot, open_skin
 
 __version__ = "0.1.0"
 
@@ -25,6 +26,8 @@ _HOME = {
     "Pattern": "model.pattern",
     "Session": "files.session",
     "Skin": "model.skin",
+    "open_robot": "run",
+    "open_skin": "run",
     "plot": "files.exports",
 }
 """Where each public name lives; it is imported when it is first asked for."""
@@ -38,6 +41,8 @@ __all__ = [
     "Session",
     "Skin",
     "__version__",
+    "open_robot",
+    "open_skin",
     "plot",
 ]
 

@@ -38,7 +38,7 @@ def test_every_reading_is_asked_for_and_said() -> None:
 
 
 def test_a_wrong_reading_ends_it_with_where_to_look() -> None:
-    wrong = [*GOOD[:5], "2,7 V"]
+    wrong = [*GOOD[:6], "2,7 V"]
     done = CliRunner().invoke(app, ["check"], input="\n".join([*wrong, ""]))
     assert done.exit_code == 1
     assert "2.5V: 2.7 V, expected 2.49 to 2.51 V: U2, U3" in done.stdout
@@ -54,8 +54,8 @@ def test_what_is_no_number_is_asked_for_again_and_enter_leaves_one_out() -> None
 
 
 def test_what_is_right_follows_from_the_readings_before() -> None:
-    """11.5 V in: 11.4 V are right at SENSE; the nominal 12 V would refuse them."""
-    low = ["11.5", "0", "11.4", "4.8", "-4.5", "2.5", "2.2", "10.28", "0", "0", "0", ""]
+    """11.45 V at +12V: 10.22 V are right at SENSE; the nominal 12 V would refuse them."""
+    low = ["11.5", "0.1", "0", "4.8", "11.45", "-4.5", "2.5", "2.2", "10.22", "0", "0", "0", ""]
     done = CliRunner().invoke(app, ["check"], input="\n".join(low))
     assert done.exit_code == 0
     assert done.stdout.count("ok  ") == len(low)

@@ -73,6 +73,8 @@ def test_what_is_learnt_is_used(tomoskin, tmp_path, presses, touched):
     told = np.array([[float(row["x_m"]), float(row["y_m"])] for row in rows])
     assert np.median(np.linalg.norm(told - xy, axis=1)) < 5e-3
     assert all(float(row["sd_x_m"]) > 0 for row in rows)
+    _, _, said = out.partition("±")  # nine in ten, as the ellipses on the page
+    assert float(said.split()[0]) == pytest.approx(1645 * float(rows[0]["sd_x_m"]), abs=0.06)
 
 
 def test_rows_that_have_jumped_are_left_out_and_named(tomoskin, tmp_path, presses):

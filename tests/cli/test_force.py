@@ -69,6 +69,27 @@ def test_weights_in_grams_become_newtons_in_the_table(tomoskin, tmp_path, files)
     assert touch["force_n"]["low"] < touch["force_n"]["newtons"] < touch["force_n"]["high"]
 
 
+def test_simulated_presses_teach_forces(tomoskin, tmp_path):
+    made, out = tmp_path / "set.npz", tmp_path / "force.npz"
+    simulate = ("simulate", "--presses", 12, "--seed", 1, "--processes", 1, "--out", made)
+    assert tomoskin(*simulate)[0] == 0
+    calibrate = ("calibrate", "force", "--skin", "textile-disc-8", "--out", out, "--force")
+    code, said, _ = tomoskin(*calibrate, made)
+    assert code == 0
+    assert " touches of " in said
+    with made.open("rb") as file, np.load(file) as kept:
+        arrays = dict(kept)
+    assert arrays["force_n"] == pytest.approx(arrays["press_force_n"][:, 0])
+    older = tmp_path / "older.npz"  # sets of before had a column for the only press
+    np.savez(older, **arrays | {"force_n": arrays["press_force_n"]})
+    assert tomoskin(*calibrate, older)[0] == 0
+    np.savez(older, **arrays | {"force_n": np.ones((12, 2))})
+    code, _, error = tomoskin(*calibrate, older)
+    assert code == 1
+    assert "expected force_n of shape (12,)" in error
+    assert "got (12, 2)" in error
+
+
 def test_grams_read_as_newtons_are_noticed(tomoskin, tmp_path, files):
     path, skin = files
     code, _, err = tomoskin("calibrate", "force", path, "--skin", skin, "--out", tmp_path / "f.npz")

@@ -18,6 +18,7 @@ from PIL import Image
 
 from core.seeing import blue_beside_red
 from tomoskin.core import FloatArray
+from tomoskin.files import imports
 from tomoskin.files.exports.display import circular_average
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import triangulate
@@ -70,6 +71,18 @@ def test_a_press_is_found_where_it_was(save, image, tmp_path, reference) -> None
     code, _, err = image(save(), "--touches", table, "--frames", "3:4", *chosen)
     assert (code, err) == (0, "")
     assert np.hypot(*np.subtract(places(table)[3], PLACE)) < 0.012
+
+
+def test_a_file_that_is_the_reference_is_read_once(
+    save, image, frames, tmp_path, monkeypatch
+) -> None:
+    """Whatever is made of the frames: smooth and sharp images, a longer search."""
+    read, own = [], imports.read_recording
+    monkeypatch.setattr(imports, "read_recording", lambda path: (read.append(path), own(path))[1])
+    idle = save("idle.npz", voltages=frames[:3])
+    ways = "--sharp", "--thorough", tmp_path / "all.csv"
+    assert image(save(), "--reference", idle, "--frames", "3:4", *ways)[0] == 0
+    assert read.count(Path(idle)) == 1
 
 
 def test_currents_into_many_electrodes(save, image, tmp_path) -> None:

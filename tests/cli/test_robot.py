@@ -151,7 +151,7 @@ def test_a_robot_file_says_all(tomoskin, arm):
         ("--skin a=textile-disc-8 --calibration {c}", "does not say to which skin it belongs"),
         ("--skin a=textile-disc-9", "textile-disc-8"),
         ("--skin a=textile-disc-8 --source serial:/dev/x --skin b=textile-disc-8 "
-         "--source serial:/dev/x", "two skins have the same source serial:/dev/x"),
+         "--source serial:/dev/x", "got one for a (serial:/dev/x) and b (serial:/dev/x)"),
     ],
 )  # fmt: skip
 @pytest.mark.usefixtures("built_page")

@@ -2,6 +2,8 @@
 
 import json
 
+import pytest
+
 from tomoskin.model.skin import Skin
 
 
@@ -42,6 +44,21 @@ def test_check(tomoskin):
     assert "ok" in out
     _, out, _ = tomoskin("skin", "check", "textile-disc-8", "--json")
     assert json.loads(out)["mesh"]["quality_minimum"] > 0.3
+
+
+@pytest.mark.parametrize("prior", ["gaussian", "laplace"])
+def test_a_prior_under_which_regions_lie_too_far_out_is_said(tomoskin, tmp_path, prior):
+    changes = {"inverse": {"prior": prior}, "touch": {"method": "image"}}
+    skin = Skin.load("textile-disc-8").altered(changes)
+    file = tmp_path / "own.toml"
+    file.write_text(skin.to_toml())
+    code, _, errors = tomoskin("skin", "check", file)
+    assert code == 0
+    assert f'images under prior "{prior}" are smooth up to the rim' in errors
+    file.write_text(skin.altered({"touch": {"method": "fit"}}).to_toml())
+    assert "smooth" not in tomoskin("skin", "check", file)[2]
+    file.write_text(skin.altered({"inverse": {"prior": "noser"}}).to_toml())
+    assert "smooth" not in tomoskin("skin", "check", file)[2]
 
 
 def test_a_wrong_file_is_one_sentence(tomoskin, tmp_path):

@@ -83,11 +83,12 @@ def test_the_stack_up_is_in_the_boards():
     for channels in parasitics.BOARDS:
         text = (KICAD / f"board-{channels}.kicad_pcb").read_text(encoding="utf-8")
         of_copper = dict(
-            re.findall(r'\(layer "(\S+)" \(type "copper"\) \(thickness ([^)]+)\)', text)
+            re.findall(r'\(layer "(\S+)"\s+\(type "copper"\)\s+\(thickness ([^)]+)\)', text)
         )
         assert of_copper == {name: str(layer.thickness) for name, layer in LAYERS.items()}
         prepreg = (
-            r'\(type "prepreg"\) \(thickness ([^)]+)\) \(material "FR4"\) \(epsilon_r ([^)]+)\)'
+            r'\(type "prepreg"\)\s+\(thickness ([^)]+)\)\s+\(material "FR4"\)\s+'
+            r"\(epsilon_r ([^)]+)\)"
         )
         found = {(float(a), float(b)) for a, b in re.findall(prepreg, text)}
         assert found == {(layer.height, layer.permittivity) for layer in LAYERS.values()}

@@ -88,6 +88,38 @@ def test_floating_pins_drive_nothing(five):
     assert wrong["skin"][0] > 5e-3
 
 
+ARDUINO, LIFTED = "100", "1g"
+"""ohm: what an Arduino without power draws from 5 V, about; a board that was lifted off it."""
+
+
+def rails(variant, channels, usb, pull="1", mega=ARDUINO):
+    said = run("rails", variant=variant, channels=channels, usb=usb, pull=pull, mega=mega)
+    return {name: value[0] for name, value in said.items()}
+
+
+@pytest.mark.parametrize("channels", [8, 16])
+@pytest.mark.parametrize(("usb", "pull"), [(OFF, "1"), (ON, "100m")], ids=["never", "pulled"])
+def test_12_v_without_5_v_stays_at_the_jack(channels, usb, pull):
+    wrong = rails("bare", channels, usb, pull)
+    assert wrong["substrate"] == pytest.approx(0.35e-3 * channels, rel=0.05)  # through U1
+    assert wrong["above"] > 0.6
+    assert wrong["five"] > 0.4
+    for mega in (ARDUINO, LIFTED):
+        ours = rails("mended", channels, usb, pull, mega)
+        assert ours["substrate"] < 1e-6
+        assert ours["above"] < 0.1
+        assert abs(ours["twelve"]) < 1
+        assert ours["five"] < 0.01
+
+
+@pytest.mark.parametrize("channels", [8, 16])
+def test_with_5_v_the_rails_are_as_without_the_switch(channels):
+    wrong, ours = (rails(variant, channels, ON) for variant in ("bare", "mended"))
+    assert ours["twelve"] == pytest.approx(wrong["twelve"], abs=0.01)
+    assert ours["negative"] == pytest.approx(wrong["negative"], abs=0.01)
+    assert -5 < ours["negative"] < -4.16  # as the first power-up asks
+
+
 @pytest.mark.parametrize(("high", "low"), [(BROKEN, SOUND), (SOUND, BROKEN)])
 def test_one_stuck_transistor_drives_nothing_while_all_is_off(high, low):
     assert run("stuck", variant="mended", on=OFF, high=high, low=low)["skin"][0] < 1e-7

@@ -45,7 +45,7 @@ def kind(net):
     name = net.rsplit("/", 1)[-1]
     if name in ("BUS", "EL", "SENSE"):
         return "current"
-    return "supply" if name in ("+12V", "+5V", "-5V", "RAW") else "signal"
+    return "supply" if name in ("+12V", "+5V", "-5V", "RAW", "INPUT") else "signal"
 
 
 def test_outputs_are_those_of_their_sources():

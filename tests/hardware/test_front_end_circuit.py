@@ -91,15 +91,24 @@ def test_current_and_gain() -> None:
 
 def test_each_switch_reaches_each_electrode() -> None:
     source, sink = of("ADG1606BRUZ")
-    read, ground = of("CD74HCT4067M96")
+    read, _ = of("CD74HCT4067M96")
     for switch in (source, sink):
         assert [switch[f"S{number}"] for number in range(1, 17)] == ELECTRODES
-    for switch in (read, ground):
-        assert [switch[f"I{number}"] for number in range(16)] == ELECTRODES
-    assert (source["D"], sink["D"], read["COM"], ground["COM"]) == ("BUS", "GND", "MUX+", "MUX-")
-    assert [ground[f"S{bit}"] for bit in range(4)] == [sink[f"A{bit}"] for bit in range(4)]
+    assert [read[f"I{number}"] for number in range(16)] == ELECTRODES
+    assert (source["D"], sink["D"], read["COM"]) == ("BUS", "GND", "MUX+")
     (header,) = of("61301621121")
     assert list(header.values()) == ELECTRODES
+
+
+def test_it_reads_against_the_electrode_before_the_sink() -> None:
+    """The sink carries the current: against it, a reading would have the sink's contact in it."""
+    _, sink = of("ADG1606BRUZ")
+    _, against = of("CD74HCT4067M96")
+    assert against["COM"] == "MUX-"
+    assert [against[f"S{bit}"] for bit in range(4)] == [sink[f"A{bit}"] for bit in range(4)]
+    for address in range(16):
+        assert sink[f"S{address + 1}"] == ELECTRODES[address]
+        assert against[f"I{address}"] == ELECTRODES[address - 1]
 
 
 def test_the_pico_has_them_where_the_firmware_does() -> None:

@@ -59,6 +59,17 @@ def test_every_control_line_has_a_pull_down(circuit):
             assert {net, "GND"} in held, net
 
 
+def test_12_v_come_only_with_5_v(circuit):
+    """All +12V goes through Q1, its source towards the jack, and -5V has a diode to ground."""
+    net = circuit.net_of
+    assert {net[pin] for pin in (("F1", "2"), ("D1", "1"), ("Q1", "2"))} == {"/Supply/INPUT"}
+    assert {reference for reference, _ in circuit.nets["/Supply/INPUT"]} == {
+        *("F1", "D1", "C1", "TP1", "Q1", "R2", "C6")
+    }
+    assert (net["Q1", "3"], net["Q2", "2"], net["R4", "1"]) == ("+12V", "GND", "+5V")
+    assert [net["D2", pin] for pin in "132"] == ["-5V", "-5V", "GND"]
+
+
 def test_an_amplifier_reads_against_the_electrode_before_the_sink(circuit):
     inputs = [9, 8, 7, 6, 5, 4, 3, 2, 23, 22, 21, 20, 19, 18, 17, 16]
     for sink in range(16):

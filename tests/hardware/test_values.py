@@ -25,6 +25,11 @@ def in_deck(block, element):
         ("CURRENT_mended", "R2", ("Q21", "3"), ("U22", "4")),
         ("CURRENT_mended", "C2", ("U22", "1"), ("U22", "4")),
         ("CURRENT_mended", "R3", ("U22", "1"), ("Q21", "1")),
+        ("INPUT_mended", "R2", ("Q1", "2"), ("Q1", "1")),
+        ("INPUT_mended", "C6", ("Q1", "2"), ("Q1", "1")),
+        ("INPUT_mended", "R3", ("Q1", "1"), ("Q2", "3")),
+        ("INPUT_mended", "R4", ("U1", "8"), ("Q2", "1")),
+        ("INPUT_mended", "R5", ("Q2", "1"), GND),
         ("DUMP_mended", "R2", ("U23", "4"), ("Q22", "1")),
         ("HIGH_mended", "R1", TWELVE, ("Q302", "1")),
         ("HIGH_mended", "R2", ("U81", "13"), ("Q301", "1")),
@@ -43,7 +48,7 @@ def in_deck(block, element):
     ],
 )
 def test_a_value_is_the_same_in_both(block, element, one, other):
-    assert BOARD.value(one, other).split()[0] == in_deck(block, element)
+    assert BOARD.value(one, other, kinds=element[0]).split()[0] == in_deck(block, element)
 
 
 def test_what_sets_the_current():

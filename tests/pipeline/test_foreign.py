@@ -96,6 +96,19 @@ def test_a_board_that_is_not_known_has_no_noise_to_predict(skin: str, own: str) 
     assert rules == ["model-error", own]
 
 
+def test_a_trained_operator_shows_two_objects_of_another_board_apart() -> None:
+    """Their distance is that of objects in a tank of others that were one maximum."""
+    made = prepare(Skin.load("tank-16"))
+    ends = np.array([[-0.0425, -0.05], [0.0425, -0.05]])
+    sigma = np.full(len(made.mesh.cells), made.skin.conductivity)
+    far = [np.linalg.norm(made.mesh.centroids - p, axis=1) for p in (*ends, ends.mean(axis=0))]
+    sigma[np.minimum(*far[:2]) < 0.02] *= 0.5
+    values = np.array([made.model.solve(s).voltages for s in (made.skin.conductivity, sigma)])
+    image = reconstruct(made, recording(made, values), values[:1]).images[1]
+    one, other, middle = (-image[away < 0.012].mean() for away in far)
+    assert middle < 0.95 * min(one, other)
+
+
 def test_changes_in_common_show_unless_idle_frames_have_them_too() -> None:
     made = prepared()
     rng = np.random.default_rng(3)

@@ -16,9 +16,23 @@ from tomoskin.model.robot import Place, Pose
 from tomoskin.run import Member, RobotRun
 from tomoskin.run.publisher import Turns
 from tomoskin.run.robot_run import board_problems
-from tomoskin.run.sinks import ContactListener
+from tomoskin.run.sinks import Contacts, Sink
 
 PATIENCE = 300
+
+
+class Kept(Sink):
+    """Keeps whether touches were valid, and what was wrong."""
+
+    name = "kept"
+
+    def __init__(self):
+        self.said, self.lost = [], threading.Event()
+
+    def publish(self, item):
+        if isinstance(item, Contacts):
+            self.said.append((item.valid, item.problem))
+            self.lost.set()
 
 
 class Watch:
@@ -66,20 +80,11 @@ def grown(run, names, by=40):
 
 
 def test_all_run_and_each_says_who_it_is(prepared, boards):
-    told, news = {}, threading.Event()
-
-    def react(contacts):
-        told[contacts.skin] = contacts.frame_id
-        if len(told) == len(boards):
-            news.set()
-
     pose = Pose.of((0, 0, 0.1), (0, 0, 0))
-    members = [
-        Member(Place(n, f"{n}_link", pose), prepared, b.open, [ContactListener(react)])
-        for n, b in boards.items()
-    ]
-    with running(members):
-        assert news.wait(PATIENCE)
+    members = [Member(Place(n, f"{n}_link", pose), prepared, b.open) for n, b in boards.items()]
+    with running(members) as run:
+        Watch(run).until(grown(run, boards))
+        told = {c.skin: c.frame_id for c in (skin.latest() for skin in run.skins.values())}
     assert told == {"left": "left_link", "right": "right_link", "hand": "hand_link"}
 
 
@@ -104,24 +109,18 @@ def test_a_missing_board_and_a_lost_one_disturb_no_other(prepared, boards):
 
 def test_a_board_that_was_missing_from_the_start_is_told_to_its_sinks(prepared, boards):
     boards["left"].lost = True
-    told, lost = [], threading.Event()
-
-    def react(contacts):
-        if contacts.skin == "left":
-            told.append((contacts.valid, contacts.problem))
-            lost.set()
-
-    sinks = [ContactListener(react)]
-    left = member(prepared, "left", boards["left"], sinks=sinks)
+    sink = Kept()
+    left = member(prepared, "left", boards["left"], sinks=[sink])
     with running([left, member(prepared, "right", boards["right"])]) as run:
-        assert lost.wait(PATIENCE)
-        assert told[0][0] is False
-        assert "the port is gone" in told[0][1]
+        assert sink.lost.wait(PATIENCE)
+        Watch(run).until(lambda: "the port is gone" in run.skins["left"].latest().problem)
         assert not run.statuses()["left"].running
         boards["left"].lost = False
         Watch(run).until(grown(run, ["left"]))
         assert len(run.runners["left"].status().sinks) == 1
-    assert told[-1] == (True, None)
+    assert sink.said[0][0] is False
+    assert "the port is gone" in sink.said[0][1]
+    assert sink.said[-1] == (True, None)
 
 
 def test_without_any_board_it_says_so(prepared, boards):

@@ -6,7 +6,6 @@ import json
 import re
 import threading
 from contextlib import closing
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -137,8 +136,9 @@ def test_touches_are_told_in_the_frame_of_the_robot(site, pressed):
 def test_of_a_board_that_is_lost_no_touch_is_shown(site, pressed, monkeypatch):
     """The last ones may be over."""
     del pressed
-    now = Runner.status
-    monkeypatch.setattr(Runner, "status", lambda runner: replace(now(runner), running=False))
+    now = Runner.contacts.fget
+    gone = property(lambda runner: now(runner).outdated("the port is gone"))
+    monkeypatch.setattr(Runner, "contacts", gone)
     with site.connect() as page:
         while not isinstance(told := page.recv(PATIENCE), bytes):
             pass

@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 import type { Touch } from "../src/decode";
 import { History } from "../src/history";
-import { ellipse } from "../src/sheet/overlay";
+import { ellipse, halfAxes } from "../src/sheet/overlay";
 import { Locator } from "../src/sheet/locate";
 import { rotation, Seen } from "../src/sheet/solid";
 import { prepareTopology } from "../src/sheet/topology";
@@ -85,6 +85,8 @@ describe("the ellipse of a touch", () => {
     }
     const [farX, farY] = places[0];
     expect((farY - 0.02) / (farX - 0.01)).toBeCloseTo(1, 6);
+    const reach = Math.max(...places.map(([x, y]) => Math.hypot(x - 0.01, y - 0.02)));
+    expect(halfAxes(touch)?.[0]).toBeCloseTo(reach, 6); // what the list says in words
   });
 
   it("is not drawn where the noise is unknown", () => {

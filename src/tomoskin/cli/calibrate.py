@@ -243,7 +243,7 @@ def force(
     with Bar("preparing"):
         prepared = prepare(skin)
     with Bar("finding touches") as bar:
-        result = reconstructed(labelled.data, prepared, labelled.reference, None, bar)
+        result = reconstructed(labelled, prepared, None, bar)
     presses = weighed(path, result, newtons, labelled.data.time)
     with Bar("learning"):
         model = ForceModel.fit(presses, skin)

@@ -111,9 +111,13 @@ def forces(path: Path, n: int, given: list[str] | None) -> FloatArray:
             hint="add force_n, or --weight 4.9=40:60 --weight 9.8=80:100",
         )
     labels = real_numbers(arrays, "force_n", str(path))
-    if labels.shape != (n,):
-        raise DataError(f"expected {n} values of force_n, got {labels.shape}", where=str(path))
-    return labels
+    if labels.shape not in ((n,), (n, 1)):  # older sets of single presses have a column
+        raise DataError(
+            f"expected force_n of shape ({n},), one force for each frame, got {labels.shape}",
+            where=str(path),
+            hint="give the force of frames with one press, and NaN of all others",
+        )
+    return labels.ravel()
 
 
 def _number(text: str) -> float:

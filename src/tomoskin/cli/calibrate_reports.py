@@ -11,9 +11,8 @@ if TYPE_CHECKING:
     from tomoskin.learning import Classifier, Locator, MappingAnswer
     from tomoskin.model.skin import Skin
 
-_SHOWN, _DRIFTED, _WORSE = 10, 2.0, 1.1
-"""Remarks that are listed, growth of the errors from which the skin has changed, and from which
-more presses have made it worse."""
+_SHOWN, _DRIFTED = 10, 2.0
+"""Remarks that are listed, and growth of the errors from which the skin has changed."""
 
 _HARDLY = 0.5
 """Part of the labelled frames that are right, below which labels hardly depend on the data."""
@@ -50,6 +49,8 @@ def touch_facts(
 
 def touch_lines(facts: dict[str, Any]) -> list[str]:
     """What :func:`touch_facts` gave, in sentences."""
+    from tomoskin.learning import worse
+
     lines = [
         f"{facts['presses']} presses; each press left out in turn, the mean error is "
         f"{facts['mean_mm']:.1f} mm (median {facts['median_mm']:.1f}, 95 % "
@@ -72,11 +73,10 @@ def touch_lines(facts: dict[str, Any]) -> list[str]:
             f"the errors of the last presses are {facts['drift']:.1f} times as large as usual: "
             "the skin has changed; press it again"
         )
-    if facts["growth"] > _WORSE:
+    if what := worse(facts["growth"]):
         lines.append(
-            f"since the newer presses were added, the older ones are missed {facts['growth']:.1f} "
-            "times as far: the newer ones do not fit with them. Check their labels and the wiring; "
-            "where the skin has changed, calibrate it again"
+            f"{what}. Check their labels and the wiring; where the skin has changed, calibrate it "
+            "again"
         )
     x, y = facts["next_press_mm"]
     return [*lines, f"the next press is most useful at x {x:+.0f} mm, y {y:+.0f} mm"]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,12 +9,10 @@ import typer
 
 from tomoskin.cli.options import DEFAULT_SKIN
 from tomoskin.cli.output import remark
-from tomoskin.core import DataError
 
 if TYPE_CHECKING:
     from tomoskin.model.skin import Skin
     from tomoskin.pipeline import Prepared
-    from tomoskin.run import BoardMemory
     from tomoskin.run.sinks import Sink
     from tomoskin.sensing.signal import Headroom
 
@@ -83,40 +80,6 @@ def chosen_sinks(specs: list[str] | None) -> tuple[Sink, ...]:
     from tomoskin.run.sinks import make_sink
 
     return tuple(make_sink(spec) for spec in specs or ())
-
-
-def board_memory() -> BoardMemory | None:
-    """Where boards are remembered; None where nothing is kept on this disk."""
-    from tomoskin.core import cache_folder
-    from tomoskin.run import BoardMemory
-
-    folder = cache_folder()
-    return None if folder is None else BoardMemory(folder / "boards")
-
-
-def with_calibrations(prepared: Prepared, paths: Iterable[Path] | None, skin: Skin) -> Prepared:
-    """The skin with the calibrations named, of any kind.
-
-    ``skin`` as its file says, whatever images are made of it. Raises DataError for calibrations of
-    another skin, and for two of one kind.
-    """
-    from tomoskin.learning import load_calibration
-
-    named: dict[str, Path] = {}
-    for path in paths or ():
-        calibration = load_calibration(path)
-        kind = calibration.kind
-        if kind.name in named:
-            raise DataError(
-                f"is a calibration of {kind.subject}, and so is {named[kind.name]}",
-                where=str(path),
-                hint="give only one of them",
-            )
-        named[kind.name] = path
-        if kind.own_settings:
-            calibration.check_skin(skin)
-        prepared = prepared.calibrated(calibration)
-    return prepared
 
 
 def with_recorded_calibrations(prepared: Prepared, path: Path) -> Prepared:

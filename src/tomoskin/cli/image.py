@@ -14,11 +14,10 @@ import typer
 from tomoskin.cli.choices import (
     quantity,
     skin_for_file,
-    with_calibrations,
     with_recorded_calibrations,
 )
 from tomoskin.cli.named_files import TABLE, ForceFlag, Writes
-from tomoskin.cli.named_parts import first_time, reconstructed, say_notes, sharp, span_lines
+from tomoskin.cli.named_parts import Recorded, first_time, reconstructed, say_notes, span_lines
 from tomoskin.cli.options import (
     CalibrationsOption,
     FramesOption,
@@ -178,7 +177,7 @@ def image(
     from tomoskin.files.exports import write_touches
     from tomoskin.files.imports import read_recording
     from tomoskin.learning import FORCE
-    from tomoskin.pipeline import ALONE, located_alone, prepare
+    from tomoskin.pipeline import ALONE, located_alone, prepare, sharpened
     from tomoskin.sensing.track import touch_spans
 
     own = skin_for_file(skin, recording)
@@ -189,24 +188,22 @@ def image(
     with Bar("preparing"):
         prepared = prepare(chosen)
         if tuned.calibration or skin is not None:
-            prepared = with_calibrations(prepared, tuned.calibration, own)
+            prepared = prepared.calibrated_by(tuned.calibration or (), own)
         else:
             prepared = with_recorded_calibrations(prepared, recording)
-    recorded = data.in_order_of(prepared.pattern)
+    given = Recorded(recording, data, prepared.skin, reference, prepared.pattern)
     _say_order(data, prepared)
-    say_notes(recorded)
+    say_notes(given.data)
     with Bar("reconstructing") as bar:
-        result = reconstructed(recorded, prepared, reference, frames, bar, rule=rule)
+        result = reconstructed(given, prepared, frames, bar, rule=rule)
     if tuned.sharp:
         with Bar("sharpening") as bar:
-            result = sharp(recorded, prepared, reference, result, bar)
+            result = sharpened(result, prepared, given.data, given.against, bar)
     surface, forces = prepared.skin.surface, FORCE.name in prepared.calibrations
     tables = {touches: result}
     if thorough is not None:
         with Bar("searching each frame") as bar:
-            tables[thorough] = reconstructed(
-                recorded, prepared, reference, frames, bar, rule=rule, setting=ALONE
-            )
+            tables[thorough] = reconstructed(given, prepared, frames, bar, rule=rule, setting=ALONE)
     for path, part in tables.items():
         if path is not None:
             rows = zip(part.frames.tolist(), part.time.tolist(), part.touches, strict=True)
@@ -214,18 +211,18 @@ def image(
     if results.out is not None:
         write = WRITERS[results.out.suffix.lower()]
         write(results.out, prepared, result, display, overwrite=force)
-    _warn(recorded, result)
+    _warn(given.data, result, chosen)
     if located_alone(prepared, result.model_agreement):
         remark(f"{recording}: the calibration alone locates touches, one at a time")
-    since = (result.time - first_time(recorded)).tolist()
+    since = (result.time - first_time(given.data)).tolist()
     spans = touch_spans(zip(since, result.touches, strict=True))
     lines = _lines(result, spans, prepared)
     if thorough is not None:
         count = sum(map(len, tables[thorough].touches))
         lines.append(f"{thorough}: each frame searched by itself, {count} touches in them all")
-    if not recorded.board_known:
+    if not given.data.board_known:
         lines.append(_unknowable(chosen))
-    if not recorded.timed:
+    if not given.data.timed:
         lines.append("the file has no times of its frames, so each is searched by itself")
     tell(_document(result, spans, prepared), lines, json=json)
 
@@ -269,9 +266,10 @@ def _say_order(recording: Recording, prepared: Prepared) -> None:
         )
 
 
-def _warn(recorded: Recording, result: Reconstruction) -> None:
+def _warn(recorded: Recording, result: Reconstruction, skin: Skin) -> None:
     """Say on stderr what was left out, and what looks wrong."""
     from tomoskin.files.imports import is_session
+    from tomoskin.model.skin import regions_doubt
 
     source = Path(recorded.source)
     for note in result.notes:
@@ -296,6 +294,8 @@ def _warn(recorded: Recording, result: Reconstruction) -> None:
         )
     if (doubt := result.model_agreement.doubt(volts=is_session(source))) is not None:
         remark(f"{source}: {doubt}")
+    if (doubt := regions_doubt(skin.inverse, skin.touch)) is not None:
+        remark(f"{skin.source}: {doubt}")
 
 
 def _document(

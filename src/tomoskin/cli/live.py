@@ -15,13 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tomoskin.cli.choices import (
-    board_memory,
-    chosen_sinks,
-    say_headroom,
-    skin_for_source,
-    with_calibrations,
-)
+from tomoskin.cli.choices import chosen_sinks, say_headroom, skin_for_source
 from tomoskin.cli.named_files import RECORDING, Otherwise, Reads, Writes
 from tomoskin.cli.options import CalibrationsOption, SinkOption, SkinsOption, SourcesOption
 from tomoskin.cli.output import Bar, JsonFlag, emit, remark
@@ -30,9 +24,9 @@ from tomoskin.cli.record import ended_by_signals, recording_to, troubles_told
 if TYPE_CHECKING:
     from socket import socket
 
-    from tomoskin.model.robot import PlacedSkin, Robot
+    from tomoskin.model.robot import Robot
     from tomoskin.pipeline import Prepared
-    from tomoskin.run import Member, RobotRun, Runner
+    from tomoskin.run import RobotRun, Runner
     from tomoskin.server import AccessPolicy, Hub
 
 
@@ -125,6 +119,7 @@ def live(
     """Run source, pipeline and server until a signal comes."""
     several = chosen_robot(robot, skin or [], source or [], calibration or [])
     with ended_by_signals():
+        from tomoskin.run import prepared_for
         from tomoskin.server import check_page
 
         check_page()
@@ -134,8 +129,9 @@ def live(
         origin = source[0] if source else "twin"
         sinks = chosen_sinks(sink)
         with Bar("preparing"):
-            prepared = _prepared(skin[0] if skin else None, origin)
-            prepared = with_calibrations(prepared, calibration, prepared.skin)
+            recorded = skin is None and origin.startswith("replay:")
+            chosen = None if recorded else skin_for_source(skin[0] if skin else None, origin)
+            prepared = prepared_for(chosen, origin, calibration or ())
         say_headroom(prepared.headroom)
         _run_skin(prepared, origin, sinks, served)
 
@@ -143,30 +139,18 @@ def live(
 def _run_skin(prepared: Prepared, source: str, sinks: Sequence[Any], served: Served) -> None:
     from tomoskin.board.source import open_source
     from tomoskin.core import plain_values
-    from tomoskin.run import Runner
+    from tomoskin.run import BoardMemory, Runner
     from tomoskin.server import application, state
 
     opener = partial(open_source, source, prepared.skin)
     with served.listening() as (listener, policy):
-        runner = Runner(prepared, opener, sinks=sinks, memory=board_memory())
+        runner = Runner(prepared, opener, sinks=sinks, memory=BoardMemory.in_cache())
         with recording_to(runner, served.record) as stopped:
             app = application(_hub_of(runner, source, served.folder), policy)
             served.serve(app, listener, policy, f"{runner.status().source} is live")
     now = plain_values(state(runner.status()))
     kept = ("frames", "p50_ms", "p99_ms", "stages", "bend", "class", "calibration")
     served.end({name: now[name] for name in kept}, stopped)
-
-
-def _prepared(skin: str | None, source: str) -> Prepared:
-    """The skin, of a recording with the calibrations that it holds."""
-    from tomoskin.files.session import SessionReader, as_recorded, parse_replay
-    from tomoskin.pipeline import prepare
-
-    name, _, argument = source.partition(":")
-    if skin is None and name == "replay":
-        with SessionReader(parse_replay(argument)[0]) as session:
-            return as_recorded(session)
-    return prepare(skin_for_source(skin, source))
 
 
 def _hub_of(runner: Runner, source: str, folder: Path) -> Hub:
@@ -229,36 +213,23 @@ def _named(given: str) -> tuple[str, str]:
 
 def _run_robot(robot: Robot, sinks: list[str] | None, served: Served) -> None:
     """Run the skins of a robot and their page until a signal comes."""
-    from tomoskin.run import RobotRun
+    from tomoskin.run import BoardMemory, Member, RobotRun
 
     with Bar("preparing"):
-        members = [_member(skin, sinks) for skin in robot.skins]
-    run = RobotRun(members, board_memory())
+        members = [
+            Member.of(skin, skin_for_source(skin.skin, skin.source), chosen_sinks(sinks))
+            for skin in robot.skins
+        ]
+    for member in members:
+        if (problem := member.prepared.headroom.problem) is not None:
+            remark(f"{member.place.name}: {problem}")
+    run = RobotRun(members, BoardMemory.in_cache())
     stopped = _serve_robot(robot, run, served)
     facts = {
         name: {"frames": s.frames, "p50_ms": 1e3 * s.p50, "p99_ms": 1e3 * s.p99}
         for name, s in run.statuses().items()
     }
     served.end({"skins": facts}, stopped)
-
-
-def _member(skin: PlacedSkin, sinks: list[str] | None) -> Member:
-    from tomoskin.board.source import open_source
-    from tomoskin.run import Member
-
-    prepared = _placed(skin)
-    if prepared.headroom.problem is not None:
-        remark(f"{skin.name}: {prepared.headroom.problem}")
-    opened = partial(open_source, skin.source, prepared.skin)
-    return Member(skin.place, prepared, opened, chosen_sinks(sinks), skin.board)
-
-
-def _placed(skin: PlacedSkin) -> Prepared:
-    """With the calibrations that the robot file names."""
-    from tomoskin.pipeline import prepare
-
-    chosen = skin_for_source(skin.skin, skin.source)
-    return with_calibrations(prepare(chosen), skin.calibrations, chosen)
 
 
 def _serve_robot(robot: Robot, run: RobotRun, served: Served) -> list[str]:

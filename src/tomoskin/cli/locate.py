@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from tomoskin.sensing.signal import Recording
 
 _BLOCK = 256
+_NINETY = 1645.0
+"""Millimetres on either side within which nine in ten lie, of a deviation of 1 m."""
+
 _SHOWN = 20
 
 
@@ -70,7 +73,7 @@ def _in_flow(given: Recorded, skin: Skin, loaded: Calibration[Locator]) -> Locat
     with Bar("preparing"):
         prepared = prepare(skin).calibrated(loaded)
     with Bar("locating") as bar:
-        result = reconstructed(given.data, prepared, given.reference, None, bar)
+        result = reconstructed(given, prepared, None, bar)
     return result.frames.tolist(), list(result.touches)
 
 
@@ -157,8 +160,10 @@ def _lines(rows: list[tuple[int, Touch]]) -> Iterator[str]:
         r = touch.detection
         close = "" if touch.said == touch.kind else f"  {touch.said}"
         yield (
-            f"frame {frame:>4}  x {1e3 * r.x:+7.1f} ± {1e3 * r.sd_x:4.1f} mm  "
-            f"y {1e3 * r.y:+7.1f} ± {1e3 * r.sd_y:4.1f} mm  strength {r.peak:.2f}{close}"
+            f"frame {frame:>4}  x {1e3 * r.x:+7.1f} ± {_NINETY * r.sd_x:4.1f} mm  "
+            f"y {1e3 * r.y:+7.1f} ± {_NINETY * r.sd_y:4.1f} mm  strength {r.peak:.2f}{close}"
         )
+    if rows:
+        yield "nine in ten positions lie within ± along each axis"
     if len(rows) > _SHOWN:
         yield f"… and {len(rows) - _SHOWN} more touches: --touches writes all"

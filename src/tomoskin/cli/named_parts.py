@@ -91,9 +91,14 @@ class Recorded:
         return self.recording.in_order_of(self.pattern)
 
     @cached_property
+    def against(self) -> Idle:
+        """What the frames are held against. A file that is named is read once."""
+        return _idle(self.data, self.reference, self.pattern)
+
+    @cached_property
     def idle(self) -> NDArray[Any] | Literal["previous"] | None:
         """(n_idle, n_meas) what the frames are held against; None for a file of differences."""
-        idle = _idle(self.data, self.reference, self.pattern)
+        idle = self.against
         return self.data.voltages[idle.start : idle.stop] if isinstance(idle, range) else idle
 
     @cached_property
@@ -187,9 +192,8 @@ def _idle(recording: Recording, spec: str | None, pattern: Pattern) -> Idle:
 
 
 def reconstructed(
-    recording: Recording,
+    given: Recorded,
     prepared: Prepared,
-    reference: str | None,
     frames: str | None,
     advance: Advance,
     *,
@@ -205,10 +209,10 @@ def reconstructed(
     from tomoskin.files.session import SessionReader, reconstruct_session
     from tomoskin.pipeline import reconstruct, recorded_frames, tuned_by_rule, with_choice
 
+    recording, idle, own = given.data, given.against, given.reference is None
     path, (start, stop) = Path(recording.source), frame_range(recording, frames)
-    idle = _idle(recording, reference, prepared.pattern)
     count = len(idle) if isinstance(idle, range) and not idle.start else 1
-    if is_session(path) and (reference is None or count > 1):
+    if is_session(path) and (own or count > 1):
         with SessionReader(path) as session:
             if session.skin.pattern().identity == prepared.pattern.identity:
                 if rule is not None:
@@ -221,27 +225,13 @@ def reconstructed(
                     start=start,
                     stop=stop,
                     setting=setting,
-                    idle=None if reference is None else count,
+                    idle=None if own else count,
                     advance=advance,
                 )
     return reconstruct(
         prepared, recording, idle, start=start, stop=stop, rule=rule, setting=setting,
         advance=advance,
     )  # fmt: skip
-
-
-def sharp(
-    recording: Recording,
-    prepared: Prepared,
-    reference: str | None,
-    result: Reconstruction,
-    advance: Advance,
-) -> Reconstruction:
-    """This reconstruction with sharp images in place of its own."""
-    from tomoskin.pipeline import sharpened
-
-    idle = _idle(recording, reference, prepared.pattern)
-    return sharpened(result, prepared, recording, idle, advance)
 
 
 def first_time(recording: Recording) -> float:

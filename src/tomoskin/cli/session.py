@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
@@ -143,15 +144,28 @@ def export(
     every: Annotated[
         float, typer.Option(min=1e-3, help="Seconds between two images, for formats with images.")
     ] = 0.1,
+    skin: Annotated[
+        str, typer.Option(metavar="NAME", help="One skin of a robot's recording.")
+    ] = "",
+    like: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="Dataset of a robot: X.lerobot has its rate, and its episodes begin at the notes.",
+        ),
+        Reads(),
+    ] = None,
     force: ForceFlag = False,
 ) -> None:
     """Convert a session to tables, images or the format of another program."""
     from tomoskin.files.exports import WRITERS, Export, export_touches, omitted
-    from tomoskin.files.session import SessionReader
+    from tomoskin.files.session import SessionReader, skins_in
 
     write = WRITERS[out.suffix.lower()]
-    with SessionReader(file) as session, Bar(f"writing {out}") as bar:
-        job = Export(session, every, bar, overwrite=force)
+    names = (skin,) if skin or out.suffix.lower() != ".lerobot" else skins_in(file)
+    with ExitStack() as stack, Bar(f"writing {out}") as bar:
+        session, *others = [stack.enter_context(SessionReader(file, name)) for name in names]
+        job = Export(session, every, bar, overwrite=force, others=tuple(others), like=like)
         write(job, out)
         if touches is not None:
             export_touches(job, touches)

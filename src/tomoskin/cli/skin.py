@@ -12,7 +12,7 @@ from tomoskin.cli.alpha import alpha
 from tomoskin.cli.app import group
 from tomoskin.cli.named_files import SKIN, ForceFlag, Otherwise, Reads, Writes
 from tomoskin.cli.options import DEFAULT_SKIN, NamedSkinOption, RecordingArgument, SkinArgument
-from tomoskin.cli.output import JsonFlag, tell
+from tomoskin.cli.output import JsonFlag, remark, tell
 from tomoskin.cli.skin_merit import merit
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def check(file: SkinArgument, json: JsonFlag = False) -> None:
     """Check a skin file, mesh it, and compare the expected voltages with the board's limits."""
     from tomoskin.core import SkinError
     from tomoskin.model.mesh import quality
-    from tomoskin.model.skin import Skin
+    from tomoskin.model.skin import Skin, regions_doubt
     from tomoskin.sensing.signal import Headroom
 
     skin = Skin.load(file)
@@ -58,6 +58,8 @@ def check(file: SkinArgument, json: JsonFlag = False) -> None:
     headroom = Headroom.of_skin(skin)
     if headroom.problem is not None:
         raise SkinError(headroom.problem, where=skin.source)
+    if (doubt := regions_doubt(skin.inverse, skin.touch)) is not None:
+        remark(f"{skin.source}: {doubt}")
     figures = {
         "n_cells": mesh.n_cells,
         "n_points": mesh.n_points,

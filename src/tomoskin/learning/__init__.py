@@ -29,6 +29,7 @@ from tomoskin.learning.touch.calibration_health import (
     CalibrationHealth,
     LeftOut,
     growth_of_errors,
+    worse,
 )
 from tomoskin.learning.touch.located_touch import TOUCH
 from tomoskin.learning.touch.locator import Locator, detection_at
@@ -100,4 +101,5 @@ __all__ = [
     "quiet_electrodes",
     "ring_of",
     "solve_channel_mapping",
+    "worse",
 ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -12,7 +12,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from tomoskin.board.source import Configuration, ScanSettings
-from tomoskin.core import FloatArray, Image, IntArray, ModelError, reach
+from tomoskin.core import DataError, FloatArray, Image, IntArray, ModelError, StrPath, reach
 from tomoskin.imaging import (
     AlphaChoice,
     Greit,
@@ -22,7 +22,7 @@ from tomoskin.imaging import (
     Operator,
     Spectrum,
 )
-from tomoskin.learning import Calibration, Kind
+from tomoskin.learning import Calibration, Kind, load_calibration
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.pattern import Pattern, Scan
@@ -95,9 +95,32 @@ class Prepared:
         calibration.check(self.skin)
         return self._with({**self.calibrations, calibration.kind.name: calibration})
 
-    def uncalibrated(self, kind: Kind[Any]) -> Prepared:
-        """Without a calibration of that kind."""
-        return self._with({k: c for k, c in self.calibrations.items() if k != kind.name})
+    def calibrated_by(self, paths: Iterable[StrPath], skin: Skin | None = None) -> Prepared:
+        """With calibrations of any kind from files; ``skin``: the one they must be of, as its
+        file says, where images are made otherwise.
+
+        Raises DataError for calibrations of another skin, and for two of one kind.
+        """
+        prepared, named = self, dict[str, StrPath]()
+        for path in paths:
+            calibration = load_calibration(path)
+            kind = calibration.kind
+            if kind.name in named:
+                raise DataError(
+                    f"is a calibration of {kind.subject}, and so is {named[kind.name]}",
+                    where=str(path),
+                    hint="give only one of them",
+                )
+            named[kind.name] = path
+            if kind.own_settings:
+                calibration.check_skin(skin or self.skin)
+            prepared = prepared.calibrated(calibration)
+        return prepared
+
+    def uncalibrated(self, kind: Kind[Any] | None = None) -> Prepared:
+        """Without a calibration of that kind; None: without any."""
+        kept = {k: c for k, c in self.calibrations.items() if kind is not None and k != kind.name}
+        return self._with(kept)
 
     def _with(self, calibrations: Mapping[str, Calibration[Any]]) -> Prepared:
         spots = None

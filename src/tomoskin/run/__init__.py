@@ -13,7 +13,8 @@ from tomoskin.run.labelled_frames import (
     on_cluster,
     processors,
 )
-from tomoskin.run.robot_run import Member, RobotRun
+from tomoskin.run.live_skin import LiveSkin, open_skin, prepared_for
+from tomoskin.run.robot_run import Member, RobotRun, open_robot
 from tomoskin.run.runner import Runner
 from tomoskin.run.scripted import simulate
 from tomoskin.run.status import ReplayStatus, Status
@@ -23,6 +24,7 @@ __all__ = [
     "MAX_FORCE",
     "BoardMemory",
     "CheckFinding",
+    "LiveSkin",
     "Member",
     "ReplayStatus",
     "RobotRun",
@@ -40,6 +42,9 @@ __all__ = [
     "in_this_process",
     "make_set",
     "on_cluster",
+    "open_robot",
+    "open_skin",
+    "prepared_for",
     "processors",
     "simulate",
     "way_to_bend",

@@ -8,10 +8,10 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 from tomoskin.board.wire import Info
-from tomoskin.core import Frame, Mark, MarkedFrame, StrPath, TomoskinError
+from tomoskin.core import Frame, Mark, MarkedFrame, StrPath, TomoskinError, cache_folder
 from tomoskin.files.session import SessionReader, SessionWriter, errors_of, recorded_calibrations
 from tomoskin.learning import Calibration
 from tomoskin.pipeline import REFERENCE_FRAMES, FrameResult, Prepared
@@ -46,6 +46,12 @@ class BoardMemory:
 
     def __init__(self, folder: StrPath) -> None:
         self.folder = Path(folder)
+
+    @classmethod
+    def in_cache(cls) -> Self | None:
+        """The one beside the cache; None where nothing is kept on this disk."""
+        folder = cache_folder()
+        return None if folder is None else cls(folder / "boards")
 
     def keep(self, board: Info, prepared: Prepared, frames: Sequence[Frame]) -> None:
         """Keep ``frames`` of the untouched skin; nothing where there are too few or no id.

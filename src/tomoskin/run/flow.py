@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
@@ -14,6 +15,7 @@ from typing import Any
 from tomoskin.board.source import Link, ScanSettings, Transport
 from tomoskin.board.wire import Info
 from tomoskin.core import Event, Frame, Mark, MarkedFrame, TomoskinError
+from tomoskin.files.messages import NO_REFERENCE, Contacts
 from tomoskin.files.session import BoardInfo, RawRead, Truth
 from tomoskin.pipeline import FrameResult, Pipeline, Prepared, ReferenceState
 from tomoskin.run.board_memory import Recall
@@ -63,7 +65,7 @@ class Flow:
         self.board: Info | None = None
         self.board_name = ""
         self.pipeline, self.marker, self.twin = Pipeline(prepared), Marker(), TwinControl()
-        self.out = Publisher(prepared, audience, lambda: self.pipeline.numbered)
+        self.out = Publisher(prepared, audience, lambda: self.pipeline.numbered, self.board_report)
         self.latency, self.costs = Latency(), CostMeter(time.perf_counter)
         self._clock, self._turns = audience.clock, audience.turns
         self._recall, self.intake = Recall(audience.memory), Intake()
@@ -83,6 +85,11 @@ class Flow:
         self.out.begin(self.prepared, self.source, replay.epoch if replay else None)
         if (saturated := self.prepared.headroom.problem) is not None:
             self.out.say("saturated", saturated)
+
+    def begin_without(self, why: str) -> None:
+        """Its source could not be opened yet."""
+        self.out.begin(self.prepared, self.prepared.skin.name)
+        self.out.say("source-lost", why)
 
     def link(self, transport: Transport) -> Link:
         """The protocol session with its source, which has just been opened, maybe again."""
@@ -148,6 +155,39 @@ class Flow:
                 out.say("replay-damaged", f"the replay ends here: {replay.damage}")
             out.wake()
 
+    def contacts(self, trouble: str | None) -> Contacts:
+        """The newest result as it leaves the program; ``trouble``: why there is no source."""
+        stream, newest = self.out.stream, self.newest
+        trouble = trouble or self.intake.standstill
+        if newest is None:
+            return Contacts.without_frame(stream, trouble or NO_REFERENCE, self.now())
+        played = None
+        if stream.replayed:  # as if its scan had been read when it was played
+            scan_time = newest.result.scan_time
+            half = 0.0 if math.isnan(scan_time) else scan_time / 2
+            played = newest.ready - newest.latency - half
+        contacts = Contacts.of(stream, newest.result, played)
+        return contacts if trouble is None else contacts.outdated(trouble)
+
+    def board_report(self) -> dict[str, object]:
+        """How the board is doing now, by name; from any thread."""
+        info, losses, newest = self.board, self.intake.losses, self.newest
+        health = newest.result.health if newest else None
+        return {
+            "board": info.unique_id.hex() if info else "",
+            "board_name": self.board_name,
+            "firmware": ".".join(map(str, info.firmware)) if info else "",
+            "frames_per_s": round(self.latency.rate(self._clock()), 1),
+            "dropped": self._dropped(),
+            "corrupt": losses.corrupt,
+            "missing": losses.gaps,
+            "electrodes": (health.text if health else None) or "good",
+        }
+
+    def _dropped(self) -> int:
+        """Frames that the device or this host left out."""
+        return self.intake.losses.dropped + self.intake.skipped + self.pipeline.refused
+
     def status(self, trouble: str | None) -> Status:
         """How it is doing now; ``trouble``: why there is no source, or None."""
         now, replay = self._clock(), self.marker.replay
@@ -165,7 +205,7 @@ class Flow:
             replay=replay_status(replay, ended=self._ended) if replay else None,
             frames=self.latency.frames,
             fps=self.latency.rate(now),
-            dropped=losses.dropped + self.intake.skipped + self.pipeline.refused,
+            dropped=self._dropped(),
             corrupt=losses.corrupt,
             gaps=losses.gaps,
             p50=p50,

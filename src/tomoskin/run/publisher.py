@@ -6,7 +6,8 @@ import contextlib
 import logging
 import threading
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from tomoskin.core import Capacity, Consumer, Event, Worker, stop_workers
@@ -134,7 +135,7 @@ class Audience:
 
     @contextlib.contextmanager
     def watch(self, call: Callable[[], None]) -> Iterator[None]:
-        """While the block lasts, ``call`` is called from the run's thread at each result.
+        """While the block lasts, ``call`` is called at each result and event, in their thread.
 
         It must return at once. After the block it is not called again.
         """
@@ -168,14 +169,14 @@ class Audience:
         self.events.add(Event(self.clock(), kind, text))
 
     def put(self, message: RunMessage) -> None:
-        """Give ``message`` to those who subscribe; keep an event, and wake others at a result."""
+        """Give ``message`` to those who subscribe; keep an event; wake others at either."""
         if isinstance(message, Event):
             self.events.add(message)
         with self._lock:
             subscribers = tuple(self._subscribers)
         for worker in subscribers:
             worker.put(message)
-        if isinstance(message, FrameResult):
+        if isinstance(message, FrameResult | Event):
             self.wake()
 
     def wake(self) -> None:
@@ -196,10 +197,27 @@ class Publisher:
         Who listens.
     numbered
         The last identity that was given to a touch.
+    board
+        How the board is doing, by name.
+
+    Attributes
+    ----------
+    stream
+        What will be published, once a source is followed.
+    recordings
+        The recording, and what it needs.
     """
 
-    def __init__(self, prepared: Prepared, audience: Audience, numbered: Callable[[], int]) -> None:
-        self._audience = audience
+    stream: Stream
+
+    def __init__(
+        self,
+        prepared: Prepared,
+        audience: Audience,
+        numbered: Callable[[], int],
+        board: Callable[[], Mapping[str, object]],
+    ) -> None:
+        self._audience, self._board = audience, board
         self._sinks: tuple[Worker[SinkConsumer], ...] = ()
         self.recordings = Recordings(prepared, self.say, audience.clock, numbered)
 
@@ -209,9 +227,10 @@ class Publisher:
         Sinks that run already, because it could not be opened at first, go on.
         """
         self.recordings.name_source(source)
+        stream = Stream.of(prepared, source, recorded, self._audience.place)
+        self.stream = stream = replace(stream, board=self._board)
         if self._sinks:
             return
-        stream = Stream.of(prepared, source, recorded, self._audience.place)
         self._sinks = tuple(sink_worker(sink, stream, self.say) for sink in self._audience.sinks)
         for worker in self._sinks:
             worker.start()

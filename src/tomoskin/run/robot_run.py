@@ -7,20 +7,25 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import wait
 from contextlib import AbstractContextManager, ExitStack, suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from time import monotonic
+from typing import Self
 
-from tomoskin.core import SourceError, StrPath, TomoskinError
+from tomoskin.board.source import open_source
+from tomoskin.core import StrPath, TomoskinError
 from tomoskin.files.messages import epoch
 from tomoskin.files.session import MessageLog, robot_logs
-from tomoskin.model.robot import Place
-from tomoskin.pipeline import Prepared
+from tomoskin.model.robot import Place, PlacedSkin, Robot
+from tomoskin.model.skin import Skin
+from tomoskin.pipeline import Prepared, prepare
 from tomoskin.run import commands
 from tomoskin.run.board_memory import BoardMemory
 from tomoskin.run.commands import Opener
+from tomoskin.run.live_skin import LiveSkin
 from tomoskin.run.publisher import Turns
 from tomoskin.run.runner import Runner
-from tomoskin.run.sinks import Sink
+from tomoskin.run.sinks import Sink, make_sink
 from tomoskin.run.status import Status
 
 _OFTEN = 0.25
@@ -41,6 +46,17 @@ class Member:
     sinks: Sequence[Sink] = ()
     board: str | None = None
 
+    @classmethod
+    def of(cls, placed: PlacedSkin, skin: Skin, sinks: Sequence[Sink]) -> Self:
+        """The ``skin`` that a robot file has ``placed``, with the calibrations that it names there.
+
+        Raises TomoskinError.
+        """
+        prepared = prepare(skin).calibrated_by(placed.calibrations)
+        return cls(
+            placed.place, prepared, partial(open_source, placed.source, skin), sinks, placed.board
+        )
+
 
 class RobotRun:
     """Runs the skins of a robot.
@@ -50,8 +66,8 @@ class RobotRun:
 
     Attributes
     ----------
-    runners
-        By the names of the skins, in their order.
+    runners, skins
+        By the names of the skins, in their order: what runs each, and what a program reads.
     """
 
     def __init__(self, members: Sequence[Member], memory: BoardMemory | None = None) -> None:
@@ -62,11 +78,20 @@ class RobotRun:
             )
             for m in members
         }
+        self.skins = {name: LiveSkin(runner) for name, runner in self.runners.items()}
         self._boards = {m.place.name: m.board for m in members}
         self._problems: Mapping[str, str] = {}
         self._logs: Mapping[str, MessageLog] = {}
         self._ended = threading.Event()
         self._watch = threading.Thread(target=self._look_on, name="tomoskin-robot", daemon=True)
+
+    def __enter__(self) -> Self:
+        """Itself, which runs."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Stop."""
+        self.stop()
 
     def start(self) -> None:
         """Open the sources and begin.
@@ -76,18 +101,11 @@ class RobotRun:
         SourceError
             When none of the sources can be opened.
         """
-        errors = []
-        for runner in self.runners.values():
-            try:
-                runner.start()
-            except SourceError as error:
-                errors.append(error)
-                runner.start_without_source(
-                    f"the source cannot be opened, and tomoskin tries again: {error}"
-                )
-        if len(errors) == len(self.runners):
+        started = [runner.start(patient=True) for runner in self.runners.values()]
+        missing = [error for error in started if error is not None]
+        if len(missing) == len(started):
             self.stop()
-            raise errors[0]
+            raise missing[0]
         self._watch.start()
 
     def stop(self) -> None:
@@ -167,6 +185,25 @@ class RobotRun:
                 begun += step
                 for runner in self.runners.values():
                     runner.say("clock-step", _STEPPED.format(step))
+
+
+def open_robot(file: StrPath, sinks: Sequence[str] = ()) -> RobotRun:
+    """All skins of a robot file, running; ``sinks`` as for :func:`open_skin`.
+
+    A board that is missing is sought on, and its skin is not valid until it comes.
+
+    Raises
+    ------
+    TomoskinError
+        When the file, a skin or a calibration cannot be used, or no source at all can be opened.
+    """
+    members = [
+        Member.of(placed, Skin.load(placed.skin), [*map(make_sink, sinks)])
+        for placed in Robot.load(file).skins
+    ]
+    run = RobotRun(members, BoardMemory.in_cache())
+    run.start()
+    return run
 
 
 _STEPPED = "the clock of this computer was set by {:+.1f} s: messages keep the time of the start"

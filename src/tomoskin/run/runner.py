@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 
 from tomoskin.board.source import Transport
-from tomoskin.core import Event, ModelError, WireError
+from tomoskin.core import Event, ModelError, SourceError, WireError
 from tomoskin.files.session import ReplayTransport
 from tomoskin.model.robot import Place
 from tomoskin.pipeline import Prepared
@@ -25,7 +25,7 @@ from tomoskin.run.flow import Flow, Snapshot
 from tomoskin.run.intake import play
 from tomoskin.run.loop import Loop
 from tomoskin.run.publisher import Audience, Turns
-from tomoskin.run.sinks import Sink
+from tomoskin.run.sinks import Contacts, Sink
 from tomoskin.run.status import Latency, Status
 from tomoskin.run.twin_control import TwinControl
 from tomoskin.sensing.signal import Reference
@@ -109,34 +109,36 @@ class Runner:
         self._loop = Loop(prepared, open_transport, self.audience)
         self._thread: threading.Thread | None = None
 
-    def start(self) -> None:
+    def start(self, *, patient: bool = False) -> SourceError | None:
         """Open the source and begin.
+
+        Where ``patient``, begin without it too, and go on trying to open it: one of several
+        boards may be missing. Sinks are given why as they are given the loss of a board, and it
+        is returned.
 
         Raises
         ------
         SourceError
             When the source cannot be opened the first time: better said at once than retried.
         """
-        transport = self._loop.open()
-        self._loop.flow.begin(transport)
-        self._begin(transport)
-
-    def start_without_source(self, why: str) -> None:
-        """Begin, and go on trying to open the source: one of several boards may be missing.
-
-        Sinks are given ``why`` as they are given the loss of a board.
-        """
-        out, prepared = self._loop.flow.out, self._loop.flow.prepared
-        out.begin(prepared, prepared.skin.name)
-        out.say("source-lost", why)
-        self._begin(None)
-
-    def _begin(self, transport: Transport | None) -> None:
+        transport: Transport | None = None
+        missing: SourceError | None = None
+        try:
+            transport = self._loop.open()
+            self._loop.flow.begin(transport)
+        except SourceError as error:
+            if not patient:
+                raise
+            missing = error
+            self._loop.flow.begin_without(
+                f"the source cannot be opened, and tomoskin tries again: {error}"
+            )
         self._loop.commands.begin()
         self._thread = threading.Thread(
             target=self._loop.run, args=(transport,), name="tomoskin-runner", daemon=True
         )
         self._thread.start()
+        return missing
 
     def stop(self) -> None:
         """Stop the device and end; returns when it is done. A second call does nothing."""
@@ -189,6 +191,11 @@ class Runner:
     def newest(self) -> Snapshot | None:
         """The newest result, or None before the first."""
         return self._loop.flow.newest
+
+    @property
+    def contacts(self) -> Contacts:
+        """The newest result as it leaves the program; not valid while no frames come."""
+        return self._loop.flow.contacts(self._loop.trouble)
 
     @property
     def reference(self) -> Reference | None:

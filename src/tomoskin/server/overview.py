@@ -14,7 +14,7 @@ import numpy as np
 
 from tomoskin import __version__
 from tomoskin.core import FloatArray, Force, WireError, encode_json
-from tomoskin.files.messages import Contacts, Stream
+from tomoskin.files.messages import Stream
 from tomoskin.model.robot import PlacedSkin, Pose, Robot
 from tomoskin.run import RobotRun, Runner, StrictRequest, commands
 from tomoskin.server.hub import FILE_NAME
@@ -58,7 +58,7 @@ class Overview(Host):
             n: Stream.of(r.prepared, n, 0.0, placed[n].place) for n, r in run.runners.items()
         }
         poses = {n: robot.link_pose(placed[n].place) for n in run.runners}
-        self._streams, self._poses, self._touches = streams, poses, b""
+        self._poses, self._touches = poses, b""
         self._scene = scene(robot, streams, poses)
 
     @contextlib.asynccontextmanager
@@ -125,18 +125,14 @@ class Overview(Host):
             self._touches = made
 
     def _on(self, name: str, runner: Runner) -> TouchesOfSkin:
-        assert runner.newest is not None
-        if not runner.status().running:  # what touched last may touch no more
-            return TouchesOfSkin(valid=False, touches=[])
-        contacts = Contacts.of(self._streams[name], runner.newest.result)
-        pose = self._poses[name]
+        contacts, pose = runner.contacts, self._poses[name]
         touches = [
             SpaceTouch(
                 id=contact.touch.id,
                 position=_rounded(pose(np.array([contact.position]))[0]),
                 normal=_rounded(pose.rotation @ contact.normal),
                 peak=contact.touch.detection.peak,
-                force=contact.force,
+                force=None if math.isnan(contact.force) else contact.force,
                 more_than=_more_than(contact.touch.detection.force),
             )
             for contact in contacts.touches

@@ -14,8 +14,10 @@ from tomoskin.learning import (
     LeftOut,
     Locator,
     MappingAnswer,
+    growth_of_errors,
     ring_of,
     solve_channel_mapping,
+    worse,
 )
 from tomoskin.pipeline import FrameResult, Prepared, prepare
 from tomoskin.run import Runner, commands
@@ -56,6 +58,11 @@ def estimate_touch(prepared: Prepared, presses: Sequence[GuidedPress]) -> Estima
         text += "; the mean of all positions is as good an estimate: press harder"
     elif len(presses) < _FIRST:
         text += ". Ten presses are a start, fifty are good"
+    if what := worse(growth_of_errors(locator)):
+        text += (
+            f". But {what}. Take back those that were not on their dot; where the skin has "
+            "changed, begin again"
+        )
     figures = Figures(
         errors_mm=errors.tolist(), median_mm=float(np.median(errors)), doubtful=doubted
     )

@@ -77,7 +77,7 @@ class SourceSwitch:
         """Play a recording with its own skin. Raises DataError, SourceError."""
         runner = self._hub.runner
         with SessionReader(path) as session:
-            prepared = as_recorded(session)
+            prepared = as_recorded(session, runner.prepared)
         live = self._live or _Live(self.spec, runner.prepared)
         runner.ask(commands.Change(prepared, partial(_replay, path, prepared.skin)))
         self._live, self.spec, self._hub.opener = live, f"replay:{path.name}", None

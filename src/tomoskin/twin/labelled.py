@@ -119,6 +119,9 @@ COMMON_PRESSES = Population(
 SHARD_FRAMES = 500
 """Frames of a shard: what is drawn from one seed, and written as one file."""
 
+_LABELS = 2
+"""Version of the labels: sets of different ones are not continued."""
+
 Arrays = dict[str, NDArray[Any]]
 
 
@@ -164,7 +167,7 @@ class SetPlan:
     @cached_property
     def identity(self) -> str:
         """Short hash of all that a frame of the set depends on; how many there are is not it."""
-        content = (__version__, self.skin, self.population, self.preset, self.seed)
+        content = (__version__, _LABELS, self.skin, self.population, self.preset, self.seed)
         return hashlib.sha256(msgspec.json.encode(content)).hexdigest()[:16]
 
 
@@ -172,9 +175,10 @@ def make_shard(plan: SetPlan, shard: int) -> Arrays:
     """The frames of one shard as arrays of an interchange file, labels beside them.
 
     ``voltages`` (n, n_meas) and ``reference`` (n_meas,) V, ``drive``, ``measure``; ``xy_m``
-    (n, 2) where there is exactly one press, else NaN. Of each press, NaN or "" where a frame has
-    fewer: ``press_xy_m`` (n, most, 2), ``force_n``, ``radius_m`` (of the circle with the area of
-    the face), ``angle_rad`` and ``shape`` (n, most).
+    (n, 2) and ``force_n`` (n,) where there is exactly one press, else NaN, as calibrations read
+    them. Of each press, NaN or "" where a frame has fewer: ``press_xy_m`` (n, most, 2),
+    ``press_force_n``, ``radius_m`` (of the circle with the area of the face), ``angle_rad`` and
+    ``shape`` (n, most).
 
     Raises
     ------
@@ -243,8 +247,9 @@ def _labels(presses: list[tuple[Probe, ...]], most: int) -> Arrays:
     single = np.array([len(probes) == 1 for probes in presses])
     return {
         "xy_m": np.where(single[:, None], positions[:, 0], np.nan),
+        "force_n": np.where(single, force[:, 0], np.nan),
         "press_xy_m": positions,
-        "force_n": force,
+        "press_force_n": force,
         "radius_m": radius,
         "angle_rad": angle,
         "shape": name,

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tomoskin.core import FloatArray, Touch
-from tomoskin.pipeline import REFERENCE_FRAMES, Pipeline, Prepared
+from tomoskin.core import FloatArray, Frame, Touch
+from tomoskin.pipeline import REFERENCE_FRAMES, FrameResult, Pipeline, Prepared
 from tomoskin.twin.presets import TwinSettings
 from tomoskin.twin.probe import Probe
 from tomoskin.twin.source import Scans
@@ -49,7 +49,13 @@ class SteppedSkin:
     ----------
     period
         Seconds of a scan.
+    frame, result
+        The newest scan as a board sends it, and all that the pipeline makes of it; None where the
+        voltages alone are asked for.
     """
+
+    frame: Frame
+    result: FrameResult | None = None
 
     def __init__(
         self,
@@ -89,10 +95,11 @@ class SteppedSkin:
         self._scans.electronics.sheet.set_presses(tuple(presses))
         time = self._steps * self.period
         self._steps += 1
-        frame = self._scans.frame(self._steps, time)
+        self.frame = frame = self._scans.frame(self._steps, time)
         if not self._with_touches:
             return Step(self._prepared.readout(frame).values, ())
         result = self._pipeline.push(frame)
         if result is None:
             raise AssertionError("a frame of the skin's own scan is never left out")
+        self.result = result
         return Step(result.voltages, result.touches)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import struct
 
 import numpy as np
@@ -33,7 +34,11 @@ def write_stl(path, triangles):
 def solids_of(folder, links):
     path = folder / "arm" / "urdf" / "arm.urdf"
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(f'<robot name="arm">{links}</robot>')
+    first, *others = re.findall('<link name="(.)"', links)
+    held = (
+        f'<joint name="{n}"><parent link="{first}"/><child link="{n}"/></joint>' for n in others
+    )
+    path.write_text(f'<robot name="arm">{links}{"".join(held)}</robot>')
     return {solid.link: solid for solid in Urdf.read(path).solids()}
 
 

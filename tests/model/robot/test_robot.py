@@ -105,6 +105,7 @@ def test_a_moved_surface_is_the_surface_moved():
         ('name = "right"', 'name = "Right arm"', "small letters"),
         ('source = "twin:seed=1"', 'source = "twin:seed=1"\nboard = "0102"', "the same board 0102"),
         ('link = "fore"', 'link = "four"', 'no link "four".*did you mean "fore"'),
+        ('urdf = "arm.urdf"', "", 'expected a URDF that has the link "fore", got none'),
         ('link = "fore"', "", "needs the key link"),
         ('"arm.urdf"', '"leg.urdf"', "no such file|cannot be read"),
         ('board = "0102"', 'board = "x1"', "hexadecimal"),
@@ -120,13 +121,43 @@ def test_what_cannot_be_meant_is_said(files, old, new, said):
         Robot.load(files / "robot.toml")
 
 
+@pytest.mark.parametrize("link", ["fore arm", "Unterarm-außen", "/fore"])
+def test_a_link_that_can_be_no_frame_is_refused(files, link):
+    (files / "arm.urdf").write_text(URDF.replace('"fore"', f'"{link}"'), encoding="utf-8")
+    (files / "robot.toml").write_text(ROBOT.replace('"fore"', f'"{link}"'), encoding="utf-8")
+    with pytest.raises(SkinError, match="frame_id of all messages") as error:
+        Robot.load(files / "robot.toml")
+    assert link in str(error.value)
+    assert "arm.urdf" in str(error.value)
+
+
+def test_one_port_by_two_paths_is_one_port(files):
+    port, by_id = files / "ttyACM0", files / "by-id-usb-board"
+    port.write_bytes(b"")
+    by_id.symlink_to(port)
+    text = ROBOT.replace("twin:seed=1", f"serial:{port}")
+    for other in (f"serial:{by_id},baud=115200", f"serial:{port}"):
+        (files / "robot.toml").write_text(text.replace("replay:run.mcap@2", other))
+        with pytest.raises(SkinError, match=r"one for left .*ttyACM0.* and right") as error:
+            Robot.load(files / "robot.toml")
+        assert (f"both are {port}" in str(error.value)) == (str(by_id) in other)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
         ("<robot", "<robots", "expected <robot>|not valid XML"),
         ('<link name="fore"/>', "", 'no link "fore"'),
         ('<link name="fore"/>', '<link name="fore"/><link name="fore"/>', "twice"),
-        ('parent link="base"', 'parent link="fore"', "ring"),
+        ('<link name="fore"/>', '<link name="fore"/><link name="table"/>', "got 2: base, table"),
+        ('parent link="base"', 'parent link="fore"', "got 2|ring|got 0"),
+        ('xyz="0.3 0 0"', 'xyz="${length} 0 0"', "got a xacro"),
+        (
+            '<robot name="arm">',
+            '<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">'
+            '<xacro:macro name="finger"><link name="tip"/></xacro:macro>',
+            "got a xacro.*expand xacro first",
+        ),
         ('xyz="0.3 0 0"', 'xyz="0.3 0"', "three numbers"),
         ('xyz="0.3 0 0"', 'xyz="nan 0 0"', "three numbers"),
         ("</robot>", "", "not valid XML"),

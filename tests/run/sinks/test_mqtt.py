@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import queue
 import shutil
 import socket
+import ssl
 import subprocess
 import time
+from contextlib import contextmanager
 from dataclasses import replace
 
 import pytest
@@ -18,7 +21,7 @@ from files.session.runs import TOUCH
 from run.sinks.conftest import EPOCH, EVENT, PATIENCE, begin, free_port, result_at, touch_of
 from tomoskin.core import Event, SinkError
 from tomoskin.files.messages import Reporter
-from tomoskin.run.sinks import make_sink
+from tomoskin.run.sinks import make_sink, mqtt
 from tomoskin.run.sinks.mqtt import PERIOD
 from tomoskin.sensing.track import TouchEvent
 
@@ -28,7 +31,7 @@ BROKERS = "/usr/sbin:/usr/local/sbin:/opt/homebrew/sbin"
 class Broker:
     """mosquitto on a port of its own, for ``me`` with the password ``secret``."""
 
-    def __init__(self, folder, program):
+    def __init__(self, folder, program, *more):
         self.port = free_port()
         self._program, self._folder = program, folder
         people = folder / "people"
@@ -37,7 +40,7 @@ class Broker:
         command = [shutil.which("mosquitto_passwd") or "mosquitto_passwd", "-U", str(people)]
         subprocess.run(command, check=True, capture_output=True)
         lines = f"listener {self.port} 127.0.0.1\npassword_file {people}\nuser root\n"
-        (folder / "broker.conf").write_text(lines)
+        (folder / "broker.conf").write_text("\n".join([lines, *more, ""]))
         self.start()
 
     @property
@@ -61,30 +64,47 @@ class Broker:
 
 
 @pytest.fixture
-def broker(tmp_path):
+def mosquitto():
     program = shutil.which("mosquitto") or shutil.which("mosquitto", path=BROKERS)
     if program is None:
         missing("the MQTT sink: no mosquitto (Debian: apt-get install mosquitto)")
-    broker = Broker(tmp_path, program)
+    return program
+
+
+@pytest.fixture
+def broker(tmp_path, mosquitto):
+    broker = Broker(tmp_path, mosquitto)
     yield broker
     broker.stop()
+
+
+@contextmanager
+def subscribed(broker):
+    """The messages that a subscriber gets, one after the other; it speaks MQTT 3.1.1."""
+    came, ready = queue.SimpleQueue(), queue.SimpleQueue()
+    client = paho.Client(paho.CallbackAPIVersion.VERSION2)
+    client.username_pw_set("me", "secret")
+    client.on_message = lambda *told: came.put(told[2])
+    client.on_subscribe = lambda *_: ready.put(None)
+    client.connect("127.0.0.1", broker.port)
+    client.loop_start()
+    client.subscribe("robot/#", qos=1)
+    ready.get(timeout=PATIENCE)
+    yield came
+    client.disconnect()
+    client.loop_stop()
 
 
 @pytest.fixture
 def heard(broker):
     """The next (topic, content) that a subscriber gets."""
-    came, ready = queue.SimpleQueue(), queue.SimpleQueue()
-    client = paho.Client(paho.CallbackAPIVersion.VERSION2)
-    client.username_pw_set("me", "secret")
-    client.on_message = lambda *told: came.put((told[2].topic, told[2].payload.decode()))
-    client.on_subscribe = lambda *_: ready.put(None)
-    client.connect("127.0.0.1", broker.port)
-    client.loop_start()
-    client.subscribe("robot/#")
-    ready.get(timeout=PATIENCE)
-    yield lambda: came.get(timeout=PATIENCE)
-    client.disconnect()
-    client.loop_stop()
+    with subscribed(broker) as came:
+
+        def hear():
+            message = came.get(timeout=PATIENCE)
+            return message.topic, message.payload.decode()
+
+        yield hear
 
 
 def test_touches_events_and_status(broker, heard, stream):
@@ -146,6 +166,101 @@ def test_a_lost_board_is_told_and_kept_until_frames_come_again(broker, heard, st
     sink.publish(reporter.of(result_at(2.0)))
     assert heard() == ("robot/skin/status", "online")
     sink.close()
+
+
+def happening(contacts, kind):
+    event = TouchEvent(kind, TOUCH, contacts.host_time)
+    return replace(contacts, happened=(event,), is_due=False)
+
+
+def test_all_that_happens_to_a_touch_but_a_move_is_acknowledged(broker, stream):
+    sink = make_sink(broker.url)
+    contacts_at = begin(sink, stream)
+    with subscribed(broker) as came:
+        for kind in ("onset", "move", "release"):
+            sink.publish(happening(contacts_at(1.0, TOUCH), kind))
+        heard = [came.get(timeout=PATIENCE) for _ in range(4)]
+    told = [(m.topic.rpartition("/")[2], m.qos) for m in heard]
+    assert told == [("status", 1), ("touch", 1), ("touch", 0), ("touch", 1)]
+    sink.close()
+
+
+def test_an_onset_outlasts_a_broker_that_was_away(broker, stream):
+    sink = make_sink(broker.url)
+    contacts_at = begin(sink, stream)
+    broker.stop()
+    with contextlib.suppress(SinkError):  # the client may have noticed, or not
+        sink.publish(happening(contacts_at(1.0, TOUCH), "onset"))
+    sink.close()
+    broker.start()
+    with subscribed(broker) as came:
+        begin(sink, stream)
+        heard = [came.get(timeout=PATIENCE) for _ in range(2)]
+        assert [m.topic for m in heard] == ["robot/skin/status", "robot/skin/touch"]
+        assert json.loads(heard[1].payload)["event"] == "onset"
+        sink.close()
+        begin(sink, stream)  # it has arrived, and does not come again
+        sink.close()
+        rest = [came.get(timeout=PATIENCE).payload for _ in range(3)]
+    assert rest == [b"offline", b"online", b"offline"]
+
+
+def test_who_comes_later_gets_the_touches_until_they_are_old(broker, stream, monkeypatch):
+    monkeypatch.setattr(mqtt, "_EXPIRY", 2)
+    sink = make_sink(broker.url)
+    contacts_at = begin(sink, stream)
+    sink.publish(contacts_at(1.0, TOUCH))
+    sink.close()
+    published = time.monotonic()
+    with subscribed(broker) as came:
+        kept = [came.get(timeout=PATIENCE) for _ in range(2)]
+    assert {m.topic for m in kept} == {"robot/skin/status", "robot/skin/touches"}
+    assert all(m.retain for m in kept)
+    time.sleep(max(0.0, published + 4.0 - time.monotonic()))
+    with subscribed(broker) as came:
+        assert came.get(timeout=PATIENCE).topic == "robot/skin/status"
+        with pytest.raises(queue.Empty):
+            came.get(timeout=0.5)
+
+
+@pytest.fixture
+def authority(tmp_path):
+    """An authority that has signed a certificate of this machine."""
+    if shutil.which("openssl") is None:
+        missing("TLS of the MQTT sink: no openssl (Debian: apt-get install openssl)")
+
+    def openssl(*words):
+        subprocess.run(["openssl", *words], check=True, capture_output=True, cwd=tmp_path)
+
+    new = ("req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2")
+    openssl(*new, "-subj", "/CN=authority", "-keyout", "ca.key", "-out", "ca.pem")
+    openssl(
+        *new, "-subj", "/CN=broker", "-addext", "subjectAltName=IP:127.0.0.1",
+        "-addext", "basicConstraints=CA:FALSE",
+        "-CA", "ca.pem", "-CAkey", "ca.key", "-keyout", "broker.key", "-out", "broker.pem",
+    )  # fmt: skip
+    return tmp_path / "ca.pem"
+
+
+# the library leaves the socket of a refused broker to the collector of garbage
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_it_trusts_a_broker_by_its_authority_alone(tmp_path, mosquitto, authority, stream):
+    lines = f"certfile {tmp_path}/broker.pem", f"keyfile {tmp_path}/broker.key"
+    broker = Broker(tmp_path, mosquitto, *lines)
+    try:
+        sink = make_sink(f"{broker.url}?tls={authority}")
+        assert sink.name == f"mqtts://127.0.0.1:{broker.port}/robot/skin"
+        contacts_at = begin(sink, stream)
+        sink.publish(contacts_at(1.0, TOUCH))
+        sink.close()
+        stranger = make_sink(f"{broker.url}?tls=system")
+        with pytest.raises(ssl.SSLError, match="CERTIFICATE_VERIFY_FAILED"):
+            begin(stranger, stream)
+        stranger.close()
+    finally:
+        broker.stop()
+    with pytest.raises(SinkError, match="expected tls=system, or the file of an authority"):
+        make_sink(f"{broker.url}?tls={tmp_path}/none.pem")
 
 
 def test_a_wrong_password_is_said(broker, stream):

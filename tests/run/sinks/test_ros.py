@@ -146,7 +146,8 @@ def test_a_touch_is_a_pose_with_covariance(stream):
     covariance = np.array([cdr.take("d") for _ in range(36)]).reshape(6, 6)
     assert cdr.ends()
     assert covariance[0, 0] == TOUCH.detection.sd_x**2
-    assert (np.diag(covariance)[1:] == 1e6).all()  # its sd_y is not known
+    turn = np.pi**2 / 3
+    assert np.diag(covariance)[1:] == pytest.approx([1.0, 1e-4, turn, turn, turn])  # sd_y unknown
     assert (covariance == np.diag(np.diag(covariance))).all()
     reading = replace(TOUCH.detection, sd_y=2e-3, cov_xy=5e-7)
     value = messages_of(stream, 0.25, replace(TOUCH, detection=reading))["touch"]
@@ -180,7 +181,7 @@ def test_on_a_curved_skin_a_touch_is_where_it_is_in_space(stream):
     turn = Rotation.from_quat([*pose["pose"]["orientation"].values()])
     assert turn.as_rotvec() == pytest.approx([0, angle, 0])  # about the cylinder's axis
     local = turn.as_matrix().T @ pose["covariance"].reshape(6, 6)[:3, :3] @ turn.as_matrix()
-    assert np.diag(local) == pytest.approx([1e-6, 4e-6, 1e6], rel=1e-3)
+    assert np.diag(local) == pytest.approx([1e-6, 4e-6, 1e-4], rel=1e-3)
     (told,) = msgspec.json.decode(value["touches"]["data"])["touches"]
     assert told["position"] == pytest.approx(place.tolist())
     assert told["normal"] == pytest.approx([np.sin(angle), 0, np.cos(angle)])
@@ -287,6 +288,20 @@ def test_a_report_says_whether_touches_are_valid(stream):
     assert levels == [(0, "OK"), (2, "E4 is dead"), (0, "OK")]
 
 
+def value_of(values, key):
+    """What the report says of the skin by that name."""
+    (status,) = values["/diagnostics"]["status"]
+    (value,) = (row["value"] for row in status["values"] if row["key"] == key)
+    return value
+
+
+def test_what_is_not_known_is_drawn_in_the_size_of_a_skin(stream):
+    unknown = replace(TOUCH, detection=replace(TOUCH.detection, sd_x=np.inf, sd_y=np.inf))
+    covariance = messages_of(stream, 0.25, unknown)["touch"]["pose"]["covariance"].reshape(6, 6)
+    assert 0.01 <= np.sqrt(np.diag(covariance))[:3].max() <= 1.0  # m
+    assert np.sqrt(np.diag(covariance))[3:] == pytest.approx(np.pi / np.sqrt(3))
+
+
 def test_a_frame_on_a_robot_is_a_transform(stream):
     turn = (0.3, -0.4, 1.2)
     mount = Place("", "tool0", Pose.of((0.1, 0.2, 0.3), turn))
@@ -296,7 +311,11 @@ def test_a_frame_on_a_robot_is_a_transform(stream):
     wanted = Rotation.from_euler("xyz", turn)
     rotation = Rotation.from_quat([*found["transform"]["rotation"].values()])
     assert (rotation.inv() * wanted).magnitude() == pytest.approx(0, abs=1e-12)
-    assert "/tf_static" not in messages_of(stream, 0.0)
+    alone = messages_of(stream, 0.0)
+    assert "/tf_static" not in alone
+    assert value_of(alone, "parent").startswith("none: parent=LINK")
+    mounted = messages_of(stream.named(Naming(mount=mount)), 0.0)
+    assert value_of(mounted, "parent") == "tool0"
 
 
 def test_an_image_is_of_floats_with_the_top_row_first(stream):
@@ -321,7 +340,7 @@ def test_what_is_sent_when(stream):
         )
     ]  # fmt: skip
     always = ["touches", "valid", "contacts", "wrench", "markers"]
-    assert sent[0] == ["touch", "track", *always, "image", "/diagnostics"]
+    assert sent[0] == ["touch", "track", "/tf", *always, "image", "/diagnostics"]
     assert sent[1] == [*always, "image"]  # the last touch has ended
     assert sent[2] == ["image"]
     assert sent[3] == ["events", "image"]

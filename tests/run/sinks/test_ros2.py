@@ -13,9 +13,11 @@ import numpy as np
 import pytest
 
 from files.session.runs import TOUCH
+from run.board import Board
 from run.sinks.conftest import EPOCH, EVENT, MESH, PATIENCE, begin
 from tomoskin.core import SinkError
 from tomoskin.files.messages import TOPICS, dds_name, type_hash
+from tomoskin.run import Runner
 from tomoskin.run.sinks import make_sink
 
 PEER = Path(__file__).with_name("ros_peer.py")
@@ -89,6 +91,11 @@ def test_another_process_sees_what_ros_2_would(program, domain, sink):
     assert cloud["width"] == len(MESH.cells)
     (status,) = messages["rt/diagnostics"]["value"]["status"]
     assert (status["level"], status["message"]) == (0, "OK")
+    (frame,) = messages["rt/tf"]["value"]["transforms"]
+    track = messages["rt/left_arm/track"]["value"]
+    assert frame["child_frame_id"] == track["child_frame_id"] == "left_arm/skin/touch_4"
+    assert frame["transform"]["translation"] == track["pose"]["pose"]["position"]
+    assert frame["transform"]["rotation"] == track["pose"]["pose"]["orientation"]
     (transform,) = messages["rt/tf_static"]["value"]["transforms"]
     assert (transform["header"]["frame_id"], transform["child_frame_id"]) == (
         "tool0", "left_arm/skin",
@@ -106,6 +113,31 @@ def test_a_subscriber_that_reads_no_more_delays_nobody(program, domain, sink):
     assert time.monotonic() - begun < PATIENCE  # none stands still for ever, and none raises
     peer.send(signal.SIGCONT)
     peer.hears(lambda n: publish(sink, 2000 + n))
+
+
+def test_the_report_of_a_run_says_how_its_board_is(program, domain, prepared, idle):
+    peer, board = program(str(PEER), domain), Board(free=idle, period=0.02)
+    board.number = bytes.fromhex("0102030405060708")
+    runner = Runner(prepared, board.open, sinks=[make_sink("ros2")])
+    runner.start()
+    try:
+        for text in peer.lines(lambda _: None):
+            line = json.loads(text)
+            if line.get("heard") != "rt/diagnostics":
+                continue
+            (status,) = line["value"]["status"]
+            told = {row["key"]: row["value"] for row in status["values"]}
+            if status["level"] == 0 and float(told["frames_per_s"]):
+                break
+        said = [e.text for e in runner.events.since(0)[1] if e.kind == "sink-open"]
+    finally:
+        runner.stop()
+    assert told["board"] == "0102030405060708"
+    assert told["firmware"] == "1.2.3"
+    assert 1 < float(told["frames_per_s"]) < 60
+    assert (told["corrupt"], told["missing"], told["electrodes"]) == ("0", "0", "good")
+    assert told["parent"].startswith("none")
+    assert 'no parent of its frame "skin" is published' in said[0]
 
 
 def test_a_sink_may_be_opened_again(sink, stream):

@@ -37,6 +37,19 @@ def test_a_touch_that_no_frame_alone_shows_is_found_after_some() -> None:
     assert all(one.count(2) > 5 for one in seen)
 
 
+def test_what_a_wrong_profile_may_leave_goes_on_but_does_not_begin() -> None:
+    """Beside a heavy press; the same alone may begin."""
+    heavy, spots = press(0.05, 0.0, depth=-1.5), press(-0.04, 0.0, depth=-0.3)
+    light, ours, alone = press(-0.04, 0.0, depth=-0.06), finder(), finder()
+    for n in noise(16, 3, 5):
+        found = ours.push(data(np.concatenate([heavy, spots])) + n, NOTHING)
+        assert [detection.weak for detection in found] == [False, False]
+    for n in noise(16, 3, 6):
+        found = ours.push(data(np.concatenate([heavy, light])) + n, NOTHING)
+        assert [detection.weak for detection in found] == [False, True]
+        assert not alone.push(data(light) + n, NOTHING)[0].weak
+
+
 def test_noise_beside_a_touch_is_no_rival_for_long() -> None:
     nothing = press(-0.02, 0.0)[:0]
     assert counts(nothing, 4, frames=200) == [1] * 200

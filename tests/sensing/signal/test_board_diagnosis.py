@@ -117,7 +117,8 @@ def test_a_multimeter_tells_a_source_from_none(current: float) -> None:
     assert bus.accepts(22 * current)
     assert not bus.accepts(0)
     assert not steps["Arduino", "SENSE"].accepts(12.0)
-    assert not steps["supply", "SENSE"].accepts(10.8)
+    assert not steps["supply", "+12V"].accepts(12.0)  # without 5 V
+    assert not steps["Arduino", "+12V"].accepts(0)
     assert all(step.low < step.high for step in steps.values())
 
 
@@ -129,8 +130,9 @@ def test_a_multimeter_refuses_no_good_board(five: float, twelve: float) -> None:
     for channels, ohms in ((8, 70.0), (16, 100.0)):
         read: dict[str, float] = {}
         for step in meter_steps(CURRENT, channels, read):
-            sense = twelve if step.stage == "supply" else twelve - 1.225
-            known = volts | {"-5V": -five + ohms * 0.35e-3 * channels, "SENSE": sense}
+            known = volts | {"-5V": -five + ohms * 0.35e-3 * channels}
+            known |= {"12V IN": twelve + 0.03, "SENSE": twelve - 1.225}
+            known |= {"+12V": 0.2} if step.stage == "supply" else {}
             read[step.point] = known.get(step.point, 0.0)
             assert step.accepts(read[step.point]), step.point
 

@@ -36,6 +36,13 @@ def test_a_press_ends_although_something_is_left(rate: float) -> None:
     assert ended / rate < 0.25
 
 
+def test_a_press_that_a_fit_cuts_in_two_goes_on() -> None:
+    """Its parts overlap: each stands out little where the other is given, but changes as much."""
+    parts = [detection(0.0, peak=-0.9, snr=10.0), detection(0.012, peak=-0.1, snr=9.0)]
+    run = Run(10)([[sized(1)]] * 20 + [parts] * 2 + [[sized(1)]] * 10)
+    assert run.happened == [("onset", 1)]
+
+
 def test_what_is_left_may_come_and_go() -> None:
     """At the edge of the noise; outshone by another; after a second of nothing."""
     run = lifted(40)(fading(2, 40))

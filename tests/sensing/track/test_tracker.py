@@ -41,6 +41,22 @@ def test_beside_another_no_touch_begins_in_its_first_frame() -> None:
     assert run([[detection(-0.05), detection(0.05, snr=30.0)]] * 2).shown[-1] == [1, 2]
 
 
+def test_what_a_strong_touch_may_leave_in_frame_after_frame_takes_longer_to_begin() -> None:
+    """A wrong profile errs alike in each frame; a second finger stands out by more."""
+    strong = detection(-0.05, snr=260.0)
+    run = Run(5)([[strong]] * 4 + [[strong, detection(0.05, snr=12.0)]] * 2 + [[strong]] * 4)
+    assert run.happened == [("onset", 1)]
+    run([[strong, detection(0.05, snr=40.0)]] * 2)
+    assert run.happened == [("onset", 1), ("onset", 2)]
+
+
+def test_what_stands_out_in_one_frame_alone_does_not_begin() -> None:
+    faint = [detection(0.05, snr=6.0, weak=True)]
+    run = Run(5)([[detection(-0.05)]] * 4)
+    run([[detection(-0.05), detection(0.05, snr=8.0)], *[[detection(-0.05), *faint]] * 10])
+    assert run.happened == [("onset", 1)]
+
+
 def test_what_was_beside_a_touch_and_is_gone_does_not_hold_it_back() -> None:
     run = Run(10)([[detection(-0.05)], [detection(0.05, snr=15.0)]])
     assert run.shown == [[1], [1, 2]]

@@ -5,15 +5,16 @@ import type { Force, Touch } from "../decode";
 import { fixed, inScale, millimetres, scaleFor, type Scale } from "../format";
 import { fingers } from "../screen";
 import { limit, link, scene, shown, status } from "../state";
+import { halfAxes } from "../sheet/overlay";
 import { classInWords } from "../words";
 import { asChange, forceState } from "./forces";
 
 const ROWS = 4;
 
-/** The larger of the two standard deviations, in mm; nothing where it is unknown. */
+/** How far the ellipse on the sheet reaches, in mm; nothing where it is unknown. */
 function uncertainty(touch: Touch): string {
-  const sd = Math.max(touch.sdX, touch.sdY);
-  return Number.isFinite(sd) ? millimetres(sd) : "";
+  const axes = halfAxes(touch);
+  return axes ? millimetres(axes[0]) : "";
 }
 
 /** What cannot be separated, in words; nothing where there is one touch. */
@@ -62,7 +63,7 @@ function StrengthTitle({ forces, scale }: { forces: boolean; scale: Scale }) {
       type="button"
       class="quiet"
       aria-pressed={asChange.value}
-      title={asChange.value ? "Show newtons" : "Estimated from the touch, with the interval that nine in ten lie in; again for the change of conductivity"}
+      title={asChange.value ? "Show newtons" : "Estimated from the touch, with the interval that nine in ten lie in for the tip that was taught; again for the change of conductivity"}
       onClick={() => (asChange.value = !asChange.value)}
     >
       {asChange.value ? change : forceState.value === "uncalibrated" ? "~felt, N" : "felt, N"}
@@ -175,7 +176,7 @@ export function Touches() {
                 </th>
                 <th scope="col">x, mm</th>
                 <th scope="col">y, mm</th>
-                <th scope="col" title="One standard deviation, the larger of x and y">
+                <th scope="col" title="Nine in ten positions lie within the ellipse on the sheet; this is half of its length">
                   ± mm
                 </th>
                 <th scope="col">

@@ -73,14 +73,22 @@ function loopPath(loop: number[], topology: Topology, view: View, smoothed: bool
 const NINETY = 4.605;
 const CORNERS = 40;
 
-/** The ellipse that holds a touch with 90 % of certainty, in metres around it; null: unknown. */
-export function ellipse(touch: Touch): readonly Place[] | null {
-  const { sdX, sdY, covXy } = touch;
-  const [a, b, c] = [sdX * sdX, covXy, sdY * sdY];
+/** Half of the longest and of the shortest axis of the ellipse that holds a touch with 90 % of
+ * certainty, m; null: unknown. */
+export function halfAxes({ sdX, sdY, covXy }: Touch): readonly [number, number] | null {
+  const [a, c] = [sdX * sdX, sdY * sdY];
   const middle = (a + c) / 2;
-  const spread = Math.hypot((a - c) / 2, b);
+  const spread = Math.hypot((a - c) / 2, covXy);
   if (!Number.isFinite(middle)) return null;
-  const [long, short] = [middle + spread, Math.max(0, middle - spread)].map((v) => Math.sqrt(NINETY * v));
+  return [Math.sqrt(NINETY * (middle + spread)), Math.sqrt(NINETY * Math.max(0, middle - spread))];
+}
+
+/** That ellipse, in metres around the touch; null: unknown. */
+export function ellipse(touch: Touch): readonly Place[] | null {
+  const axes = halfAxes(touch);
+  if (axes === null) return null;
+  const [long, short] = axes;
+  const [a, b, c] = [touch.sdX * touch.sdX, touch.covXy, touch.sdY * touch.sdY];
   const angle = Math.atan2(2 * b, a - c) / 2;
   const [cos, sin] = [Math.cos(angle), Math.sin(angle)];
   return Array.from({ length: CORNERS }, (_, k) => {

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain
+from pathlib import Path
 
 from tomoskin.core import DataError
 from tomoskin.files.exports.picture import Panel
@@ -26,13 +27,16 @@ class Export:
     """A session to be exported.
 
     ``every`` s between two images; ``advance`` is called with how far it is. Files that are
-    there are written over with ``overwrite`` only.
+    there are written over with ``overwrite`` only. ``others`` are the sessions of a robot's other
+    skins, and ``like`` the dataset of a robot whose rows are wanted: for formats that take them.
     """
 
     session: SessionReader
     every: float = 0.1
     advance: Advance = no_report
     overwrite: bool = False
+    others: tuple[SessionReader, ...] = ()
+    like: Path | None = None
 
     @cached_property
     def prepared(self) -> Prepared:
@@ -44,6 +48,10 @@ class Export:
         """What the run of the recording would have published."""
         stream = Stream.of(self.prepared, str(self.session.path), self.session.epoch)
         return replace(stream, replayed=False)  # here events are those of the recording too
+
+    def each(self) -> Iterator[Export]:
+        """The same for each skin."""
+        return (replace(self, session=one, others=()) for one in (self.session, *self.others))
 
     def results(self) -> Iterator[FrameResult]:
         """What a replay makes of each frame; ``advance`` is called as it goes."""

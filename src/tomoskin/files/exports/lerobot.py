@@ -1,7 +1,7 @@
-"""A session as a LeRobot dataset, format 3.0: a folder of Parquet and JSON (extra ``parquet``).
+"""Sessions as a LeRobot dataset, format 3.0: a folder of Parquet and JSON (extra ``parquet``).
 
-One episode without actions: what the skin shows, at even times. LeRobot's own package is not
-needed to write it.
+It has no actions: what skins show, at even times, in episodes. LeRobot's own package is not needed
+to write it, and its tools join it to a robot's dataset.
 """
 
 from __future__ import annotations
@@ -9,12 +9,14 @@ from __future__ import annotations
 import json
 import secrets
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tomoskin.core import (
     DataError,
@@ -27,58 +29,71 @@ from tomoskin.core import (
     needed,
     write_text,
 )
+from tomoskin.files.exports.episodes import Episode, Rows, rows_like, rows_of
 from tomoskin.files.exports.export import Export
-from tomoskin.files.messages import Contacts, row_labels
+from tomoskin.files.messages import (
+    FIELDS,
+    SLOTS,
+    Contacts,
+    Slots,
+    last_before,
+    row_labels,
+    still_holds,
+)
 from tomoskin.model.pattern import Pattern
 
-VOLTAGES, TOUCHES = "observation.tactile.voltages", "observation.tactile.touches"
-VALID = "observation.tactile.valid"
-"""Names of the features."""
+PREFIX = "observation.tactile"
+VOLTAGES, TOUCHES, VALID, WINDOW, AGES = "voltages", "touches", "valid", "window", "ages"
+"""Names of a skin's features, after the prefix and, of several skins, the skin's name."""
 
-MOST_TOUCHES = 5
-"""Touches that a row has room for, the strongest first."""
+TIME = "tactile.time_ns"
+"""Name of the feature of absolute times, ns since 1970: not an observation, so that no policy takes
+it, and whole, since LeRobot makes float32 of all other numbers."""
 
-FIELDS = ("present", "x", "y", "z", "strength")
-"""Of each touch: 1 or 0, m in space, and its extreme value in the image's unit."""
-
-_TASK = "tactile recording"
 _FILE = "chunk-000/file-000.parquet"
 _COUNTERS = ("frame_index", "episode_index", "index", "task_index")
+_QUANTILES = (0.01, 0.1, 0.5, 0.9, 0.99)
 
 Columns = dict[str, Any]
 
 
 def write_lerobot(job: Export, path: StrPath) -> None:
-    """Write a row each ``job.every`` s into a new folder, from the first frame with a reference on.
+    """Write the rows of each episode of ``job`` into a new folder.
 
     Raises
     ------
     DataError
-        When pyarrow is missing, 1/``job.every`` is no whole number, the session is damaged or too
-        short, or the disk refuses.
+        When pyarrow is missing, 1/``job.every`` is no whole number, a session is damaged or too
+        short, the episodes are not those of ``job.like``, or the disk refuses.
     OutputError
         When there is something of that name already.
     """
     pa, pq = (needed(name, "parquet", path) for name in ("pyarrow", "pyarrow.parquet"))
-    rate = _rate(job.every, path)
-    rows = _rows(job, rate)
-    statistics = {name: _statistics(values) for name, values in rows.items()}
-    features = _features(job.session.skin.pattern(), rows)
+    sessions = job.session, *job.others
+    given = None if job.like is None else rows_like(pq, job.like, sessions)
+    rate = _rate(job.every, path) if given is None else given.rate
+    tracks = [_Track.of(one) for one in job.each()]
+    rows = given or rows_of(sessions, rate, *_span(tracks))
+    columns, names = _counted(rows, job.session.epoch), dict[str, list[str]]()
+    for track in tracks:
+        count = track.frames_of_window(rows)
+        columns |= track.columns(rows, count)
+        names |= track.names(count)
     with _folder(Path(path)) as part:
         (part / "data/chunk-000").mkdir(parents=True)
         (part / "meta/episodes/chunk-000").mkdir(parents=True)
-        pq.write_table(pa.table(_arrays(pa, rows)), part / "data" / _FILE)
-        pq.write_table(_tasks(pa), part / "meta/tasks.parquet")
-        episode = pa.Table.from_pylist([_episode(len(rows["index"]), statistics)])
-        pq.write_table(episode, part / "meta/episodes" / _FILE)
-        info = _info(rate, len(rows["index"]), features)
-        for name, content in (("info", info), ("stats", statistics)):
+        pq.write_table(pa.table(_arrays(pa, columns)), part / "data" / _FILE)
+        pq.write_table(_tasks(pa, rows.tasks), part / "meta/tasks.parquet")
+        episodes = pa.Table.from_pylist(list(_episodes(rows.episodes, columns)))
+        pq.write_table(episodes, part / "meta/episodes" / _FILE)
+        info = _info(rows, _features(columns, names))
+        for name, content in (("info", info), ("stats", _statistics(columns))):
             write_text(part / f"meta/{name}.json", encode_json(content).decode())
 
 
 def _rate(every: float, path: StrPath) -> int:
     rate = round(1 / every)
-    if abs(rate * every - 1) > 1e-9:
+    if abs(rate * every - 1) > 2e-3:  # so that 0.0333 is 30 a second
         raise DataError(
             f"expected a whole number of rows a second, got one every {every:g} s",
             where=str(path),
@@ -87,74 +102,128 @@ def _rate(every: float, path: StrPath) -> int:
     return rate
 
 
-def _rows(job: Export, rate: int) -> Columns:
-    """Columns by name, a row at each even time: the newest frame that was there by then."""
-    times, voltages, touches, valid = [], [], [], []
-    for result in job.results():
-        if result.ready:
+@dataclass(frozen=True, eq=False)
+class _Track:
+    """What one skin shows in every frame with a reference."""
+
+    prefix: str
+    pattern: Pattern
+    times: FloatArray
+    valid: NDArray[np.bool_]
+    change: FloatArray
+    touches: FloatArray
+
+    @classmethod
+    def of(cls, job: Export) -> Self:
+        times, valid, change, touches, slots = [], [], [], [], Slots()
+        for result in job.results():
             contacts = Contacts.of(job.stream, result)
-            times.append(result.host_time)
-            voltages.append(result.voltages - result.reference)
-            touches.append(_touches(contacts))
-            valid.append([float(contacts.valid)])
-    if not times:
-        raise DataError("holds too few frames for a reference", where=str(job.session.path))
-    count = 1 + int(np.floor((times[-1] - times[0]) * rate + 1e-9))
-    even = np.arange(count) / rate
-    newest = np.searchsorted(np.array(times) - times[0], even + 1e-9, side="right") - 1
-    counters = {name: np.zeros(count, dtype=np.int64) for name in _COUNTERS}
-    counters["frame_index"] = counters["index"] = np.arange(count)
-    return {
-        VOLTAGES: np.array(voltages, dtype=np.float32)[newest],
-        TOUCHES: np.array(touches, dtype=np.float32)[newest],
-        VALID: np.array(valid, dtype=np.float32)[newest],
-        "timestamp": even.astype(np.float32),
-        **counters,
-    }
+            if contacts.change is not None:
+                slots = slots.after(contacts)
+                times.append(contacts.when)
+                valid.append(contacts.valid)
+                change.append(contacts.change.astype(np.float32))
+                touches.append(slots.table.ravel().astype(np.float32))
+        if not times:
+            raise DataError("holds too few frames for a reference", where=str(job.session.path))
+        name = f".{job.session.name}" if job.session.name else ""
+        return cls(
+            f"{PREFIX}{name}.",
+            job.session.skin.pattern(),
+            np.maximum.accumulate(times),
+            *map(np.array, (valid, change, touches)),
+        )
+
+    def columns(self, rows: Rows, count: int) -> Columns:
+        """Of each row the newest frame that there was, and the window that ends with it.
+
+        The window is flat: LeRobot's tools fail on tables in its rows.
+        """
+        moments = rows.moments
+        chosen = last_before(self.times, moments, count)
+        newest, ages = chosen[:, -1], moments[:, None] - self.times[chosen]
+        valid = self.valid[newest] & still_holds(self.times, ages[:, -1])
+        window = np.where((ages >= 0)[:, :, None], self.change[chosen], 0).astype(np.float32)
+        columns = {
+            VOLTAGES: window[:, -1],
+            TOUCHES: np.where(valid[:, None], self.touches[newest], 0).astype(np.float32),
+            VALID: valid.astype(np.float32),
+            WINDOW: window.reshape(len(window), -1),
+            AGES: ages.astype(np.float32),
+        }
+        return {self.prefix + name: values for name, values in columns.items()}
+
+    def frames_of_window(self, rows: Rows) -> int:
+        """Frames of a window that lose none: those between two rows, and one more.
+
+        The skin's rate says it, so that sessions of one skin fit together, unless frames came more
+        closely.
+        """
+        if self.prefix + AGES in rows.windows:
+            return rows.windows[self.prefix + AGES]
+        period = float(np.median(np.diff(self.times))) if len(self.times) > 1 else 1.0
+        usual = 1 + round(1 / (period * rows.rate)) if period > 0 else 1
+        before = np.searchsorted(self.times, rows.moments, side="right")
+        within = rows.episode_index[1:] == rows.episode_index[:-1]
+        return int(max(usual, *np.diff(before)[within], 1))
+
+    def names(self, count: int) -> dict[str, list[str]]:
+        """What the columns of each feature are, by its name."""
+        labels = row_labels(self.pattern)
+        slots = [f"touch_{n}.{name}" for n in range(SLOTS) for name in FIELDS]
+        frames = [f"frame_{n - count + 1}" for n in range(count)]
+        window = [f"{frame}.{label}" for frame in frames for label in labels]
+        named = {VOLTAGES: labels, TOUCHES: slots, WINDOW: window, AGES: frames}
+        return {self.prefix + name: words for name, words in named.items()}
 
 
-def _touches(contacts: Contacts) -> FloatArray:
-    """(MOST_TOUCHES · 5,) zeros where there are fewer."""
-    row = np.zeros((MOST_TOUCHES, len(FIELDS)))
-    for number, contact in enumerate(contacts.strongest(MOST_TOUCHES)):
-        row[number] = 1.0, *contact.position, contact.touch.detection.peak
-    return row.ravel()
+def _span(tracks: Sequence[_Track]) -> tuple[float, float]:
+    """From when all skins have a reference until the last frame of any."""
+    return max(t.times[0] for t in tracks), max(t.times[-1] for t in tracks)
 
 
-def _features(pattern: Pattern, rows: Columns) -> dict[str, Any]:
-    names = {
-        VOLTAGES: row_labels(pattern),
-        TOUCHES: [f"touch_{n}.{field}" for n in range(MOST_TOUCHES) for field in FIELDS],
-        VALID: ["valid"],
-    }
+def _counted(rows: Rows, epoch: float) -> Columns:
+    """The columns that LeRobot needs of each row, and its absolute time."""
+    numbers = (rows.frame_index, rows.episode_index, np.arange(len(rows.moments)), rows.task_index)
+    counters = zip(_COUNTERS, (column.astype(np.int64) for column in numbers), strict=True)
+    timestamp = (rows.frame_index / rows.rate).astype(np.float32)
+    times = np.round(1e9 * (rows.moments + epoch)).astype(np.int64)
+    return {TIME: times, "timestamp": timestamp, **dict(counters)}
+
+
+def _features(columns: Columns, names: Mapping[str, list[str]]) -> dict[str, Any]:
     return {
         name: {
             "dtype": values.dtype.name,
             "shape": values.shape[1:] or (1,),
             "names": names.get(name),
         }
-        for name, values in rows.items()
+        for name, values in columns.items()
     }
 
 
-def _statistics(values: Any) -> dict[str, Any]:
-    columns = values.reshape(len(values), -1)
-    extent = {
-        name: getattr(np, name)(columns, axis=0).tolist() for name in ("min", "max", "mean", "std")
-    }
-    return extent | {"count": [len(values)]}
+def _statistics(columns: Columns) -> dict[str, Any]:
+    return {name: _statistics_of(values) for name, values in columns.items()}
 
 
-def _arrays(pa: Any, rows: Columns) -> Columns:
+def _statistics_of(values: Any) -> dict[str, Any]:
+    table = values.reshape(-1, 1) if values.ndim == 1 else values
+    extent = {name: getattr(np, name)(table, axis=0) for name in ("min", "max", "mean", "std")}
+    quantiles = np.quantile(table, _QUANTILES, axis=0)
+    extent |= {f"q{100 * q:02.0f}": row for q, row in zip(_QUANTILES, quantiles, strict=True)}
+    return {name: numbers.tolist() for name, numbers in extent.items()} | {"count": [len(table)]}
+
+
+def _arrays(pa: Any, columns: Columns) -> Columns:
     return {
         name: pa.FixedSizeListArray.from_arrays(pa.array(values.ravel()), values.shape[1])
         if values.ndim > 1
         else pa.array(values)
-        for name, values in rows.items()
+        for name, values in columns.items()
     }
 
 
-def _tasks(pa: Any) -> Any:
+def _tasks(pa: Any, tasks: Sequence[str]) -> Any:
     """Indexed by the task's words, as pandas writes it, since LeRobot reads it by pandas."""
     index = "__index_level_0__"
     about = {
@@ -167,41 +236,46 @@ def _tasks(pa: Any) -> Any:
              "numpy_type": "object", "metadata": None},
         ],
     }  # fmt: skip
-    table = pa.table({"task_index": pa.array([0], pa.int64()), index: pa.array([_TASK])})
+    numbers = pa.array(range(len(tasks)), pa.int64())
+    table = pa.table({"task_index": numbers, index: pa.array(tasks)})
     return table.replace_schema_metadata({"pandas": json.dumps(about)})
 
 
-def _episode(count: int, statistics: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-    return {
-        "episode_index": 0,
-        "tasks": [_TASK],
-        "length": count,
-        "data/chunk_index": 0,
-        "data/file_index": 0,
-        "dataset_from_index": 0,
-        "dataset_to_index": count,
-        "meta/episodes/chunk_index": 0,
-        "meta/episodes/file_index": 0,
-        **{
-            f"stats/{name}/{kind}": numbers
-            for name, values in statistics.items()
-            for kind, numbers in values.items()
-        },
-    }
+def _episodes(episodes: Sequence[Episode], columns: Columns) -> Iterator[dict[str, Any]]:
+    stop = 0
+    for number, episode in enumerate(episodes):
+        start, stop = stop, stop + episode.count
+        statistics = _statistics({name: values[start:stop] for name, values in columns.items()})
+        yield {
+            "episode_index": number,
+            "tasks": [episode.task],
+            "length": episode.count,
+            "data/chunk_index": 0,
+            "data/file_index": 0,
+            "dataset_from_index": start,
+            "dataset_to_index": stop,
+            "meta/episodes/chunk_index": 0,
+            "meta/episodes/file_index": 0,
+            **{
+                f"stats/{name}/{kind}": numbers
+                for name, values in statistics.items()
+                for kind, numbers in values.items()
+            },
+        }
 
 
-def _info(rate: int, count: int, features: Mapping[str, Any]) -> dict[str, Any]:
+def _info(rows: Rows, features: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "codebase_version": "v3.0",
-        "robot_type": "tomoskin",
-        "total_episodes": 1,
-        "total_frames": count,
-        "total_tasks": 1,
+        "robot_type": rows.robot_type,
+        "total_episodes": len(rows.episodes),
+        "total_frames": len(rows.moments),
+        "total_tasks": len(rows.tasks),
         "chunks_size": 1000,
         "data_files_size_in_mb": 100,
         "video_files_size_in_mb": 500,
-        "fps": rate,
-        "splits": {"train": "0:1"},
+        "fps": rows.rate,
+        "splits": {"train": f"0:{len(rows.episodes)}"},
         "data_path": "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet",
         "video_path": None,
         "features": features,

@@ -125,7 +125,7 @@ class RerunView:
         for contact in contacts.touches:
             touch = contact.touch
             self._series(f"peak/{touch.id}", touch.detection.peak)
-            if contact.force is not None:
+            if not np.isnan(contact.force):
                 self._series(f"force/{touch.id}", contact.force)
         ids = {touch.id for touch in touches}
         for gone in self._ids - ids:  # or its line would go on for ever

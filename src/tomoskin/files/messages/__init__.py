@@ -1,6 +1,7 @@
 """One frame as it leaves the program, and the messages of other programs made of it."""
 
 from tomoskin.files.messages.contacts import (
+    NO_REFERENCE,
     Contact,
     Contacts,
     event_content,
@@ -15,6 +16,15 @@ from tomoskin.files.messages.foxglove_records import (
     touch_colour,
     touch_width,
 )
+from tomoskin.files.messages.policy_forms import (
+    FIELDS,
+    SLOTS,
+    PolicyForms,
+    PolicyView,
+    Slots,
+    last_before,
+    still_holds,
+)
 from tomoskin.files.messages.reporter import Every, Item, Reporter
 from tomoskin.files.messages.ros_types import (
     TYPES,
@@ -28,8 +38,11 @@ from tomoskin.files.messages.ros_view import KEPT, TOPICS, RosMessage, ros_messa
 from tomoskin.files.messages.stream import NAMES, Naming, Stream, epoch, raster, row_labels
 
 __all__ = [
+    "FIELDS",
     "KEPT",
     "NAMES",
+    "NO_REFERENCE",
+    "SLOTS",
     "TOPICS",
     "TYPES",
     "Contact",
@@ -38,8 +51,11 @@ __all__ = [
     "Field",
     "Item",
     "Naming",
+    "PolicyForms",
+    "PolicyView",
     "Reporter",
     "RosMessage",
+    "Slots",
     "Stream",
     "dds_name",
     "definition",
@@ -48,11 +64,13 @@ __all__ = [
     "event_content",
     "event_of",
     "grid_message",
+    "last_before",
     "log_message",
     "raster",
     "ros_messages",
     "row_labels",
     "scene_message",
+    "still_holds",
     "time_of",
     "touch_colour",
     "touch_row",

@@ -6,12 +6,14 @@ Every message, table and file for other programs is made from :class:`Contacts`.
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tomoskin.core import Detection, Event, FloatArray, Force, Image, Touch
 from tomoskin.files.messages.stream import Stream
@@ -22,8 +24,14 @@ from tomoskin.sensing.track import TouchEvent
 
 NO_REFERENCE = "the reference has not been taken yet: do not touch the skin for a moment"
 
-UNKNOWN = 1e6
-"""Variance of what is not measured, m² or rad²: what filters take for no knowledge."""
+_ANYWHERE = 1.0
+"""Variance of a position on a sheet whose noise is not known, m²: beyond any skin."""
+
+_DENT = 1e-4
+"""Variance of a position along the normal, m²: a press dents a skin by a centimetre at most."""
+
+_ANY_TURN = math.pi**2 / 3
+"""Variance of an angle of which nothing is known, rad²."""
 
 _NO_FORCE = {"force": None, "force_interval": None, "force_calibrated": False}
 """What a row says of a touch whose force nothing tells."""
@@ -83,24 +91,25 @@ class Contact:
     def pose_covariance(self) -> FloatArray:
         """(6, 6) of position and rotation, m² and rad².
 
-        Along the normal, and of rotations, it is :data:`UNKNOWN`.
+        What is not measured has the variance of what it can be: along the normal that of a dent,
+        and of a rotation that of any angle. So programs that draw it show the size of a skin.
         """
-        whole = UNKNOWN * np.eye(6)
+        whole = _ANY_TURN * np.eye(6)
         normal = np.array(self.normal)
         whole[:3, :3] = self._in_space(_on_sheet(self.touch.detection))
-        whole[:3, :3] += UNKNOWN * normal[:, None] * normal
+        whole[:3, :3] += _DENT * normal[:, None] * normal
         return whole
 
     @property
-    def force(self) -> float | None:
-        """N, against the normal; None where nothing tells it."""
+    def force(self) -> float:
+        """N, against the normal; NaN where nothing tells it."""
         force = self.touch.detection.force
-        return None if force is None else force.newtons
+        return math.nan if force is None else force.newtons
 
     @property
     def push(self) -> FloatArray:
         """(3,) N, into the body; NaN where nothing tells it."""
-        return -(np.nan if self.force is None else self.force) * np.array(self.normal)
+        return -self.force * np.array(self.normal)
 
     @property
     def torque(self) -> FloatArray:
@@ -146,13 +155,19 @@ class Contacts:
         The touches on the sheet, in the order of their identities.
     happened
         What happened to touches in this frame: onset, move, release, merge, split.
-    voltages, reference
-        (n_meas,) V; None where no frame came, or no reference stands.
+    voltages, reference, noise
+        (n_meas,) V, the last the standard deviation of one frame; None where no frame came, or no
+        reference stands.
+    excluded
+        (n_meas,) bool: measurements that do not count.
     image
         Change of conductivity; None where a newer frame waits, or one was sent a moment ago.
     scanned, scan_time
         Middle of the scan on the same clock as ``host_time``, and how long it took, s; NaN where
         no frame came, or its board has no clock.
+    measured
+        Middle of the scan on this machine's monotonic clock, also of a replay that a run plays;
+        NaN where the frame is not of now, and minus infinity where none has come.
     is_due
         Whether the touches are worth a message.
     reports
@@ -172,20 +187,24 @@ class Contacts:
     image: Image | None = field(default=None, repr=False)
     scanned: float = math.nan
     scan_time: float = math.nan
+    measured: float = math.nan
     is_due: bool = True
     reports: bool = True
+    noise: FloatArray | None = field(default=None, repr=False)
+    excluded: NDArray[np.bool_] | None = field(default=None, repr=False)
 
     @classmethod
-    def of(cls, stream: Stream, result: FrameResult) -> Self:
-        """What ``result`` says of the skin."""
+    def of(cls, stream: Stream, result: FrameResult, measured: float | None = None) -> Self:
+        """What ``result`` says of the skin; of a replay that is played: as if ``measured`` then."""
         valid = result.ready and result.has_image
+        when = _when(result.scanned, result.host_time)
         return cls(
             stream=stream,
             sequence=result.sequence,
             host_time=result.host_time,
             valid=valid,
             problem=result.problem if result.ready else NO_REFERENCE,
-            latency=stream.latency(_when(result.scanned, result.host_time)),
+            latency=stream.latency(when),
             tracked=result.touches,
             happened=result.events,
             voltages=result.voltages,
@@ -193,7 +212,41 @@ class Contacts:
             image=result.image if valid else None,
             scanned=result.scanned,
             scan_time=result.scan_time,
+            noise=result.baseline.deviation if result.ready and result.baseline else None,
+            excluded=None if result.health is None else result.health.lost,
+            measured=(math.nan if stream.replayed else when) if measured is None else measured,
         )
+
+    @classmethod
+    def without_frame(cls, stream: Stream, problem: str, host_time: float) -> Self:
+        """Of a skin of which no frame has come, and why."""
+        return cls(stream, -1, host_time, False, problem, None, measured=-math.inf)
+
+    def outdated(self, problem: str) -> Self:
+        """The same, but no touches, which are not true any more, and why."""
+        return replace(
+            self, valid=False, problem=problem, tracked=(), happened=(), voltages=None,
+            reference=None, image=None,
+        )  # fmt: skip
+
+    @property
+    def age_s(self) -> float:
+        """S since the middle of the scan, at this moment; NaN of a file, infinite of no frame."""
+        return time.monotonic() - self.measured
+
+    @property
+    def force(self) -> float:
+        """N, of all touches against their normals; NaN where one is not known, or none is valid."""
+        return sum((c.force for c in self.touches), start=0.0 if self.valid else math.nan)
+
+    @property
+    def change(self) -> FloatArray | None:
+        """(n_meas,) V against the reference; 0 of what is excluded, as in the image."""
+        if self.voltages is None or self.reference is None:
+            return None
+        change = self.voltages - self.reference
+        excluded = ~np.isfinite(change)
+        return np.where(excluded if self.excluded is None else excluded | self.excluded, 0, change)
 
     @property
     def skin(self) -> str:
@@ -308,7 +361,7 @@ def _on_sheet(detection: Detection) -> FloatArray:
     variance = np.array([detection.sd_x**2, detection.sd_y**2])
     if np.isfinite(variance).all():
         return np.diag(variance) + detection.cov_xy * np.eye(2)[::-1]
-    return np.diag(np.where(np.isfinite(variance), variance, UNKNOWN))
+    return np.diag(np.where(np.isfinite(variance), variance, _ANYWHERE))
 
 
 def _cross(a: Vector, b: Vector) -> Vector:

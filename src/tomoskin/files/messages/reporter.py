@@ -76,9 +76,12 @@ class Reporter:
         if event.kind not in LOST:
             return None
         self._is_lost = True
-        number = -1 if self._newest is None else self._newest.sequence
+        now = self._now(event.host_time)
+        if self._newest is None:
+            return self._paced(Contacts.without_frame(self.stream, event.text, now))
+        last = self._newest.outdated(event.text)
         return self._paced(
-            Contacts(self.stream, number, self._now(event.host_time), False, event.text, None)
+            replace(last, host_time=now, scanned=math.nan, scan_time=math.nan, latency=None)
         )
 
     def still_lost(self) -> Contacts | None:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from tomoskin.core import FloatArray, Image, PixelMap
-from tomoskin.files.messages.contacts import UNKNOWN, Contact, Contacts
+from tomoskin.files.messages.contacts import Contact, Contacts
 from tomoskin.files.messages.foxglove_records import touch_colour, touch_width
 from tomoskin.model.robot import Place
 
@@ -20,7 +20,9 @@ _LABEL = 8e-3
 _GREY = {"r": 0.5, "g": 0.5, "b": 0.5, "a": 1.0}
 _OK, _WARN, _ERROR = 0, 1, 2
 _FLOAT32 = 7
-_NOT_MEASURED = {"covariance": (UNKNOWN * np.eye(6)).ravel()}
+_NO_PARENT = "none: parent=LINK,at=X/Y/Z of the sink would publish where the frame is"
+_NOT_MEASURED = {"covariance": (1e6 * np.eye(6)).ravel()}
+"""Of velocities: what filters take for no knowledge."""
 
 
 def header(stamp: int, frame: str) -> Value:
@@ -83,22 +85,43 @@ def markers(head: Value, frame: Contacts) -> Value:
 
 
 def diagnostics(head: Value, frame: Contacts) -> Value:
-    """``diagnostic_msgs/DiagnosticArray``: error where touches are not valid."""
+    """``diagnostic_msgs/DiagnosticArray``: an error where touches are not valid, and the board."""
+    stream = frame.stream
     level = _ERROR if not frame.valid else _WARN if frame.problem else _OK
     values = {
         "sequence": frame.sequence,
         "latency_s": frame.latency,
         "touches": len(frame.touches),
         "valid": frame.valid,
+        "frame": frame.frame_id,
+        "parent": stream.parent or _NO_PARENT,
+        **(stream.board() if stream.board else {}),
     }
     status = {
         "level": level,
-        "name": f"{frame.stream.naming.namespace}: skin",
+        "name": f"{stream.naming.namespace}: skin",
         "message": frame.problem or "OK",
         "hardware_id": frame.skin,
         "values": [{"key": key, "value": str(value)} for key, value in values.items()],
     }
     return {"header": head, "status": [status]}
+
+
+def touch_frames(head: Value, frame: Contacts) -> Value:
+    """``tf2_msgs/TFMessage``: the frame of each touch, which tracks name, z along the normal."""
+    return {
+        "transforms": [
+            {
+                "header": head,
+                "child_frame_id": _name(head, contact),
+                "transform": {
+                    "translation": _named("xyz", contact.position),
+                    "rotation": _named("xyzw", contact.orientation),
+                },
+            }
+            for contact in frame.touches
+        ]
+    }
 
 
 def transform(stamp: int, frame: str, mount: Place) -> Value:

@@ -30,6 +30,7 @@ TOPICS = {
     "points": "sensor_msgs/msg/PointCloud2",
     "events": TEXT,
     "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray",
+    "/tf": "tf2_msgs/msg/TFMessage",
     "/tf_static": "tf2_msgs/msg/TFMessage",
 }
 """Type of each topic, by its name in the skin's namespace; with "/": of the whole robot."""
@@ -82,13 +83,15 @@ def _images(head: Value, stream: Stream, image: Image) -> Iterator[tuple[str, Va
 
 
 def _touches(head: Value, contacts: Contacts) -> Iterator[tuple[str, Value]]:
-    """Each touch as a pose and as a track, which has its identity; then all of them.
+    """Each touch as a pose and as a track, which has its identity and a frame; then all of them.
 
     Where touches are not valid there are no contacts, not even none.
     """
     for contact in contacts.touches:
         yield "touch", {"header": head, "pose": ros_fields.pose(contact)}
         yield "track", ros_fields.track(head, contact)
+    if contacts.touches:
+        yield "/tf", ros_fields.touch_frames(head, contacts)
     yield "touches", _json(contacts.content())
     yield "valid", {"data": contacts.valid}
     if contacts.valid:

@@ -14,11 +14,10 @@ import numpy as np
 from tomoskin.core import FloatArray, GeometryError, PixelMap, SinkError, StrPath, clock_ahead
 from tomoskin.model.mesh import Mesh, Plane, Surface
 from tomoskin.model.pattern import Pattern
-from tomoskin.model.robot import Place, Pose, pose_numbers
+from tomoskin.model.robot import FRAME, Place, Pose, pose_numbers
 from tomoskin.pipeline import Prepared, colour_limit
 
 _NAMESPACE = re.compile(r"[A-Za-z]\w*(/[A-Za-z]\w*)*", re.ASCII)
-_FRAME = re.compile(r"[\w.-]+(/[\w.-]+)*", re.ASCII)
 
 NAMES = ("namespace", "frame", "parent", "at")
 """Options of a sink that can say where the skin is."""
@@ -44,7 +43,7 @@ class Naming:
     @classmethod
     def of(cls, options: Mapping[str, str], where: str) -> Self:
         """Read the options of :data:`NAMES`, as far as they are there. Raises SinkError."""
-        for key, form in (("namespace", _NAMESPACE), ("frame", _FRAME), ("parent", _FRAME)):
+        for key, form in (("namespace", _NAMESPACE), ("frame", FRAME), ("parent", FRAME)):
             text = options.get(key)
             if text is not None and not form.fullmatch(text):
                 raise SinkError(
@@ -111,6 +110,8 @@ class Stream:
         End of the symmetric scale of colours, in the image's unit.
     clock
         What host times are times of; None where they are those of a recording.
+    board
+        How the board is doing at this moment, by name; None where no run is going on.
     place
         Which of a robot's skins it is; None where there is no robot.
     naming
@@ -128,6 +129,7 @@ class Stream:
     corners: FloatArray | None = None
     limit: float = 1.0
     clock: Callable[[], float] | None = None
+    board: Callable[[], Mapping[str, object]] | None = None
     place: Place | None = None
     naming: Naming = field(default_factory=Naming)
 
@@ -157,6 +159,12 @@ class Stream:
             place=place,
             naming=Naming().of_skin(place),
         )
+
+    @property
+    def parent(self) -> str:
+        """The link that the skin is known to lie on; "" where none is."""
+        mount = self.naming.mount or self.place
+        return "" if mount is None else mount.link
 
     def named(self, naming: Naming) -> Self:
         """The same, called as ``naming`` says, and each of a robot's skins below it."""

@@ -35,7 +35,12 @@ from tomoskin.files.session.scanned import (
     read_session,
     recording_of,
 )
-from tomoskin.files.session.session_reader import SessionReader, indexed_frames, message_counts
+from tomoskin.files.session.session_reader import (
+    SessionReader,
+    indexed_frames,
+    message_counts,
+    skins_in,
+)
 from tomoskin.files.session.session_writer import SessionWriter, robot_logs
 
 __all__ = [
@@ -78,6 +83,7 @@ __all__ = [
     "schema_of",
     "session_info",
     "session_touches",
+    "skins_in",
     "split",
     "split_targets",
 ]

@@ -6,7 +6,10 @@ import io
 from collections import deque
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from copy import copy
+from dataclasses import replace
 from pathlib import Path
+from typing import Self
 
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Footer, Metadata
@@ -45,6 +48,8 @@ class ContainerReader:
         A sentence on what is missing at the end, or "".
     summary
         Totals and index of all messages; None in a file without its end.
+    first
+        What is taken off the numbers of channels: 0, but for a part of the file.
 
     Raises
     ------
@@ -54,6 +59,7 @@ class ContainerReader:
 
     def __init__(self, path: Path) -> None:
         self.where, self.torn = str(path), ""
+        self._prefix, self.first = "", 0
         self.summary: Summary | None = None
         self._file = open_input(path, buffering=1 << 18)
         self.size = self._end = self._file.seek(0, io.SEEK_END)
@@ -67,15 +73,21 @@ class ContainerReader:
         """Close the file; nothing can be read afterwards."""
         self._file.close()
 
+    def part(self, name: str, first: int) -> Self:
+        """One of several sessions in this file: names that begin so, channels from ``first`` on."""
+        part = copy(self)
+        part._prefix, part.first = f"{name}/", first
+        return part
+
     def description(self, name: str) -> dict[str, str] | None:
-        """The named strings that stand before the first chunk."""
+        """The named strings of that name; those of the file itself are before the first chunk."""
         for opcode, offset in self._records():
-            if opcode == Opcode.CHUNK:
+            if opcode == Opcode.CHUNK and not self._prefix:
                 break
             if opcode == Opcode.METADATA:
                 with self._damage_at(offset):
                     record = decode(Metadata, self._record(offset))
-                if record.name == name:
+                if record.name == self._prefix + name:
                     return record.metadata
         return None
 
@@ -89,7 +101,8 @@ class ContainerReader:
         for offset in offsets:
             with self._damage_at(offset):
                 record = decode(Attachment, self._record(offset))
-            yield record
+            if record.name.startswith(self._prefix):
+                yield replace(record, name=record.name.removeprefix(self._prefix))
 
     def messages(self, channels: frozenset[int], since: int = 0) -> Iterator[LoggedMessage]:
         """Messages of the channels ``wanted`` logged at ``since`` ns or later, in file order.
@@ -117,7 +130,8 @@ class ContainerReader:
             yield from (place for opcode, place in self._records() if opcode == Opcode.CHUNK)
             return
         with self._damage_at(self._end):
-            yield from self.summary.chunks(channels, since)
+            own = frozenset(self.first + channel for channel in channels)
+            yield from self.summary.chunks(own, since)
 
     def _messages_at(self, offset: int) -> Iterator[LoggedMessage]:
         with self._damage_at(offset):
@@ -130,7 +144,7 @@ class ContainerReader:
                 hint="decompress it first: mcap decompress",
             )
         with self._damage_at(offset):
-            yield from messages_in(chunk, offset)
+            yield from messages_in(chunk, offset, self.first)
 
     def _open(self) -> None:
         """Read the summary, where the file has its end."""

@@ -146,8 +146,8 @@ def decode_summary(footer: Footer, data: bytes) -> Summary | None:
     return None if totals is None else Summary(totals, offsets, index)
 
 
-def messages_in(chunk: Chunk, offset: int) -> Iterator[LoggedMessage]:
-    """Messages of a chunk whose record is at ``offset``.
+def messages_in(chunk: Chunk, offset: int, first: int = 0) -> Iterator[LoggedMessage]:
+    """Messages of a chunk whose record is at ``offset``; channels count from ``first``.
 
     Raises ValueError where its records do not add up although the CRC is right: another program
     has written them wrongly.
@@ -163,7 +163,7 @@ def messages_in(chunk: Chunk, offset: int) -> Iterator[LoggedMessage]:
             if begin > after:
                 break
             _, _, channel, _, log_time, _ = MESSAGE.unpack_from(data, place)
-            yield LoggedMessage(channel, log_time, data[begin:after], offset)
+            yield LoggedMessage(channel - first, log_time, data[begin:after], offset)
         place = after
     if place != end:
         raise ValueError("the records of a chunk are inconsistent")

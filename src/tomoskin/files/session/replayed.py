@@ -3,7 +3,7 @@ and a session for those who compute with it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -46,20 +46,33 @@ from tomoskin.sensing.signal import Recording
 from tomoskin.sensing.track import TouchedFrame, has_forces, touch_columns
 
 
-def as_recorded(session: SessionReader) -> Prepared:
-    """The session's own skin, with the calibrations that were on. Raises DataError."""
-    prepared = prepare(session.skin)
-    for calibration in recorded_calibrations(session):
+def as_recorded(session: SessionReader, previous: Prepared | None = None) -> Prepared:
+    """The session's own skin, with the calibrations that were on. Raises DataError.
+
+    Of ``previous``, what the session has too serves again: it is not learnt and tabulated anew.
+    """
+    known = previous.calibrations if previous else {}
+    prepared = prepare(session.skin, previous.uncalibrated() if previous else None)
+    for calibration in recorded_calibrations(session, known):
         prepared = prepared.calibrated(calibration)
     return prepared
 
 
-def recorded_calibrations(session: SessionReader) -> Iterator[Calibration[Any]]:
-    """The calibrations that were on, in the order in which they are applied. Raises DataError."""
+def recorded_calibrations(
+    session: SessionReader, known: Mapping[str, Calibration[Any]] | None = None
+) -> Iterator[Calibration[Any]]:
+    """The calibrations that were on, in the order in which they are applied. Raises DataError.
+
+    Those that are ``known``, by the name of their kind, to the byte are not learnt again.
+    """
     held = session.attachments()
     for kind in KINDS:
         if (data := held.get(kind.attachment)) is not None:
-            yield kind.decode(data, f"{session.path}, {kind.attachment}")
+            same = (known or {}).get(kind.name)
+            if same is not None and same.encode() == data:
+                yield same
+            else:
+                yield kind.decode(data, f"{session.path}, {kind.attachment}")
 
 
 def replaying(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, closing
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -33,7 +33,7 @@ _RAW, _FRAMES = frozenset({channels.RAW}), frozenset({channels.FRAMES})
 
 
 class SessionReader(AbstractContextManager["SessionReader"]):
-    """A session file, open for reading; a context manager.
+    """A session file, or that of one ``skin`` of a robot's recording, open for reading.
 
     Iterators read as they go: memory does not grow with the file. Times are host monotonic
     seconds, as they were when it was recorded.
@@ -42,6 +42,8 @@ class SessionReader(AbstractContextManager["SessionReader"]):
     ----------
     path
         The file.
+    name
+        Which of a robot's skins it is; "" where there is no robot.
     skin
         The skin that it was recorded with.
     epoch
@@ -55,10 +57,12 @@ class SessionReader(AbstractContextManager["SessionReader"]):
         When the file cannot be read, is no session, or is damaged; from every method.
     """
 
-    def __init__(self, path: StrPath) -> None:
-        self.path = Path(path)
+    def __init__(self, path: StrPath, skin: str = "") -> None:
+        self.path, self.name = Path(path), skin
         self.container = ContainerReader(self.path)
         try:
+            if skin:
+                self.container = _part(self.container, skin)
             self.epoch = _epoch(self.container)
             self.skin = _skin(self.container)
         except BaseException:
@@ -127,6 +131,12 @@ class SessionReader(AbstractContextManager["SessionReader"]):
         return _last(self, channels.SETTINGS)
 
 
+def skins_in(path: StrPath) -> tuple[str, ...]:
+    """Names of the skins in a recording of several; ("",) of one alone. Raises DataError."""
+    with closing(ContainerReader(Path(path))) as container:
+        return tuple((container.description(ABOUT) or {}).get(SKINS, "").split()) or ("",)
+
+
 def tick_rate(session: SessionReader) -> float:
     """Of the device's clock, Hz; see :func:`stated_rate`."""
     return stated_rate(session.device(), session.skin)
@@ -158,17 +168,23 @@ def reference_frames(settings: Mapping[str, Any]) -> int:
 
 def message_counts(session: SessionReader) -> dict[str, int]:
     """Messages by topic; goes through a file without its end."""
-    if session.container.summary is not None:
-        counts = session.container.summary.totals.channel_message_counts
-    else:
-        counts = Counter(m.channel for m in session.container.messages(frozenset(channels.TOPICS)))
+    counts = _indexed(session)
+    if session.container.summary is None:
+        every = session.container.messages(frozenset(channels.TOPICS))
+        counts = Counter(message.channel for message in every)
     return {topic: counts.get(number, 0) for number, topic in channels.TOPICS.items()}
 
 
 def indexed_frames(session: SessionReader) -> int:
     """Number of frames by the index; 0 where there is none."""
-    summary = session.container.summary
-    return summary.totals.channel_message_counts.get(channels.FRAMES, 0) if summary else 0
+    return _indexed(session).get(channels.FRAMES, 0)
+
+
+def _indexed(session: SessionReader) -> dict[int, int]:
+    """Messages by channel, by the index."""
+    summary, first = session.container.summary, session.container.first
+    counts = summary.totals.channel_message_counts if summary else {}
+    return {channel - first: count for channel, count in counts.items()}
 
 
 def start_time(session: SessionReader) -> float:
@@ -181,6 +197,14 @@ def end_time(session: SessionReader) -> float | None:
     """Host time of the last message by the index; None where there is none."""
     summary = session.container.summary
     return summary.totals.message_end_time / 1e9 - session.epoch if summary else None
+
+
+def _part(container: ContainerReader, skin: str) -> ContainerReader:
+    names = (container.description(ABOUT) or {}).get(SKINS, "").split()
+    if skin not in names:
+        held = ", ".join(names) or "a single skin"
+        raise DataError(f'expected one of its skins, {held}, got "{skin}"', where=container.where)
+    return container.part(skin, channels.SPAN * names.index(skin))
 
 
 def _epoch(container: ContainerReader) -> float:

@@ -35,15 +35,15 @@ DESIRED_RADIUS = 0.15
 It was chosen on targets along a radius of discs with 8 and 16 electrodes."""
 
 
-def desired_images(mesh: Mesh, positions: FloatArray) -> csr_array:
+def desired_images(mesh: Mesh, positions: FloatArray, radius: float = DESIRED_RADIUS) -> csr_array:
     """(n_cells, n) images of unit targets at ``positions`` (n, d), per S·m².
 
     A flat disc around the target (in a volume, a ball), which holds its change of conductivity,
-    spread evenly; what of the disc lies beyond the rim is held by the rest. Raises ModelError
-    where the mesh is too coarse for it.
+    spread evenly; what of the disc lies beyond the rim is held by the rest. Its ``radius`` is a
+    part of the mesh's largest extent. Raises ModelError where the mesh is too coarse for it.
     """
-    radius = DESIRED_RADIUS * float(np.ptp(mesh.points, axis=0).max())
-    each = list(Balls(mesh).each(positions, radius))
+    extent = float(np.ptp(mesh.points, axis=0).max())
+    each = list(Balls(mesh).each(positions, radius * extent))
     cells = np.concatenate([cells for cells, _ in each])
     columns = np.repeat(np.arange(len(each)), [len(cells) for cells, _ in each])
     shares = np.concatenate([share for _, share in each])
@@ -71,8 +71,11 @@ class Trainer:
     middle: FloatArray
 
     @classmethod
-    def of(cls, mesh: Mesh, training: Targets, noise: ArrayLike) -> Self:
-        """Set up for targets and noise, one deviation or (n_meas,). Raises ModelError."""
+    def of(
+        cls, mesh: Mesh, training: Targets, noise: ArrayLike, radius: float = DESIRED_RADIUS
+    ) -> Self:
+        """Set up for targets, noise, one deviation or (n_meas,), and the ``radius`` that targets
+        are to be shown with. Raises ModelError."""
         data = (training.dv / training.amount[:, None]).T
         sd = np.asarray(noise, dtype=np.float64)
         if sd.shape not in ((), (len(data),)):
@@ -82,7 +85,8 @@ class Trainer:
             raise ModelError(f"expected finite noise above 0, got {sd.min():g} to {sd.max():g}")
         scaled = sd * np.sqrt(((data / sd[:, None]) ** 2).sum() / len(sd))
         centre = int(np.linalg.norm(training.places - centre_of(mesh), axis=1).argmin())
-        return cls(mesh, data, scaled, desired_images(mesh, training.places), data[:, centre])
+        desired = desired_images(mesh, training.places, radius)
+        return cls(mesh, data, scaled, desired, data[:, centre])
 
     def matrix(self, weight: float) -> tuple[FloatArray, FloatArray]:
         """Operator (n_cells, n_meas) and precision (n_meas, n_meas) at that weight."""
@@ -192,9 +196,11 @@ class Greit(Operator):
             difference=difference,
         )
 
-    def weighed(self, noise: ArrayLike, weight: float) -> Operator:
-        """The operator trained on the same targets for another noise and its weight μ."""
-        return self.remade(*Trainer.of(self.model.mesh, self.training, noise).matrix(weight))
+    def weighed(self, noise: ArrayLike, weight: float, radius: float = DESIRED_RADIUS) -> Operator:
+        """The operator trained on the same targets for another noise and its weight μ, to show
+        them with that ``radius``."""
+        trainer = Trainer.of(self.model.mesh, self.training, noise, radius)
+        return self.remade(*trainer.matrix(weight))
 
 
 def _target_radius(mesh: Mesh) -> float:

@@ -170,6 +170,20 @@ def growth_of_errors(locator: Locator, older: Locator | None = None) -> float:
     return float(1 + more.mean() / before.mean())
 
 
+_WORSE = 1.1
+"""Growth from which more presses have made a calibration worse."""
+
+
+def worse(growth: float) -> str:
+    """What a ``growth`` of errors says of the newer presses; nothing where it is small."""
+    if growth <= _WORSE:
+        return ""
+    return (
+        f"since the newer presses were added, the older ones are missed {growth:.1f} times as far: "
+        "the newer ones do not fit with them"
+    )
+
+
 _FEWEST_FITTED = 8
 """Presses that were fitted, and part of all, from which something is said of the fit."""
 

@@ -31,6 +31,9 @@ FORMAT = 1
 MOST_SKINS = 64
 
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,31}")
+FRAME = re.compile(r"[\w.-]+(/[\w.-]+)*", re.ASCII)
+"""What names a frame of coordinates: that which every program of ROS takes."""
+
 _BOARD = re.compile(r"([0-9a-f]{2}){1,16}")
 _LENGTH = Quantity("length", "mm", -100_000, 100_000)
 _ANGLE = Quantity("angle", "deg", -360, 360)
@@ -174,8 +177,8 @@ def _placed(given: SkinSection, where: str, folder: Path, urdf: Urdf | None) -> 
     ):
         if not form.fullmatch(text):
             raise SkinError(f'expected a {what}, got "{text}"', where=where)
-    if given.link is not None and urdf is not None:
-        urdf.check_link(given.link, where)
+    if given.link is not None:
+        _check_link(given.link, urdf, where)
     zero = np.zeros(3)
     pose = Pose.of(given.position or zero, given.angles or zero)
     return PlacedSkin(
@@ -185,6 +188,24 @@ def _placed(given: SkinSection, where: str, folder: Path, urdf: Urdf | None) -> 
         board=given.board,
         calibrations=tuple(folder / path for path in given.calibration or ()),
     )
+
+
+def _check_link(link: str, urdf: Urdf | None, where: str) -> None:
+    """Raise SkinError for a link that the robot does not have, or that can name no frame."""
+    if urdf is None:
+        raise SkinError(
+            f'expected a URDF that has the link "{link}", got none',
+            where=where,
+            hint='name it in the section [robot], as in urdf = "arm.urdf", or leave out link',
+        )
+    urdf.check_link(link, where)
+    if not FRAME.fullmatch(link):
+        raise SkinError(
+            'expected a link of letters, digits, "_", "-" and ".", with "/" between names, since '
+            f'it is the frame_id of all messages; got "{link}"',
+            where=where,
+            hint=f"rename it in {urdf.source}",
+        )
 
 
 def _from(folder: Path, source: str) -> str:
@@ -198,8 +219,21 @@ def _check_different(skins: tuple[PlacedSkin, ...], source: str) -> None:
     for what, values in (
         ("name", [skin.name for skin in skins]),
         ("board", [skin.board for skin in skins if skin.board]),
-        ("source", [skin.source for skin in skins if skin.source.startswith("serial:")]),
     ):
         twice = sorted({value for value in values if values.count(value) > 1})
         if twice:
             raise SkinError(f"two skins have the same {what} {twice[0]}", where=source)
+    ports: dict[Path, PlacedSkin] = {}
+    for skin in skins:
+        kind, _, rest = skin.source.partition(":")
+        port = rest.partition(",")[0]
+        if kind != "serial" or not port:
+            continue
+        other = ports.setdefault(Path(port).resolve(), skin)  # a link to a port is that port
+        if other is not skin:
+            raise SkinError(
+                f"expected a port of its own for each skin, got one for {other.name} "
+                f"({other.source}) and {skin.name} ({skin.source})",
+                where=source,
+                hint=f"both are {Path(port).resolve()}" if other.source != skin.source else "",
+            )

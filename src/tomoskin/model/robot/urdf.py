@@ -94,9 +94,14 @@ class Urdf:
             raise SkinError(
                 f"is not valid XML, so it is not a URDF: {error}", where=where
             ) from None
-        if root.tag != "robot":
-            hint = "expand xacro first: xacro ROBOT.xacro > ROBOT.urdf"
-            raise SkinError(f"expected <robot>, got <{root.tag}>", where=where, hint=hint)
+        macro = next((e.tag for e in root.iter() if "xacro}" in e.tag), "")
+        if root.tag != "robot" or macro or "${" in text:
+            raise SkinError(
+                "expected <robot> with its links, got "
+                + (f"<{root.tag}>" if root.tag != "robot" else "a xacro with macros"),
+                where=where,
+                hint="expand xacro first: xacro ROBOT.xacro > ROBOT.urdf",
+            )
         links = tuple(name_of(link, where) for link in root.findall("link"))
         joints = [_joint(joint, where) for joint in root.findall("joint")]
         shapes = tuple(read_shapes(root, path))
@@ -153,6 +158,13 @@ class Urdf:
         for joint in joints:
             for end in (joint.parent, joint.child):
                 self.check_link(end, f'{self.source}: joint "{joint.name}"')
+        roots = [link for link in self.links if link not in self.joints]
+        if len(roots) > 1 or not self.links:
+            raise SkinError(
+                f"expected one link that no joint holds, got {len(roots)}: {', '.join(roots)}",
+                where=self.source,
+                hint="hold all of them but one by a <joint>",
+            )
         for start in self.links:
             link = start
             for _ in joints:

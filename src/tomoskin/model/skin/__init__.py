@@ -18,6 +18,7 @@ from tomoskin.model.skin.lay import lay
 from tomoskin.model.skin.processing import (
     InverseSettings,
     TouchSettings,
+    regions_doubt,
 )
 from tomoskin.model.skin.skin import Skin
 
@@ -37,5 +38,6 @@ __all__ = [
     "lay",
     "load_of",
     "read_text",
+    "regions_doubt",
     "responses",
 ]

@@ -2,7 +2,6 @@
 
 from tomoskin.files.messages import Contact, Contacts, Item, Naming, Stream
 from tomoskin.run.sinks.sink import (
-    ContactListener,
     Sink,
     SinkConsumer,
     SinkReport,
@@ -14,7 +13,6 @@ from tomoskin.run.sinks.sink import (
 
 __all__ = [
     "Contact",
-    "ContactListener",
     "Contacts",
     "Item",
     "Naming",

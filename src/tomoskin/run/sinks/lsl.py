@@ -101,5 +101,5 @@ def _touch_row(contacts: Contacts) -> FloatArray:
     for number, contact in enumerate(contacts.strongest(MOST_TOUCHES)):
         detection = contact.touch.detection
         row[number] = contact.touch.id, detection.x, detection.y, detection.peak
-        forces[number] = np.nan if contact.force is None else contact.force
+        forces[number] = contact.force
     return np.concatenate((row.ravel(), forces, [float(contacts.valid)]))

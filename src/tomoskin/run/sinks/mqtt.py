@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import threading
+from collections import deque
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 from urllib.parse import SplitResult, unquote, urlsplit
 
@@ -11,49 +13,76 @@ from tomoskin.core import Event, SinkError, encode_json, needed
 from tomoskin.files.messages import Item, Naming, Stream, event_content
 from tomoskin.run.sinks.sink import Sink, options_of
 
-DEFAULT_PORT = 1883
+DEFAULT_PORT, TLS_PORT = 1883, 8883
 
 PERIOD = 0.05
 """Seconds between two messages of touches that go on; beginnings and ends are sent at once."""
 
-_WHERE = "sink mqtt"
+_WHERE, _SYSTEM = "sink mqtt", "system"
 _PATIENCE = 5.0
 _KEEPALIVE = 10
+
+_EXPIRY = 3
+"""Seconds for which the broker keeps touches: what is older is not true any more."""
+
+_MOST_OWED = 100
+"""Messages that are sent again after the broker was away; the oldest make room."""
 
 
 class MqttSink(Sink):
     """Publishes below one topic: ``touch``, ``touches``, ``events``, and ``status``.
 
-    ``touch`` is what happens to one: onset, move, release. ``status``, online or offline, is kept
-    by the broker: it is offline while no frames come, and the broker turns it so when we vanish.
+    ``touch`` is what happens to one: onset, move, release. All but moves reach the broker at least
+    once (quality of service 1). ``status``, online or offline, is kept by the broker: it is
+    offline while no frames come, and the broker turns it so when we vanish. ``touches`` are kept
+    until they are old.
+
+    Parameters
+    ----------
+    url, port
+        Of the broker.
+    tls
+        "" for none; else the file of the authority that signed the broker's certificate, or
+        "system" for those that the system trusts.
+    naming
+        Of topics and frame.
     """
 
     period = PERIOD
 
-    def __init__(self, url: SplitResult, port: int, naming: Naming) -> None:
+    def __init__(self, url: SplitResult, port: int, tls: str, naming: Naming) -> None:
         self.naming = naming
-        self.name = f"mqtt://{url.hostname}:{port}/{naming.namespace}"
-        self._url, self._port = url, port
+        self.name = f"mqtt{'s' if tls else ''}://{url.hostname}:{port}/{naming.namespace}"
+        self._url, self._port, self._tls = url, port, tls
         self._paho = needed("paho.mqtt.client", "mqtt", _WHERE, SinkError)
         self._client: Any = None
+        self._owed: deque[tuple[str, bytes, Any]] = deque(maxlen=_MOST_OWED)
 
     def open(self, stream: Stream) -> None:
         """Connect; SinkError when the broker does not let us in."""
         self._stream, self._status = stream, ""
         paho = self._paho
-        client = paho.Client(paho.CallbackAPIVersion.VERSION2, reconnect_on_failure=False)
+        client = paho.Client(
+            paho.CallbackAPIVersion.VERSION2, protocol=paho.MQTTv5, reconnect_on_failure=False
+        )
         self._client = client
+        if self._tls:
+            client.tls_set(None if self._tls == _SYSTEM else self._tls)
         if self._url.username:
             password = unquote(self._url.password) if self._url.password else None
             client.username_pw_set(unquote(self._url.username), password)
         client.connect_timeout = _PATIENCE
-        client.will_set(stream.naming.topic("status"), "offline", retain=True)
+        client.will_set(stream.naming.topic("status"), "offline", qos=1, retain=True)
         answer = _Answer()
         client.on_connect = answer
         client.connect(self._url.hostname, self._port, keepalive=_KEEPALIVE)
         client.loop_start()
         answer.check(self.name)
         self._say("online")
+        owed, self._owed = self._owed, deque(maxlen=_MOST_OWED)
+        for name, data, sent in owed:
+            if sent.rc or not sent.is_published():
+                self._put(name, data, qos=1)
 
     def publish(self, item: Item) -> None:
         """Send what is worth a message."""
@@ -62,9 +91,9 @@ class MqttSink(Sink):
             return
         self._say("offline" if item.voltages is None else "online")
         for content in item.happenings():
-            self._put("touch", encode_json(content))
+            self._put("touch", encode_json(content), qos=int(content["event"] != "move"))
         if item.is_due:
-            self._put("touches", encode_json(item.content()))
+            self._put("touches", encode_json(item.content()), keep=_EXPIRY)
 
     def close(self) -> None:
         """Say that we are offline, and disconnect."""
@@ -73,7 +102,7 @@ class MqttSink(Sink):
             return
         if client.is_connected():
             topic = self._stream.naming.topic("status")
-            last = client.publish(topic, "offline", retain=True)
+            last = client.publish(topic, "offline", qos=1, retain=True)
             last.wait_for_publish(_PATIENCE)
             client.disconnect()
         client.loop_stop()
@@ -81,11 +110,29 @@ class MqttSink(Sink):
     def _say(self, status: str) -> None:
         """Have the broker keep whether frames come, where that has changed."""
         if status != self._status:
-            self._put("status", status.encode(), keep=True)
+            topic = self._stream.naming.topic("status")
+            self._check(self._client.publish(topic, status, qos=1, retain=True))
             self._status = status
 
-    def _put(self, name: str, data: bytes, *, keep: bool = False) -> None:
-        sent = self._client.publish(self._stream.naming.topic(name), data, retain=keep)
+    def _put(self, name: str, data: bytes, *, qos: int = 0, keep: int = 0) -> None:
+        """Send it; ``keep``: s for which the broker keeps it for those who come later."""
+        properties = self._properties(keep) if keep else None
+        topic = self._stream.naming.topic(name)
+        sent = self._client.publish(topic, data, qos, retain=bool(keep), properties=properties)
+        if qos:
+            self._owed.append((name, data, sent))
+            while self._owed and not sent.rc and self._owed[0][2].is_published():
+                self._owed.popleft()
+        self._check(sent)
+
+    def _properties(self, expiry: int) -> Any:
+        packets = needed("paho.mqtt.packettypes", "mqtt", _WHERE, SinkError).PacketTypes
+        module = needed("paho.mqtt.properties", "mqtt", _WHERE, SinkError)
+        properties = module.Properties(packets.PUBLISH)
+        properties.MessageExpiryInterval = expiry
+        return properties
+
+    def _check(self, sent: Any) -> None:
         if sent.rc:
             raise SinkError(self._paho.error_string(sent.rc), where=self.name)
 
@@ -111,10 +158,10 @@ class _Answer:
 
 
 def open_mqtt(argument: str) -> MqttSink:
-    """``mqtt://[USER:PASSWORD@]HOST[:1883][/TOPIC][?frame=NAME]``."""
+    """``mqtt://[USER:PASSWORD@]HOST[:PORT][/TOPIC][?frame=NAME&tls=system|FILE]``."""
     try:
         url = urlsplit(f"mqtt:{argument}")
-        port = url.port or DEFAULT_PORT
+        port = url.port
     except ValueError as error:
         raise SinkError(str(error), where=_WHERE) from None
     if not url.hostname or "#" in argument or "+" in url.path or "@" in url.query:
@@ -123,7 +170,14 @@ def open_mqtt(argument: str) -> MqttSink:
             where=_WHERE,
             hint="for example mqtt://127.0.0.1:1883/robot/skin",
         )
-    options = options_of(filter(None, url.query.split("&")), ("frame",), _WHERE)
+    options = options_of(filter(None, url.query.split("&")), ("frame", "tls"), _WHERE)
+    tls = unquote(options.pop("tls", ""))
+    if tls and tls != _SYSTEM and not Path(tls).is_file():
+        raise SinkError(
+            f'expected tls=system, or the file of an authority, got "{tls}": it is no file',
+            where=_WHERE,
+        )
     naming = Naming.of(options, _WHERE)
     topic = url.path.strip("/") or naming.namespace  # MQTT's may be called anything
-    return MqttSink(url, port, replace(naming, namespace=topic))
+    port = port or (TLS_PORT if tls else DEFAULT_PORT)
+    return MqttSink(url, port, tls, replace(naming, namespace=topic))

@@ -74,6 +74,11 @@ class Ros2Sink(Sink):
                 hint="set CYCLONEDDS_URI to choose the network interface",
             ) from error
         self._stream = stream
+        if not stream.parent:
+            self.hint = (
+                f'no parent of its frame "{stream.naming.frame_id}" is published: choose it as '
+                "Fixed Frame in RViz, or give parent=LINK,at=X/Y/Z"
+            )
 
     def publish(self, item: Item) -> None:
         """Write the messages of ``item``; the source time is that of the measurement."""

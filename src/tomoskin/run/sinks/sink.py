@@ -5,13 +5,13 @@ from __future__ import annotations
 import contextlib
 import logging
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from importlib.metadata import entry_points
 from typing import Any
 
 from tomoskin.core import Capacity, Consumer, Event, Say, SinkError, TomoskinError, Worker, meant
-from tomoskin.files.messages import Contacts, Item, Naming, Reporter, Stream
+from tomoskin.files.messages import Item, Naming, Reporter, Stream
 from tomoskin.pipeline import FrameResult
 
 GROUP = "tomoskin.sinks"
@@ -32,11 +32,14 @@ class Sink(ABC):
         What it calls the skin; those of a robot have their own names below it.
     period
         Seconds between two messages of touches that go on.
+    hint
+        What someone should know of it once it has been opened.
     """
 
     name: str
     naming = Naming()
     period = 0.0
+    hint = ""
 
     def open(self, stream: Stream) -> None:
         """Get ready to publish; again after :meth:`close`."""
@@ -49,25 +52,6 @@ class Sink(ABC):
     def close(self) -> None:
         """Let go of everything; also after an :meth:`open` that failed half-way."""
         return
-
-
-class ContactListener(Sink):
-    """Calls ``react`` with the contacts of each frame, from a thread of its own.
-
-    A function that is slow gets the newest 256 frames, and delays nobody; one that raises is
-    called again after a pause. Of a source that is lost it gets one last, not valid.
-    """
-
-    def __init__(
-        self, react: Callable[[Contacts], None], naming: Naming | None = None, name: str = "robot"
-    ) -> None:
-        self.name, self.naming = name, naming or Naming()
-        self._react = react
-
-    def publish(self, item: Item) -> None:
-        """Call the function with the contacts of a frame."""
-        if not isinstance(item, Event) and (item.voltages is not None or item.is_due):
-            self._react(item)
 
 
 def sink_names() -> tuple[str, ...]:
@@ -150,7 +134,7 @@ class SinkConsumer(Consumer):
     """
 
     kind = "sink"
-    slow, ready = "is too slow, and results are left out", "takes results"
+    slow = "is too slow, and results are left out"
 
     def __init__(self, sink: Sink, stream: Stream, say: Say) -> None:
         self.name = sink.name
@@ -174,6 +158,7 @@ class SinkConsumer(Consumer):
     def open(self) -> None:
         """Open the sink, which gets what comes next in full."""
         self._sink.open(self._stream)
+        self.ready = "; ".join(filter(None, ("takes results", self._sink.hint)))
         self.trouble = ""
         self._reporter.repeat()
 

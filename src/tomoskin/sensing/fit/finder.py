@@ -254,7 +254,7 @@ class SpotFinder:
 
     def _detection(self, detected: SpotDetections, k: int, spot: list[float]) -> Detection:
         x, y, log_radius, content = spot
-        radius = math.exp(log_radius)
+        radius, ratio = math.exp(log_radius), float(detected.ratio[k])
         # a touch is told against the untouched skin
         content += self._residual.beneath(x, y, radius)
         spread = detected.covariance[4 * k : 4 * k + 2, 4 * k : 4 * k + 2]
@@ -268,8 +268,8 @@ class SpotFinder:
             peak=self._unit * math.expm1(content / (FILLING * radius**2)),
             cells=self._cells.within(x, y, radius),
             cov_xy=xy,
-            snr=float(detected.ratio[k]),
-            weak=bool(detected.fresh[k] < self._policy.least),
+            snr=ratio,
+            weak=self._policy.is_weak(ratio, float(detected.fresh[k]), float(detected.beside[k])),
             close=bool(detected.close[k]),
         )
 
@@ -312,10 +312,10 @@ def _merged(detected: SpotDetections, i: int, j: int) -> SpotDetections:
     ratio, fresh = detected.ratio.copy(), detected.fresh.copy()
     for each in (ratio, fresh):
         each[i] = np.hypot(*each[[i, j]])
-    close = detected.close.copy()
-    close[i] = True
+    close, beside = detected.close.copy(), detected.beside.copy()
+    close[i], beside[i] = True, min(beside[i], beside[j])
     kept = replace(fit, spots=spots[keep])
-    return SpotDetections(kept, ratio[keep], fresh[keep], covariance, close[keep])
+    return SpotDetections(kept, ratio[keep], fresh[keep], covariance, close[keep], beside[keep])
 
 
 _MARGIN = 1 + 1e-9

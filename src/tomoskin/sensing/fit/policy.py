@@ -253,6 +253,18 @@ class DetectionPolicy:
         """Deviations that a wrong profile of the spots of a fit may leave."""
         return self.misshapen * math.sqrt(fit.predicted @ fit.predicted)
 
+    def beside(self, fit: Fit) -> FloatArray:
+        """(k,) the same of the spots beside each; 0 where the evidence decides on further ones."""
+        if len(fit.spots) < 2 or self.pace.joint:
+            return np.zeros(len(fit.spots))
+        others = fit.predicted - fit.each
+        return np.asarray(self.misshapen * np.sqrt(np.einsum("kc,kc->k", others, others)))
+
+    def is_weak(self, ratio: float, fresh: float, beside: float) -> bool:
+        """Whether a touch may go on but not begin: it does not stand out of what others have left,
+        or may be what a wrong profile of those ``beside`` it leaves in frame after frame."""
+        return fresh < self.least or ratio < math.hypot(self.least, beside)
+
     def threshold(self, fit: Fit, part: float = 1.0) -> float:
         """Deviations for that ``part`` of a touch; a wrong profile adds to the noise."""
         return part * math.hypot(self.least, self.left_by(fit))

@@ -263,6 +263,8 @@ class SpotDetections:
         (4k, 4k), noise and a wrong profile together.
     close
         (k,) bool: another touch so near cannot be ruled out.
+    beside
+        (k,) deviations that a wrong profile of the others may leave.
     """
 
     fit: Fit
@@ -270,19 +272,21 @@ class SpotDetections:
     fresh: FloatArray
     covariance: FloatArray
     close: NDArray[np.bool_]
+    beside: FloatArray
 
 
 def judged(selection: ForwardSelection, fit: Fit) -> SpotDetections:
     """How sure each touch of a fit is."""
     if not len(fit.spots):
         none = np.zeros(0)
-        return SpotDetections(fit, none, none, np.zeros((0, 0)), none.astype(bool))
+        return SpotDetections(fit, none, none, np.zeros((0, 0)), none.astype(bool), none)
     reach("covariances")
     problem = selection.problem
     squares, covariance = problem.solver.judged(problem, fit, _UNEVEN)
     ratio = np.sqrt(squares)
     fresh = selection.ratios(fit) if len(problem.left) else ratio
-    return SpotDetections(fit, ratio, fresh, covariance, _close(selection, fit))
+    close, beside = _close(selection, fit), selection.policy.beside(fit)
+    return SpotDetections(fit, ratio, fresh, covariance, close, beside)
 
 
 def _close(selection: ForwardSelection, fit: Fit) -> NDArray[np.bool_]:

@@ -15,6 +15,9 @@ from tomoskin.sensing.signal.readout import FIGURES
 _SUPPLY, _FIVE, _REFERENCE, _DUMP = 12.0, 5.0, 1.225, 22.0
 """V; V; V across the sense resistor; Ω from the bus to ground while no source is enabled."""
 
+_OFF = 1.0
+"""V at +12V that a switch's leakage may leave."""
+
 _SAG = 0.385e-3 * 120.0
 """V a channel that −5V sags: an INA118 draws at most 0.385 mA through at most 120 Ω of U1."""
 
@@ -68,7 +71,8 @@ def meter_steps(
     may add each reading there before the next step is made.
     """
     read = {} if read is None else read
-    yield MeterStep("supply", "+12V", 11.4, 12.6, "0 V: polarity, fuse F1")
+    yield MeterStep("supply", "12V IN", 11.4, 12.6, "0 V: polarity, fuse F1")
+    yield MeterStep("supply", "+12V", -0.1, _OFF, "Q1, Q2: 12 V must not come without 5 V")
     yield MeterStep(
         "supply",
         "1 kΩ between E1 and E2, across it",
@@ -76,11 +80,11 @@ def meter_steps(
         0.001,
         "a gate is not off at rest: Q101 to Q103, Q201 to Q203; the same for other pairs",
     )
-    supply = read.get("+12V", _SUPPLY)
-    source = "U21, U22: the source has no path for its current"
-    yield MeterStep("supply", "SENSE", supply - 0.3, supply + 0.2, source)
     yield MeterStep("Arduino", "+5V", 4.75, 5.25, "USB, header J61")
-    five = read.get("+5V", _FIVE)
+    five, supply = read.get("+5V", _FIVE), read.get("12V IN", _SUPPLY)
+    yield MeterStep("Arduino", "+12V", supply - 0.2, supply + 0.05, "Q1, Q2, R3 to R5")
+    rail = read.get("+12V", 0.0)
+    supply = rail if rail > _OFF else supply  # else it is the reading of the stage before
     sag = 0.1 + _SAG * channels
     yield MeterStep("Arduino", "-5V", -five - 0.05, -five + sag, "U1, C2, C3")
     yield MeterStep("Arduino", "2.5V", 2.49, 2.51, "U2, U3")

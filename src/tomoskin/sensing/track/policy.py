@@ -41,7 +41,8 @@ _TAIL, _MISFIT = 0.6, 0.03
 at least so much of the strongest one's."""
 
 _AGAIN = 7.0
-"""Logarithm of how much rarer a detection of nothing is where another has been the frame before."""
+"""Logarithm of how much rarer a detection of nothing is where another has been the frame before; of
+what a misfit may be, less: that is the same in the next frame."""
 
 _CLUTTER = 3.0
 """Logarithm of the range of ratios that touches have."""
@@ -150,7 +151,8 @@ def confirmed(
 ) -> float:
     """Odds after a further detection, so many ``seconds`` after the frame before."""
     snr = 2 * threshold if math.isnan(detection.snr) else max(detection.snr, threshold)
-    gain = _AGAIN - (_BESIDE if strongest > 0 else 0.0) + _standing_out(snr, threshold, strongest)
+    again = _AGAIN / (1 + (_MISFIT * strongest / snr) ** 2) - (_BESIDE if strongest > 0 else 0.0)
+    gain = again + _standing_out(snr, threshold, strongest)
     return min(odds + _share(seconds) * max(gain, 0.0), MOST)
 
 
@@ -170,8 +172,9 @@ def may_begin(detection: Detection, threshold: float) -> bool:
 
 
 def is_forgotten(detection: Detection, threshold: float) -> bool:
-    """Whether a newcomer that is not reported yet is no touch, since it no longer stands out."""
-    return detection.snr < threshold
+    """Whether a newcomer that is not reported yet is no touch, since it no longer stands out, as
+    it did when it began."""
+    return not may_begin(detection, threshold)
 
 
 def is_reported(odds: float, detection: Detection, seconds: float) -> bool:

@@ -105,7 +105,7 @@ def is_residual(trace: Trace, time: float) -> bool:
     """
     size, top = size_of(trace.detection), trace.top
     slow = trace.low is None and time - trace.strong > RESIDUAL.recovery
-    if slow or not RESIDUAL.holds(size, top):
+    if slow or trace.is_full or not RESIDUAL.holds(size, top):
         trace.low = None
         return False
     if trace.low is None or RESIDUAL.has_grown(size, trace.least, 0.0):

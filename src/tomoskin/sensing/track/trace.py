@@ -141,6 +141,8 @@ class Trace:
     strong, low, least
         Device times at which it was last strong for its position, and since which it has been
         so weak that it may be a residual response, or None; least size of its peak since then.
+    full
+        Its content when it was last strong.
     footprints, top
         Where it has been, the newest last; and how large it has been where its detection is now,
         for a press that slid leaves a residual response anywhere along its way.
@@ -162,6 +164,7 @@ class Trace:
     met: dict[int, float] = field(default_factory=dict)
     parted: float = -math.inf
     strong: float = 0.0
+    full: float = 0.0
     low: float | None = None
     least: float = 0.0
     footprints: list[Footprint] = field(default_factory=list)
@@ -173,7 +176,7 @@ class Trace:
 
     def __post_init__(self) -> None:
         """Begin with what the first detection shows."""
-        self.strong = self.since
+        self.strong, self.full = self.since, content_of(self.detection)
         self.strength = self.fresh = TouchStrength.of(self.detection)
         self.held = Position.of(self.detection, content_of(self.detection), self.since)
         self._step()
@@ -198,6 +201,12 @@ class Trace:
         """Its newest detection, where it is held to be."""
         return self.held.of_detection(self.detection)
 
+    @property
+    def is_full(self) -> bool:
+        """Whether it still changes as much as when it was strong. A touch that a fit has cut in two
+        does: each part stands out little where the other is given."""
+        return content_of(self.detection) > _STRONG * self.full
+
     def alone(self, time: float) -> Alone:
         """The touch as it is now, by itself."""
         return Alone(self.state, self.strength, time)
@@ -214,7 +223,7 @@ class Trace:
         self.missing = None
         self._step()
         if size_of(detection) >= _STRONG * self.top:
-            self.strong = time
+            self.strong, self.full = time, content_of(detection)
 
     def change(self, time: float) -> None:
         """It stands for other fingers from now on: what it was says nothing of them."""
@@ -224,7 +233,8 @@ class Trace:
 
     def become(self, other: Trace) -> None:
         """Go on from where ``other`` is."""
-        self.detection, self.state, self.strong = other.detection, other.state, other.strong
+        self.detection, self.state = other.detection, other.state
+        self.strong, self.full = other.strong, other.full
         self.held, self.strength, self.odds = other.held, other.strength, other.odds
         self.missing, self.low = other.missing, None
         self._step()
