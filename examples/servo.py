@@ -44,7 +44,7 @@ RADIUS = 0.012
 FASTEST = np.array([0.06, 0.06, 0.008])
 """Of the pad along x and y and towards the finger, m/s."""
 
-GAIN = 8.0
+GAIN = 10.0
 """Of the expert, 1/s."""
 
 STEPS, WARM_UP, REST = 70, 35, 20
@@ -59,7 +59,7 @@ KEPT = 0.8
 EDGE = 0.075
 """Farthest that a touch can be from the middle of the sheet, m."""
 
-SHEETS, OTHERS = 4, 1000
+SHEETS, OTHERS = 12, 2000
 """Sheets of the demonstrations, and the seed of the first of the others."""
 
 Policy = Callable[[PolicyView, "World"], FloatArray]

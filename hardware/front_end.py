@@ -11,12 +11,14 @@ from results import Figures
 from spice import run
 
 PARTS = Path(__file__).resolve().parent / "front_end.toml"
-GAIN = 40
-AMPERES = 0.05
+PICO = tomllib.loads(MEGA.read_text(encoding="utf-8"))["pico"]
+"""Its record, whose gain, reference and current the decks and the schematic are held to."""
+
+GAIN, AMPERES = PICO["gain"], PICO["current"]
 SENSE = 1 / (1 / 24.9 + 1 / 1540)
 """Ω, of two resistors."""
 
-REFERENCE, BITS = 3.3, 12
+REFERENCE, BITS = PICO["reference"], PICO["adc_bits"]
 LSB = REFERENCE / (1 << BITS)
 CONVERTER_NOISE = 0.46
 """LSB, standard deviation of a conversion of an ADS7042: 70 dB of signal to noise."""

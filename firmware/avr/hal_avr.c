@@ -31,7 +31,12 @@ struct identity {
 };
 static EEMEM struct identity identity;
 
-static uint8_t reset_flags __attribute__((section(".noinit")));
+/* What a reset leaves as it was, but power coming up does not. */
+#define NOINIT __attribute__((section(".noinit")))
+#define REMEMBERED UINT32_C(0x746F6D6F)
+static NOINIT uint8_t reset_flags, serial_before;
+static NOINIT uint32_t memory;
+static bool remembers;
 static volatile uint16_t ticks_high;
 static volatile bool awake;
 static uint8_t converter; /* ADCSRA without the start bit */
@@ -51,11 +56,14 @@ void first_of_all(void) {
     CONTROL_PORT = LATCH;
     CONTROL_DDR = ENABLES | LATCH;
     reset_flags = MCUSR;
+    serial_before = UCSR0B;
     MCUSR = 0u;
     wdt_disable();
 }
 
 void hal_init(void) {
+    remembers = memory == REMEMBERED;
+    memory = REMEMBERED;
     ADDRESS_PORT = 0u;
     ADDRESS_DDR = ADDRESS_MASK;
     DIDR0 = 0xFFu; /* digital inputs off where potentials come in */
@@ -75,7 +83,23 @@ void hal_init(void) {
     sei();
 }
 
+/* Behind the stock bootloader, which clears MCUSR. It hands a watchdog's reset over at once; before
+   all others it has set up the serial line. A brown-out that leaves the memory cannot be told from
+   the reset line there; one that does not is power coming up. */
+static uint8_t cause_behind_bootloader(void) {
+    if (!remembers) {
+        return RESET_POWER;
+    }
+    if (serial_before == 0u) {
+        return RESET_WATCHDOG;
+    }
+    return serial_before == (_BV(RXEN0) | _BV(TXEN0)) ? RESET_EXTERNAL : RESET_UNKNOWN;
+}
+
 uint8_t hal_reset_cause(void) {
+    if (reset_flags == 0u) {
+        return cause_behind_bootloader();
+    }
     if ((reset_flags & _BV(WDRF)) != 0u) {
         return RESET_WATCHDOG;
     }

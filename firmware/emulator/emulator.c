@@ -2,7 +2,8 @@
    the firmware on a simulated ATmega2560. Its switches and converter inputs are as in avr/pins.h;
    what they must never do is said on stderr. -e: a file that its EEPROM begins with. -f: while it scans, as fast as it goes and not in real
    time. -r: opening the port resets the board, and for a second its bootloader swallows what is
-   said to it. -d: end when stdin does. */
+   said to it; as the stock one it clears MCUSR, hands a watchdog's reset over at once, and before all
+   others sets up the serial line. -d: end when stdin does. */
 #include "skin.h"
 #include "watch.h"
 
@@ -34,8 +35,8 @@
 #define BOOTLOADER_CYCLES CLOCK /* a second, as on a Mega 2560 */
 
 /* Places in data space. */
-enum { PORT_A = 0x22, DDR_C = 0x27, PORT_C = 0x28, MCU_SR = 0x54, SP_L = 0x5D, SP_H = 0x5E, ADC_L = 0x78, ADC_H = 0x79, ADC_SRB = 0x7B, ADC_MUX = 0x7C };
-enum { SOURCE_0 = 1, SOURCE_8 = 2, SINK_0 = 4, SINK_8 = 8, LATCH = 16, MUX5 = 8 };
+enum { PORT_A = 0x22, DDR_C = 0x27, PORT_C = 0x28, MCU_SR = 0x54, SP_L = 0x5D, SP_H = 0x5E, ADC_L = 0x78, ADC_H = 0x79, ADC_SRB = 0x7B, ADC_MUX = 0x7C, UCSR_0B = 0xC1 };
+enum { SOURCE_0 = 1, SOURCE_8 = 2, SINK_0 = 4, SINK_8 = 8, LATCH = 16, MUX5 = 8, WDRF = 8, RXEN_TXEN = 0x18 };
 
 static avr_t *avr;
 static const struct skin_memory *skin;
@@ -128,7 +129,16 @@ static void on_control(struct avr_irq_t *irq, uint32_t value, void *unused) {
     if (is_on && new_source == new_sink) {
         complain("source = sink");
     }
+    if ((new_source == OFF) != (new_sink == OFF)) {
+        complain("half a drive");
+    }
     connect(new_source, new_sink);
+}
+
+/* A pin that becomes an output connects what has been written to it before. */
+static void on_direction(struct avr_irq_t *irq, uint32_t value, void *unused) {
+    avr->data[DDR_C] = (uint8_t)value;
+    on_control(irq, avr->data[PORT_C], unused);
 }
 
 static void on_conversion(struct avr_irq_t *irq, uint32_t value, void *unused) {
@@ -270,6 +280,7 @@ static void say_errors(struct avr_t *machine, const int level, const char *forma
 }
 
 static void (*core_reset)(struct avr_t *machine);
+static bool has_reset = true;
 
 /* Pins float in reset, and pull-downs keep the enables low. */
 static void on_reset(struct avr_t *machine) {
@@ -278,6 +289,7 @@ static void on_reset(struct avr_t *machine) {
     address = 0;
     n_out = 0;
     may_feed = true;
+    has_reset = true;
     if (watch != NULL) {
         watch->resets++;
     }
@@ -296,6 +308,13 @@ static void mind_opening(void) {
         booted = avr->cycle + BOOTLOADER_CYCLES;
     }
     was_open = is_open;
+}
+
+/* What the bootloader leaves behind. */
+static void hand_over(void) {
+    has_reset = false;
+    avr->data[UCSR_0B] = (avr->data[MCU_SR] & WDRF) != 0 ? 0 : RXEN_TXEN; /* simavr has a transmitter on */
+    avr->data[MCU_SR] = 0;
 }
 
 /* The bootloader's second: nothing but time goes by. */
@@ -326,6 +345,8 @@ static void build_board(const char *path) {
     avr->log = LOG_ERROR;
     avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('C'), IOPORT_IRQ_REG_PORT),
                             on_control, NULL);
+    avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('C'), IOPORT_IRQ_DIRECTION_ALL),
+                            on_direction, NULL);
     avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_ADC_GETIRQ, ADC_IRQ_OUT_TRIGGER),
                             on_conversion, NULL);
     avr->io[ADC_L - 32].r.c = read_code;
@@ -397,6 +418,9 @@ int main(int count, char **arguments) {
         if (avr->cycle < booted) {
             boot();
         } else {
+            if (has_reset && resets_on_open) {
+                hand_over();
+            }
             run();
         }
         if (avr->cycle >= next) {

@@ -64,6 +64,29 @@ TEST_F(Board, PackedFramesHoldTheSameInTenBits) {
     }
 }
 
+TEST_F(Board, TheLastIncompleteGroupHasItsUpperBitsWhereWholeOnesDo) {
+    oversampling = 1;
+    for (size_t left : {1u, 2u, 3u}) {
+        SCOPED_TRACE(left);
+        machine.power_on();
+        drives = {{12, 5, static_cast<uint16_t>(0x0Fu | (0x700u >> (3u - left) & 0x700u))}};
+        auto wanted = expected();
+        ASSERT_EQ(wanted.size(), 4u + left);
+        set_up();
+        ASSERT_EQ(set_format(FORMAT_PACKED), RESULT_OK);
+        ASSERT_EQ(start(), RESULT_OK);
+        machine.run_us(5'000);
+        auto frames = of(MSG_FRAME_PACKED, machine.heard());
+        ASSERT_GT(frames.size(), 0u);
+        unsigned upper = 0;
+        for (size_t s = 0; s < left; s++) {
+            upper |= wanted[4 + s] >> 8 << 2 * s;
+        }
+        EXPECT_NE(upper, 0u) << "a shift of nothing is no test";
+        EXPECT_EQ(frames[0].back(), upper);
+    }
+}
+
 TEST_F(Board, OnlySingleConversionsArePacked) {
     EXPECT_EQ(set_format(FORMAT_PACKED), RESULT_WRONG_CONFIGURATION);
     oversampling = 2;

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from run.sinks.test_mqtt import broker, heard
+from run.sinks.test_mqtt import broker, heard, mosquitto
 
-__all__ = ["broker", "heard"]
+__all__ = ["broker", "heard", "mosquitto"]
 
 
 def test_a_run_is_published_while_it_is_recorded(tomoskin, tmp_path, broker, heard):

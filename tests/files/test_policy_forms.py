@@ -155,12 +155,7 @@ def test_what_is_old_or_lost_is_not_valid(session, touched):
     old = forms.at(touched.scanned + 0.5)
     assert (old.valid, old.map_valid, old.points.any(), old.map.any()) == (False,) * 4
     assert not forms.at(touched.scanned - 1).valid
-    lost = replace(
-        contacts_of(session, touched),
-        **{"valid": False, "voltages": None, "reference": None, "tracked": ()},
-        scanned=touched.scanned + 0.05,
-    )
-    forms.push(lost)
+    forms.push(contacts_of(session, touched).outdated("the board is gone"))
     assert not forms.at().valid
 
 

@@ -62,6 +62,11 @@ MUTANTS = {
         "RESULT_UNKNOWN_COMMAND, 0u);\n        return true;",
     ),
     "stuck sequence number": ("scan.c", "    scan.sequence++;\n", ""),
+    "the last incomplete group shifted": (
+        "scan.c",
+        "(uint8_t)(scan.upper >> (2u * (4u - scan.group)))",
+        "scan.upper",
+    ),
     "drops not counted": ("scan.c", "(uint16_t)(scan.drops + 1u)", "scan.drops"),
     "a frame overwritten while it is sent": ("scan.c", "        filling ^= 1u;\n", ""),
     "the first conversion lost": (

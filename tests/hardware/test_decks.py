@@ -1,5 +1,7 @@
 """The board's circuit under ngspice: ours keeps its promises, the source's shows what was wrong."""
 
+import math
+
 import pytest
 
 import parasitics
@@ -77,6 +79,14 @@ def test_noise_is_the_converters():
     quiet, loud = results.noise(0), results.noise(1 / results.GAIN)
     assert quiet["pin"] < loud["pin"] < 0.1 * results.CONVERTER_NOISE * results.LSB
     assert quiet["gain"] == pytest.approx(results.GAIN, rel=1e-3)
+
+
+def test_noise_is_that_on_paper():
+    """12 nV of amplifier and 4.07 of each 1 kohm before it, through one pole: docs/hardware.md."""
+    quiet = results.noise(0)
+    density = math.sqrt(12**2 + 2 * 4.07**2) * 1e-9
+    paper = results.GAIN * density * math.sqrt(math.pi / 2 * quiet["bandwidth"])
+    assert quiet["pin"] == pytest.approx(paper, rel=0.1)
 
 
 @pytest.mark.parametrize("five", [OFF, ON])

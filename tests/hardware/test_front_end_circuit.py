@@ -83,6 +83,12 @@ def in_deck(deck: str, element: str) -> float:
 
 
 def test_current_and_gain() -> None:
+    """Of parts, of the deck, and of the board's record: one truth."""
+    amperes = sum(1.225 / ohms for ohms in (24.9, 1540.0))
+    assert amperes == pytest.approx(front_end.PICO["current"], rel=1e-3)
+    (pico,) = of("Raspberry Pi Pico")
+    assert pico["3V3"] == "+3V3"
+    assert front_end.PICO["reference"] == 3.3
     assert between("R", "+5V", "SENSE") == [24.9, 1540.0]
     assert 1 / sum(1 / ohms for ohms in (24.9, 1540.0)) == pytest.approx(front_end.SENSE)
     (ohms,) = between("R", "RG1", "RG2")

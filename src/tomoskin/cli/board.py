@@ -76,7 +76,9 @@ def _findings(
 
     if meter:
         yield from _readings(current, channels, read)
-    ring = LoadRing.for_current(channels, current)
+    name, _, board = source.partition(":")
+    record = BOARDS.get(board if name == "emulator" else "", BOARDS[DEFAULT_BOARD])
+    ring = LoadRing.for_current(channels, current, record.ring_drop)
     with _opened(source, ring, current) as transport:
         yield from check_board(transport, ring, current, five_volts=read.get(FIVE))
 

@@ -162,6 +162,10 @@ def export(
     from tomoskin.files.session import SessionReader, skins_in
 
     write = WRITERS[out.suffix.lower()]
+    if like is not None and out.suffix.lower() != ".lerobot":
+        raise typer.BadParameter(
+            f"expected it together with X.lerobot, got {out}", param_hint="--like"
+        )
     names = (skin,) if skin or out.suffix.lower() != ".lerobot" else skins_in(file)
     with ExitStack() as stack, Bar(f"writing {out}") as bar:
         session, *others = [stack.enter_context(SessionReader(file, name)) for name in names]

@@ -14,6 +14,7 @@ from tomoskin.run.labelled_frames import (
     processors,
 )
 from tomoskin.run.live_skin import LiveSkin, open_skin, prepared_for
+from tomoskin.run.recordings import FILE_NAME
 from tomoskin.run.robot_run import Member, RobotRun, open_robot
 from tomoskin.run.runner import Runner
 from tomoskin.run.scripted import simulate
@@ -21,6 +22,7 @@ from tomoskin.run.status import ReplayStatus, Status
 from tomoskin.run.twin_control import way_to_bend
 
 __all__ = [
+    "FILE_NAME",
     "MAX_FORCE",
     "BoardMemory",
     "CheckFinding",

@@ -40,9 +40,6 @@ from tomoskin.sensing.signal import CountScale, LoadRing, diagnose
 BITS = BOARDS[DEFAULT_BOARD].adc_bits
 """Of a count here: the samples of a finer converter are scaled to it."""
 
-USB_VOLTS = 5.0
-"""Reference of a converter that has no other than the 5 V of USB, V."""
-
 _NOISE = 2.0
 """Counts a conversion; the decks give 0.7, and rounding adds 0.3."""
 
@@ -119,9 +116,10 @@ def check_board(
     yield from _differences(first)
     second = _measure(transport, back, settings, frames, _AT_ONCE)
     record = first.record
-    supplied = record.reference == USB_VOLTS
-    guessed = supplied and five_volts is None
-    reference = five_volts if supplied and five_volts is not None else record.reference
+    guessed = record.usb_reference and five_volts is None
+    reference = record.reference
+    if record.usb_reference and five_volts is not None:
+        reference = five_volts
     scale = CountScale.of(record.gain, reference, BITS, measured=not guessed)
     found = diagnose(
         np.vstack([first.mean, second.mean]),

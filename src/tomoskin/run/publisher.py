@@ -8,6 +8,7 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from tomoskin.core import Capacity, Consumer, Event, Worker, stop_workers
@@ -117,6 +118,8 @@ class Audience:
         Taken for each frame; those of a robot's skins share them.
     memory
         Where boards are remembered from one start to the next; None: nowhere.
+    obey
+        Has the run do what a listener asks for, as :class:`~tomoskin.files.messages.Stream` says.
     """
 
     def __init__(
@@ -129,6 +132,7 @@ class Audience:
     ) -> None:
         self.clock, self.sinks, self.events = clock, sinks, EventLog()
         self.place, self.turns, self.memory = place, turns or Turns(), memory
+        self.obey: Callable[[str, Path], str] | None = None
         self._calls: list[Callable[[], None]] = []
         self._subscribers: list[Worker[Subscriber]] = []
         self._lock = threading.Lock()
@@ -228,7 +232,7 @@ class Publisher:
         """
         self.recordings.name_source(source)
         stream = Stream.of(prepared, source, recorded, self._audience.place)
-        self.stream = stream = replace(stream, board=self._board)
+        self.stream = stream = replace(stream, board=self._board, obey=self._audience.obey)
         if self._sinks:
             return
         self._sinks = tuple(sink_worker(sink, stream, self.say) for sink in self._audience.sinks)

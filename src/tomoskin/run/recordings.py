@@ -25,6 +25,9 @@ from tomoskin.pipeline import REFERENCE_FRAMES, FrameResult, Prepared
 _KEPT = 3 * REFERENCE_FRAMES
 """Frames that make a reference, and during which the operator follows its noise."""
 
+FILE_NAME = "tomoskin-%Y%m%d-%H%M%S.mcap"
+"""Of a recording that nobody has named."""
+
 _DELAY = 3
 """A touch is certain only when it has stood for so many frames."""
 

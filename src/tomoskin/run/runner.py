@@ -6,9 +6,10 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
+from pathlib import Path
 
 from tomoskin.board.source import Transport
-from tomoskin.core import Event, ModelError, SourceError, WireError
+from tomoskin.core import Event, ModelError, OutputError, SourceError, WireError
 from tomoskin.files.session import ReplayTransport
 from tomoskin.model.robot import Place
 from tomoskin.pipeline import Prepared
@@ -18,13 +19,17 @@ from tomoskin.run.commands import (
     DirectCommand,
     Note,
     Opener,
+    Record,
     SetPose,
     SetTwin,
+    StopRecording,
+    TakeReference,
 )
 from tomoskin.run.flow import Flow, Snapshot
 from tomoskin.run.intake import play
 from tomoskin.run.loop import Loop
 from tomoskin.run.publisher import Audience, Turns
+from tomoskin.run.recordings import FILE_NAME
 from tomoskin.run.sinks import Contacts, Sink
 from tomoskin.run.status import Latency, Status
 from tomoskin.run.twin_control import TwinControl
@@ -105,6 +110,7 @@ class Runner:
         memory: BoardMemory | None = None,
     ) -> None:
         self.audience = Audience(clock, tuple(sinks), place, turns, memory)
+        self.audience.obey = self.obey
         self.events = self.audience.events
         self._loop = Loop(prepared, open_transport, self.audience)
         self._thread: threading.Thread | None = None
@@ -173,6 +179,31 @@ class Runner:
             What is wrong with it, as the command's own description says.
         """
         self.submit(command).result()
+
+    def obey(self, request: str, folder: Path) -> str:
+        """Do what a listener asks for by name, a recording in ``folder``; what was done.
+
+        Raises
+        ------
+        TomoskinError
+            What is wrong with it.
+        """
+        out = self._loop.flow.out
+        file = out.recordings.path
+        match request:
+            case "reference":
+                self.ask(TakeReference())
+                return "the next frames are the reference: do not touch the skin"
+            case "record":
+                if file is not None:
+                    raise OutputError("is being recorded to", where=str(file), hint="stop it first")
+                file = out.stream.file(folder / time.strftime(FILE_NAME))
+                self.ask(Record(file))
+                return f"recording to {file}"
+            case "stop":
+                self.ask(StopRecording())
+                return f"{file} is complete" if file else "nothing was being recorded"
+        raise WireError(f'expected "reference", "record" or "stop", got "{request}"')
 
     def say(self, kind: str, text: str) -> None:
         """Publish an event of this moment."""

@@ -18,7 +18,7 @@ from tomoskin.core import DataError, GeometryError, TomoskinError, WireError
 from tomoskin.files.session import read_timeline
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, Unresolved, colour_limit
-from tomoskin.run import Runner, SetPresses, Snapshot, StrictRequest, commands
+from tomoskin.run import FILE_NAME, Runner, SetPresses, Snapshot, StrictRequest, commands
 from tomoskin.server import views
 from tomoskin.server.frames import encode_result
 from tomoskin.server.page_connection import Handler, Handlers, Host, Page, Tasks, during
@@ -32,9 +32,6 @@ from tomoskin.server.page_messages import (
 )
 from tomoskin.server.requests import AskUnresolved, Painted, SetRecording
 from tomoskin.twin import Probe
-
-FILE_NAME = "tomoskin-%Y%m%d-%H%M%S.mcap"
-"""Of a recording that is asked for on a page, for ``time.strftime``."""
 
 
 def run_handlers(runner: Runner, folder: Path, tasks: Tasks) -> Handlers:

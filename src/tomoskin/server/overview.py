@@ -16,8 +16,7 @@ from tomoskin import __version__
 from tomoskin.core import FloatArray, Force, WireError, encode_json
 from tomoskin.files.messages import Stream
 from tomoskin.model.robot import PlacedSkin, Pose, Robot
-from tomoskin.run import RobotRun, Runner, StrictRequest, commands
-from tomoskin.server.hub import FILE_NAME
+from tomoskin.run import FILE_NAME, RobotRun, Runner, StrictRequest, commands
 from tomoskin.server.page_connection import Host, Page, Tasks, during
 from tomoskin.server.page_messages import (
     PlacedShape,

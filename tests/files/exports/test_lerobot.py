@@ -203,6 +203,8 @@ def test_rows_like_those_of_a_robot(session, tomoskin):
     info = json.loads((folder / "meta/info.json").read_text())
     assert (info["fps"], info["robot_type"], info["total_frames"]) == (10, "arm", 10)
     assert table_of(folder)["episode_index"].tolist() == [0] * 7 + [1] * 3
+    table = tomoskin("session", "export", session, session.with_name("x.csv"), "--like", like)
+    assert (table[0], "--like" in table[2]) == (2, True)
     other = session.with_name("three")
     robot_dataset(other, lengths=(7, 3, 1))
     with pytest.raises(DataError, match="each of the 3 episodes"):

@@ -76,7 +76,7 @@ def main():
     while True:
         for found in publications.take(N=100):
             name = found.topic_name
-            if not found.sample_info.valid_data or name in readers:
+            if not found.sample_info.valid_data or name in readers or not name.startswith("rt/"):
                 continue
             qos = found.qos
             kept = qos[Policy.Durability] == Policy.Durability.TransientLocal

@@ -249,7 +249,7 @@ def test_a_lost_source_says_so_once_and_reports_on(stream):
         sent.append(messages_of(live, reporter.still_lost()))
     assert sent[0]["valid"] == {"data": False}
     assert msgspec.json.decode(sent[0]["touches"]["data"])["touches"] == []
-    assert [set(values) for values in sent[1:]] == [{"/diagnostics"}] * 2
+    assert [set(values) for values in sent[1:]] == [{"rows", "/diagnostics"}] * 2
     status = [values["/diagnostics"]["status"][0] for values in sent]
     assert {(s["level"], s["message"]) for s in status} == {(2, "the cable is out")}
     stamps = [values["/diagnostics"]["header"]["stamp"] for values in sent]
@@ -340,12 +340,13 @@ def test_what_is_sent_when(stream):
         )
     ]  # fmt: skip
     always = ["touches", "valid", "contacts", "wrench", "markers"]
-    assert sent[0] == ["touch", "track", "/tf", *always, "image", "/diagnostics"]
-    assert sent[1] == [*always, "image"]  # the last touch has ended
-    assert sent[2] == ["image"]
-    assert sent[3] == ["events", "image"]
-    assert sent[4] == ["touches", "valid", "wrench", "markers", "/diagnostics"]  # it is blind
-    assert sent[5] == [*always, "image", "/diagnostics"]  # once a second in any case
+    seen, report = ["voltages", "image"], ["rows", "/diagnostics"]
+    assert sent[0] == ["touch", "track", "/tf", *always, *seen, *report]
+    assert sent[1] == [*always, *seen]  # the last touch has ended
+    assert sent[2] == seen
+    assert sent[3] == ["events", *seen]
+    assert sent[4] == ["touches", "valid", "wrench", "markers", "voltages", *report]  # it is blind
+    assert sent[5] == [*always, *seen, *report]  # once a second in any case
 
 
 def test_texts_are_json(stream):

@@ -5,22 +5,28 @@ from __future__ import annotations
 import json
 import os
 import signal
+import subprocess
+import sys
 import time
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsSubscription
+from cyclonedds.domain import DomainParticipant
 
 from files.session.runs import TOUCH
 from run.board import Board
-from run.sinks.conftest import EPOCH, EVENT, MESH, PATIENCE, begin
+from run.sinks.conftest import EPOCH, EVENT, MESH, PATIENCE, PATTERN, begin
 from tomoskin.core import SinkError
 from tomoskin.files.messages import TOPICS, dds_name, type_hash
-from tomoskin.run import Runner
+from tomoskin.files.session import SessionReader
+from tomoskin.run import LiveSkin, Runner
 from tomoskin.run.sinks import make_sink
 
 PEER = Path(__file__).with_name("ros_peer.py")
+CLIENT = Path(__file__).with_name("ros_client.py")
 LOOPBACK = (
     "<CycloneDDS><Domain><General><Interfaces><NetworkInterface name='lo'/></Interfaces>"
     "<AllowMulticast>false</AllowMulticast></General><Discovery>"
@@ -76,7 +82,7 @@ def test_another_process_sees_what_ros_2_would(program, domain, sink):
         kind = TOPICS[named[topic]]
         assert said["type"] == dds_name(kind)
         assert said["data"] == f"typehash={type_hash(kind)};"
-        assert said["kept"] == (named[topic] == "/tf_static")
+        assert said["kept"] == (named[topic] in {"/tf_static", "rows"})
     (contact,) = messages["rt/left_arm/contacts"]["value"]["contacts"]
     assert contact["name"] == "left_arm/skin/touch_4"
     assert contact["position"] == {"x": TOUCH.detection.x, "y": TOUCH.detection.y, "z": 0}
@@ -91,6 +97,14 @@ def test_another_process_sees_what_ros_2_would(program, domain, sink):
     assert cloud["width"] == len(MESH.cells)
     (status,) = messages["rt/diagnostics"]["value"]["status"]
     assert (status["level"], status["message"]) == (0, "OK")
+    raw = messages["rt/left_arm/voltages"]["value"]
+    count = PATTERN.n_meas
+    assert [(dim["size"], dim["stride"]) for dim in raw["layout"]["dim"]] == [
+        (2, 2 * count), (count, count),
+    ]  # fmt: skip
+    assert raw["data"] == [*(np.arange(count) + 0.25), *range(count)]
+    rows = json.loads(messages["rt/left_arm/rows"]["value"]["data"])["measurements"]
+    assert (len(rows), rows[0]) == (count, "E2-E1 E3-E4")
     (frame,) = messages["rt/tf"]["value"]["transforms"]
     track = messages["rt/left_arm/track"]["value"]
     assert frame["child_frame_id"] == track["child_frame_id"] == "left_arm/skin/touch_4"
@@ -140,6 +154,59 @@ def test_the_report_of_a_run_says_how_its_board_is(program, domain, prepared, id
     assert 'no parent of its frame "skin" is published' in said[0]
 
 
+def asked(domain, service):
+    """The reply that a node gets from a service."""
+    command = [sys.executable, str(CLIENT), domain, service]
+    done = subprocess.run(command, check=True, capture_output=True, text=True, timeout=PATIENCE)
+    return json.loads(done.stdout)
+
+
+def test_nodes_ask_for_a_reference_and_for_recordings(domain, prepared, idle, tmp_path):
+    board = Board(free=idle, period=0.02)
+    runner = Runner(prepared, board.open, sinks=[make_sink(f"ros2:folder={tmp_path}")])
+    runner.start()
+    try:
+        with LiveSkin(runner) as skin:
+            while not skin.wait(PATIENCE).valid:
+                pass
+            reply = asked(domain, "/tomoskin/take_reference")
+            assert reply["success"]
+            assert "do not touch the skin" in reply["message"]
+            assert reply["ends"][0] == reply["ends"][1]  # which of the ends belong together
+            assert reply["ends"][0].startswith("serviceid=")
+            started = asked(domain, "/tomoskin/start_recording")
+            assert started["success"]
+            (file,) = tmp_path.glob("*.mcap")
+            assert started["message"] == f"recording to {file}"
+            again = asked(domain, "/tomoskin/start_recording")
+            assert not again["success"]
+            assert "stop it first" in again["message"]
+            assert asked(domain, "/tomoskin/stop_recording")["message"] == f"{file} is complete"
+            nothing = asked(domain, "/tomoskin/stop_recording")
+            assert nothing["message"] == "nothing was being recorded"
+        with SessionReader(file) as session:
+            assert len([*session.frames()]) > 0
+            assert not session.torn
+    finally:
+        runner.stop()
+
+
+def test_without_a_folder_nobody_may_have_it_record(domain, prepared, idle):
+    runner = Runner(prepared, Board(free=idle).open, sinks=[make_sink("ros2")])
+    runner.start()
+    try:
+        assert asked(domain, "/tomoskin/take_reference")["success"]
+        participant = DomainParticipant(int(domain))
+        topics = BuiltinDataReader(participant, BuiltinTopicDcpsSubscription)
+        names = set()
+        while "rq/tomoskin/take_referenceRequest" not in names:
+            names |= {found.topic_name for found in topics.take(N=100)}
+            time.sleep(0.05)
+    finally:
+        runner.stop()
+    assert not any("recording" in name for name in names)
+
+
 def test_a_sink_may_be_opened_again(sink, stream):
     sink.close()
     sink.close()
@@ -160,13 +227,14 @@ def test_the_listener_of_the_documentation_hears_touches(listener, domain, strea
 @pytest.mark.parametrize(
     ("argument", "said"),
     [
-        ("node", "expected domain=…, namespace=…, frame=…, parent=…, at=…"),
+        ("node", "expected domain=…, namespace=…, frame=…, parent=…, at=…, folder=…"),
         ("namespace=left arm", "expected a namespace"),
         ("namespace=/arm", "expected a namespace"),
         ("frame=", "expected domain"),
         ("domain=233", "expected a domain from 0 to 232"),
         ("domain=x", "expected a domain"),
         ("at=0/0/0", "expected parent"),
+        ("folder=/no/such/folder", "expected a folder that exists"),
         ("parent=tool0,at=0/0", "at: expected X/Y/Z"),
         ("parent=tool0,at=0/0/nan", "at: expected X/Y/Z"),
         ("parent=tool0,at=a/b/c", "at: expected X/Y/Z"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -47,6 +48,15 @@ def test_what_a_strong_touch_may_leave_in_frame_after_frame_takes_longer_to_begi
     run = Run(5)([[strong]] * 4 + [[strong, detection(0.05, snr=12.0)]] * 2 + [[strong]] * 4)
     assert run.happened == [("onset", 1)]
     run([[strong, detection(0.05, snr=40.0)]] * 2)
+    assert run.happened == [("onset", 1), ("onset", 2)]
+
+
+def test_touches_that_begin_together_are_beside_each_other() -> None:
+    """What a wrong profile leaves begins with its touch."""
+    strong, ghost = detection(-0.05, snr=130.0), detection(0.05, snr=13.0)
+    run = Run(5)([[strong, ghost], [strong, replace(ghost, snr=10.0)], *[[strong]] * 4])
+    assert run.happened == [("onset", 1)]
+    run = Run(5)([[strong, detection(0.05, snr=60.0)]])
     assert run.happened == [("onset", 1), ("onset", 2)]
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from tomoskin.board.source import BOARDS
 from tomoskin.cli import main
 from tomoskin.run import CheckFinding, check_board
 from tomoskin.sensing.signal import LoadRing
@@ -81,7 +82,8 @@ def test_a_board_of_sixteen_passes() -> None:
 @pytest.mark.slow
 def test_a_pico_passes(pico: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tomoskin.twin.emulator.source.programs_of", lambda _: pico)
-    ring = LoadRing.for_current(8, CURRENT)
+    record = BOARDS["pico"]
+    ring = LoadRing.for_current(8, CURRENT, record.ring_drop)
     with emulate_load(ring.resistance, CURRENT, "pico") as transport:
         assert all(one.ok for one in check_board(transport, ring, CURRENT, frames=4))
 

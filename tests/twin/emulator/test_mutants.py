@@ -64,6 +64,13 @@ MUTANTS = {
     "no break": [("src/switches.c", "    hal_switches_disable();\n", "")],
     "hang with current on": [(*HANG[:2], HANG[2] + HANG[1]), NO_WATCHDOG],
     "stuck sequence number": [("src/scan.c", "    scan.sequence++;\n", "")],
+    "a source on before main": [
+        (
+            "avr/hal_avr.c",
+            "    CONTROL_PORT = LATCH;\n    CONTROL_DDR",
+            "    CONTROL_PORT = LATCH | SOURCE_ENABLE_0;\n    CONTROL_DDR",
+        )
+    ],
     "host silence ignored": [("src/board.c", "if (board.hello_due ||", "if (true ||")],
     "converter on the wrong channel": [
         ("avr/hal_avr.c", "_BV(REFS0) | (channel & 7u)", "_BV(REFS0) | (channel & 3u)")
@@ -93,9 +100,12 @@ def mutated(changes: list[tuple[str, str, str]], folder: Path) -> Path:
     return folder / "tomoskin-16.elf"
 
 
-def examine(programs: Programs, elf: Path, folder: Path, patience: float = IMPATIENCE) -> Examined:
+def examine(
+    programs: Programs, elf: Path, folder: Path, patience: float = IMPATIENCE, *options: str
+) -> Examined:
     """Scan, fall silent, and look at values, numbers, switches and time."""
-    board = Process(programs.emulator, folder / "port", "-f", "-w", str(folder / "watch"), str(elf))
+    seen = ("-w", str(folder / "watch"), *options)
+    board = Process(programs.emulator, folder / "port", "-f", *seen, str(elf))
     talk = Talk(SerialTransport(board.path))
     wrong: list[str] = []
     try:
@@ -169,3 +179,45 @@ def test_the_watchdog_ends_a_hang(
     assert found.faults == [FaultCode.WATCHDOG]
     assert not found.watch.connected
     assert 0 < found.watch.on <= longest * CLOCK
+
+
+@pytest.mark.slow
+def test_the_watchdog_is_named_behind_a_bootloader_that_hides_it(
+    programs: Programs, tmp_path: Path
+) -> None:
+    """The stock one clears the register that says it; opening the port is the other reset."""
+    file, place, planted = STALL
+    elf = mutated([(file, place, planted + place)], tmp_path)
+    found = examine(programs, elf, tmp_path, PATIENCE, "-r")
+    assert found.watch.resets == 2
+    assert found.faults == [FaultCode.WATCHDOG]
+
+
+CLOCK_PROGRAM = FIRMWARE / "tests" / "avr" / "ticks.c"
+UNLOCKED = ("avr/hal_avr.c", "    cli();\n    uint16_t low", "    uint16_t low")
+
+
+def clock_jumps(programs: Programs, folder: Path, *changes: tuple[str, str, str]) -> bool:
+    """Whether the clock jumps where its halves meet, of a firmware with ``changes``."""
+    main = (FIRMWARE / "src" / "main.c").read_text(encoding="utf-8")
+    program = ("src/main.c", main, CLOCK_PROGRAM.read_text(encoding="utf-8"))
+    board = Process(
+        programs.emulator, folder / "port", str(mutated([program, *changes], folder))
+    )
+    transport = SerialTransport(board.path)
+    said = b""
+    while len(said) < 4:
+        said += transport.read(0.1)
+    transport.close()
+    board.end()
+    assert set(said) <= set(b".x")
+    return b"x" in said
+
+
+def test_the_clock_does_not_jump(programs: Programs, tmp_path: Path) -> None:
+    assert not clock_jumps(programs, tmp_path)
+
+
+@pytest.mark.slow
+def test_a_clock_that_is_interrupted_does(programs: Programs, tmp_path: Path) -> None:
+    assert clock_jumps(programs, tmp_path, UNLOCKED)

@@ -13,7 +13,6 @@ from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tomoskin.core import Detection, Event, FloatArray, Force, Image, Touch
 from tomoskin.files.messages.stream import Stream
@@ -155,11 +154,11 @@ class Contacts:
         The touches on the sheet, in the order of their identities.
     happened
         What happened to touches in this frame: onset, move, release, merge, split.
-    voltages, reference, noise
-        (n_meas,) V, the last the standard deviation of one frame; None where no frame came, or no
-        reference stands.
-    excluded
-        (n_meas,) bool: measurements that do not count.
+    voltages, reference
+        (n_meas,) V; None where no frame came, or no reference stands.
+    change, noise
+        (n_meas,) V against the reference, 0 of measurements that are excluded, as in the image;
+        and the standard deviation of one frame. None without a reference.
     image
         Change of conductivity; None where a newer frame waits, or one was sent a moment ago.
     scanned, scan_time
@@ -190,8 +189,8 @@ class Contacts:
     measured: float = math.nan
     is_due: bool = True
     reports: bool = True
+    change: FloatArray | None = field(default=None, repr=False)
     noise: FloatArray | None = field(default=None, repr=False)
-    excluded: NDArray[np.bool_] | None = field(default=None, repr=False)
 
     @classmethod
     def of(cls, stream: Stream, result: FrameResult, measured: float | None = None) -> Self:
@@ -212,8 +211,8 @@ class Contacts:
             image=result.image if valid else None,
             scanned=result.scanned,
             scan_time=result.scan_time,
+            change=_change(result) if result.ready else None,
             noise=result.baseline.deviation if result.ready and result.baseline else None,
-            excluded=None if result.health is None else result.health.lost,
             measured=(math.nan if stream.replayed else when) if measured is None else measured,
         )
 
@@ -226,7 +225,7 @@ class Contacts:
         """The same, but no touches, which are not true any more, and why."""
         return replace(
             self, valid=False, problem=problem, tracked=(), happened=(), voltages=None,
-            reference=None, image=None,
+            reference=None, change=None, image=None,
         )  # fmt: skip
 
     @property
@@ -238,15 +237,6 @@ class Contacts:
     def force(self) -> float:
         """N, of all touches against their normals; NaN where one is not known, or none is valid."""
         return sum((c.force for c in self.touches), start=0.0 if self.valid else math.nan)
-
-    @property
-    def change(self) -> FloatArray | None:
-        """(n_meas,) V against the reference; 0 of what is excluded, as in the image."""
-        if self.voltages is None or self.reference is None:
-            return None
-        change = self.voltages - self.reference
-        excluded = ~np.isfinite(change)
-        return np.where(excluded if self.excluded is None else excluded | self.excluded, 0, change)
 
     @property
     def skin(self) -> str:
@@ -308,6 +298,14 @@ class Contacts:
             | Contact.of(event.touch, self.stream.surface).content()
             for event in self.happened
         ]
+
+
+def _change(result: FrameResult) -> FloatArray:
+    change = result.voltages - result.reference
+    excluded = ~np.isfinite(change)
+    if result.health is not None:
+        excluded |= result.health.lost
+    return np.where(excluded, 0, change)
 
 
 def time_of(item: Contacts | Event) -> float:

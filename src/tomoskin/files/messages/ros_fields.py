@@ -124,6 +124,24 @@ def touch_frames(head: Value, frame: Contacts) -> Value:
     }
 
 
+def voltages(frame: Contacts) -> Value:
+    """``std_msgs/Float32MultiArray``: a row of voltages, V, and one of the reference where it
+    stands; the columns are those of :func:`rows`."""
+    rows = [row for row in (frame.voltages, frame.reference) if row is not None]
+    count = frame.stream.pattern.n_meas
+    sizes = {"voltages, reference (V)": len(rows), "measurements": count}
+    strides = len(rows) * count, count
+    return {
+        "layout": {
+            "dim": [
+                {"label": label, "size": size, "stride": stride}
+                for (label, size), stride in zip(sizes.items(), strides, strict=True)
+            ]
+        },
+        "data": np.concatenate(rows).astype("<f4"),
+    }
+
+
 def transform(stamp: int, frame: str, mount: Place) -> Value:
     """``tf2_msgs/TFMessage``: where the skin is on the robot."""
     place = {

@@ -11,7 +11,7 @@ from tomoskin.files.messages import ros_fields
 from tomoskin.files.messages.contacts import Contacts, event_content, time_of
 from tomoskin.files.messages.reporter import Item
 from tomoskin.files.messages.ros_fields import Value
-from tomoskin.files.messages.stream import Stream
+from tomoskin.files.messages.stream import Stream, row_labels
 
 POSE = "geometry_msgs/msg/PoseWithCovarianceStamped"
 ODOMETRY = "nav_msgs/msg/Odometry"
@@ -28,6 +28,8 @@ TOPICS = {
     "markers": "visualization_msgs/msg/MarkerArray",
     "image": IMAGE,
     "points": "sensor_msgs/msg/PointCloud2",
+    "voltages": "std_msgs/msg/Float32MultiArray",
+    "rows": TEXT,
     "events": TEXT,
     "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray",
     "/tf": "tf2_msgs/msg/TFMessage",
@@ -35,7 +37,7 @@ TOPICS = {
 }
 """Type of each topic, by its name in the skin's namespace; with "/": of the whole robot."""
 
-KEPT = frozenset({"/tf_static"})
+KEPT = frozenset({"rows", "/tf_static"})
 """Topics whose last message is for those too who come later."""
 
 
@@ -66,10 +68,13 @@ def _of_frame(head: Value, contacts: Contacts, stamp: int) -> Iterator[tuple[str
     stream = contacts.stream
     if contacts.is_due:
         yield from _touches(head, contacts)
+    if contacts.voltages is not None:
+        yield "voltages", ros_fields.voltages(contacts)
     if contacts.image is not None:
         yield from _images(head, stream, contacts.image)
     if contacts.reports:
         naming = stream.naming
+        yield "rows", _json({"measurements": row_labels(stream.pattern)})
         yield "/diagnostics", ros_fields.diagnostics(head, contacts)
         if naming.mount is not None:
             yield "/tf_static", ros_fields.transform(stamp, naming.frame_id, naming.mount)

@@ -112,6 +112,9 @@ class Stream:
         What host times are times of; None where they are those of a recording.
     board
         How the board is doing at this moment, by name; None where no run is going on.
+    obey
+        Has the run do what a listener asks for: "reference", "record" into a folder, "stop".
+        Returns what was done, in words; raises TomoskinError. None where no run is going on.
     place
         Which of a robot's skins it is; None where there is no robot.
     naming
@@ -130,6 +133,7 @@ class Stream:
     limit: float = 1.0
     clock: Callable[[], float] | None = None
     board: Callable[[], Mapping[str, object]] | None = None
+    obey: Callable[[str, Path], str] | None = None
     place: Place | None = None
     naming: Naming = field(default_factory=Naming)
 

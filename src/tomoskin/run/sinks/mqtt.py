@@ -174,7 +174,7 @@ def open_mqtt(argument: str) -> MqttSink:
     tls = unquote(options.pop("tls", ""))
     if tls and tls != _SYSTEM and not Path(tls).is_file():
         raise SinkError(
-            f'expected tls=system, or the file of an authority, got "{tls}": it is no file',
+            f'expected tls=system, or the file of an authority that exists, got "{tls}"',
             where=_WHERE,
         )
     naming = Naming.of(options, _WHERE)

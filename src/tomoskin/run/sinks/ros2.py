@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import functools
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
 
 from tomoskin.core import SinkError, needed
@@ -22,6 +23,7 @@ from tomoskin.files.messages import (
     ros_messages,
     type_hash,
 )
+from tomoskin.run.sinks.ros2_services import Action, TriggerServices
 from tomoskin.run.sinks.sink import Sink, options_of
 
 _WHERE = "sink ros2"
@@ -46,14 +48,17 @@ class Ros2Sink(Sink):
         ROS domain, 0 to 232.
     naming
         Of topics and frame.
+    folder
+        Where recordings go that nodes ask for; None: nowhere, and nobody may ask.
     """
 
-    def __init__(self, domain: int, naming: Naming) -> None:
+    def __init__(self, domain: int, naming: Naming, folder: Path | None = None) -> None:
         self.name = f"ros2 /{naming.namespace}, domain {domain}"
-        self.naming, self._domain = naming, domain
+        self.naming, self._domain, self._folder = naming, domain, folder
+        self._services: TriggerServices | None = None
         self._dds = {
             name: needed(f"cyclonedds.{name}", "ros2", _WHERE, SinkError)
-            for name in ("core", "domain", "pub", "topic", "idl")
+            for name in ("core", "domain", "pub", "sub", "topic", "idl")
         }
         self._writers: dict[str, Any] = {}
 
@@ -67,6 +72,9 @@ class Ros2Sink(Sink):
             self._writers = {
                 topic: self._writer(participant, stream.naming, topic) for topic in TOPICS
             }
+            if stream.obey is not None:
+                actions = _actions(stream, stream.obey, self._folder)
+                self._services = TriggerServices(self._dds, participant, actions)
         except core.DDSException as error:
             raise SinkError(
                 f"cannot join domain {self._domain}: {error}",
@@ -91,7 +99,9 @@ class Ros2Sink(Sink):
 
     def close(self) -> None:
         """Leave: with the last reference to a writer its participant goes too."""
-        self._writers = {}
+        if self._services is not None:
+            self._services.close()
+        self._services, self._writers = None, {}
 
     def _writer(self, participant: Any, naming: Naming, topic: str) -> Any:
         core, kind = self._dds["core"], TOPICS[topic]
@@ -110,16 +120,35 @@ class Ros2Sink(Sink):
         )
 
 
+def _actions(
+    stream: Stream, obey: Callable[[str, Path], str], folder: Path | None
+) -> dict[str, Action]:
+    """What nodes may ask for, by the names of services."""
+
+    requests = {"take_reference": "reference"}
+    if folder is not None:
+        requests |= {"start_recording": "record", "stop_recording": "stop"}
+    return {
+        stream.naming.topic(name): functools.partial(obey, request, folder or Path())
+        for name, request in requests.items()
+    }
+
+
 def open_ros2(argument: str) -> Ros2Sink:
-    """``ros2``, ``ros2:domain=N,namespace=NAME,frame=NAME,parent=NAME,at=X/Y/Z``; SinkError.
+    """``ros2``, ``ros2:domain=N,namespace=NAME,frame=NAME,parent=NAME,at=X/Y/Z,folder=DIR``.
+
+    Raises SinkError.
 
     Without ``domain`` it is the environment's ROS_DOMAIN_ID, as for ROS 2 itself.
     """
-    options = options_of(filter(None, argument.split(",")), ("domain", *NAMES), _WHERE)
+    options = options_of(filter(None, argument.split(",")), ("domain", *NAMES, "folder"), _WHERE)
+    folder = Path(options["folder"]) if "folder" in options else None
+    if folder is not None and not folder.is_dir():
+        raise SinkError(f'expected a folder that exists, got "{folder}"', where=_WHERE)
     text = options.get("domain", os.environ.get("ROS_DOMAIN_ID") or "0")
     if not (text.isascii() and text.isdigit() and int(text) <= _MOST_DOMAINS):
         raise SinkError(f'expected a domain from 0 to {_MOST_DOMAINS}, got "{text}"', where=_WHERE)
-    return Ros2Sink(int(text), Naming.of(options, _WHERE))
+    return Ros2Sink(int(text), Naming.of(options, _WHERE), folder)
 
 
 @functools.cache

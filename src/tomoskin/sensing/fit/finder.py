@@ -24,6 +24,7 @@ from tomoskin.sensing.fit.policy import (
     Pace,
     are_distinct,
     favours,
+    is_weak,
     rises_beside,
 )
 from tomoskin.sensing.fit.problem import Matched, Problem
@@ -269,7 +270,7 @@ class SpotFinder:
             cells=self._cells.within(x, y, radius),
             cov_xy=xy,
             snr=ratio,
-            weak=self._policy.is_weak(ratio, float(detected.fresh[k]), float(detected.beside[k])),
+            weak=is_weak(self._policy, ratio, float(detected.fresh[k]), float(detected.beside[k])),
             close=bool(detected.close[k]),
         )
 

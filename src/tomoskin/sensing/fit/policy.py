@@ -260,11 +260,6 @@ class DetectionPolicy:
         others = fit.predicted - fit.each
         return np.asarray(self.misshapen * np.sqrt(np.einsum("kc,kc->k", others, others)))
 
-    def is_weak(self, ratio: float, fresh: float, beside: float) -> bool:
-        """Whether a touch may go on but not begin: it does not stand out of what others have left,
-        or may be what a wrong profile of those ``beside`` it leaves in frame after frame."""
-        return fresh < self.least or ratio < math.hypot(self.least, beside)
-
     def threshold(self, fit: Fit, part: float = 1.0) -> float:
         """Deviations for that ``part`` of a touch; a wrong profile adds to the noise."""
         return part * math.hypot(self.least, self.left_by(fit))
@@ -327,6 +322,12 @@ class DetectionPolicy:
     def is_wrong(self, content: FloatArray) -> NDArray[np.bool_]:
         """Whether contents are not of the skin's sign."""
         return np.asarray(content * _SIGNS[self.sign] < 0)
+
+
+def is_weak(policy: DetectionPolicy, ratio: float, fresh: float, beside: float) -> bool:
+    """Whether a touch may go on but not begin: it does not stand out of what others have left, or
+    may be what a wrong profile of those ``beside`` it leaves in frame after frame."""
+    return fresh < policy.least or ratio < math.hypot(policy.least, beside)
 
 
 # A rival: one touch more, that no frame alone shows.

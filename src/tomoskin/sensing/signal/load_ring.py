@@ -31,9 +31,12 @@ class LoadRing:
     ohms: FloatArray
 
     @classmethod
-    def for_current(cls, channels: int, current: float) -> Self:
-        """Of one stock value, 1 Ω at 100 mA: two in parallel at first, then three, else one."""
-        ohms = np.full(channels, _DROP / current)
+    def for_current(cls, channels: int, current: float, drop: float = _DROP) -> Self:
+        """Of one stock value, 1 Ω at 100 mA: two in parallel at first, then three, else one.
+
+        ``drop`` is the V between neighbours, as the board's record has it.
+        """
+        ohms = np.full(channels, drop / current)
         ohms[:2] /= (2.0, 3.0)
         return cls(ohms)
 

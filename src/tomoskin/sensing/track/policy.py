@@ -137,13 +137,14 @@ RESIDUAL = ResidualModel()
 """The only model of it: the tracker's, and that of the noise of a fit."""
 
 
-def initiated(detection: Detection, threshold: float, strongest: float) -> float:
-    """Odds that a new ``detection`` is a touch; ``strongest`` is the largest ratio of others
-    that stand, 0 where there are none: beside others one frame is never enough."""
+def initiated(detection: Detection, threshold: float, strongest: float, *, stands: bool) -> float:
+    """Odds that a new ``detection`` is a touch; ``strongest`` is the largest ratio of others, 0
+    where there are none: beside one that ``stands`` already one frame is never enough."""
     if math.isnan(detection.snr):
         return 0.0
     odds = _BEGINS + _standing_out(detection.snr, threshold, strongest)
-    return min(odds - _BESIDE, BEGUN - 1) if strongest > 0 else odds
+    odds -= _BESIDE if strongest > 0 else 0.0
+    return min(odds, BEGUN - 1) if stands else odds
 
 
 def confirmed(

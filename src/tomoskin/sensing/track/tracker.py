@@ -127,8 +127,9 @@ class Tracker:
     ) -> None:
         self._keys += 1
         detection = observed.detection
-        others = any(trace.reported and trace.missing is None for trace in self.traces)
-        odds = policy.initiated(detection, self.settings.snr, frame.strongest if others else 0.0)
+        stands = any(trace.reported and trace.missing is None for trace in self.traces)
+        strongest = frame.strongest if stands or detection.snr < frame.strongest else 0.0
+        odds = policy.initiated(detection, self.settings.snr, strongest, stands=stands)
         state = begin(observed.position, self.settings)
         clock = self._clock
         trace = Trace(detection, state, clock.now, clock.host, odds, [MergedFinger(self._keys)])
