@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -31,16 +31,11 @@ class Episode:
 
 @dataclass(frozen=True)
 class Rows:
-    """All rows of a dataset.
-
-    ``windows`` says how many frames a window has, by the name of its feature, where a dataset
-    before does.
-    """
+    """All rows of a dataset."""
 
     rate: int
     episodes: tuple[Episode, ...]
     robot_type: str | None = "tomoskin"
-    windows: Mapping[str, int] = field(default_factory=dict)
 
     @cached_property
     def episode_index(self) -> IntArray:
@@ -91,16 +86,13 @@ def rows_like(pq: Any, folder: Path, sessions: Sequence[SessionReader]) -> Rows:
         tables = sorted((folder / "meta/episodes").rglob("*.parquet"))
         held = [row for path in tables for row in pq.read_table(path, columns=_HELD).to_pylist()]
         held.sort(key=lambda row: row["episode_index"])
-        rate, features = int(info["fps"]), info["features"]
-        windows = {
-            name: one["shape"][0] for name, one in features.items() if name.endswith(".ages")
-        }
+        rate = int(info["fps"])
     except (OSError, ValueError, KeyError, TypeError, msgspec.MsgspecError) as error:
         raise DataError(
             f"cannot be read as a LeRobot dataset of format 3.0: {error}", where=str(folder)
         ) from error
     starts = [start for start, _, _ in _marked(sessions)]
-    if len(starts) != len(held):
+    if len(starts) != len(held) or not held:
         raise DataError(
             f'expected a note "{BEGIN}" for each of the {len(held)} episodes in {folder}, got '
             f"{len(starts)}",
@@ -110,7 +102,7 @@ def rows_like(pq: Any, folder: Path, sessions: Sequence[SessionReader]) -> Rows:
         Episode(start, row["length"], row["tasks"][0] if row["tasks"] else _TASK)
         for start, row in zip(starts, held, strict=True)
     )
-    return Rows(rate, tuple(episodes), info.get("robot_type"), windows)
+    return Rows(rate, tuple(episodes), info.get("robot_type"))
 
 
 _HELD = ["episode_index", "length", "tasks"]

@@ -159,13 +159,11 @@ class _Track:
         The skin's rate says it, so that sessions of one skin fit together, unless frames came more
         closely.
         """
-        if self.prefix + AGES in rows.windows:
-            return rows.windows[self.prefix + AGES]
         period = float(np.median(np.diff(self.times))) if len(self.times) > 1 else 1.0
         usual = 1 + round(1 / (period * rows.rate)) if period > 0 else 1
         before = np.searchsorted(self.times, rows.moments, side="right")
         within = rows.episode_index[1:] == rows.episode_index[:-1]
-        return int(max(usual, *np.diff(before)[within], 1))
+        return max(usual, int(np.max(np.diff(before)[within], initial=1)))
 
     def names(self, count: int) -> dict[str, list[str]]:
         """What the columns of each feature are, by its name."""
