@@ -18,7 +18,8 @@ _TERMINAL = 5e-3
 _COSS = 93e-12
 """F of a p-MOSFET that is off, on BUS, as in models.lib."""
 
-VOLTS = {"+12V": 12, "RAW": 12, "INPUT": 12, "BUS": 12, "SENSE": 12, "EL": 12, "+5V": 5, "-5V": -5, "GND": 0}
+VOLTS = {"+12V": 12, "RAW": 12, "INPUT": 12, "BUS": 12, "SENSE": 12, "EL": 12}
+VOLTS |= {"+5V": 5, "-5V": -5, "GND": 0}
 """Of nets that stand at a rail or reach one; what is not here lies between them."""
 
 AMPERES = {"BUS": 0.1, "SENSE": 0.1, "EL": 0.1, "+12V": 0.3, "RAW": 0.3, "INPUT": 0.3}

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from tomoskin.server.guided_flow import GuidedPress
+from tomoskin.server.press_flow import estimate_touch
 from tomoskin.server.press_taker import PressTaker
 
 Floats = NDArray[np.float64]
@@ -137,3 +139,18 @@ def test_a_skin_that_does_not_come_back_is_said_and_can_be_begun_anew(skin: Skin
     skin.taker.restart()
     skin.frames(30, 15)
     assert skin.phase == "press"
+
+
+def test_it_is_said_when_newer_presses_do_not_fit_with_the_older_ones(prepared):
+    """Each of the newer ones was made on the dot before."""
+    mesh, sheet = prepared.mesh, -0.1 * prepared.skin.conductivity
+    random = np.random.default_rng(1)
+    away, turn = 0.08 * np.sqrt(random.uniform(size=40)), random.uniform(0, 2 * np.pi, 40)
+    dots = np.column_stack([away * np.cos(turn), away * np.sin(turn)])
+    far = np.linalg.norm(mesh.centroids - dots[:, None], axis=-1)
+    dv = sheet * np.exp(-((far / 0.015) ** 2)) @ prepared.problem.jacobian.T
+    right = [GuidedPress((x, y), one) for (x, y), one in zip(dots.tolist(), dv, strict=True)]
+    assert "do not fit" not in estimate_touch(prepared, right).text
+    late = np.vstack([dv[:20], np.roll(dv[20:], 1, axis=0)])
+    wrong = [GuidedPress((x, y), one) for (x, y), one in zip(dots.tolist(), late, strict=True)]
+    assert "the newer ones do not fit with them. Take back" in estimate_touch(prepared, wrong).text

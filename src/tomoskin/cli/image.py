@@ -177,7 +177,7 @@ def image(
     from tomoskin.files.exports import write_touches
     from tomoskin.files.imports import read_recording
     from tomoskin.learning import FORCE
-    from tomoskin.pipeline import ALONE, located_alone, prepare, sharpened
+    from tomoskin.pipeline import ALONE, located_alone, prepare, sharpened, with_calibrations
     from tomoskin.sensing.track import touch_spans
 
     own = skin_for_file(skin, recording)
@@ -188,7 +188,7 @@ def image(
     with Bar("preparing"):
         prepared = prepare(chosen)
         if tuned.calibration or skin is not None:
-            prepared = prepared.calibrated_by(tuned.calibration or (), own)
+            prepared = with_calibrations(prepared, tuned.calibration or (), own)
         else:
             prepared = with_recorded_calibrations(prepared, recording)
     given = Recorded(recording, data, prepared.skin, reference, prepared.pattern)

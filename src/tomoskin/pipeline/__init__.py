@@ -8,7 +8,7 @@ from tomoskin.pipeline.guess import guess_skin
 from tomoskin.pipeline.imaging import Unresolved
 from tomoskin.pipeline.offline import ALONE, Gathered, Reconstruction, reconstruct
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES, Pipeline
-from tomoskin.pipeline.prepare import Prepared, colour_limit, prepare
+from tomoskin.pipeline.prepare import Prepared, colour_limit, prepare, with_calibrations
 from tomoskin.pipeline.recorded import Idle, recorded_frames
 from tomoskin.pipeline.rest import tuned, tuned_by_rule, tuned_image, with_choice
 from tomoskin.pipeline.sharp import sharpened
@@ -38,5 +38,6 @@ __all__ = [
     "tuned_by_rule",
     "tuned_image",
     "voltage_covariance",
+    "with_calibrations",
     "with_choice",
 ]

@@ -95,28 +95,6 @@ class Prepared:
         calibration.check(self.skin)
         return self._with({**self.calibrations, calibration.kind.name: calibration})
 
-    def calibrated_by(self, paths: Iterable[StrPath], skin: Skin | None = None) -> Prepared:
-        """With calibrations of any kind from files; ``skin``: the one they must be of, as its
-        file says, where images are made otherwise.
-
-        Raises DataError for calibrations of another skin, and for two of one kind.
-        """
-        prepared, named = self, dict[str, StrPath]()
-        for path in paths:
-            calibration = load_calibration(path)
-            kind = calibration.kind
-            if kind.name in named:
-                raise DataError(
-                    f"is a calibration of {kind.subject}, and so is {named[kind.name]}",
-                    where=str(path),
-                    hint="give only one of them",
-                )
-            named[kind.name] = path
-            if kind.own_settings:
-                calibration.check_skin(skin or self.skin)
-            prepared = prepared.calibrated(calibration)
-        return prepared
-
     def uncalibrated(self, kind: Kind[Any] | None = None) -> Prepared:
         """Without a calibration of that kind; None: without any."""
         kept = {k: c for k, c in self.calibrations.items() if kind is not None and k != kind.name}
@@ -227,6 +205,31 @@ def prepare(skin: Skin, previous: Prepared | None = None) -> Prepared:
                 calibration.check(skin)
             return _prepared(skin, _problem_after(previous, skin), previous)
         return _prepared(skin, _problem(_model(skin), skin))
+
+
+def with_calibrations(
+    prepared: Prepared, paths: Iterable[StrPath], skin: Skin | None = None
+) -> Prepared:
+    """The skin with calibrations of any kind from files.
+
+    ``skin``: the one that they must be of, as its file says, where images are made otherwise.
+    Raises DataError for calibrations of another skin, and for two of one kind.
+    """
+    named: dict[str, StrPath] = {}
+    for path in paths:
+        calibration = load_calibration(path)
+        kind = calibration.kind
+        if kind.name in named:
+            raise DataError(
+                f"is a calibration of {kind.subject}, and so is {named[kind.name]}",
+                where=str(path),
+                hint="give only one of them",
+            )
+        named[kind.name] = path
+        if kind.own_settings:
+            calibration.check_skin(skin or prepared.skin)
+        prepared = prepared.calibrated(calibration)
+    return prepared
 
 
 def _model(skin: Skin) -> ForwardModel:

@@ -9,13 +9,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from itertools import chain
 from typing import Any
 
 from tomoskin.board.source import Link, ScanSettings, Transport
 from tomoskin.board.wire import Info
 from tomoskin.core import Event, Frame, Mark, MarkedFrame, TomoskinError
-from tomoskin.files.messages import NO_REFERENCE, Contacts
+from tomoskin.files.messages import NO_REFERENCE, Contacts, without_frame
 from tomoskin.files.session import BoardInfo, RawRead, Truth
 from tomoskin.pipeline import FrameResult, Pipeline, Prepared, ReferenceState
 from tomoskin.run.board_memory import Recall
@@ -65,7 +66,9 @@ class Flow:
         self.board: Info | None = None
         self.board_name = ""
         self.pipeline, self.marker, self.twin = Pipeline(prepared), Marker(), TwinControl()
-        self.out = Publisher(prepared, audience, lambda: self.pipeline.numbered, self.board_report)
+        self.out = Publisher(
+            prepared, audience, lambda: self.pipeline.numbered, partial(_board, self)
+        )
         self.latency, self.costs = Latency(), CostMeter(time.perf_counter)
         self._clock, self._turns = audience.clock, audience.turns
         self._recall, self.intake = Recall(audience.memory), Intake()
@@ -85,11 +88,6 @@ class Flow:
         self.out.begin(self.prepared, self.source, replay.epoch if replay else None)
         if (saturated := self.prepared.headroom.problem) is not None:
             self.out.say("saturated", saturated)
-
-    def begin_without(self, why: str) -> None:
-        """Its source could not be opened yet."""
-        self.out.begin(self.prepared, self.prepared.skin.name)
-        self.out.say("source-lost", why)
 
     def link(self, transport: Transport) -> Link:
         """The protocol session with its source, which has just been opened, maybe again."""
@@ -160,7 +158,7 @@ class Flow:
         stream, newest = self.out.stream, self.newest
         trouble = trouble or self.intake.standstill
         if newest is None:
-            return Contacts.without_frame(stream, trouble or NO_REFERENCE, self.now())
+            return without_frame(stream, trouble or NO_REFERENCE, self.now())
         played = None
         if stream.replayed:  # as if its scan had been read when it was played
             scan_time = newest.result.scan_time
@@ -169,22 +167,7 @@ class Flow:
         contacts = Contacts.of(stream, newest.result, played)
         return contacts if trouble is None else contacts.outdated(trouble)
 
-    def board_report(self) -> dict[str, object]:
-        """How the board is doing now, by name; from any thread."""
-        info, losses, newest = self.board, self.intake.losses, self.newest
-        health = newest.result.health if newest else None
-        return {
-            "board": info.unique_id.hex() if info else "",
-            "board_name": self.board_name,
-            "firmware": ".".join(map(str, info.firmware)) if info else "",
-            "frames_per_s": round(self.latency.rate(self._clock()), 1),
-            "dropped": self._dropped(),
-            "corrupt": losses.corrupt,
-            "missing": losses.gaps,
-            "electrodes": (health.text if health else None) or "good",
-        }
-
-    def _dropped(self) -> int:
+    def dropped(self) -> int:
         """Frames that the device or this host left out."""
         return self.intake.losses.dropped + self.intake.skipped + self.pipeline.refused
 
@@ -205,7 +188,7 @@ class Flow:
             replay=replay_status(replay, ended=self._ended) if replay else None,
             frames=self.latency.frames,
             fps=self.latency.rate(now),
-            dropped=self._dropped(),
+            dropped=self.dropped(),
             corrupt=losses.corrupt,
             gaps=losses.gaps,
             p50=p50,
@@ -279,6 +262,22 @@ class Flow:
         self.newest = Snapshot(result, self._truth(frame), decode + ready - begun, ready)
         self._recall.see(result, self)
         self.out.put(result)
+
+
+def _board(flow: Flow) -> dict[str, object]:
+    """How the board is doing now, by name; from any thread."""
+    info, losses, newest = flow.board, flow.intake.losses, flow.newest
+    health = newest.result.health if newest else None
+    return {
+        "board": info.unique_id.hex() if info else "",
+        "board_name": flow.board_name,
+        "firmware": ".".join(map(str, info.firmware)) if info else "",
+        "frames_per_s": round(flow.latency.rate(flow.now()), 1),
+        "dropped": flow.dropped(),
+        "corrupt": losses.corrupt,
+        "missing": losses.gaps,
+        "electrodes": (health.text if health else None) or "good",
+    }
 
 
 def _recorded(press: Mapping[str, Any]) -> Iterator[Press]:

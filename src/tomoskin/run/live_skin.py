@@ -11,7 +11,7 @@ from tomoskin.board.source import open_source
 from tomoskin.core import SkinError, StrPath
 from tomoskin.files.session import SessionReader, as_recorded, parse_replay
 from tomoskin.model.skin import Skin
-from tomoskin.pipeline import Prepared, prepare
+from tomoskin.pipeline import Prepared, prepare, with_calibrations
 from tomoskin.run.board_memory import BoardMemory
 from tomoskin.run.runner import Runner
 from tomoskin.run.sinks import Contacts, make_sink
@@ -140,4 +140,4 @@ def prepared_for(
             )
         with SessionReader(parse_replay(argument)[0]) as session:
             prepared = as_recorded(session)
-    return prepared.calibrated_by(calibrations)
+    return with_calibrations(prepared, calibrations)

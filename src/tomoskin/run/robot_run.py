@@ -18,7 +18,7 @@ from tomoskin.files.messages import epoch
 from tomoskin.files.session import MessageLog, robot_logs
 from tomoskin.model.robot import Place, PlacedSkin, Robot
 from tomoskin.model.skin import Skin
-from tomoskin.pipeline import Prepared, prepare
+from tomoskin.pipeline import Prepared, prepare, with_calibrations
 from tomoskin.run import commands
 from tomoskin.run.board_memory import BoardMemory
 from tomoskin.run.commands import Opener
@@ -52,7 +52,7 @@ class Member:
 
         Raises TomoskinError.
         """
-        prepared = prepare(skin).calibrated_by(placed.calibrations)
+        prepared = with_calibrations(prepare(skin), placed.calibrations)
         return cls(
             placed.place, prepared, partial(open_source, placed.source, skin), sinks, placed.board
         )

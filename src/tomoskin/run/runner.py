@@ -9,7 +9,7 @@ from concurrent.futures import Future
 from pathlib import Path
 
 from tomoskin.board.source import Transport
-from tomoskin.core import Event, ModelError, OutputError, SourceError, WireError
+from tomoskin.core import Event, ModelError, OutputError, SourceError, StrPath, WireError
 from tomoskin.files.session import ReplayTransport
 from tomoskin.model.robot import Place
 from tomoskin.pipeline import Prepared
@@ -136,9 +136,10 @@ class Runner:
             if not patient:
                 raise
             missing = error
-            self._loop.flow.begin_without(
-                f"the source cannot be opened, and tomoskin tries again: {error}"
-            )
+            out, prepared = self._loop.flow.out, self._loop.flow.prepared
+            out.begin(prepared, prepared.skin.name)
+            why = f"the source cannot be opened, and tomoskin tries again: {error}"
+            out.say("source-lost", why)
         self._loop.commands.begin()
         self._thread = threading.Thread(
             target=self._loop.run, args=(transport,), name="tomoskin-runner", daemon=True
@@ -180,7 +181,7 @@ class Runner:
         """
         self.submit(command).result()
 
-    def obey(self, request: str, folder: Path) -> str:
+    def obey(self, request: str, folder: StrPath) -> str:
         """Do what a listener asks for by name, a recording in ``folder``; what was done.
 
         Raises
@@ -197,7 +198,7 @@ class Runner:
             case "record":
                 if file is not None:
                     raise OutputError("is being recorded to", where=str(file), hint="stop it first")
-                file = out.stream.file(folder / time.strftime(FILE_NAME))
+                file = out.stream.file(Path(folder) / time.strftime(FILE_NAME))
                 self.ask(Record(file))
                 return f"recording to {file}"
             case "stop":

@@ -43,6 +43,13 @@ def test_a_press_that_a_fit_cuts_in_two_goes_on() -> None:
     assert run.happened == [("onset", 1)]
 
 
+def test_a_press_ends_though_a_fit_takes_what_is_left_for_much() -> None:
+    """It is wide and stands out little: alone, how far it stands out is known better."""
+    left = detection(0.0, peak=-0.6, snr=15.0)
+    run = Run(10)([[sized(1)]] * 20 + [[left]] * 10)
+    assert run.happened == [("onset", 1), ("release", 1)]
+
+
 def test_what_is_left_may_come_and_go() -> None:
     """At the edge of the noise; outshone by another; after a second of nothing."""
     run = lifted(40)(fading(2, 40))

@@ -201,9 +201,7 @@ def clock_jumps(programs: Programs, folder: Path, *changes: tuple[str, str, str]
     """Whether the clock jumps where its halves meet, of a firmware with ``changes``."""
     main = (FIRMWARE / "src" / "main.c").read_text(encoding="utf-8")
     program = ("src/main.c", main, CLOCK_PROGRAM.read_text(encoding="utf-8"))
-    board = Process(
-        programs.emulator, folder / "port", str(mutated([program, *changes], folder))
-    )
+    board = Process(programs.emulator, folder / "port", str(mutated([program, *changes], folder)))
     transport = SerialTransport(board.path)
     said = b""
     while len(said) < 4:

@@ -156,7 +156,7 @@ LATER = late("hal_delay_us(1u);")
 """So late that the next conversion has ended."""
 DRAINS: Change = ("pico/converter.c", "if (!runs()) {", "if (!runs() || true) {")
 LONGEST_ON = 5e-3
-"""s that a drive is on here, with its guard's slack: what is on at a reset has been on for longer."""
+"""s that a drive is on here, with its guard's slack; what a reset ends has been on for longer."""
 STAYS_ON: Change = (
     "pico/start.c",
     "void on_fault(void) {\n    switches_off();",
@@ -368,9 +368,7 @@ def test_the_watchdog_ends_a_hang(name: str, pico: PicoPrograms, tmp_path: Path)
 
 
 @pytest.mark.slow
-def test_a_fault_that_leaves_the_switches_on_is_noticed(
-    pico: PicoPrograms, tmp_path: Path
-) -> None:
+def test_a_fault_that_leaves_the_switches_on_is_noticed(pico: PicoPrograms, tmp_path: Path) -> None:
     on = end_a_hang(mutated(pico, tmp_path, HANGS[AFTER_A_FAULT], STAYS_ON), tmp_path)
     assert on > LONGEST_ON
 

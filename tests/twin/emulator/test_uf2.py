@@ -96,7 +96,7 @@ def test_configure_writes_the_last_sector_and_the_firmware_reads_it(
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--current", "150 mA"), "100 mA, which is what the board's parts"),
+        (("--current", "60 mA"), "50 mA, which is what the board's parts"),
         (("--id", "arm"), "its flash chip's, and cannot be changed"),
         ((), "expected --current"),
     ],

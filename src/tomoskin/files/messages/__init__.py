@@ -8,6 +8,7 @@ from tomoskin.files.messages.contacts import (
     event_of,
     time_of,
     touch_row,
+    without_frame,
 )
 from tomoskin.files.messages.foxglove_records import (
     grid_message,
@@ -76,4 +77,5 @@ __all__ = [
     "touch_row",
     "touch_width",
     "type_hash",
+    "without_frame",
 ]

@@ -216,11 +216,6 @@ class Contacts:
             measured=(math.nan if stream.replayed else when) if measured is None else measured,
         )
 
-    @classmethod
-    def without_frame(cls, stream: Stream, problem: str, host_time: float) -> Self:
-        """Of a skin of which no frame has come, and why."""
-        return cls(stream, -1, host_time, False, problem, None, measured=-math.inf)
-
     def outdated(self, problem: str) -> Self:
         """The same, but no touches, which are not true any more, and why."""
         return replace(
@@ -298,6 +293,11 @@ class Contacts:
             | Contact.of(event.touch, self.stream.surface).content()
             for event in self.happened
         ]
+
+
+def without_frame(stream: Stream, problem: str, host_time: float) -> Contacts:
+    """Of a skin of which no frame has come, and why."""
+    return Contacts(stream, -1, host_time, False, problem, None, measured=-math.inf)
 
 
 def _change(result: FrameResult) -> FloatArray:

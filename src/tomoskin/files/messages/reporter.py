@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, replace
 
 from tomoskin.core import Event
-from tomoskin.files.messages.contacts import Contacts
+from tomoskin.files.messages.contacts import Contacts, without_frame
 from tomoskin.files.messages.stream import Stream
 from tomoskin.pipeline import FrameResult
 
@@ -78,7 +78,7 @@ class Reporter:
         self._is_lost = True
         now = self._now(event.host_time)
         if self._newest is None:
-            return self._paced(Contacts.without_frame(self.stream, event.text, now))
+            return self._paced(without_frame(self.stream, event.text, now))
         last = self._newest.outdated(event.text)
         return self._paced(
             replace(last, host_time=now, scanned=math.nan, scan_time=math.nan, latency=None)

@@ -141,9 +141,8 @@ def regions_doubt(inverse: InverseSettings, touch: TouchSettings) -> str | None:
     if touch.method != "image" or inverse.method != _ONE_STEP or inverse.prior not in _SMOOTH:
         return None
     return (
-        f'images under prior "{inverse.prior}" are smooth up to the rim, so that the touches of '
-        'method "image", regions of them, lie too far out (with 8 electrodes by some 15 mm on a '
-        'disc of 200 mm): prior "noser", or touches of method "fit", are nearer'
+        f'images under prior "{inverse.prior}" are smooth up to the rim, so that touches of method '
+        '"image" lie too far out (by 15 mm on a disc with 8 electrodes): prior "noser" is nearer'
     )
 
 

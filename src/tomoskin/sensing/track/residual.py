@@ -98,14 +98,15 @@ def _is_under(detection: Detection, foot: Footprint, sign: float, radius: float)
     return near and sign_of(detection) == sign and RESIDUAL.holds(size_of(detection), foot.top)
 
 
-def is_residual(trace: Trace, time: float) -> bool:
+def is_residual(trace: Trace, time: float, *, alone: bool) -> bool:
     """Whether a touch has ended and only its residual response is seen.
 
-    It must have fallen fast and not grown since.
+    It must have fallen fast and not grown since. Not ``alone`` it may stand out little only since
+    others are given, and then it is what it changes that must have fallen.
     """
     size, top = size_of(trace.detection), trace.top
     slow = trace.low is None and time - trace.strong > RESIDUAL.recovery
-    if slow or trace.is_full or not RESIDUAL.holds(size, top):
+    if slow or (trace.is_full and not alone) or not RESIDUAL.holds(size, top):
         trace.low = None
         return False
     if trace.low is None or RESIDUAL.has_grown(size, trace.least, 0.0):

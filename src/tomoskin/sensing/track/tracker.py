@@ -119,7 +119,7 @@ class Tracker:
                     if self.ledger.sure:
                         trace.change(now)
                 self.ledger.exchange(one.key, other.key, odds)
-        self._settle()
+        self._settle(alone=len(frame.observed) == 1)
         self.ledger.judge(self.traces)
 
     def _begin(
@@ -139,14 +139,14 @@ class Tracker:
             sibling.change(clock.now)
         self.traces.append(trace)
 
-    def _settle(self) -> None:
-        """Report what is there, end what is gone."""
+    def _settle(self, *, alone: bool) -> None:
+        """Report what is there, end what is gone; ``alone``: one detection was all."""
         for trace in [t for t in self.traces if not t.reported]:
             self._consider(trace)
         for trace in [t for t in self.traces if t.reported]:
             if trace.missing is not None:
                 self._lose(trace)
-            elif is_residual(trace, self._clock.now):
+            elif is_residual(trace, self._clock.now, alone=alone):
                 self._end(trace)
 
     def _consider(self, trace: Trace) -> None:
