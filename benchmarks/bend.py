@@ -13,10 +13,11 @@ from report import Floats, Report, mm, progress, rms, table
 from tomoskin.core import Detection, Frame
 from tomoskin.learning import BENDS, BendExamples, BendModel, Differences, FrameView, JointReference
 from tomoskin.model.mesh import Cylinder, Hinge
-from tomoskin.pipeline import Pipeline
+from tomoskin.pipeline import Pipeline, Prepared
 from tomoskin.pipeline.finding import finder_of, voltage_covariance
 from tomoskin.pipeline.frame_subspace import JUMP
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
+from tomoskin.pipeline.rest import tuned_sheet
 from tomoskin.sensing.signal import Reference
 from tomoskin.twin import Bent, Pose, Press
 from touch_lab import HOLD, TwinLab
@@ -127,9 +128,15 @@ class Bench:
         self.frame((), pose, REST)
         return Reference.of(self.frames(IDLE, pose))
 
-    def finder(self, reference: Reference) -> Callable[[Floats, Floats], list[Detection]]:
-        """What finds touches in V less the reference, beside directions that say nothing."""
-        found = finder_of(self.lab.prepared, reference)
+    def finder(
+        self, reference: Reference, prepared: Prepared | None = None
+    ) -> Callable[[Floats, Floats], list[Detection]]:
+        """What finds touches in V less the reference, beside directions that say nothing.
+
+        On the sheet of ``prepared``; by default it is the one that the reference shows, as a run
+        finds it some 200 frames later.
+        """
+        found = finder_of(prepared or tuned_sheet(self.lab.prepared, reference), reference)
         image = self.lab.image
         n_meas = self.lab.prepared.pattern.n_meas
         none, excluded = np.zeros((n_meas, 0)), np.zeros(n_meas, bool)
@@ -143,12 +150,12 @@ class Bench:
 
     def static(self, pose: Pose) -> list[float]:
         """Errors of touches on a sheet that is held so, a reference taken before each of them."""
-        self.frame((), pose, REST)
+        sheet = tuned_sheet(self.lab.prepared, self.reference(pose))
         found = []
         for _ in range(TOUCHES):
             reference, press = Reference.of(self.frames(IDLE, pose)), drawn(self.random, 1)
             change = self.volts(press, pose) - reference.mean
-            readings = self.finder(reference)(change, np.zeros((len(change), 0)))
+            readings = self.finder(reference, sheet)(change, np.zeros((len(change), 0)))
             found.append(missed(readings, press))
             self.volts((), pose)
         return found
@@ -213,11 +220,12 @@ class Bench:
         for angle, there in own.items():
             self.frames(2, hinged(angle))
             told = joint.at(math.radians(angle))
+            ways = [(r, tuned_sheet(self.lab.prepared, r)) for r in (there, told)]
             for _ in range(TOUCHES // len(BETWEEN)):
                 press = drawn(self.random, 1)
                 volts = self.volts(press, hinged(angle))
-                for reference, found in zip((there, told), errors, strict=True):
-                    find = self.finder(reference)
+                for (reference, sheet), found in zip(ways, errors, strict=True):
+                    find = self.finder(reference, sheet)
                     blind = self.model.directions
                     found.append(missed(find(volts - reference.mean, blind), press))
                 self.volts((), hinged(angle))

@@ -32,7 +32,7 @@ def run() -> Iterator[Report]:
         "six expressions of a face",
         _expressions(face),
         f"{seeds}: {face.LEARNT} sessions learnt, {face.ASKED} asked, {face.RUNS} runs each; "
-        "electrodes put on anew each time",
+        "electrodes put on again each time",
     )
 
 

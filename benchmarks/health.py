@@ -60,7 +60,7 @@ def run(data: Path | None) -> Iterator[Report]:
         "false alarms of electrode health",
         (_alarms(*case, pressed=on) for case in WELL_SKINS for on in (False, True)),
         "seed 7; pressed: up to three presses at a time of 1 to 12 N anywhere within 95 % of "
-        "the radius, begun and ended within a frame, 1 to 10 frames long, no two alike",
+        "the radius, begun and ended within a frame, 1 to 10 frames long, no two the same",
     )
     folder = available(data)
     if folder is None:

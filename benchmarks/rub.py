@@ -59,13 +59,18 @@ def _public(data: Path) -> Report:
         touched, asked = known.at(drawn[:TOUCHED]), known.at(drawn[-ASKED:])
         alone = plain(touched.dv[:PLAIN], touched.xy[:PLAIN], asked.dv)
         error = 1e3 * np.linalg.norm(alone - asked.xy, axis=1).mean()
+        begun = time.process_time()
         learnt = {f"{n} labels": _rubbed(touched, asked, n) for n in LABELS}
+        taken = (time.process_time() - begun) / len(LABELS)
         alone_text = {f"plain process, {PLAIN} labels alone": round(float(error), 1)}
-        rows.append({"skin": Path(name).name} | learnt | alone_text)
+        rows.append(
+            {"skin": Path(name).name} | learnt | alone_text | {"learnt in s": round(taken, 1)}
+        )
     return table(
         "rubbed, not pressed",
         rows,
-        "mean error in mm, part in the 90 % ellipses, s of processor to learn",
+        "mean error in mm, part in the 90 % ellipses; s of processor; refused: the touches do not "
+        "say where they were",
         f"{TOUCHED} touches, {ASKED} others asked, seed {SEED}; settings chosen on the first two "
         "skins",
     )
@@ -122,11 +127,9 @@ def _pressed(skin: Skin, n: int, seed: int) -> Set:
 def _rubbed(touched: Set, asked: Set, labelled: int) -> str:
     labels = np.full(touched.xy.shape, np.nan)
     labels[:labelled] = touched.xy[:labelled]
-    begun = time.process_time()
     assert touched.skin is not None
     found = Rubbing.of(touched.dv, touched.skin, labels, pattern=touched.pattern)
     if not found.holds:
-        return f"refused: {'; '.join(found.findings)}"
+        return "refused"
     locator = found.locator()
-    taken = time.process_time() - begun
-    return f"{mean_error(locator, asked):.1f}, {held(locator, asked):.0%}, {taken:.1f} s"
+    return f"{mean_error(locator, asked):.1f}, {held(locator, asked):.0%}"

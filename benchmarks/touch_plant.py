@@ -139,8 +139,9 @@ def _row(case: Case, frames: Iterator[Frame]) -> dict[str, Any]:
     for presses, least, both in frames:
         for scores, touches in zip((fit, image), both, strict=True):
             scores.add(presses, least, touches, np.inf if case.anywhere else APART / 2)
+    ratio = round(rms(fit.errors) / rms(fit.bounds), 2)
     over = {
-        "rms / bound": round(rms(fit.errors) / rms(fit.bounds), 2),
+        "rms / bound": "–" if np.isnan(ratio) else ratio,
         "in 90 % ellipse": percent(np.array(fit.distances) < INSIDE_90),
     }
     return case.columns | fit.columns("fit") | over | image.columns("image")

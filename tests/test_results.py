@@ -96,7 +96,7 @@ def test_positions_of_the_comparison_are_those_of_the_benchmark() -> None:
         for row in rows(section("comparison.md", "touches-position"))
         if re.match(r"(tomoskin|authors' network)?[ ,\d]+$", row[0])
     ]
-    measured = tables_in(section("benchmarks.md", "touch-from-labelled-presses"))
+    measured = tables_in(section("benchmarks-touch.md", "touch-from-labelled-presses"))
     assert len(ours) > 6
     assert [unfounded(" | ".join(row), measured) for row in ours] == [[]] * len(ours)
 
