@@ -50,7 +50,7 @@ class Export:
         return replace(stream, replayed=False)  # here events are those of the recording too
 
     def each(self) -> Iterator[Export]:
-        """The same for each skin."""
+        """The same export for each of the skins."""
         return (replace(self, session=one, others=()) for one in (self.session, *self.others))
 
     def results(self) -> Iterator[FrameResult]:
