@@ -40,11 +40,11 @@ class LiveSkin:
         self._mine = threading.local()
 
     def __enter__(self) -> Self:
-        """Itself, which runs."""
+        """The skin itself, which runs already."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Stop the board and end."""
+        """Stop the board and end the run."""
         self.close()
 
     def latest(self) -> Contacts:

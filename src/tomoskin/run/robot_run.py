@@ -86,11 +86,11 @@ class RobotRun:
         self._watch = threading.Thread(target=self._look_on, name="tomoskin-robot", daemon=True)
 
     def __enter__(self) -> Self:
-        """Itself, which runs."""
+        """The robot itself, which runs already."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Stop."""
+        """Stop the boards and end the runs."""
         self.stop()
 
     def start(self) -> None:

@@ -31,7 +31,7 @@ class Episode:
 
 @dataclass(frozen=True)
 class Rows:
-    """All rows of a dataset."""
+    """All rows of a dataset, by their episodes."""
 
     rate: int
     episodes: tuple[Episode, ...]
@@ -39,7 +39,7 @@ class Rows:
 
     @cached_property
     def episode_index(self) -> IntArray:
-        """(n,) episode of each row."""
+        """(n,) number of the episode of each row."""
         return np.repeat(np.arange(len(self.episodes)), [e.count for e in self.episodes])
 
     @cached_property
@@ -55,12 +55,12 @@ class Rows:
 
     @cached_property
     def tasks(self) -> tuple[str, ...]:
-        """Each task once."""
+        """Each task once, as they come."""
         return tuple(dict.fromkeys(episode.task for episode in self.episodes))
 
     @cached_property
     def task_index(self) -> IntArray:
-        """(n,) task of each row."""
+        """(n,) number of the task of each row."""
         return np.array([self.tasks.index(e.task) for e in self.episodes])[self.episode_index]
 
 

@@ -284,7 +284,7 @@ class _Grid:
         return cls(pixels, x, y, (top, left), mask)
 
     def conductance(self, contacts: Contacts) -> FloatArray:
-        """The image, 0 outside."""
+        """The image, which is 0 outside of the sheet."""
         drawn = np.zeros(self.mask.shape)
         if contacts.image is not None:
             values = contacts.image.on_pixels(self.pixels)
