@@ -78,7 +78,12 @@ def test_a_file_that_is_the_reference_is_read_once(
 ) -> None:
     """Whatever is made of the frames: smooth and sharp images, a longer search."""
     read, own = [], imports.read_recording
-    monkeypatch.setattr(imports, "read_recording", lambda path: (read.append(path), own(path))[1])
+
+    def noted(path):
+        read.append(path)
+        return own(path)
+
+    monkeypatch.setattr(imports, "read_recording", noted)
     idle = save("idle.npz", voltages=frames[:3])
     ways = "--sharp", "--thorough", tmp_path / "all.csv"
     assert image(save(), "--reference", idle, "--frames", "3:4", *ways)[0] == 0
