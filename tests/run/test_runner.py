@@ -207,7 +207,7 @@ def test_losses_are_counted(prepared, idle):
     board.send(idle)
     board.send(idle, skip=3, drops=2)
     until(lambda: runner.status().gaps == 3)
-    until(lambda: runner.newest.result.sequence == 4)
+    until(lambda: runner.newest and runner.newest.result.sequence == 4)
     status = runner.status()
     runner.stop()
     assert status.corrupt == 2

@@ -38,9 +38,16 @@ while True:
 """
 
 
+def begun(watch: Path) -> bool:
+    return Watch.read(watch).cycle > 0.01 * CLOCK
+
+
 def test_opening_the_port_resets_the_board_each_time(programs: Programs, tmp_path: Path) -> None:
-    options = ("-f", "-r", "-w", str(tmp_path / "watch"), str(programs.elf))
+    watch = tmp_path / "watch"
+    options = ("-f", "-r", "-w", str(watch), str(programs.elf))
     with running(programs.emulator, tmp_path / "port", *options) as board:
+        while not (watch.exists() and watch.stat().st_size and begun(watch)):
+            pass  # a reset before its first instructions is power coming up
         for opened in (1, 2):
             with Link(SerialTransport(board.path), SCAN, SETTINGS) as link:
                 frames = frames_of(link, 3)
@@ -49,9 +56,9 @@ def test_opening_the_port_resets_the_board_each_time(programs: Programs, tmp_pat
                 assert [frame.sequence for frame in frames[:3]] == [0, 1, 2]
                 # HELLO was awaited: what the bootloader swallows would have been asked again
                 assert link._session.commands._request == 9
-            seen = Watch.read(tmp_path / "watch")
+            seen = Watch.read(watch)
             assert seen.resets == opened
-            while Watch.read(tmp_path / "watch").cycle < seen.cycle + 0.01 * CLOCK:
+            while Watch.read(watch).cycle < seen.cycle + 0.01 * CLOCK:
                 pass  # closed for long enough to be noticed
 
 
