@@ -134,7 +134,7 @@ class SessionReader(AbstractContextManager["SessionReader"]):
 def skins_in(path: StrPath) -> tuple[str, ...]:
     """Names of the skins in a recording of several; ("",) of one alone. Raises DataError."""
     with closing(ContainerReader(Path(path))) as container:
-        return tuple((container.description(ABOUT) or {}).get(SKINS, "").split()) or ("",)
+        return _skins(container) or ("",)
 
 
 def tick_rate(session: SessionReader) -> float:
@@ -199,8 +199,13 @@ def end_time(session: SessionReader) -> float | None:
     return summary.totals.message_end_time / 1e9 - session.epoch if summary else None
 
 
+def _skins(container: ContainerReader) -> tuple[str, ...]:
+    """Names of a robot's skins; none where the recording is of one alone."""
+    return tuple((container.description(ABOUT) or {}).get(SKINS, "").split())
+
+
 def _part(container: ContainerReader, skin: str) -> ContainerReader:
-    names = (container.description(ABOUT) or {}).get(SKINS, "").split()
+    names = _skins(container)
     if skin not in names:
         held = ", ".join(names) or "a single skin"
         raise DataError(f'expected one of its skins, {held}, got "{skin}"', where=container.where)
