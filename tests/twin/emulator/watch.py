@@ -19,7 +19,8 @@ class Watch:
     """Cycles of the simulated clock.
 
     ``spent`` in the instruction at each word of flash; ``net`` (16,) of pairs, by the lower
-    channel: from the other one to it, less from it to the other.
+    channel: from the other one to it, less from it to the other. ``said``: from the end of a drive
+    to the last byte of the newest message.
     """
 
     cycle: int
@@ -29,15 +30,16 @@ class Watch:
     shortest_off: int
     resets: int
     lowest_stack: int
+    said: int
     spent: np.ndarray
     net: np.ndarray
 
     @classmethod
     def read(cls, path: Path) -> Watch:
         words = np.fromfile(path, "<u8")
-        cycle, connected, since, on, off, resets, stack = words[:7].tolist()
-        net = words[-CHANNELS:].astype(np.int64)
-        return cls(cycle, bool(connected), since, on, off, resets, stack, words[7:-CHANNELS], net)
+        cycle, connected, since, on, off, resets, stack, said = words[:8].tolist()
+        spent, net = words[8:-CHANNELS], words[-CHANNELS:].astype(np.int64)
+        return cls(cycle, bool(connected), since, on, off, resets, stack, said, spent, net)
 
     @property
     def on(self) -> int:
