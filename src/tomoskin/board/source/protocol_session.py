@@ -176,7 +176,7 @@ class ProtocolSession:
         """Ask for the ``drives`` again and again; see :meth:`Link.ask_order`."""
         if self.stage is not Stage.RUNNING or not self.configuration.singly:
             return 0
-        self._order = self._order % 255 + 1
+        self._order = self._order % 255 + 1 if drives else self._order
         identity = self._order if drives else 0
         order = SetOrder(0, self.configuration.identity, identity, bytes(drives))
         encode(order)  # one that does not fit a message is refused here, not when it is sent
