@@ -32,6 +32,10 @@ from tomoskin.sensing.fit import LIVE, Pace
 from tomoskin.sensing.signal import Reference
 from tomoskin.sensing.track import SlideCorrection, Tracker
 
+_STEP = 5e-3
+"""Seconds between two frames that allow one step of what is prepared anew. A step is a millisecond
+of work or two; counted by the device's clock, a replay takes the same steps."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Setting:
@@ -103,6 +107,7 @@ class Following:
         interval = np.nan if rest is None else rest.interval
         if not interval > 0:
             interval = setting.interval
+        self._steps = max(1, int(interval / _STEP)) if interval > 0 else 1
         known = rest is None or not located_alone(prepared, rest.agreement)
         self._finder = finder_of(prepared, reference, setting.pace, interval, fitted=known)
         self._renewal: FinderSteps | None = None
@@ -146,8 +151,9 @@ class Following:
 
     def push(self, measured: Voltages) -> FrameResult:
         """Take the voltages of one frame all the way to touches."""
-        self._tune()
-        self._refind()
+        for _ in range(self._steps):
+            self._tune()
+            self._refind()
         reach("voltages")
         conditioned = self.conditioning.condition(measured)
         if conditioned.differences is None:

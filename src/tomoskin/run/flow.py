@@ -38,6 +38,10 @@ class Snapshot:
     ready: float
 
 
+News = tuple[Snapshot | None, str | None]
+"""The newest result, and why no others come; None where there is none."""
+
+
 class Flow:
     """Feeds a pipeline, from the first frame of a skin and source to the last.
 
@@ -153,10 +157,13 @@ class Flow:
                 out.say("replay-damaged", f"the replay ends here: {replay.damage}")
             out.wake()
 
-    def contacts(self, trouble: str | None) -> Contacts:
-        """The newest result as it leaves the program; ``trouble``: why there is no source."""
-        stream, newest = self.out.stream, self.newest
-        trouble = trouble or self.intake.standstill
+    def news(self, trouble: str | None) -> News:
+        """The newest result, and why no others come; ``trouble``: why there is no source."""
+        return self.newest, trouble or self.intake.standstill
+
+    def contacts(self, news: News) -> Contacts:
+        """A result as it leaves the program, not valid where no others come."""
+        stream, (newest, trouble) = self.out.stream, news
         if newest is None:
             return without_frame(stream, trouble or NO_REFERENCE, self.now())
         played = None

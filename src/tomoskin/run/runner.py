@@ -25,7 +25,7 @@ from tomoskin.run.commands import (
     StopRecording,
     TakeReference,
 )
-from tomoskin.run.flow import Flow, Snapshot
+from tomoskin.run.flow import Flow, News, Snapshot
 from tomoskin.run.intake import play
 from tomoskin.run.loop import Loop
 from tomoskin.run.publisher import Audience, Turns
@@ -227,7 +227,16 @@ class Runner:
     @property
     def contacts(self) -> Contacts:
         """The newest result as it leaves the program; not valid while no frames come."""
-        return self._loop.flow.contacts(self._loop.trouble)
+        return self.contacts_of(self.news)
+
+    @property
+    def news(self) -> News:
+        """What :meth:`contacts_of` makes contacts of, at no cost: another pair is other news."""
+        return self._loop.flow.news(self._loop.trouble)
+
+    def contacts_of(self, news: News) -> Contacts:
+        """The contacts of a result that :attr:`news` gave."""
+        return self._loop.flow.contacts(news)
 
     @property
     def reference(self) -> Reference | None:
