@@ -1,8 +1,8 @@
 """Touches before a scan ends: what each drive tells, beside the frames.
 
 Frames alone decide what is recorded and learnt: nothing here changes what becomes of them. Drives
-say earlier that a touch has begun or is lifted, and where it is now. The next frames confirm a touch
-that has begun, or withdraw it.
+say earlier that a touch has begun or is lifted, and where it is now. The next frames confirm a
+touch that has begun, or withdraw it.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from operator import is_
 
 import numpy as np
 
@@ -21,14 +20,18 @@ from tomoskin.sensing.fit import (
     DriveFilter,
     Initiation,
     MovingTouch,
+    NoiseKey,
     Onset,
     SpotFinder,
 )
 from tomoskin.sensing.fit.spot import CONTENT, FILLING
-from tomoskin.sensing.track import GATE
+from tomoskin.sensing.track import GATE, RESIDUAL
 
 _LIFTED = 8.0
 """Logarithm of the odds from which a touch is lifted."""
+
+_MOST = 6.0
+"""The most that one drive says of that: a single one may be wrong."""
 
 _CONFIRMED = 2
 """Frames in which a touch that has begun must show, or it is withdrawn. The scan of the first one
@@ -59,13 +62,32 @@ class DriveResult:
 
 @dataclass(slots=True, eq=False)
 class _Followed:
-    """A touch as frames have it, as drives have it, the logarithm of the odds that it is lifted,
-    and for a provisional one the frames without it."""
+    """A touch as frames have it, and as drives have it.
+
+    ``odds``: their logarithm that it is lifted, and the device time, s, at which it was; ``frames``
+    of a provisional one: those without it.
+    """
 
     touch: Touch
     moving: MovingTouch
-    lifted: float = 0.0
+    odds: float = 0.0
+    lifted: float | None = None
     frames: int | None = None
+
+    def take(self, moving: MovingTouch, gone: float) -> None:
+        """Take a drive, and what it says of the odds."""
+        self.moving = moving
+        if self.frames is None and self.lifted is None:
+            self.odds = max(self.odds + min(gone, _MOST), 0.0)
+            self.lifted = moving.time if self.odds > _LIFTED else None
+
+    def stands(self, touch: Touch, time: float) -> bool:
+        """Whether a frame whose scan began at ``time`` s has a ``touch`` that is not lifted: it was
+        in that frame, and is more than what is left of it."""
+        before, now = self.touch.detection, touch.detection
+        if self.lifted is None or time < self.lifted or now.snr == before.snr:
+            return self.lifted is None
+        return not RESIDUAL.holds(now.snr, before.snr)
 
 
 class DriveWatch:
@@ -81,13 +103,18 @@ class DriveWatch:
         Ratio at which a touch begins.
     interval
         Between frames, s.
+    follows
+        Whether positions are those of a fit, which drives tell too.
     """
 
-    def __init__(self, finder: SpotFinder, pattern: Pattern, snr: float, interval: float) -> None:
-        self.finder = finder
+    def __init__(
+        self, finder: SpotFinder, pattern: Pattern, snr: float, interval: float, *, follows: bool
+    ) -> None:
+        self.finder, self._follows = finder, follows
         self._drives, self._snr = pattern.drive_index, snr
         self._length = interval / pattern.n_drive
-        self._key: tuple[object, ...] = ()
+        self._key: NoiseKey | None = None
+        self._blocked = True
         self._making: Generator[None, None, DriveEvidence] | None = None
         self._initiation: Initiation | None = None
         self._evidence: DriveEvidence | None = None
@@ -112,7 +139,7 @@ class DriveWatch:
                 self._begin(onset, time, host_time, numbered + 1)
         else:
             self._follow(rows, data, time)
-        shown = {n: f for n, f in self._followed.items() if f.lifted < _LIFTED}
+        shown = {n: f for n, f in self._followed.items() if f.lifted is None}
         touches = tuple([self._shown(each, time) for each in shown.values()])
         new = tuple([number for number, each in shown.items() if each.frames is not None])
         return DriveResult(drive, host_time, touches, new)
@@ -120,9 +147,9 @@ class DriveWatch:
     def confirm(self, touches: Sequence[Touch], time: float) -> int:
         """Take the ``touches`` of a frame whose scan began at ``time`` s of the board; how many
         provisional ones are withdrawn."""
-        before, middle = self._followed, time + self._length * self._drives[-1] / 2
+        before = self._followed
         new = [number for number, each in before.items() if each.frames is not None]
-        self._followed = {t.id: self._going_on(t, before, middle) for t in touches}
+        self._followed = {t.id: self._going_on(t, before, time) for t in touches}
         withdrawn = 0
         for number in new if not touches else []:
             each = before[number]
@@ -137,26 +164,31 @@ class DriveWatch:
     def _ready(self) -> bool:
         """Whether the noise is that of now; a piece of work where it is not."""
         key, noise, jumps = self.finder.newest_noise()
-        if len(key) != len(self._key) or not all(map(is_, key[:-1], self._key[:-1])) or (
-            key[-1] != self._key[-1]
+        if (
+            not self._key
+            or any(a is not b for a, b in zip(key[:-1], self._key[:-1], strict=True))
+            or (key[-1] != self._key[-1])
         ):
-            model = self.finder.model
-            self._key = key
-            self._making = DriveEvidence.making(
-                model.candidates, noise + jumps @ jumps.T, self._drives
-            )
-            self._filter = DriveFilter(model.solver, model.prior, self.finder.sign, noise)
+            self._blocked |= not self._key or _says_less(key, self._key)
+            self._key, model = key, self.finder.model
+            every = noise + jumps @ jumps.T
+            self._making = DriveEvidence.making(model.candidates, every, self._drives)
+            sign, sheet = self.finder.sign, model.sheet
+            self._filter = DriveFilter(model.solver, model.prior, sign, sheet, noise)
         if self._making is not None:
             try:
                 next(self._making)
             except StopIteration as end:
-                self._evidence, self._making = end.value, None
+                self._evidence, self._making, self._blocked = end.value, None, False
                 self._initiation = self._renewed(end.value)
-        return self._making is None or bool(self._followed)
+        return not self._blocked or bool(self._followed)
 
     def _renewed(self, evidence: DriveEvidence) -> Initiation:
         threshold = evidence.threshold(1 / self._length, self._snr)
-        return Initiation(evidence, threshold, self.finder.sign)
+        made = Initiation(evidence, threshold, self.finder.sign)
+        if self._initiation is not None:
+            made.go_on(self._initiation)
+        return made
 
     def _begin(self, onset: Onset, time: float, host_time: float, number: int) -> None:
         prior = self.finder.model.prior
@@ -177,22 +209,25 @@ class DriveWatch:
         every = np.sum(list(changes.values()), axis=0)
         for number, each in self._followed.items():
             own = data - every + changes[number]
-            each.moving, gone = self._filter.pushed(moved[number], rows, own)
-            each.lifted = min(max(each.lifted + gone, 0.0), 2 * _LIFTED)
+            each.take(*self._filter.pushed(moved[number], rows, own))
 
     def _going_on(self, touch: Touch, before: Mapping[int, _Followed], time: float) -> _Followed:
-        """A touch of a frame: as the drives have it where they agree, else as the frame has it."""
+        """A touch of a frame whose scan began at ``time`` s: as the drives have it where they
+        agree, else as the frame has it."""
         known = before.get(touch.id)
         if known is None:
             known = next((each for each in before.values() if each.frames is not None), None)
-        if known is not None and known.moving.time >= time and known.lifted < _LIFTED:
+        middle = time + self._length * self._drives[-1] / 2
+        if known is not None and not known.stands(touch, time):
+            return known
+        if known is not None and known.lifted is None:
             where, spread = known.moving.position()
             off = where - [touch.detection.x, touch.detection.y]
-            off = off - known.moving.state[2:4] * (known.moving.time - time)
+            off = off - known.moving.state[2:4] * (known.moving.time - middle)
             both = spread + _spread(touch.detection)
             if off @ np.linalg.solve(both, off) < GATE:
-                return replace_touch(known, touch)
-        return _Followed(touch, self._moving(touch.detection, time))
+                return _Followed(touch, known.moving, known.odds)
+        return _Followed(touch, self._moving(touch.detection, middle))
 
     def _moving(self, detection: Detection, time: float) -> MovingTouch:
         radius = math.sqrt(detection.area / math.pi)
@@ -203,6 +238,8 @@ class DriveWatch:
 
     def _shown(self, each: _Followed, time: float) -> Touch:
         """A touch where it is at the end of a drive that began at ``time`` s."""
+        if each.frames is None and not self._follows:
+            return each.touch
         now = each.moving.at(time + self._length)
         where, spread = now.position()
         spot = now.spot
@@ -211,9 +248,12 @@ class DriveWatch:
         return replace(each.touch, detection=detection)
 
 
-def replace_touch(followed: _Followed, touch: Touch) -> _Followed:
-    """The same as a frame has confirmed it."""
-    return _Followed(touch, followed.moving, followed.lifted)
+def _says_less(key: NoiseKey, before: NoiseKey) -> bool:
+    """Whether drives told less in the noise of a ``key`` than in that ``before``: then they must
+    not be read by that."""
+    (*_, left), (*_, known) = key, before
+    other = key[0] is not before[0] or key[3] is not before[3]
+    return other or len(left) != len(known) or any(a > b for a, b in zip(left, known, strict=True))
 
 
 def _spread(detection: Detection) -> FloatArray:

@@ -60,7 +60,7 @@ class DriveEvidence:
         cls, candidates: Candidates, noise: FloatArray, drives: IntArray
     ) -> Generator[None, None, Self]:
         """A piece of work for each drive; ``noise`` (n_meas, n_meas) V², ``drives`` (n_meas,)."""
-        signatures, precision = candidates.signatures, np.linalg.inv(noise)
+        signatures, precision = candidates.signatures, np.asarray(np.linalg.inv(noise))
         firsts = np.flatnonzero(np.diff(drives, prepend=-1))
         gram = np.empty((len(signatures), len(firsts), len(firsts)))
         for drive, rows in enumerate(_slices(firsts, len(drives))):
@@ -118,7 +118,8 @@ class Initiation:
 
     def __init__(self, evidence: DriveEvidence, threshold: float, sign: str) -> None:
         self._evidence, self._threshold, self._sign = evidence, threshold, sign
-        self._data = self._matched = np.zeros(len(evidence.precision))
+        self._data = np.zeros(len(evidence.precision))
+        self._matched = np.zeros(len(evidence.precision))
         self._sizes: dict[tuple[int, ...], FloatArray] = {}
         self.forget()
 
@@ -127,6 +128,11 @@ class Initiation:
         self._order: tuple[int, ...] = ()
         self._since: int | None = None
 
+    def go_on(self, other: Initiation) -> None:
+        """Go on where an ``other`` one of the same skin is."""
+        self._data, self._order, self._since = other._data, other._order, other._since
+        self._matched = self._evidence.precision @ self._data
+
     def push(self, drive: int, data: FloatArray) -> Onset | None:
         """Take the ``data`` (m,) V of a drive; a touch, once one has begun.
 
@@ -134,10 +140,7 @@ class Initiation:
         existence but not for its position. So a touch is not told before the drive after that.
         """
         evidence, rows = self._evidence, self._evidence.rows[drive]
-        change = data - self._data[rows]
-        self._data, self._matched = self._data.copy(), self._matched + (
-            evidence.precision[:, rows] @ change
-        )
+        self._matched += evidence.precision[:, rows] @ (data - self._data[rows])
         self._data[rows] = data
         self._order = (drive, *(d for d in self._order if d != drive))
         if len(self._order) < len(evidence.firsts):

@@ -15,6 +15,7 @@ import numpy as np
 
 from tomoskin.core import FloatArray
 from tomoskin.sensing.fit.problem import Solver
+from tomoskin.sensing.fit.solver import SheetDomain
 from tomoskin.sensing.fit.spot import CONTENT, LOG_RADIUS, N_PARAMETERS, X, Y
 from tomoskin.sensing.fit.spot_fit import SpotPrior
 from tomoskin.sensing.track import RESIDUAL, TrackSettings
@@ -118,6 +119,8 @@ class DriveFilter:
         Its table says what a spot does.
     prior, sign
         Of the touches.
+    sheet
+        Where they may be.
     noise
         (n_meas, n_meas) V² of the measurements.
     """
@@ -125,13 +128,16 @@ class DriveFilter:
     solver: Solver
     prior: SpotPrior
     sign: str
+    sheet: SheetDomain
     noise: FloatArray
 
     def changes(self, touch: MovingTouch, rows: slice) -> FloatArray:
         """(m,) V that a touch changes."""
         return self._response(touch.state, rows)[0]
 
-    def pushed(self, touch: MovingTouch, rows: slice, data: FloatArray) -> tuple[MovingTouch, float]:
+    def pushed(
+        self, touch: MovingTouch, rows: slice, data: FloatArray
+    ) -> tuple[MovingTouch, float]:
         """The touch after the ``data`` (m,) V of a drive at its time; and the logarithm of how much
         likelier these are of a skin from which it has been lifted."""
         before, spread = touch.state, touch.covariance
@@ -162,5 +168,5 @@ class DriveFilter:
 
     def _held(self, state: FloatArray) -> FloatArray:
         held = state.copy()
-        held[_SPOT] = self.prior.held(state[None, _SPOT], self.sign)[0]
+        held[_SPOT] = self.prior.held(self.sheet.held(state[None, _SPOT]), self.sign)[0]
         return held

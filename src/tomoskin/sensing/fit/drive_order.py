@@ -1,4 +1,4 @@
-"""Which drives to ask for: a sparse watch over an untouched sheet, and what tells most of touches."""
+"""Which drives to ask for: a sparse watch over an untouched sheet, or what touches need most."""
 
 from __future__ import annotations
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from tomoskin.core import Detection, FloatArray, IntArray, reach
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.skin import Skin
+from tomoskin.sensing.fit.excess import Excess
 from tomoskin.sensing.fit.expectation import Expectation, ResidualResponse
 from tomoskin.sensing.fit.hypotheses import CommonModeJump, Explained, Jumps, Rival, challenged
 from tomoskin.sensing.fit.policy import (
@@ -43,6 +44,11 @@ _REST = 0.5
 
 _SWELLS = 0.08
 """Standard deviation of the logarithm of a touch's radius from frame to frame."""
+
+
+NoiseKey = tuple[FloatArray, FloatArray, FloatArray, Excess, tuple[float, ...]]
+"""What the noise of the newest measurements depends on: see :meth:`Sight.of_newest`; and how much
+of what touches may have left behind is not known."""
 
 
 class SpotFinder:
@@ -161,11 +167,16 @@ class SpotFinder:
         return self._model
 
     @property
+    def unit(self) -> float:
+        """Conductivity of the untouched sheet, S."""
+        return self._unit
+
+    @property
     def sign(self) -> str:
         """The sign of touches, as in a skin's ``[touch]``."""
         return self._policy.sign
 
-    def newest_noise(self) -> tuple[tuple[object, ...], FloatArray, FloatArray]:
+    def newest_noise(self) -> tuple[NoiseKey, FloatArray, FloatArray]:
         """See :meth:`Sight.of_newest`; with what touches may have left behind."""
         key, noise, jumps = self._sight.of_newest(self.watch.excess)
         doubts, left = self._residual.doubtful(len(noise))
@@ -176,7 +187,7 @@ class SpotFinder:
         return self._residual.without(dv / self._sight.scale)
 
     def shown(self, spot: FloatArray, spread: FloatArray, ratio: float) -> Detection:
-        """A ``spot`` (4,) whose position has the covariance ``spread`` (2, 2) m², as a detection."""
+        """A ``spot`` (4,) as a detection; its position has the covariance ``spread`` (2, 2) m²."""
         x, y, log_radius, content = spot.tolist()
         radius = math.exp(log_radius)
         (xx, xy), (_, yy) = spread.tolist()

@@ -20,6 +20,8 @@ _MASKS = 8
 """Nuisance subspaces whose whitening is kept."""
 
 
+_Key = tuple[FloatArray, FloatArray, FloatArray, Excess]
+
 _UNKNOWN = 1e6
 """Variance along what is excluded, in parts of the largest one."""
 
@@ -97,8 +99,9 @@ class Sight:
             newest = self._newest = now, self._made(excess)
         return newest[1]
 
-    def of_newest(self, excess: Excess) -> tuple[tuple[object, ...], FloatArray, FloatArray]:
-        """What the noise of the newest measurements depends on; that, (n_meas, n_meas) V² of the
+    def of_newest(self, excess: Excess) -> tuple[_Key, FloatArray, FloatArray]:
+        """What the noise of the newest measurements depends on: nuisance directions, jumps, idle
+        noise and excess. That, (n_meas, n_meas) V² of the
         model, in which what is excluded is unknown; and jumps (n_meas, j) V."""
         key = self._nuisance, self._jumps, self._noise, excess
         nuisance, jumps = self._scaled(self.scale)
