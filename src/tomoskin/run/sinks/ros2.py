@@ -145,10 +145,15 @@ def open_ros2(argument: str) -> Ros2Sink:
     folder = Path(options["folder"]) if "folder" in options else None
     if folder is not None and not folder.is_dir():
         raise SinkError(f'expected a folder that exists, got "{folder}"', where=_WHERE)
+    return Ros2Sink(ros_domain(options, _WHERE), Naming.of(options, _WHERE), folder)
+
+
+def ros_domain(options: Mapping[str, str], where: str) -> int:
+    """The option ``domain``, else that of the environment. Raises SinkError."""
     text = options.get("domain", os.environ.get("ROS_DOMAIN_ID") or "0")
     if not (text.isascii() and text.isdigit() and int(text) <= _MOST_DOMAINS):
-        raise SinkError(f'expected a domain from 0 to {_MOST_DOMAINS}, got "{text}"', where=_WHERE)
-    return Ros2Sink(int(text), Naming.of(options, _WHERE), folder)
+        raise SinkError(f'expected a domain from 0 to {_MOST_DOMAINS}, got "{text}"', where=where)
+    return int(text)
 
 
 @functools.cache
