@@ -114,8 +114,8 @@ class RobotSection(Section, section="robot"):
     )
     joints: str | None = key(
         _FILE,
-        "Where the positions of its joints come from: `ros2` for the topic `/joint_states`, or an MCAP file "
-        "of ROS 2 that holds it.",
+        "Where positions of its joints come from: `ros2` for the topic `/joint_states`, or an MCAP "
+        "file of ROS 2 that holds it.",
         default=None,
         needs="urdf",
     )
