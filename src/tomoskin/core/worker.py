@@ -47,6 +47,9 @@ class Consumer(Protocol):
     ready: str = ""
     """What is said when it has been opened; "": nothing."""
 
+    gathering: float = 0.0
+    """Seconds for which messages may wait to be taken together; 0: each wakes the thread."""
+
     def admit(self, message: Any) -> Any:
         """What of ``message`` is to wait for it; None: it is not meant for it."""
 
@@ -263,12 +266,15 @@ class Worker(Generic[C]):
         return None
 
     def _wait(self) -> bool:
-        """Wait for a message, until the routine is due; False where there will be no more."""
-        patience = self._tended + _ROUTINE - time.monotonic()
+        """Wait for messages, until the routine is due; False where there will be no more."""
+        patience, gathering = self._tended + _ROUTINE - time.monotonic(), self.consumer.gathering
         with self._news:
-            self._is_idle = True
-            self._news.wait_for(lambda: self._waiting or self._deadline is not None, patience)
-            self._is_idle = False
+            if gathering:
+                self._news.wait_for(lambda: self._deadline is not None, min(gathering, patience))
+            else:
+                self._is_idle = True
+                self._news.wait_for(lambda: self._waiting or self._deadline is not None, patience)
+                self._is_idle = False
             return bool(self._waiting) or self._deadline is None
 
     def _report_gap(self) -> None:

@@ -82,6 +82,7 @@ class Recorder(Consumer):
     """
 
     kind, slow = "recording", "the disk is too slow, and messages are lost"
+    gathering = 0.1
 
     def __init__(
         self,
@@ -123,8 +124,26 @@ class Recorder(Consumer):
 
     def take(self, item: list[_Part]) -> None:
         """Write what was admitted of one message. Raises DataError."""
+        session = self._session
         for part in item:
-            self._write(part)
+            match part:
+                case RawRead():
+                    session.raw(part.host_time, part.data)
+                case MarkedFrame():
+                    self._fit_clock(part)
+                    session.frame(part.frame, part.mark)
+                case RecordedTouches():
+                    session.touches(part.host_time, part.sequence, part.touches)
+                case FrameResult() if self._pixels is not None:
+                    session.image(part.host_time, part.image, self._pixels, part.touches)
+                case Event():
+                    session.event(part)
+                case Truth():
+                    session.truth(part.host_time, part.presses, part.bends)
+                case BoardInfo():
+                    session.device(part.host_time, part.info, part.name)
+                case RunSettings():
+                    session.settings(part.host_time, part.values)
 
     def tend(self) -> None:
         """Write the open chunk, to lose a second at most. Raises DataError."""
@@ -147,27 +166,6 @@ class Recorder(Consumer):
             _log.exception("the recording thread ended", exc_info=error)
             why = f"internal error, {type(error).__name__}: {error}"
         self._say("recording-stopped", f"the recording has ended: {why}")
-
-    def _write(self, part: _Part) -> None:
-        session = self._session
-        match part:
-            case RawRead():
-                session.raw(part.host_time, part.data)
-            case MarkedFrame():
-                self._fit_clock(part)
-                session.frame(part.frame, part.mark)
-            case RecordedTouches():
-                session.touches(part.host_time, part.sequence, part.touches)
-            case FrameResult() if self._pixels is not None:
-                session.image(part.host_time, part.image, self._pixels, part.touches)
-            case Event():
-                session.event(part)
-            case Truth():
-                session.truth(part.host_time, part.presses, part.bends)
-            case BoardInfo():
-                session.device(part.host_time, part.info, part.name)
-            case RunSettings():
-                session.settings(part.host_time, part.values)
 
     def _fit_clock(self, item: MarkedFrame) -> None:
         """Now and then a fit of the device's clock."""
