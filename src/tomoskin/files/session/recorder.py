@@ -22,9 +22,6 @@ IMAGE_PERIOD = 0.2
 CLOCK_PERIOD = 10.0
 """Seconds between two fits of the device's clock."""
 
-_OBJECT = 256
-"""Bytes that a waiting message is taken for, beside its data."""
-
 _log = logging.getLogger(__name__)
 
 
@@ -114,10 +111,6 @@ class Recorder(Consumer):
         parts += map(event_of, message.events)
         return parts or None
 
-    def size(self, item: list[_Part]) -> int:
-        """Bytes that it takes while it waits."""
-        return sum(map(_size, item))
-
     def open(self) -> None:
         """Make the file. Raises DataError."""
         self._session, self._made = self._make(), True
@@ -176,19 +169,3 @@ class Recorder(Consumer):
         if frame.host_time >= self._next_fit and (fit := self._clock.fit) is not None:
             self._session.clock(frame.host_time, fit)
             self._next_fit = frame.host_time + CLOCK_PERIOD
-
-
-def _size(part: _Part) -> int:
-    match part:
-        case RawRead():
-            return _OBJECT + len(part.data)
-        case MarkedFrame():
-            return _OBJECT + part.frame.samples.nbytes
-        case FrameResult():
-            return _OBJECT + part.image.values.nbytes + part.voltages.nbytes
-        case RecordedTouches():
-            return _OBJECT + 200 * len(part.touches)
-        case Truth():
-            return _OBJECT + 100 * (len(part.presses) + len(part.bends))
-        case _:
-            return _OBJECT
