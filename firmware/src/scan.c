@@ -8,7 +8,8 @@
 
 #include <stddef.h>
 
-/* Longer dead times are waited for by the timer, not in the interrupt. */
+/* Longer dead times are waited for by the timer, not in the interrupt, where time for frames and
+   the main loop is lost. The line is listened to meanwhile. */
 #define LONGEST_BUSY_US 50u
 #define SLACK_TICKS (2u * TICKS_PER_MS)
 
@@ -98,6 +99,7 @@ static void end_samples(void) {
 
 static void begin_frame(void) {
     struct frame *frame = &frames[filling];
+    hal_listen();
     frame->started = hal_ticks();
     scan.place = frame->buffer + FRAMING_BEFORE + SIZE_FRAME;
     scan.drive = 0u;
@@ -110,7 +112,9 @@ static void connect(uint16_t dead_time) {
     uint8_t sink = reversed() ? drive->source : drive->sink;
     scan.rest = drive->mask;
     scan.channel = 0u;
+    hal_listen();
     scan.allowed = allowed_ticks(drive);
+    hal_listen();
     if (!switches_set(source, sink, dead_time)) {
         fail(FAULT_SWITCH_REFUSED, scan.drive);
         return;
@@ -158,15 +162,19 @@ static void put_demodulated(void) {
     for (channel_set rest = config.drives[scan.drive].mask; rest != 0u; rest >>= 1, channel++) {
         if ((rest & 1u) != 0u) {
             put_sample(demodulator_difference(channel));
+            hal_listen();
             put_sample(demodulator_sum(channel));
+            hal_listen();
         }
     }
     demodulator_clear();
+    hal_listen();
 }
 
 /* The next direction of the drive, or the next drive. */
 static void end_direction(void) {
     switches_off();
+    hal_listen();
     if (++scan.direction < scan.directions) {
         begin_drive();
         return;
@@ -226,6 +234,7 @@ void scan_on_sample(uint16_t sum) {
     scan.rest >>= 1;
     scan.channel++;
     bool more = next_channel(); /* it runs while this one is booked */
+    hal_listen();
     if (scan.directions == 1u) {
         put_sample(sum);
     } else {
@@ -252,6 +261,7 @@ void scan_start(void) {
     scan.settling_ticks = config_ticks(config.settling);
     scan.directions = config_directions();
     scan.on_ticks = on_ticks();
+    hal_listen();
     demodulator_clear();
     hal_adc_prepare(config.prescaler, config_conversions());
     begin_frame();
