@@ -225,15 +225,6 @@ class Flow:
         if self._recall.is_due(self._clock(), at_end=True):
             self._recall.keep(self.prepared, self.out)
 
-    def _truth(self, frame: Frame) -> tuple[Probe, ...]:
-        """What pressed when the frame was read."""
-        replay = self.marker.replay
-        if replay is None:
-            return self.twin.truth
-        number = bisect_right(replay.truth, frame.host_time, key=lambda truth: truth.host_time)
-        presses = replay.truth[number - 1].presses if number else ()
-        return tuple(chain.from_iterable(map(_recorded, presses)))
-
     def _note_board(self, info: Info | None, name: str) -> None:
         self.board, self.board_name = info, name
         if info is None:
@@ -266,7 +257,7 @@ class Flow:
             return
         ready, decode = self._clock(), begun - read + intake.waited
         self.latency.add_result(decode, ready - begun)
-        self.newest = Snapshot(result, self._truth(frame), decode + ready - begun, ready)
+        self.newest = Snapshot(result, _truth(self, frame), decode + ready - begun, ready)
         self._recall.see(result, self)
         self.out.put(result)
 
@@ -285,6 +276,16 @@ def _board(flow: Flow) -> dict[str, object]:
         "missing": losses.gaps,
         "electrodes": (health.text if health else None) or "good",
     }
+
+
+def _truth(flow: Flow, frame: Frame) -> tuple[Probe, ...]:
+    """What pressed when the frame was read."""
+    replay = flow.marker.replay
+    if replay is None:
+        return flow.twin.truth
+    number = bisect_right(replay.truth, frame.host_time, key=lambda truth: truth.host_time)
+    presses = replay.truth[number - 1].presses if number else ()
+    return tuple(chain.from_iterable(map(_recorded, presses)))
 
 
 def _recorded(press: Mapping[str, Any]) -> Iterator[Press]:
