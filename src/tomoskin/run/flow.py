@@ -13,7 +13,7 @@ from functools import partial
 from itertools import chain
 from typing import Any
 
-from tomoskin.board.source import Link, ScanSettings, Transport
+from tomoskin.board.source import Link, Received, ScanSettings, Transport
 from tomoskin.board.wire import Info
 from tomoskin.core import Event, Frame, Mark, MarkedFrame, TomoskinError
 from tomoskin.files.messages import NO_REFERENCE, Contacts, without_frame
@@ -132,7 +132,7 @@ class Flow:
                 if why not in before:
                     self.out.say("press-refused", f"a press is left out: {why}")
 
-    def take(self, link: Link, items: Sequence[Frame | Event]) -> None:
+    def take(self, link: Link, items: Sequence[Received]) -> None:
         """What one read of the link brought: frames and events."""
         intake, out = self.intake, self.out
         frames = intake.take(link, items, self._clock())

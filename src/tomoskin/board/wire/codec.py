@@ -6,6 +6,7 @@ import dataclasses
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import starmap
 from typing import Any, TypeGuard
 
 import numpy as np
@@ -95,11 +96,11 @@ def encode_payload(message: Message, *, packed: bool = False) -> bytes:
         values = tuple(getattr(message, field.name) for field in layout.spec.fields[:-1])
     else:
         layout, values, tail = _BY_RECORD[type(message)], dataclasses.astuple(message), b""
-        if layout.tail is not None:
-            values, tail = values[:-1], values[-1]
     try:
-        if layout.tail is not None and layout.tail_record is not None:
-            tail = b"".join(layout.tail.pack(*item) for item in tail)
+        if layout.tail is not None and not isinstance(message, Frame | DriveSamples):
+            values, items = values[:-1], values[-1]
+            records = layout.tail_record is not None
+            tail = b"".join(starmap(layout.tail.pack, items)) if records else items
         return layout.head.pack(layout.spec.type, *values) + tail
     except struct.error as error:
         raise WireError(f"{error} in {message!r}", where=layout.spec.name) from error
@@ -158,17 +159,19 @@ def _frame(
         samples = unpack(data)
     else:
         samples = data.view("<u2")
-    made = FRAMES[name]
-    if not name.endswith("_CHOPPED"):
-        return made(sequence, ticks, host_time, *rest, samples)
-    if len(samples) % 2:
-        return None
-    return made(sequence, ticks, host_time, *rest, samples[::2], samples[1::2])
+    values = [sequence, ticks, host_time, *rest, samples]
+    if name.endswith("_CHOPPED"):
+        if len(samples) % 2:
+            return None
+        values[-1:] = samples[::2], samples[1::2]
+    made: Frame | DriveSamples = FRAMES[name](*values)
+    return made
 
 
 def is_command(message: Message) -> TypeGuard[Command]:
     """Whether ``message`` goes to the device."""
-    return not isinstance(message, Frame | DriveSamples) and _BY_RECORD[type(message)].spec.to_device
+    layout = _BY_RECORD.get(type(message))
+    return layout is not None and layout.spec.to_device
 
 
 class Decoder:
