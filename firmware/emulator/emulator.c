@@ -163,6 +163,9 @@ static void on_output(struct avr_irq_t *irq, uint32_t value, void *unused) {
     if (n_out < sizeof out) {
         out[n_out++] = (uint8_t)value;
     }
+    if (watch != NULL && value == 0) {
+        watch->said = avr->cycle - opened;
+    }
 }
 
 static void on_xon(struct avr_irq_t *irq, uint32_t value, void *flag) {

@@ -95,7 +95,7 @@ TEST_F(Board, OnlySingleConversionsArePacked) {
     EXPECT_EQ(set_format(FORMAT_SIXTEEN), RESULT_OK);
     oversampling = 1;
     ASSERT_EQ(set_scan(1), RESULT_OK);
-    EXPECT_EQ(set_format(2), RESULT_BAD_VALUE);
+    EXPECT_EQ(set_format(4), RESULT_BAD_VALUE);
     EXPECT_EQ(set_format(FORMAT_PACKED), RESULT_OK);
     ASSERT_EQ(set_scan(1), RESULT_OK);  // back to what every host understands
     ASSERT_EQ(set_drive(0, {1, 0, 4}), RESULT_OK);

@@ -1,6 +1,7 @@
 """Where bytes come from, and the protocol session with the board behind them."""
 
 from tomoskin.board.source.agreement import BOARDS_SINCE, current_damaged
+from tomoskin.board.source.assembler import Received
 from tomoskin.board.source.boards import (
     BOARDS,
     DEFAULT_BOARD,
@@ -42,6 +43,7 @@ __all__ = [
     "Exchange",
     "FirmwareFiles",
     "Link",
+    "Received",
     "ScanSettings",
     "ScanTimer",
     "SerialTransport",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Protocol, runtime_checkable
 
 from tomoskin.board.source.boards import BOARDS, DEFAULT_BOARD
@@ -25,6 +25,12 @@ from tomoskin.model.pattern import Scan
 
 BOARDS_SINCE = 2
 """The minor version in which boards say their name, and drive alternately."""
+
+DRIVES_SINCE = 3
+"""The minor version in which boards send drives one by one, if they are asked to."""
+
+_MOST_SINGLY = 255
+"""The most drives of a scan whose drives are sent one by one: their numbers have eight bits."""
 
 RATES = (1_000_000, 500_000, 250_000)
 """Rates that the ATmega's clock divides into exactly, fastest first, Bd."""
@@ -152,7 +158,8 @@ def fit_board(info: Info, scan: Scan, asked: ScanSettings, where: str) -> ScanSe
             where=where,
             hint="lower the limiter before you connect the skin",
         )
-    return settings
+    singly = settings.singly and info.minor >= DRIVES_SINCE and len(scan.drives) <= _MOST_SINGLY
+    return replace(settings, singly=singly)
 
 
 def _check_size(info: Info, scan: Scan, asked: ScanSettings, where: str) -> None:
