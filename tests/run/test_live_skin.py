@@ -195,3 +195,16 @@ def test_the_reflex_of_the_documentation_acts_on_newtons(monkeypatch, force_file
     assert newtons == pytest.approx(PRESS.force, rel=0.6)
     assert position == pytest.approx((PRESS.x, PRESS.y, 0), abs=0.015)
     assert normal == (0, 0, 1)
+
+
+def test_who_waits_makes_contacts_once_for_all_that_wakes_it(live, board, prepared, monkeypatch):
+    begin(live, board, prepared)
+    made, contacts_of = [], Runner.contacts_of
+    monkeypatch.setattr(
+        Runner, "contacts_of", lambda run, news: made.append(news) or contacts_of(run, news)
+    )
+    woken = [threading.Timer(0.02 * number, live.runner.audience.wake) for number in range(1, 6)]
+    for timer in woken:
+        timer.start()
+    live.wait(0.3)
+    assert len(made) == 1

@@ -213,8 +213,9 @@ def _named(given: str) -> tuple[str, str]:
 
 def _run_robot(robot: Robot, sinks: list[str] | None, served: Served) -> None:
     """Run the skins of a robot and their page until a signal comes."""
-    from tomoskin.run import BoardMemory, Member, RobotRun
+    from tomoskin.run import BoardMemory, Member, RobotRun, with_joints
 
+    robot = with_joints(robot)
     with Bar("preparing"):
         members = [
             Member.of(skin, skin_for_source(skin.skin, skin.source), chosen_sinks(sinks))

@@ -53,8 +53,8 @@ class LiveSkin:
         They are not valid, with the reason in ``problem``, before the untouched skin has been
         measured, while no frames come, and where the newest frame is older than ``max_age``.
         """
-        contacts = self.runner.contacts
-        self._mine.given = _identity(contacts)
+        self._mine.given = news = self.runner.news
+        contacts = self.runner.contacts_of(news)
         if contacts.valid and contacts.age_s > self.max_age:
             return contacts.outdated(f"the newest frame is {contacts.age_s:.2f} s old")
         return contacts
@@ -74,15 +74,11 @@ class LiveSkin:
         self.runner.stop()
 
     def _has_news(self) -> bool:
-        return _identity(self.runner.contacts) != getattr(self._mine, "given", None)
+        return self.runner.news != getattr(self._mine, "given", None)
 
     def _wake(self) -> None:
         with self._news:
             self._news.notify_all()
-
-
-def _identity(contacts: Contacts) -> object:
-    return contacts.measured, contacts.valid, contacts.problem
 
 
 def open_skin(

@@ -60,11 +60,11 @@ def test_a_robot_is_read_with_its_files_beside_it(files):
     assert right.source == f"replay:{files / 'run.mcap@2'}"
     assert left.calibrations == (files / "touch.npz", files / "bend.npz")
     assert right.calibrations == (files / "force.npz",)
-    assert robot.link_pose(left.place).position == pytest.approx([0, 0.3, 0.2])
-    assert robot.link_pose(right.place).position.tolist() == [0, 0, 0]
-    assert robot.urdf.bones() == pytest.approx(
-        np.array([[[0, 0, 0], [0, 0, 0.2]], [[0, 0, 0.2], [0, 0.3, 0.2]]])
-    )
+    assert robot.urdf.pose("fore").position == pytest.approx([0, 0.3, 0.2])
+    assert right.place.in_root(0.0) is None
+    assert robot.urdf.root == "base"
+    assert robot.urdf.bones() == (("base", "upper"), ("upper", "fore"))
+    assert robot.urdf.bones(without=["base"]) == (("upper", "fore"),)
 
 
 @pytest.mark.parametrize("angles", [(0.1, 0, 0), (0, 0.5, -2), (3, -1, 0.2)])
@@ -110,6 +110,7 @@ def test_a_moved_surface_is_the_surface_moved():
         ('"arm.urdf"', '"leg.urdf"', "no such file|cannot be read"),
         ('board = "0102"', 'board = "x1"', "hexadecimal"),
         ('board = "0102"', 'bord = "0102"', 'did you mean "board"'),
+        ('urdf = "arm.urdf"', 'joints = "ros2"', "needs the key urdf"),
         ('["10 mm", "0 mm", "30 mm"]', "[1, 2, 3]", "without a unit"),
         ('"bend.npz"', "3", '1 "left" calibration: entry 1: expected text'),
     ],
@@ -168,6 +169,66 @@ def test_a_bad_urdf_is_refused(files, old, new, said):
     (files / "arm.urdf").write_text(URDF.replace(old, new))
     with pytest.raises(SkinError, match=said):
         Urdf.read(files / "arm.urdf")
+
+
+MOVING = """<robot name="hand"><link name="base"/><link name="a"/><link name="b"/><link name="c"/>
+<joint name="turn" type="continuous"><parent link="base"/><child link="a"/>
+  <origin xyz="0.1 0 0" rpy="0.3 0 0.2"/><axis xyz="0 3 4"/></joint>
+<joint name="slide" type="prismatic"><parent link="a"/><child link="b"/>
+  <origin xyz="0 0 0.2" rpy="0 1 0"/></joint>
+<joint name="follow" type="revolute"><parent link="b"/><child link="c"/>
+  <axis xyz="0 0 1"/><mimic joint="turn" multiplier="-2" offset="0.5"/></joint></robot>"""
+
+
+def homogeneous(rotation, position):
+    whole = np.eye(4)
+    whole[:3, :3], whole[:3, 3] = rotation.as_matrix(), position
+    return whole
+
+
+def test_joints_move_links_about_and_along_their_axes(files):
+    (files / "hand.urdf").write_text(MOVING)
+    urdf, none = Urdf.read(files / "hand.urdf"), Rotation.identity()
+    positions = {"turn": 0.7, "slide": 0.05}
+    pose = urdf.pose("c", positions.__getitem__)
+    expected = (
+        homogeneous(Rotation.from_euler("xyz", (0.3, 0, 0.2)), (0.1, 0, 0))
+        @ homogeneous(Rotation.from_rotvec(0.7 * np.array([0, 0.6, 0.8])), (0, 0, 0))
+        @ homogeneous(Rotation.from_euler("xyz", (0, 1, 0)), (0, 0, 0.2))
+        @ homogeneous(none, (0.05, 0, 0))
+        @ homogeneous(Rotation.from_rotvec((0, 0, 0.5 - 2 * 0.7)), (0, 0, 0))
+    )
+    assert pose.rotation == pytest.approx(expected[:3, :3])
+    assert pose.position == pytest.approx(expected[:3, 3])
+    every = urdf.poses(positions.__getitem__)
+    assert [*every] == ["base", "a", "b", "c"]
+    assert every["c"].position == pytest.approx(pose.position)
+    assert urdf.poses()["c"].position == pytest.approx(urdf.pose("c").position)
+
+
+def test_a_joint_that_no_number_tells_has_no_pose(files):
+    (files / "hand.urdf").write_text(MOVING.replace("continuous", "floating"))
+    urdf = Urdf.read(files / "hand.urdf")
+    with pytest.raises(SkinError, match='a joint state has no position of the floating "turn"'):
+        urdf.pose("a", {}.__getitem__)
+    assert urdf.pose("a").position.tolist() == [0.1, 0, 0]  # at rest
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("continuous", "revolut", 'joint "turn": expected a type of revolute, .*got "revolut"'),
+        ('xyz="0 3 4"', 'xyz="0 0 0"', 'joint "turn": expected an axis with a direction'),
+        ('xyz="0 3 4"', 'xyz="0 3"', "three numbers in <axis> xyz"),
+        ('mimic joint="turn"', 'mimic joint="trun"', 'expected a joint to mimic, got "trun"'),
+        ('multiplier="-2"', 'multiplier="x"', "a number in <mimic> multiplier"),
+    ],
+)
+def test_a_joint_that_cannot_be_meant(files, old, new, said):
+    assert old in MOVING
+    (files / "hand.urdf").write_text(MOVING.replace(old, new))
+    with pytest.raises(SkinError, match=said):
+        Urdf.read(files / "hand.urdf")
 
 
 def test_a_mesh_lies_on_its_link(files):

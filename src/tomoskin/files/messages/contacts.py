@@ -14,10 +14,10 @@ from typing import Any, Self
 
 import numpy as np
 
-from tomoskin.core import Detection, Event, FloatArray, Force, Image, Touch
+from tomoskin.core import Detection, Event, FloatArray, Force, Image, SkinError, Touch
 from tomoskin.files.messages.stream import Stream
 from tomoskin.model.mesh import Surface
-from tomoskin.model.robot import quaternion
+from tomoskin.model.robot import Pose, Urdf, quaternion
 from tomoskin.pipeline import FrameResult
 from tomoskin.sensing.track import TouchEvent
 
@@ -52,27 +52,40 @@ class Contact:
         Unit vectors: along the sheet's x, across it, and away from the body.
     slope
         (3, 2): derivative of the position by the sheet's x and y.
+    root
+        The pose of that frame in the root frame of the robot; None where it is not known.
     """
 
     touch: Touch
     position: Vector
     axes: tuple[Vector, Vector, Vector] = field(repr=False)
     slope: FloatArray = field(repr=False)
+    root: Pose | None = field(default=None, repr=False)
 
     @classmethod
-    def of(cls, touch: Touch, surface: Surface) -> Self:
+    def of(cls, touch: Touch, surface: Surface, root: Pose | None = None) -> Self:
         """Of a touch of the sheet that lies on ``surface``; plain numbers, which is faster."""
         uv = [[touch.detection.x, touch.detection.y]]
         slope = surface.jacobian(uv)[0]
         along, up = map(_unit, slope.T.tolist())
         normal = _unit(_cross(along, up))
         x, y, z = surface.point(uv)[0].tolist()
-        return cls(touch, (x, y, z), (along, _cross(normal, along), normal), slope)
+        return cls(touch, (x, y, z), (along, _cross(normal, along), normal), slope, root)
 
     @property
     def normal(self) -> Vector:
         """(3,) unit vector, away from the body."""
         return self.axes[2]
+
+    @property
+    def root_position(self) -> Vector | None:
+        """(3,) m in the root frame of the robot; None where the pose of the link is not known."""
+        return tuple(self.root(np.array(self.position)).tolist()) if self.root else None
+
+    @property
+    def root_normal(self) -> Vector | None:
+        """(3,) unit vector in that frame; None where the pose of the link is not known."""
+        return tuple((self.root.rotation @ self.normal).tolist()) if self.root else None
 
     @property
     def orientation(self) -> Vector:
@@ -256,7 +269,31 @@ class Contacts:
     @cached_property
     def touches(self) -> tuple[Contact, ...]:
         """The touches in space, in the order of their identities."""
-        return tuple(Contact.of(touch, self.stream.surface) for touch in self.tracked)
+        return tuple(map(self._contact, self.tracked))
+
+    @property
+    def root(self) -> Pose | None:
+        """The pose of the link in the root frame of the robot at that time.
+
+        None where there is no link, and where it is not known how the robot stood.
+        """
+        return self._root[0]
+
+    @property
+    def root_problem(self) -> str | None:
+        """Why the pose of the link is not known, or None."""
+        return self._root[1]
+
+    @cached_property
+    def _root(self) -> tuple[Pose | None, str | None]:
+        place = self.stream.place
+        try:
+            return (None if place is None else place.in_root(self.utc)), None
+        except SkinError as error:
+            return None, str(error)
+
+    def _contact(self, touch: Touch) -> Contact:
+        return Contact.of(touch, self.stream.surface, self.root)
 
     @property
     def events(self) -> tuple[Event, ...]:
@@ -279,20 +316,45 @@ class Contacts:
             "latency_s": self.latency,
             "valid": self.valid,
             "problem": self.problem,
+            **self._root_header(),
         }
+
+    def _root_header(self) -> dict[str, Any]:
+        """Of a skin on a robot's link: where that is in the frame of the root, or why not."""
+        if self._urdf is None:
+            return {}
+        pose = None
+        if self.root is not None:
+            pose = {
+                "frame_id": self._urdf.root,
+                "position": self.root.position.tolist(),
+                "orientation": self.root.quaternion(),
+            }
+        return {"root": pose, "root_problem": self.root_problem}
 
     def content(self) -> dict[str, Any]:
         """Everything as plain values by name, the touches too."""
-        return self.header() | {"touches": [touch.content() for touch in self.touches]}
+        return self.header() | {"touches": [self._content(touch) for touch in self.touches]}
 
     def happenings(self) -> list[dict[str, Any]]:
         """Each thing that happened to a touch, with that touch, as plain values by name."""
         return [
             {"time_s": event.host_time, "event": event.kind}
             | self.header()
-            | Contact.of(event.touch, self.stream.surface).content()
+            | self._content(self._contact(event.touch))
             for event in self.happened
         ]
+
+    def _content(self, contact: Contact) -> dict[str, Any]:
+        """Of a touch; of one on a robot's link also where it is in the frame of the root."""
+        if self._urdf is None:
+            return contact.content()
+        in_root = {"root_position": contact.root_position, "root_normal": contact.root_normal}
+        return contact.content() | in_root
+
+    @property
+    def _urdf(self) -> Urdf | None:
+        return self.stream.place.urdf if self.stream.place else None
 
 
 def without_frame(stream: Stream, problem: str, host_time: float) -> Contacts:
