@@ -1,7 +1,7 @@
 # Each target does its own set-up, once; arguments pass through: make live ARGS="--port 9000"
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: set-up together checks programs style types page-check page-test engine-check help soak live test test-all suite firmware-test fuzz bench bench-docs docs board claims gallery lint lock native wheel release clean page dev
+.PHONY: set-up together checks programs style types page-check page-test engine-check help soak live test test-all suite firmware-test fuzz bench docs board claims gallery lint lock native wheel release clean page dev
 
 VENV := .venv
 PY := $(VENV)/bin/python
@@ -48,12 +48,6 @@ bench: native  ## all in one table, beside plain scipy and, where it is installe
 soak: dev  ## an hour of a bad day, compressed: faults, a sleeping page, a hanging sink
 	@SOAK_MINUTES=60 $(PY) -m pytest -n 0 -m "" tests/run/test_soak.py $(ARGS)
 
-bench-docs: native page  ## measure the table of all and the forward engine again into docs/benchmarks.md; ten minutes
-	@$(PIP) install --require-hashes --requirement requirements/bench.txt  # pyEIT has no wheel
-	@$(PY) scripts/native.py reference
-	@$(VENV)/bin/tomoskin bench --into docs/benchmarks.md
-	@$(VENV)/bin/tomoskin bench forward --into docs/benchmarks.md
-
 docs: dev $(VENV)/.docs  ## the documentation, in build/docs; a warning is an error
 	@$(PY) -m sphinx --quiet --fail-on-warning --keep-going docs build/docs
 
@@ -61,7 +55,9 @@ board: dev  ## the circuit boards: rules, then netlists, bills, Gerbers, picture
 	@$(PIP) install --no-deps --require-hashes --upgrade --target build/board/tools --requirement requirements/board.txt
 	@$(PY) hardware/fabricate.py $(ARGS)
 
-claims: native  ## run what the published figures come from; fails where one no longer holds (PART=gallery: ten minutes)
+claims: native page  ## run what the published figures come from; fails where one no longer holds (PART=gallery: ten minutes)
+	@$(PIP) install --require-hashes --requirement requirements/bench.txt  # pyEIT has no wheel
+	@$(PY) scripts/native.py reference
 	@$(PY) docs/claims.py $(PART) $(ARGS)
 
 gallery: native  ## run the examples again into docs/gallery.md; ten minutes

@@ -134,7 +134,7 @@ class Bench:
         """What finds touches in V less the reference, beside directions that say nothing.
 
         On the sheet of ``prepared``; by default it is the one that the reference shows, as a run
-        finds it some 200 frames later.
+        finds it a second later.
         """
         found = finder_of(prepared or tuned_sheet(self.lab.prepared, reference), reference)
         image = self.lab.image

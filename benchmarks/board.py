@@ -16,7 +16,7 @@ import numpy as np
 from bench_rig import Rig
 from report import Floats, Report, rms, table
 from tomoskin.board.source import BOARDS, Link, ScanSettings, SerialTransport, Timing
-from tomoskin.core import Frame
+from tomoskin.core import Event, Frame
 from tomoskin.model.pattern import Pattern, Scan
 from tomoskin.model.skin import Skin
 from tomoskin.sensing.signal import FIGURES, Readout
@@ -161,7 +161,7 @@ class Seen:
         while self.frames < count:
             for item in link.poll(0.05):
                 if not isinstance(item, Frame):
-                    self.resets += item.kind == "reset"
+                    self.resets += isinstance(item, Event) and item.kind == "reset"
                     continue
                 right = np.array_equal(item.samples, wanted)
                 self.wrong += not (right and item.flags == (item.sequence == 0))

@@ -139,7 +139,7 @@ def _against_library(model: ForwardModel, sigma: FloatArray) -> dict[str, float]
 def _factor_and_solve(state: State) -> dict[str, Callable[[], object]]:
     """Calls that factorise and solve on ready arrays, and do nothing else.
 
-    ``own`` by our engine; ``faer``, where the native engine was built with it (`make bench-docs`),
+    ``own`` by our engine; ``faer``, where the native engine was built with it (`make claims`),
     by that library as it comes: minimum degree, panels or not as it finds better, all of it
     analysed beforehand.
     """

@@ -81,7 +81,7 @@ def stub(schema: Schema) -> str:
         line = f"{name} = {' | '.join(names)}"
         over = f"{name} = (\n    {chr(10).join(names).replace(chr(10), chr(10) + '    | ')}\n)"
         parts.append((line if len(line) <= _WIDTH else over) + "\n")
-    return "\n".join([*parts, "Message = Command | _Report | Frame\n"])
+    return "\n".join([*parts, "Message = Command | _Report | Frame | DriveSamples\n"])
 
 
 _WIDTH = 100
@@ -92,9 +92,9 @@ from dataclasses import dataclass
 from enum import Enum, IntEnum, IntFlag
 from typing import Any
 
-from tomoskin.core import Frame
+from tomoskin.core import DriveSamples, Frame
 
-FRAMES: tuple[str, ...]
+FRAMES: dict[str, type]
 RECORDS: dict[str, type[Any]]
 STRUCTS: dict[str, type[Any]]
 ENUMS: dict[str, type[Enum]]

@@ -35,12 +35,15 @@ pub mod spot_fit;
 pub mod spot_match;
 #[cfg(feature = "python")]
 mod spot_match_python;
+pub mod spot_prior;
 #[cfg(feature = "python")]
 mod spot_python;
 pub mod spot_reduced;
 #[cfg(feature = "python")]
 mod spot_reduced_python;
 pub mod spot_search;
+#[cfg(feature = "python")]
+mod spot_seen_python;
 pub mod spot_table;
 pub mod symbolic;
 pub mod terminals;

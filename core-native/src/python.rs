@@ -15,8 +15,9 @@ use crate::patches::Patches;
 use crate::product::Rows;
 use crate::scalar::{Scalar, c64};
 use crate::spot_match_python::{standing, standing_out};
-use crate::spot_python::{SeenTable, SpotTable};
+use crate::spot_python::SpotTable;
 use crate::spot_reduced_python::Reduced;
+use crate::spot_seen_python::SeenTable;
 use crate::twin_python::{Terminals, conducted, converted, dented, lines};
 use crate::{factor, jacobian, product, solve, symbolic, threads};
 

@@ -16,6 +16,8 @@ struct watch {
     uint64_t shortest_off; /* and cycles between two drives, at least */
     uint64_t resets;       /* after power-on */
     uint64_t lowest_stack; /* address that the stack pointer has come down to */
+    uint64_t said;         /* cycles from the end of a drive to that of the last message */
+    uint64_t longest_deaf; /* cycles without a look at the line, at most, after the first drive */
     uint64_t spent[WATCH_WORDS]; /* cycles in the instruction at each word */
     int64_t net[WATCH_CHANNELS]; /* of pairs, by the lower channel: cycles from the other one to it, less
                                     those from it to the other */

@@ -135,6 +135,8 @@ uint32_t hal_ticks(void) {
     return (high << 30) | (low >> 2);
 }
 
+void hal_listen(void) {} /* the line waits by itself */
+
 void hal_delay_us(uint16_t us) {
     uint32_t from = REGISTER(SYSTICK_NOW);
     while (cycles_since(from) < us * CYCLES_PER_US) {

@@ -43,7 +43,7 @@ uint32_t commands_take_baud(void) {
 }
 
 static bool is_command(uint8_t type) {
-    return type >= MSG_GET_INFO && type <= MSG_GET_MODE;
+    return type >= MSG_GET_INFO && type <= MSG_SET_ORDER;
 }
 
 static bool right_length(uint8_t type, uint8_t size) {
@@ -64,6 +64,8 @@ static bool right_length(uint8_t type, uint8_t size) {
         return size == SIZE_SET_FORMAT;
     case MSG_SET_MODE:
         return size == SIZE_SET_MODE;
+    case MSG_SET_ORDER:
+        return size >= SIZE_SET_ORDER;
     default:
         return size == SIZE_PING; /* only the request id */
     }
@@ -80,6 +82,21 @@ static struct verdict start(const uint8_t *payload) {
     if (said.result == RESULT_OK) {
         hal_lock();
         scan_start();
+        hal_unlock();
+    }
+    return said;
+}
+
+static struct verdict set_order(const uint8_t *payload, uint8_t size) {
+    struct verdict said = {RESULT_NOT_SINGLY, 0u};
+    if (!scan_running() || !config_singly()) {
+        return said;
+    }
+    said = config_check_order(payload, size);
+    if (said.result == RESULT_OK) {
+        hal_lock();
+        scan_order(payload[AT_SET_ORDER_ORDER], payload + SIZE_SET_ORDER,
+                   (uint8_t)(size - SIZE_SET_ORDER));
         hal_unlock();
     }
     return said;
@@ -134,6 +151,8 @@ static struct verdict run(const uint8_t *payload, uint8_t size) {
         break;
     case MSG_SET_HEARTBEAT:
         return set_heartbeat(get_u16(payload + AT_SET_HEARTBEAT_INTERVAL));
+    case MSG_SET_ORDER:
+        return set_order(payload, size);
     default:
         if (!scan_running()) {
             return run_idle(payload, size);

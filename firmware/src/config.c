@@ -4,8 +4,6 @@
 #include "hal.h"
 #include "protocol.h"
 
-#include <stdbool.h>
-
 struct config config;
 
 static struct verdict verdict(uint8_t result, uint16_t detail) {
@@ -35,7 +33,8 @@ struct verdict config_set_scan(const uint8_t *payload) {
     if (n_drives > MOST_DRIVES) {
         return verdict(RESULT_TOO_MANY_DRIVES, MOST_DRIVES);
     }
-    if (hal_current() > get_u32(payload + AT_SET_SCAN_CURRENT_LIMIT)) {
+    uint32_t current = hal_current();
+    if (current == CURRENT_DAMAGED || current > get_u32(payload + AT_SET_SCAN_CURRENT_LIMIT)) {
         return verdict(RESULT_CURRENT_TOO_HIGH, 0u);
     }
     if (identity == 0u) {
@@ -112,12 +111,24 @@ struct verdict config_set_pattern(const uint8_t *payload, uint8_t size) {
     return verdict(RESULT_OK, 0u);
 }
 
+static bool packs(uint8_t format) {
+    return format == FORMAT_PACKED || format == FORMAT_DRIVES_PACKED;
+}
+
+bool config_packed(void) {
+    return packs(config.format);
+}
+
+bool config_singly(void) {
+    return config.format >= FORMAT_DRIVES;
+}
+
 struct verdict config_set_format(const uint8_t *payload) {
     uint8_t format = payload[AT_SET_FORMAT_FORMAT];
     if (!announced(get_u16(payload + AT_SET_FORMAT_CONFIGURATION))) {
         return verdict(RESULT_WRONG_CONFIGURATION, 0u);
     }
-    if (format > FORMAT_PACKED || (format == FORMAT_PACKED && (config.oversampling != 1u || ADC_BITS != 10u))) {
+    if (format > FORMAT_DRIVES_PACKED || (packs(format) && (config.oversampling != 1u || ADC_BITS != 10u))) {
         return bad(FIELD_SET_FORMAT_FORMAT);
     }
     config.format = format;
@@ -200,6 +211,23 @@ struct verdict config_check_start(uint16_t identity) {
     }
     if (chopped && config.frequency > chop_limit(most)) {
         return verdict(RESULT_CHOP_TOO_FAST, chop_limit(most));
+    }
+    return verdict(RESULT_OK, 0u);
+}
+
+struct verdict config_check_order(const uint8_t *payload, uint8_t size) {
+    uint8_t count = (uint8_t)(size - SIZE_SET_ORDER);
+    const uint8_t *drives = payload + SIZE_SET_ORDER;
+    if (!announced(get_u16(payload + AT_SET_ORDER_CONFIGURATION))) {
+        return verdict(RESULT_WRONG_CONFIGURATION, 0u);
+    }
+    if ((payload[AT_SET_ORDER_ORDER] == 0u) != (count == 0u)) {
+        return bad(FIELD_SET_ORDER_ORDER);
+    }
+    for (uint8_t number = 0u; number < count; number++) {
+        if (drives[number] >= config.n_drives) {
+            return bad(FIELD_SET_ORDER_DRIVES);
+        }
     }
     return verdict(RESULT_OK, 0u);
 }

@@ -4,6 +4,7 @@
 
 #include "limits.h"
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #define UNSET 0xFFu /* source and sink of a drive that has not been set */
@@ -45,6 +46,13 @@ struct verdict config_set_pattern(const uint8_t *payload, uint8_t size);
 struct verdict config_set_format(const uint8_t *payload);
 struct verdict config_set_mode(const uint8_t *payload);
 struct verdict config_check_start(uint16_t identity);
+
+/* Whether the order of a SET_ORDER can be scanned. */
+struct verdict config_check_order(const uint8_t *payload, uint8_t size);
+
+/* Whether each drive is a message of its own; whether samples have ten bits. */
+bool config_singly(void);
+bool config_packed(void);
 
 /* Directions of a drive, one after the other; conversions of a channel in each. */
 uint8_t config_directions(void);

@@ -12,6 +12,7 @@
 #ifndef MOST_DRIVES
 #define MOST_DRIVES 128u
 #endif
+static_assert(MOST_DRIVES <= 255u, "the number of a drive has eight bits");
 #ifndef MOST_SAMPLES
 #define MOST_SAMPLES 448u /* values in a frame: a chopped one has two a sample */
 #endif
@@ -26,7 +27,7 @@ static_assert(ADC_BITS <= 12u, "sixteen conversions fit into a sample");
 #define FIRST_BAUD UINT32_C(1000000)
 
 #define FIRMWARE_MAJOR 1u
-#define FIRMWARE_MINOR 2u
+#define FIRMWARE_MINOR 3u
 #define FIRMWARE_PATCH 0u
 
 /* Bit e: channel e. */

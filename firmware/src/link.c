@@ -12,6 +12,9 @@
 #include <stddef.h>
 
 static_assert(SIZE_FRAME == SIZE_FRAME_PACKED && SIZE_FRAME == SIZE_FRAME_CHOPPED, "one head for all");
+static_assert(SIZE_DRIVE_SAMPLES == SIZE_DRIVE_SAMPLES_PACKED && SIZE_DRIVE_SAMPLES == SIZE_DRIVE_SAMPLES_CHOPPED,
+              "one head for all");
+static_assert(AT_DRIVE_SAMPLES_ORDER == SIZE_FRAME, "a drive's head begins as a frame's");
 
 #define MOST_TOLD 9u /* drives in a PATTERN */
 
@@ -166,9 +169,17 @@ static void send(uint8_t *message, uint16_t size) {
 
 static void begin_frame(struct frame *frame, uint32_t now_high, uint32_t now) {
     uint8_t *payload = frame->buffer + FRAMING_BEFORE;
-    payload[0] = config.mode == DRIVE_MODE_CHOPPED   ? MSG_FRAME_CHOPPED
-                 : config.format == FORMAT_PACKED ? MSG_FRAME_PACKED
-                                                  : MSG_FRAME;
+    bool chopped = config.mode == DRIVE_MODE_CHOPPED;
+    if (config_singly()) {
+        payload[0] = chopped           ? MSG_DRIVE_SAMPLES_CHOPPED
+                     : config_packed() ? MSG_DRIVE_SAMPLES_PACKED
+                                       : MSG_DRIVE_SAMPLES;
+        payload[AT_DRIVE_SAMPLES_ORDER] = frame->order;
+        payload[AT_DRIVE_SAMPLES_PLACE] = frame->place;
+        payload[AT_DRIVE_SAMPLES_DRIVE] = frame->drive;
+    } else {
+        payload[0] = chopped ? MSG_FRAME_CHOPPED : config_packed() ? MSG_FRAME_PACKED : MSG_FRAME;
+    }
     put_u32(payload + AT_FRAME_SEQUENCE, frame->sequence);
     put_u32(payload + AT_FRAME_TICKS, frame->started);
     put_u32(payload + AT_FRAME_TICKS + 4u, high_of(frame->started, now_high, now));

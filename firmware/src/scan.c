@@ -7,8 +7,16 @@
 #include "switches.h"
 
 #include <stddef.h>
+#include <string.h>
 
-/* Longer dead times are waited for by the timer, not in the interrupt. */
+#define ROOM(size) (FRAMING_BEFORE + (size) + FRAMING_AFTER(size))
+#define FRAMES 2u
+#define DRIVES 16u /* so that the line may stand still for as long as with frames */
+#define FOR_FRAMES (FRAMES * ROOM(MOST_FRAME))
+#define FOR_DRIVES (DRIVES * ROOM(MOST_DRIVE_SAMPLES))
+
+/* Longer dead times are waited for by the timer, not in the interrupt, where time for frames and
+   the main loop is lost. The line is listened to meanwhile. */
 #define LONGEST_BUSY_US 50u
 #define SLACK_TICKS (2u * TICKS_PER_MS)
 
@@ -18,11 +26,14 @@ static struct {
     enum phase phase;
     uint8_t channel;
     channel_set rest;
-    uint16_t drive;
+    uint8_t drive;
+    uint8_t place;   /* of the drive in the order */
+    bool singly;     /* each drive is a message of its own */
+    uint8_t order;   /* identity of the order under way */
     uint8_t direction;  /* of the drive, from 0: odd ones are reversed */
     uint8_t directions; /* 1: the drive is direct */
     uint16_t on_ticks;  /* for each direction, where there are several */
-    uint8_t *place; /* of the next sample */
+    uint8_t *at; /* place of the next sample */
     bool packed;
     uint8_t upper; /* bits of the samples whose lower bytes have been put, the newest on top */
     uint8_t group; /* how many those are */
@@ -31,16 +42,29 @@ static struct {
     uint32_t allowed; /* ticks that it may take */
     uint32_t sequence;
     uint16_t drops;
-    bool dropped;
+    bool dropped; /* something of the turn before */
+    bool broken;  /* something of this turn is dropped */
 } scan;
 
-static struct frame frames[2];
+/* What the host has asked for; the scan takes it up at the end of a drive. */
+static struct {
+    uint8_t identity;
+    uint8_t count; /* 0: all drives of the configuration */
+    bool changed;
+    uint8_t drives[MOST_ORDER];
+} order;
+
+/* Frames, or more of the shorter drives, in the same memory, one behind the other in a ring. The
+   format cannot change while one is taken: its command is answered behind it. */
+static uint8_t memory[FOR_FRAMES > FOR_DRIVES ? FOR_FRAMES : FOR_DRIVES];
+static struct frame slots[DRIVES];
+static uint8_t n_slots = FRAMES;
 static uint8_t filling;
-static volatile bool waiting; /* the other frame is whole and not given back */
+static volatile uint8_t waiting; /* those before it: whole and not given back */
 static bool taken;
 static struct scan_fault fault;
 static struct {
-    uint16_t drive;
+    uint8_t drive;
     uint8_t channel;
     uint32_t sequence;
 } seen; /* where the guard found the scan last */
@@ -77,30 +101,48 @@ static uint32_t allowed_ticks(const struct drive *drive) {
 
 /* A sample as FRAME holds it, or as FRAME_PACKED: its lower byte, and after four the upper bits. */
 static void put_sample(uint16_t sample) {
-    *scan.place++ = (uint8_t)sample;
+    *scan.at++ = (uint8_t)sample;
     if (!scan.packed) {
-        *scan.place++ = (uint8_t)(sample >> 8);
+        *scan.at++ = (uint8_t)(sample >> 8);
         return;
     }
     scan.upper = (uint8_t)((uint8_t)(scan.upper >> 2) | (uint8_t)((uint8_t)(sample >> 8) << 6));
     if (++scan.group == 4u) {
-        *scan.place++ = scan.upper;
+        *scan.at++ = scan.upper;
         scan.group = 0u;
     }
 }
 
 static void end_samples(void) {
     if (scan.group != 0u) {
-        *scan.place++ = (uint8_t)(scan.upper >> (2u * (4u - scan.group)));
+        *scan.at++ = (uint8_t)(scan.upper >> (2u * (4u - scan.group)));
         scan.group = 0u;
     }
 }
 
-static void begin_frame(void) {
-    struct frame *frame = &frames[filling];
+static uint8_t after(uint8_t slot) {
+    return slot + 1u == n_slots ? 0u : (uint8_t)(slot + 1u);
+}
+
+static uint8_t oldest(void) {
+    return (uint8_t)(filling >= waiting ? filling - waiting : filling + n_slots - waiting);
+}
+
+static void begin_message(void) {
+    struct frame *frame = &slots[filling];
+    hal_listen();
+    scan.drive = order.count == 0u ? scan.place : order.drives[scan.place];
     frame->started = hal_ticks();
-    scan.place = frame->buffer + FRAMING_BEFORE + SIZE_FRAME;
-    scan.drive = 0u;
+    frame->order = scan.order;
+    frame->place = scan.place;
+    frame->drive = scan.drive;
+    scan.at = frame->buffer + FRAMING_BEFORE + (scan.singly ? SIZE_DRIVE_SAMPLES : SIZE_FRAME);
+}
+
+static void begin_turn(void) {
+    scan.order = order.identity;
+    order.changed = false;
+    scan.place = 0u;
     scan.direction = 0u;
 }
 
@@ -110,7 +152,9 @@ static void connect(uint16_t dead_time) {
     uint8_t sink = reversed() ? drive->source : drive->sink;
     scan.rest = drive->mask;
     scan.channel = 0u;
+    hal_listen();
     scan.allowed = allowed_ticks(drive);
+    hal_listen();
     if (!switches_set(source, sink, dead_time)) {
         fail(FAULT_SWITCH_REFUSED, scan.drive);
         return;
@@ -132,25 +176,47 @@ static void begin_drive(void) {
     hal_timer_set(ticks);
 }
 
-static void end_frame(void) {
-    struct frame *frame = &frames[filling];
+static void end_message(void) {
+    struct frame *frame = &slots[filling];
     end_samples();
-    if (waiting) {
-        scan.dropped = true;
-        scan.drops = scan.drops == UINT16_MAX ? UINT16_MAX : (uint16_t)(scan.drops + 1u);
-    } else {
-        frame->sequence = scan.sequence;
-        frame->drops = scan.drops;
-        frame->size = (uint16_t)(scan.place - (frame->buffer + FRAMING_BEFORE));
-        frame->flags = (uint8_t)((scan.sequence == 0u ? FLAG_FIRST : 0u) |
-                                 (scan.dropped ? FLAG_DROPPED : 0u));
-        scan.dropped = false;
-        waiting = true;
-        filling ^= 1u;
-        hal_wake();
+    if (waiting == n_slots - 1u) {
+        scan.broken = true;
+        return;
     }
+    frame->sequence = scan.sequence;
+    frame->drops = scan.drops;
+    frame->size = (uint16_t)(scan.at - (frame->buffer + FRAMING_BEFORE));
+    frame->flags = (uint8_t)((scan.sequence == 0u ? FLAG_FIRST : 0u) |
+                             (scan.dropped ? FLAG_DROPPED : 0u));
+    waiting++;
+    filling = after(filling);
+    hal_wake();
+}
+
+static void end_turn(void) {
+    scan.dropped = scan.broken;
+    if (scan.broken && scan.drops != UINT16_MAX) {
+        scan.drops++;
+    }
+    scan.broken = false;
     scan.sequence++;
-    begin_frame();
+    begin_turn();
+}
+
+static void end_drive(void) {
+    uint16_t count = order.count == 0u ? config.n_drives : order.count;
+    scan.direction = 0u;
+    scan.place++;
+    bool whole = order.changed || scan.place == count;
+    if (!scan.singly && !whole) {
+        scan.drive++;
+        return;
+    }
+    end_message();
+    if (whole) {
+        end_turn();
+    }
+    begin_message();
 }
 
 static void put_demodulated(void) {
@@ -158,15 +224,19 @@ static void put_demodulated(void) {
     for (channel_set rest = config.drives[scan.drive].mask; rest != 0u; rest >>= 1, channel++) {
         if ((rest & 1u) != 0u) {
             put_sample(demodulator_difference(channel));
+            hal_listen();
             put_sample(demodulator_sum(channel));
+            hal_listen();
         }
     }
     demodulator_clear();
+    hal_listen();
 }
 
 /* The next direction of the drive, or the next drive. */
 static void end_direction(void) {
     switches_off();
+    hal_listen();
     if (++scan.direction < scan.directions) {
         begin_drive();
         return;
@@ -174,11 +244,7 @@ static void end_direction(void) {
     if (scan.directions > 1u) {
         put_demodulated();
     }
-    scan.direction = 0u;
-    scan.drive++;
-    if (scan.drive == config.n_drives) {
-        end_frame();
-    }
+    end_drive();
     begin_drive();
 }
 
@@ -226,6 +292,7 @@ void scan_on_sample(uint16_t sum) {
     scan.rest >>= 1;
     scan.channel++;
     bool more = next_channel(); /* it runs while this one is booked */
+    hal_listen();
     if (scan.directions == 1u) {
         put_sample(sum);
     } else {
@@ -243,25 +310,51 @@ static uint16_t on_ticks(void) {
                : (uint16_t)((UINT32_C(500000) / config.frequency - config.dead_time) / US_PER_TICK);
 }
 
+/* Memory for frames, or for drives. */
+static void share(void) {
+    scan.singly = config_singly();
+    n_slots = scan.singly ? DRIVES : FRAMES;
+    uint16_t room = scan.singly ? ROOM(MOST_DRIVE_SAMPLES) : ROOM(MOST_FRAME);
+    for (uint8_t slot = 0u; slot < n_slots; slot++) {
+        slots[slot].buffer = memory + slot * room;
+    }
+}
+
 void scan_start(void) {
     scan.sequence = 0u;
     scan.drops = 0u;
-    scan.dropped = false;
-    scan.packed = config.format == FORMAT_PACKED;
+    scan.dropped = scan.broken = false;
+    scan.packed = config_packed();
     scan.group = 0u;
     scan.settling_ticks = config_ticks(config.settling);
     scan.directions = config_directions();
     scan.on_ticks = on_ticks();
+    order.identity = order.count = 0u;
+    share();
+    hal_listen();
     demodulator_clear();
     hal_adc_prepare(config.prescaler, config_conversions());
-    begin_frame();
+    begin_turn();
+    begin_message();
     begin_drive();
+}
+
+void scan_order(uint8_t identity, const uint8_t *drives, uint8_t count) {
+    if (identity != order.identity) {
+        order.identity = identity;
+        order.count = count;
+        (void)memcpy(order.drives, drives, count);
+        order.changed = true;
+    }
 }
 
 void scan_stop(void) {
     halt();
     fault.code = 0u;
-    waiting = taken; /* a frame that is being sent goes on */
+    if (taken) { /* what is being sent goes on */
+        filling = after(oldest());
+    }
+    waiting = taken;
 }
 
 bool scan_running(void) {
@@ -301,13 +394,14 @@ struct scan_fault scan_take_fault(void) {
 }
 
 struct frame *scan_take(void) {
-    if (!waiting || taken) {
+    if (waiting == 0u || taken) {
         return NULL;
     }
     taken = true;
-    return &frames[filling ^ 1u];
+    return &slots[oldest()];
 }
 
 void scan_give_back(void) {
-    taken = waiting = false;
+    taken = false;
+    waiting--;
 }

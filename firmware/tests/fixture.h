@@ -52,7 +52,9 @@ class Board : public testing::Test {
         payload.insert(payload.begin() + 1, ++request);
         machine.say(payload);
         machine.run_us(200);
-        auto acks = of(MSG_ACK, machine.heard());
+        auto all = machine.heard();
+        auto acks = of(MSG_ACK, all);
+        meanwhile.insert(meanwhile.end(), all.begin(), all.end());
         EXPECT_EQ(acks.size(), 1u);
         if (acks.empty()) {
             return 999;
@@ -63,12 +65,13 @@ class Board : public testing::Test {
         return acks[0][AT_ACK_RESULT];
     }
     unsigned detail = 0;
+    std::vector<Bytes> meanwhile;  // what came with the answers
 
-    unsigned set_scan(unsigned n_drives) {
+    unsigned set_scan(unsigned n_drives, uint32_t limit = 100'000) {
         machine.dead_ns = dead * uint64_t{1000};
         return ask({MSG_SET_SCAN, 5, 0, low(n_drives), high(n_drives), low(settling), high(settling),
-                    low(settling >> 16), 0, low(dead), high(dead), low(oversampling), 64, 0xA0, 0x86,
-                    1, 0});
+                    low(settling >> 16), 0, low(dead), high(dead), low(oversampling), 64, low(limit),
+                    high(limit), low(limit >> 16), high(limit >> 16)});
     }
     unsigned set_drive(unsigned number, Drive d) {
         return ask({MSG_SET_PATTERN, 5, 0, low(number), high(number), d.source, d.sink, low(d.mask),

@@ -95,7 +95,7 @@ TEST_F(Board, OnlySingleConversionsArePacked) {
     EXPECT_EQ(set_format(FORMAT_SIXTEEN), RESULT_OK);
     oversampling = 1;
     ASSERT_EQ(set_scan(1), RESULT_OK);
-    EXPECT_EQ(set_format(2), RESULT_BAD_VALUE);
+    EXPECT_EQ(set_format(4), RESULT_BAD_VALUE);
     EXPECT_EQ(set_format(FORMAT_PACKED), RESULT_OK);
     ASSERT_EQ(set_scan(1), RESULT_OK);  // back to what every host understands
     ASSERT_EQ(set_drive(0, {1, 0, 4}), RESULT_OK);
@@ -287,6 +287,8 @@ TEST_F(Board, RefusesWhatItCannotDo) {
     EXPECT_EQ(ask({0x55, 5}), RESULT_UNKNOWN_COMMAND);
     machine.current = 100'001;
     EXPECT_EQ(set_scan(3), RESULT_CURRENT_TOO_HIGH);
+    machine.current = CURRENT_DAMAGED;
+    EXPECT_EQ(set_scan(3, UINT32_MAX), RESULT_CURRENT_TOO_HIGH);
 }
 
 TEST_F(Board, TooManySamplesAreRefused) {

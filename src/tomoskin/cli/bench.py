@@ -7,6 +7,7 @@ import importlib
 import os
 import re
 import sys
+from contextlib import contextmanager
 from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
@@ -77,7 +78,7 @@ def bench(
     cores = cores or usual
     os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[-cores:])
     os.environ["RAYON_NUM_THREADS"] = str(cores)  # the native engine reads it at each call
-    with threadpool_limits(cores):
+    with threadpool_limits(cores), _on_path():  # processes that it starts look there too
         part = into and load_benchmark("report").Part.of(into, name)
         run = getattr(module, benchmarks[name].function)
         reports = tuple(run(data) if "data" in signature(run).parameters else run())
@@ -115,11 +116,17 @@ def known_benchmarks() -> dict[str, Benchmark]:
 
 
 def load_benchmark(name: str) -> ModuleType:
-    """A module of the folder, which is on the path for as long as that takes: its names are short,
-    and would hide those of tests."""
+    """A module of the folder."""
+    with _on_path():
+        return importlib.import_module(name)
+
+
+@contextmanager
+def _on_path() -> Iterator[None]:
+    """The folder is on the path for a while only: its short names would hide those of tests."""
     sys.path.insert(0, str(_FOLDER))
     try:
-        return importlib.import_module(name)
+        yield
     finally:
         sys.path.remove(str(_FOLDER))
 

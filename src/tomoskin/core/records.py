@@ -55,6 +55,47 @@ class Frame:
     sums: NDArray[np.uint16] | None = None
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class DriveSamples:
+    """One drive as the device sent it, while the scan goes on.
+
+    The drives of a full turn make the same :class:`Frame` as a scan that is sent whole.
+
+    Attributes
+    ----------
+    sequence
+        Number of the turn through the order since START, modulo 2³²: every turn counts, full or
+        not. A frame has the number of its turn.
+    ticks
+        Device clock at the start of the drive; of the first drive of a turn, at the start of the
+        scan.
+    host_time
+        Host monotonic seconds at which the last byte was read.
+    configuration, flags, drops
+        As in :class:`Frame`; the same in all drives of a turn.
+    order
+        Identity of the order that the host has asked for; 0: full turns, drive by drive.
+    place
+        Of the drive in its order, from 0.
+    drive
+        Number of the drive in the configuration, from 0: its row of ``Scan.drives``.
+    samples, sums
+        As in :class:`Frame`, of this drive alone.
+    """
+
+    sequence: int
+    ticks: int
+    host_time: float
+    configuration: int
+    flags: int
+    drops: int
+    order: int
+    place: int
+    drive: int
+    samples: NDArray[np.uint16]
+    sums: NDArray[np.uint16] | None = None
+
+
 class Mark(IntFlag):
     """What became of a frame on its way to the pipeline."""
 

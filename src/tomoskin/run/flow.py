@@ -13,7 +13,7 @@ from functools import partial
 from itertools import chain
 from typing import Any
 
-from tomoskin.board.source import Link, ScanSettings, Transport
+from tomoskin.board.source import Link, Received, ScanSettings, Transport
 from tomoskin.board.wire import Info
 from tomoskin.core import Event, Frame, Mark, MarkedFrame, TomoskinError
 from tomoskin.files.messages import NO_REFERENCE, Contacts, without_frame
@@ -132,7 +132,7 @@ class Flow:
                 if why not in before:
                     self.out.say("press-refused", f"a press is left out: {why}")
 
-    def take(self, link: Link, items: Sequence[Frame | Event]) -> None:
+    def take(self, link: Link, items: Sequence[Received]) -> None:
         """What one read of the link brought: frames and events."""
         intake, out = self.intake, self.out
         frames = intake.take(link, items, self._clock())
@@ -225,15 +225,6 @@ class Flow:
         if self._recall.is_due(self._clock(), at_end=True):
             self._recall.keep(self.prepared, self.out)
 
-    def _truth(self, frame: Frame) -> tuple[Probe, ...]:
-        """What pressed when the frame was read."""
-        replay = self.marker.replay
-        if replay is None:
-            return self.twin.truth
-        number = bisect_right(replay.truth, frame.host_time, key=lambda truth: truth.host_time)
-        presses = replay.truth[number - 1].presses if number else ()
-        return tuple(chain.from_iterable(map(_recorded, presses)))
-
     def _note_board(self, info: Info | None, name: str) -> None:
         self.board, self.board_name = info, name
         if info is None:
@@ -266,7 +257,7 @@ class Flow:
             return
         ready, decode = self._clock(), begun - read + intake.waited
         self.latency.add_result(decode, ready - begun)
-        self.newest = Snapshot(result, self._truth(frame), decode + ready - begun, ready)
+        self.newest = Snapshot(result, _truth(self, frame), decode + ready - begun, ready)
         self._recall.see(result, self)
         self.out.put(result)
 
@@ -285,6 +276,16 @@ def _board(flow: Flow) -> dict[str, object]:
         "missing": losses.gaps,
         "electrodes": (health.text if health else None) or "good",
     }
+
+
+def _truth(flow: Flow, frame: Frame) -> tuple[Probe, ...]:
+    """What pressed when the frame was read."""
+    replay = flow.marker.replay
+    if replay is None:
+        return flow.twin.truth
+    number = bisect_right(replay.truth, frame.host_time, key=lambda truth: truth.host_time)
+    presses = replay.truth[number - 1].presses if number else ()
+    return tuple(chain.from_iterable(map(_recorded, presses)))
 
 
 def _recorded(press: Mapping[str, Any]) -> Iterator[Press]:

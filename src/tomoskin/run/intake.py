@@ -9,7 +9,7 @@ from dataclasses import replace
 from operator import add
 from typing import NamedTuple
 
-from tomoskin.board.source import Link, Transport
+from tomoskin.board.source import Link, Received, Transport
 from tomoskin.core import Event, Frame, Mark
 from tomoskin.files.session import ReplayTransport
 from tomoskin.run.commands import ReplayCommand, Seek, SetLoop, SetSpeed
@@ -157,11 +157,11 @@ class Repeats:
         self._said: dict[tuple[str, str], float] = {}
         self._waiting: dict[tuple[str, str], tuple[Event, int]] = {}
 
-    def push(self, now: float, items: Sequence[Frame | Event]) -> Iterator[Event]:
+    def push(self, now: float, items: Sequence[Received]) -> Iterator[Event]:
         """What is to be said at ``now``, s: of the events of a read, and of those that have
         waited."""
         for event in items:
-            if isinstance(event, Frame):
+            if not isinstance(event, Event):
                 continue
             key = event.kind, event.text
             if event.kind not in COUNTED:
@@ -221,7 +221,7 @@ class Intake:
         now = self._drops + link.frames.foreign, link.counters.corrupt, link.frames.lost
         return Losses(*map(add, self._earlier, now))
 
-    def take(self, link: Link, items: Sequence[Frame | Event], now: float) -> list[Frame]:
+    def take(self, link: Link, items: Sequence[Received], now: float) -> list[Frame]:
         """The frames of a read of ``link`` that was made at ``now``, host s."""
         self._link, self.polled, self.waited = link, now, link.waited
         frames = []
@@ -229,6 +229,6 @@ class Intake:
             if isinstance(item, Frame):
                 frames.append(item)
                 self._drops = item.drops
-            elif item.kind in _STANDSTILL:
+            elif isinstance(item, Event) and item.kind in _STANDSTILL:
                 self.standstill = item.text
         return frames

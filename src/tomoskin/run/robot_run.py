@@ -174,7 +174,7 @@ class RobotRun:
         """What no run can see by itself."""
         begun = epoch()
         while not self._ended.wait(_OFTEN):
-            boards = {name: r.status().board for name, r in self.runners.items()}
+            boards = {name: r.flow.board for name, r in self.runners.items()}
             ids = {name: board.unique_id.hex() for name, board in boards.items() if board}
             problems = board_problems(ids, self._boards)
             for name, text in problems.items():

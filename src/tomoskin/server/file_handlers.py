@@ -42,7 +42,7 @@ class SessionUse:
     @property
     def playing(self) -> str | None:
         """Name of the session that is being played."""
-        replay = self._runner.replay
+        replay = self._runner.flow.marker.replay
         return replay.path.name if replay is not None else None
 
     @property

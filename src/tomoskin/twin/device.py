@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from tomoskin.board import wire
-from tomoskin.core import Frame
-from tomoskin.twin.held_scanning import OK, Board, HeldScanning, Question, Setting, Verdict
+from tomoskin.core import DriveSamples, Frame
+from tomoskin.twin.held_scanning import OK, PACKED, Board, HeldScanning, Question, Setting, Verdict
 from tomoskin.twin.scanning import Analogue, SampleTable, ScanClock, chopped_table, sample_table
 
 _HELLO_INTERVAL = 0.5
@@ -16,14 +16,49 @@ _HEARTBEAT_MS = (100, 10_000)
 
 @dataclass
 class _Scanning:
-    """A scan under way: ``due`` is when the next frame is whole, ``device_time`` its start."""
+    """A scan under way.
+
+    ``due`` is when what is sent next has been read, ``device_time`` the start of its turn. Where
+    drives are sent ``singly``, ``elapsed`` s of the turn are over, and ``order`` and the drives of
+    it are those of this turn; what was ``asked`` for is scanned next.
+    """
 
     table: SampleTable
+    singly: bool
     configuration: int
-    period: float
     due: float
     device_time: float
     sequence: int = 0
+    order: int = 0
+    drives: bytes = b""
+    asked: wire.SetOrder | None = None
+    place: int = 0
+    elapsed: float = 0.0
+
+    @property
+    def drive(self) -> int:
+        """The drive that is under way."""
+        return self.drives[self.place] if self.order else self.place
+
+    @property
+    def part(self) -> SampleTable:
+        """What is sent next: the whole scan, or a drive."""
+        return self.table.parts[self.drive] if self.singly else self.table
+
+    def go_on(self) -> None:
+        """The next drive, or the next turn."""
+        self.elapsed += self.part.seconds
+        self.place += 1
+        count = len(self.drives) if self.order else len(self.table.parts)
+        full = not self.order and self.place == count
+        if self.singly and self.asked is None and self.place < count:
+            return
+        # a sum over drives would be as long, but for rounding
+        self.device_time += self.table.seconds if full or not self.singly else self.elapsed
+        self.sequence = (self.sequence + 1) % 2**32
+        self.place, self.elapsed = 0, 0.0
+        if self.asked is not None:
+            self.order, self.drives, self.asked = self.asked.order, self.asked.drives, None
 
 
 class TwinDevice:
@@ -76,39 +111,37 @@ class TwinDevice:
                 self._obey(message, payload, now)
 
     def emit(self, now: float) -> bytes:
-        """What is to be sent by ``now``: answers, HELLO, at most one frame."""
+        """What is to be sent by ``now``: answers, HELLO, at most one frame or drive."""
         if self._next_hello is None and now >= self._heard + self._heartbeat:
             self._fall_silent(now)
         if self._next_hello is not None and now >= self._next_hello:
             self._say(wire.Hello(wire.SCHEMA.major, wire.SCHEMA.minor, wire.SCHEMA.hash))
             self._next_hello = max(self._next_hello + _HELLO_INTERVAL, now)
         if self._scanning and now >= self._scanning.due:
-            frame = self._frame(self._scanning, now)
-            self._out += wire.encode(frame, packed=self._held.format is wire.Format.PACKED)
+            samples = self._sample(self._scanning, now)
+            self._out += wire.encode(samples, packed=self._held.format in PACKED)
         data = bytes(self._out)
         self._out.clear()
         return data
 
-    def _frame(self, scanning: _Scanning, now: float) -> Frame:
-        counts = self._analogue.sample(scanning.table, scanning.device_time)
-        samples, sums = scanning.table.readings(counts)
-        frame = Frame(
-            sequence=scanning.sequence,
-            ticks=round(scanning.device_time * self._board.tick_rate),
-            host_time=now,
-            configuration=scanning.configuration,
-            flags=int(wire.FrameFlag.FIRST) if scanning.sequence == 0 else 0,
-            drops=0,
-            samples=samples,
-            sums=sums,
-        )
+    def _sample(self, scanning: _Scanning, now: float) -> Frame | DriveSamples:
+        part, time = scanning.part, scanning.device_time + scanning.elapsed
+        samples, sums = part.readings(self._analogue.sample(part, time))
+        ticks = round(time * self._board.tick_rate)
+        flags = int(wire.FrameFlag.FIRST) if scanning.sequence == 0 else 0
+        head = scanning.sequence, ticks, now, scanning.configuration, flags, 0
+        sent: Frame | DriveSamples = Frame(*head, samples, sums)
+        if scanning.singly:
+            place = scanning.order, scanning.place, scanning.drive
+            sent = DriveSamples(*head, *place, samples, sums)
         # A computer that is too slow for the scan makes the twin scan later, never skip.
-        next_due = scanning.due + scanning.period * self._pace
+        scanning.go_on()
+        seconds = scanning.part.seconds
+        next_due = scanning.due + seconds * self._pace
         slip = max(0.0, now - next_due)
         scanning.due = next_due + slip
-        scanning.device_time += scanning.period + slip * self._pace
-        scanning.sequence = (scanning.sequence + 1) % 2**32
-        return frame
+        scanning.device_time += slip * self._pace
+        return sent
 
     def _fall_silent(self, now: float) -> None:
         if self._scanning:
@@ -140,6 +173,8 @@ class TwinDevice:
         if isinstance(command, Setting):
             return self._held.set(command)
         match command:
+            case wire.SetOrder():
+                return self._reorder(command)
             case wire.Stop():
                 self._scanning = None
             case wire.SafeOff():
@@ -155,6 +190,18 @@ class TwinDevice:
             case _:
                 pass
         return OK
+
+    def _reorder(self, command: wire.SetOrder) -> Verdict:
+        scanning = self._scanning
+        if scanning is None or not scanning.singly:
+            return wire.Result.NOT_SINGLY, 0
+        if command.configuration != scanning.configuration:
+            return wire.Result.WRONG_CONFIGURATION, 0
+        verdict = self._board.check_order(command, len(scanning.table.parts))
+        newest = scanning.asked.order if scanning.asked else scanning.order
+        if verdict == OK and command.order != newest:
+            scanning.asked = command
+        return verdict
 
     def _start(self, command: wire.Start, now: float) -> Verdict:
         held = self._held
@@ -173,10 +220,11 @@ class TwinDevice:
             table = sample_table(drives, scan.oversampling, times)
         else:
             table = chopped_table(drives, scan.oversampling, times, mode.frequency, mode.periods)
-        period = table.seconds
-        self._scanning = _Scanning(
-            table, scan.configuration, period, now + period * self._pace, now - self._power_on
-        )
+        singly = held.format in (wire.Format.DRIVES, wire.Format.DRIVES_PACKED)
+        device_time = now - self._power_on
+        scanning = _Scanning(table, singly, scan.configuration, now, device_time)
+        scanning.due += scanning.part.seconds * self._pace
+        self._scanning = scanning
         return OK
 
     def _say(self, message: wire.Hello | wire.Fault | wire.Ack) -> None:

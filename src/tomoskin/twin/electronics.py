@@ -35,6 +35,9 @@ Courses = Sequence[tuple[FloatArray, FloatArray]]
 """What is not the same at each conversion: (n_samples,) V, and (oversampling, n_samples) of what
 part there is of it."""
 
+_MOST_TABLES = 300
+"""Tables that are remembered: the drives of a scan, one by one, and the scan before it."""
+
 
 def convert(
     volts: FloatArray,
@@ -90,7 +93,6 @@ class _Samples:
         start, and a quarter of a turn later.
     """
 
-    table: SampleTable
     place: IntArray
     gain: FloatArray
     offset: FloatArray
@@ -127,9 +129,8 @@ class TwinElectronics:
         self._course: Course | None = None
         self._bending: Bending | None = None
         self._before = np.zeros(n)
-        self._lines_of: tuple[object, ...] = ()
-        self._lines = Lines(np.zeros((0, n)))
-        self._samples: _Samples | None = None
+        self._lines: dict[SampleTable, tuple[tuple[object, ...], Lines]] = {}
+        self._samples: dict[SampleTable, _Samples] = {}
 
     @property
     def faults(self) -> Faults:
@@ -165,6 +166,8 @@ class TwinElectronics:
         until the scan is over; where presses move during the scan (:meth:`follow`), each drive
         sees the sheet as it is in its middle.
         """
+        if len(self._samples) > _MOST_TABLES:
+            self._samples, self._lines = {}, {}
         first = self._time is None or time < self._time
         self._age_contacts(0.0 if self._time is None else max(0.0, time - self._time))
         self._aged = time if first else self._aged
@@ -237,32 +240,30 @@ class TwinElectronics:
 
     def _of(self, table: SampleTable) -> _Samples:
         """What the samples have of their channels, which stay as they are."""
-        if self._samples is None or self._samples.table is not table:
+        if table not in self._samples:
             channel, gain = table.channel, self._gain
             since = table.time + _within(table)
             turn = 2 * np.pi * self.settings.hum_frequency * since + self._phase.take(channel)
             hum = (gain * self._hum).take(channel)
-            self._samples = _Samples(
-                table=table,
+            self._samples[table] = _Samples(
                 place=table.drive * len(gain) + channel,
                 gain=gain.take(channel),
                 offset=self._offset.take(channel),
                 sine=hum * np.sin(turn),
                 cosine=hum * np.cos(turn),
             )
-        return self._samples
+        return self._samples[table]
 
     def _potentials(self, table: SampleTable) -> Lines:
         """What the channels stand at under each drive; worked out anew when something changed."""
         resistance = self.sheet.resistance()
         faults = self._faults
-        key = (resistance, table, faults, self._contact)
-        if len(self._lines_of) != len(key) or any(
-            a is not b for a, b in zip(self._lines_of, key, strict=True)
-        ):
-            self._lines = self._under(table.drives, resistance)
-            self._lines_of = key
-        return self._lines
+        key = (resistance, faults, self._contact)
+        held, lines = self._lines.get(table, (key, None))
+        if lines is None or any(a is not b for a, b in zip(held, key, strict=True)):
+            lines = self._under(table.drives, resistance)
+            self._lines[table] = key, lines
+        return lines
 
     def _under(self, drives: IntArray, resistance: FloatArray) -> Lines:
         return line_potentials(

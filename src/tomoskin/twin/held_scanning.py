@@ -27,6 +27,9 @@ Question = wire.GetInfo | wire.GetBoard | wire.GetScan | wire.GetPattern | wire.
 Setting = wire.SetScan | wire.SetPattern | wire.SetFormat | wire.SetMode
 """What a host may set while nothing is scanned."""
 
+PACKED = (wire.Format.PACKED, wire.Format.DRIVES_PACKED)
+"""Formats whose samples have ten bits."""
+
 OK: Verdict = (wire.Result.OK, 0)
 _MAX_SETTLING = 100_000
 _MOST_CONVERSIONS, _MOST_SAMPLE = 64, 0xFFFF
@@ -44,7 +47,7 @@ class Board:
     tick_rate: float
     max_drives: int = 128
     max_samples: int = 2000
-    firmware: tuple[int, int, int] = (1, 2, 0)
+    firmware: tuple[int, int, int] = (1, 3, 0)
     unique_id: bytes = b"twin\0\0\0\0"
     limits: wire.BoardLimits = LIMITS
     converter: Converter = BOARDS[DEFAULT_BOARD].converter
@@ -120,7 +123,13 @@ class Board:
     def check_format(self, command: wire.SetFormat, scan: wire.SetScan) -> Verdict:
         """Whether a SET_FORMAT fits the announced scan and this converter."""
         fits = scan.oversampling == 1 and self.adc_bits == 10
-        return OK if command.format is wire.Format.SIXTEEN or fits else (wire.Result.BAD_VALUE, 2)
+        return OK if command.format not in PACKED or fits else (wire.Result.BAD_VALUE, 2)
+
+    def check_order(self, command: wire.SetOrder, n_drives: int) -> Verdict:
+        """Whether a SET_ORDER asks for drives that there are."""
+        if (command.order == 0) != (not command.drives):
+            return wire.Result.BAD_VALUE, 2
+        return OK if max(command.drives, default=0) < n_drives else (wire.Result.BAD_VALUE, 3)
 
     def check_mode(self, command: wire.SetMode, scan: wire.SetScan) -> Verdict:
         """Whether a SET_MODE fits the announced scan and this board."""

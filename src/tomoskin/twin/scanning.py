@@ -110,6 +110,27 @@ class SampleTable:
         return np.asarray(place), np.where(direction % 2, -1, 1)
 
     @cached_property
+    def parts(self) -> tuple[SampleTable, ...]:
+        """Each drive of the board alone, as a scan that begins with it."""
+        n = self.directions
+        dead = self._dead / max(len(self.drives), 1)
+        ends = np.cumsum(self.length + dead)
+        parts = []
+        for first in range(0, len(self.drives), n):
+            own = slice(*np.searchsorted(self.drive, [first, first + n]))
+            table = replace(
+                self,
+                drives=self.drives[first : first + n],
+                drive=self.drive[own] - first,
+                channel=self.channel[own],
+                since=self.since[own],
+                time=self.time[own] - (ends[first - 1] if first else 0.0),
+                length=self.length[first : first + n],
+            )
+            parts.append(table)
+        return tuple(parts)
+
+    @cached_property
     def sink(self) -> IntArray:
         """Sink electrodes (n_samples,)."""
         return np.asarray(self.drives[self.drive, 1])

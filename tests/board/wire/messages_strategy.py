@@ -1,13 +1,13 @@
 """Any message of the schema, drawn field by field from the schema itself."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 from hypothesis import strategies as st
 
 from tomoskin.board.wire import SCHEMA, Drive
-from tomoskin.board.wire.messages import ENUMS, RECORDS
-from tomoskin.core import Frame
+from tomoskin.board.wire.messages import ENUMS, FRAMES, RECORDS
+from tomoskin.core import DriveSamples, Frame
 
 BITS = {"u8": 8, "u16": 16, "u32": 32, "u64": 64}
 
@@ -20,6 +20,8 @@ def _field(field):
             Drive, st.integers(0, 255), st.integers(0, 255), st.integers(0, 2**32 - 1)
         )
         return st.lists(drive, max_size=9).map(tuple)
+    if field.is_tail and field.item == "u8":
+        return st.binary(max_size=55)
     if field.is_tail:
         counts = st.integers(0, 65535) | st.sampled_from([0, 1, 255, 256])
         return st.lists(counts, max_size=300).map(lambda c: np.array(c, dtype=np.uint16))
@@ -29,13 +31,13 @@ def _field(field):
 
 
 def _message(spec):
-    fields = {field.name: _field(field) for field in spec.fields}
-    if spec.name.startswith("FRAME"):
-        fields["host_time"] = st.just(0.0)
-    if spec.name == "FRAME_CHOPPED":
-        fields["sums"] = fields["samples"].map(lambda counts: counts[::-1])
-        return st.builds(Frame, **fields).map(_as_long)
-    return st.builds(RECORDS[spec.name], **fields)
+    values = {field.name: _field(field) for field in spec.fields}
+    if spec.name in FRAMES:
+        values["host_time"] = st.just(0.0)
+    if spec.name.endswith("_CHOPPED"):
+        values["sums"] = values["samples"].map(lambda counts: counts[::-1])
+        return st.builds(FRAMES[spec.name], **values).map(_as_long)
+    return st.builds(RECORDS[spec.name], **values)
 
 
 def _as_long(frame):
@@ -49,15 +51,15 @@ def messages(to_device=None):
     chosen = [
         message
         for message in SCHEMA.messages
-        if to_device in (None, message.to_device) and message.name != "FRAME_PACKED"
+        if to_device in (None, message.to_device) and not message.name.endswith("_PACKED")
     ]
     return st.one_of([_message(spec) for spec in chosen])
 
 
 def same(one, other):
     """Equality that looks into the samples of a frame."""
-    if isinstance(one, Frame) and isinstance(other, Frame):
-        names = ("sequence", "ticks", "configuration", "flags", "drops", "host_time")
+    if isinstance(one, Frame | DriveSamples) and type(one) is type(other):
+        names = {field.name for field in fields(one)} - {"samples", "sums"}
         return (
             all(getattr(one, n) == getattr(other, n) for n in names)
             and np.array_equal(one.samples, other.samples)

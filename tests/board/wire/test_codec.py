@@ -15,6 +15,7 @@ from tomoskin.board.wire import (
     Hello,
     Ping,
     Result,
+    SetOrder,
     SetPattern,
     crc16,
     decode_payload,
@@ -24,7 +25,7 @@ from tomoskin.board.wire import (
     type_byte,
 )
 from tomoskin.board.wire.framing import cobs_decode
-from tomoskin.core import Frame, WireError
+from tomoskin.core import DriveSamples, Frame, WireError
 
 
 @given(messages())
@@ -42,6 +43,10 @@ def test_golden_bytes():
     assert encode(Hello(1, 0, 0x11223344)).hex()[:16] == "0301010744332211"
     frame = Frame(1, 2, 0.0, 0xBEEF, 1, 0, np.array([0x0102, 0x0304], dtype=np.uint16))
     assert encode_payload(frame).hex() == "10010000000200000000000000efbe01000002010403"
+    drive = DriveSamples(1, 2, 0.0, 0xBEEF, 1, 0, 7, 3, 5, np.array([0x0102], dtype=np.uint16))
+    assert encode_payload(drive).hex() == "13010000000200000000000000efbe0100000703050201"
+    assert encode_payload(drive, packed=True).hex()[-4:] == "0201"
+    assert encode_payload(SetOrder(9, 0x1234, 7, b"\5\5\1")).hex() == "9009341207050501"
     pattern = SetPattern(9, 0x1234, 2, (Drive(3, 4, 0x0000FFE7),))
     assert encode_payload(pattern).hex() == "8609341202000304e7ff0000"
     assert encode_payload(Ack(9, 0x86, Result.BUSY, 0)).hex() == "0309860a0000"
@@ -104,12 +109,15 @@ def test_examples_in_the_document():
     document = (Path(__file__).parents[3] / "docs" / "protocol.md").read_text(encoding="utf-8")
     counts = np.array([512, 1023, 0, 300], dtype=np.uint16)
     frame = Frame(7, 250_000, 0.0, 0x1A2B, 0, 0, counts)
+    drive = DriveSamples(7, 250_003, 0.0, 0x1A2B, 0, 0, 0, 1, 1, counts)
     for message, packed in (
         (GetInfo(1), False),
         (Ack(1, 0x87, Result.OK, 0), False),
         (SetPattern(4, 0x1A2B, 0, (Drive(1, 0, 0xFC),)), False),
         (frame, False),
         (frame, True),
+        (drive, False),
+        (SetOrder(9, 0x1A2B, 7, b"\5\2"), False),
     ):
         payload = encode_payload(message, packed=packed)
         parts = {

@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 
 from tomoskin.board.wire import OLDER, SCHEMA, BoardLimits, FaultCode, Info, Schema
-from tomoskin.board.wire.messages import ENUMS, RECORDS
+from tomoskin.board.wire.messages import ENUMS, FRAMES, RECORDS
 from tomoskin.board.wire.schema import SCALARS
 
 TEXT = files("tomoskin.board.wire").joinpath("protocol.toml").read_text(encoding="utf-8")
 
-VERSIONS = {(1, 0): 0x8B6ABBBD, (1, 1): 0xF17AB758, (1, 2): 0x6B98E2FE}
+VERSIONS = {(1, 0): 0x8B6ABBBD, (1, 1): 0xF17AB758, (1, 2): 0x6B98E2FE, (1, 3): 0xFFDB1F25}
 """Hash of each version that was ever published: a change of the schema needs a new version."""
 
 
@@ -26,14 +26,15 @@ def test_hash_follows_what_is_on_the_wire_only():
     reworded = TEXT.replace("Ask for INFO", "Ask the board what it is")
     assert reworded != TEXT
     assert Schema.read(reworded).hash == SCHEMA.hash
-    for old, new in [('type = "u64"', 'type = "u32"'), ("minor = 2", "minor = 3"), ("µs", "ms")]:
+    for old, new in [('type = "u64"', 'type = "u32"'), ("minor = 3", "minor = 4"), ("µs", "ms")]:
         assert Schema.read(TEXT.replace(old, new)).hash != SCHEMA.hash
 
 
-def test_a_frame_has_what_its_messages_have():
-    own = {field.name for field in dataclasses.fields(RECORDS["FRAME"])}
-    for name in ("FRAME", "FRAME_PACKED", "FRAME_CHOPPED"):
+def test_a_frame_and_a_drive_have_what_their_messages_have():
+    for name, record in FRAMES.items():
+        own = {field.name for field in dataclasses.fields(record)}
         assert own - {field.name for field in SCHEMA.by_name[name].fields} == {"host_time", "sums"}
+        assert RECORDS[name] is record
 
 
 def test_records_and_values_are_the_schemas():

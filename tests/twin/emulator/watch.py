@@ -19,7 +19,8 @@ class Watch:
     """Cycles of the simulated clock.
 
     ``spent`` in the instruction at each word of flash; ``net`` (16,) of pairs, by the lower
-    channel: from the other one to it, less from it to the other.
+    channel: from the other one to it, less from it to the other. ``said``: from the end of a drive
+    to the last byte of the newest message; ``deaf``: without interrupts.
     """
 
     cycle: int
@@ -29,15 +30,18 @@ class Watch:
     shortest_off: int
     resets: int
     lowest_stack: int
+    said: int
+    deaf: int
     spent: np.ndarray
     net: np.ndarray
 
     @classmethod
     def read(cls, path: Path) -> Watch:
         words = np.fromfile(path, "<u8")
-        cycle, connected, since, on, off, resets, stack = words[:7].tolist()
+        cycle, connected, since, on, off, resets, stack, said, deaf = words[:9].tolist()
         net = words[-CHANNELS:].astype(np.int64)
-        return cls(cycle, bool(connected), since, on, off, resets, stack, words[7:-CHANNELS], net)
+        on_off = (cycle, bool(connected), since, on, off)
+        return cls(*on_off, resets, stack, said, deaf, words[9:-CHANNELS], net)
 
     @property
     def on(self) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Protocol, runtime_checkable
 
 from tomoskin.board.source.boards import BOARDS, DEFAULT_BOARD
@@ -25,6 +25,12 @@ from tomoskin.model.pattern import Scan
 
 BOARDS_SINCE = 2
 """The minor version in which boards say their name, and drive alternately."""
+
+DRIVES_SINCE = 3
+"""The minor version in which boards send drives one by one, if they are asked to."""
+
+_MOST_SINGLY = 255
+"""The most drives of a scan whose drives are sent one by one: their numbers have eight bits."""
 
 RATES = (1_000_000, 500_000, 250_000)
 """Rates that the ATmega's clock divides into exactly, fastest first, Bd."""
@@ -102,6 +108,11 @@ def check_version(board: Hello | Info, where: str) -> None:
     raise WireError(spoken + "this tomoskin is older", where=where, hint=_UPDATE_HOST)
 
 
+def current_damaged(current: int) -> bool:
+    """Whether a board says instead of its current (µA) that what it has stored is damaged."""
+    return current == 0xFFFFFFFF
+
+
 def fit_board(info: Info, scan: Scan, asked: ScanSettings, where: str) -> ScanSettings:
     """What to set on this board for what is ``asked``; SourceError says what it lacks."""
     if not TICK_RATES[0] <= info.tick_rate <= TICK_RATES[1]:
@@ -134,6 +145,12 @@ def fit_board(info: Info, scan: Scan, asked: ScanSettings, where: str) -> ScanSe
             where=where,
             hint=f'{_UPDATE_BOARD}, or set [drive] mode = "direct"',
         )
+    if current_damaged(info.current):
+        raise SourceError(
+            "the current that the board's memory holds is damaged: its checksum is wrong",
+            where=where,
+            hint='tomoskin firmware configure PORT --current "…" writes it again',
+        )
     if info.current > round(settings.current_limit * 1e6):
         raise SourceError(
             f"the board's current limiter is set to {info.current / 1e3:g} mA, but this skin "
@@ -141,7 +158,8 @@ def fit_board(info: Info, scan: Scan, asked: ScanSettings, where: str) -> ScanSe
             where=where,
             hint="lower the limiter before you connect the skin",
         )
-    return settings
+    singly = settings.singly and info.minor >= DRIVES_SINCE and len(scan.drives) <= _MOST_SINGLY
+    return replace(settings, singly=singly)
 
 
 def _check_size(info: Info, scan: Scan, asked: ScanSettings, where: str) -> None:

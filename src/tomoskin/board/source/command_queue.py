@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from tomoskin.board.source.configuration import Configuration
 from tomoskin.board.source.settings import Timing
 from tomoskin.board.wire import Command, SetBaud, encode
-from tomoskin.core import Event, Frame, SourceError
+from tomoskin.core import DriveSamples, Event, Frame, SourceError
 
 _MODULUS = 2**32
 _ANY = -1
@@ -21,7 +21,8 @@ class FrameCounters:
     """Frames since the link was made, until now.
 
     ``passed`` on; ``lost`` by their sequence numbers; ``foreign``: another configuration or a
-    wrong number of samples; ``stale``: behind the sequence, or before START was answered.
+    wrong number of samples; ``stale``: behind the sequence, or before START was answered. Drives
+    that come singly count as foreign or stale in the same way; a turn that lacks one is lost.
     """
 
     passed: int = 0
@@ -55,41 +56,61 @@ class SequenceFilter:
 
     def take(self, frame: Frame) -> list[Frame | Event]:
         """The frame, or nothing; and an event if frames are missing or foreign ones begin."""
-        counters = self.counters
-        if self._expected is None:
-            counters.stale += 1
-            return []
-        fault = self._fault(frame)
-        if fault:
-            counters.foreign += 1
-            first, self._foreign_run = not self._foreign_run, True
-            return [Event(frame.host_time, "foreign", fault)] if first else []
-        self._foreign_run = False
-        gap = 0 if self._expected == _ANY else (frame.sequence - self._expected) % _MODULUS
+        if (refusal := self.refuse(frame)) is not None:
+            return [*refusal]
+        gap = self._gap(frame)
         if gap >= _MODULUS // 2:
-            counters.stale += 1
+            self.counters.stale += 1
             return []
-        self._expected = (frame.sequence + 1) % _MODULUS
-        counters.passed += 1
-        if not gap:
-            return [frame]
-        counters.lost += gap
-        text = f"{gap} frame{'s' if gap > 1 else ''} lost before frame {frame.sequence}"
-        return [Event(frame.host_time, "lost", text), frame]
+        self.counters.passed += 1
+        return [*self._go_on(frame, gap), frame]
 
-    def _fault(self, frame: Frame) -> str:
-        wanted = self._configuration
-        if frame.configuration != wanted.identity:
+    def skip(self, drive: DriveSamples, *, cut: bool) -> list[Event]:
+        """The turn of ``drive`` makes no frame; ``cut``: the one before did not come to its end."""
+        gap = self._gap(drive)
+        return [] if gap >= _MODULUS // 2 else self._go_on(drive, gap - cut)
+
+    def refuse(self, item: Frame | DriveSamples) -> list[Event] | None:
+        """None for what is of this scan; all else is counted, and an event says when it begins."""
+        if self._expected is None:
+            self.counters.stale += 1
+            return []
+        fault = self._fault(item)
+        if not fault:
+            self._foreign_run = False
+            return None
+        self.counters.foreign += 1
+        first, self._foreign_run = not self._foreign_run, True
+        return [Event(item.host_time, "foreign", fault)] if first else []
+
+    def _gap(self, item: Frame | DriveSamples) -> int:
+        """How many turns are missing before this one; half the modulus or more: it is old."""
+        assert self._expected is not None
+        return 0 if self._expected == _ANY else (item.sequence - self._expected) % _MODULUS
+
+    def _go_on(self, item: Frame | DriveSamples, lost: int) -> list[Event]:
+        self._expected = (item.sequence + 1) % _MODULUS
+        if lost <= 0:
+            return []
+        self.counters.lost += lost
+        text = f"{lost} frame{'s' if lost > 1 else ''} lost before frame {item.sequence}"
+        return [Event(item.host_time, "lost", text)]
+
+    def _fault(self, item: Frame | DriveSamples) -> str:
+        scan, n = self._configuration, len(item.samples)
+        if item.configuration != scan.identity:
             return (
-                f"frames of configuration {frame.configuration:04x} are left out: this scan has "
-                f"configuration {wanted.identity:04x}"
+                f"frames of configuration {item.configuration:04x} are left out: this scan has "
+                f"configuration {scan.identity:04x}"
             )
-        if len(frame.samples) != wanted.n_samples:
-            return (
-                f"frames with {len(frame.samples)} samples are left out: this scan has "
-                f"{wanted.n_samples} samples"
-            )
-        return ""
+        if isinstance(item, Frame):
+            expected, what = scan.n_samples, f"frames with {n} samples"
+        else:
+            possible = item.drive < len(scan.channels) and (item.order or item.drive == item.place)
+            expected = scan.channels[item.drive] if possible else -1
+            what = f"messages of drive {item.drive} with {n} samples"
+        text = f"{what} are left out: this scan has {scan.n_samples} samples"
+        return "" if n == expected else text
 
 
 @dataclass
@@ -135,6 +156,13 @@ class CommandQueue:
     def add(self, commands: Iterable[Command]) -> None:
         """Send these after those that wait."""
         self._waiting.extend(commands)
+
+    def ask(self, command: Command, now: float) -> None:
+        """Send this as soon as nothing is pending, in place of one of its kind that waits."""
+        others = (waiting for waiting in self._waiting if type(waiting) is not type(command))
+        self._waiting = deque([*others, command])
+        if self._pending is None:
+            self.send_next(now)
 
     def clear(self) -> None:
         """Await nothing and send nothing more."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Self
 
 from tomoskin.board.source.settings import ScanSettings, scan_time
@@ -12,6 +13,7 @@ from tomoskin.board.wire import (
     Command,
     Drive,
     DriveMode,
+    Format,
     GetMode,
     GetPattern,
     GetScan,
@@ -56,6 +58,17 @@ class Configuration:
         mode, held = ((self.mode,), (GetMode(0),)) if self.mode else ((), ())
         settings = (self.scan, *self.patterns, self.format, *mode)
         return (*settings, GetScan(0), *read_back, *held, start)
+
+    @property
+    def singly(self) -> bool:
+        """Whether it asks for each drive in a message of its own."""
+        return self.format.format in (Format.DRIVES, Format.DRIVES_PACKED)
+
+    @cached_property
+    def channels(self) -> tuple[int, ...]:
+        """How many channels each drive reads."""
+        drives = (drive for pattern in self.patterns for drive in pattern.drives)
+        return tuple(drive.mask.bit_count() for drive in drives)
 
     def behind(self, question: Command) -> tuple[Command, ...]:
         """The commands that set what a GET_SCAN, GET_PATTERN or GET_MODE asks for."""

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 
 from tomoskin.board.source.agreement import Rated, RateFollower
+from tomoskin.board.source.assembler import Received
 from tomoskin.board.source.clock import ClockWatch
 from tomoskin.board.source.configuration import Configuration
 from tomoskin.board.source.protocol_session import ProtocolSession, Stage
 from tomoskin.board.source.settings import ScanSettings, Timing
 from tomoskin.board.source.transport import Diagnosable, Fetched, Played, Transport
 from tomoskin.board.wire import Ack, BoardLimits, Decoder, Info
-from tomoskin.core import Event, Frame, SourceError
+from tomoskin.core import Frame, SourceError
 from tomoskin.model.pattern import Scan
 
 _HEARD = 256
@@ -91,8 +92,8 @@ class Link(AbstractContextManager["Link"]):
         """How long the first byte of the last read had waited on this host, s."""
         return self._fetched.waited if self._fetched else 0.0
 
-    def poll(self, timeout: float) -> list[Frame | Event]:
-        """Frames and events, waiting at most ``timeout`` s for bytes.
+    def poll(self, timeout: float) -> list[Received]:
+        """Frames, drives sent singly, and events, waiting at most ``timeout`` s for bytes.
 
         Raises
         ------
@@ -118,6 +119,22 @@ class Link(AbstractContextManager["Link"]):
         patience = min(timeout, self._session.deadline() - now)
         items += self._listen(max(patience, 0.0))
         return items
+
+    def ask_order(self, drives: Sequence[int]) -> int:
+        """Have the ``drives`` of the scan scanned in this order, again and again; none: full turns.
+
+        Returns the identity that they come with, from the end of a drive on; 0: full turns, also
+        where the board sends whole scans or has not begun. A board that is set up again begins with
+        full turns. Of several orders between two answers the newest counts.
+
+        Raises
+        ------
+        WireError
+            For more drives than fit into a message, 55.
+        """
+        order = self._session.ask_order(drives, self._clock())
+        self._flush()
+        return order
 
     def connect(self) -> Info:
         """Poll until the board scans; what it said of itself. Raises as :meth:`poll` does."""
@@ -151,7 +168,7 @@ class Link(AbstractContextManager["Link"]):
         """Close the link, whatever ended the block."""
         self.close()
 
-    def _listen(self, timeout: float) -> list[Frame | Event]:
+    def _listen(self, timeout: float) -> list[Received]:
         data = self.transport.read(timeout)
         now = self._clock()
         if data and self._tap:
@@ -160,7 +177,7 @@ class Link(AbstractContextManager["Link"]):
             self._heard = (self._heard + data)[:_HEARD]
         if data and self._played and self._played.after_seek():
             self._decoder.forget()
-            self._session.frames.expect_any()
+            self._session.after_seek()
         items = []
         for message in self._decoder.feed(data, now):
             items += self._session.receive(message, now)

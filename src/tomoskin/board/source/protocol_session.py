@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from enum import Enum, auto
 
 import numpy as np
 
 from tomoskin.board.source.agreement import BOARDS_SINCE, check_held, check_version, fit_board
+from tomoskin.board.source.assembler import Assembler, Received
 from tomoskin.board.source.command_queue import CommandQueue, SequenceFilter
 from tomoskin.board.source.configuration import Configuration
 from tomoskin.board.source.settings import ScanSettings, Timing, choose_periods
@@ -30,10 +33,13 @@ from tomoskin.board.wire import (
     Ping,
     Result,
     SetBaud,
+    SetFormat,
+    SetOrder,
     Stop,
+    encode,
     type_byte,
 )
-from tomoskin.core import Event, Frame, SourceError
+from tomoskin.core import DriveSamples, Event, Frame, SourceError
 from tomoskin.model.pattern import Scan
 
 _ANSWERED: dict[type[Message], type[Command]] = {
@@ -87,6 +93,8 @@ class ProtocolSession:
         self._scan, self._settings, self._timing, self._where = scan, settings, timing, where
         self.configuration = Configuration.of(scan, settings)
         self.frames = SequenceFilter(self.configuration)
+        self._drives = Assembler(self.frames, len(scan.drives))
+        self._order = 0
         self.commands = CommandQueue(timing, now, where)
         self.stage = Stage.WAITING
         self.info: Info | None = None
@@ -98,6 +106,7 @@ class ProtocolSession:
         self._since = self._last_frame = now
         self._resets = 0
         self._rate: int | None = None
+        self._unsaid = settings.singly
 
     def take_rate(self) -> int | None:
         """The serial rate that the board has just changed to, once."""
@@ -113,12 +122,12 @@ class ProtocolSession:
             f"messages arrive damaged: the board is set up again at the slower rate of {rate:,} Bd",
         )
 
-    def receive(self, message: Message, now: float) -> list[Frame | Event]:
+    def receive(self, message: Message, now: float) -> list[Received]:
         """Act on a message from the board."""
         self._overdue = False
         match message:
-            case Frame():
-                return self._frame(message, now)
+            case Frame() | DriveSamples():
+                return self._samples(message, now)
             case Hello():
                 return self._hello(message, now)
             case Info():
@@ -134,7 +143,7 @@ class ProtocolSession:
                 return [Event(now, "fault", f"the board has switched its current off: {text}")]
         return []
 
-    def tick(self, now: float) -> list[Frame | Event]:
+    def tick(self, now: float) -> list[Received]:
         """Act on the time: ask again, keep alive, notice silence."""
         if self.stage is Stage.WAITING and now >= self._since + self._timing.hello:
             self._set_up(now)
@@ -148,6 +157,8 @@ class ProtocolSession:
         if not self._overdue:  # a busy host may not have read yet what has come
             self._overdue = True
             return []
+        if self._unsaid and self.configuration.singly:
+            return self._go_whole(now)
         self.is_silent = True
         text = f"no frame for {now - self._last_frame:.1f} s: check the board's power and cable"
         return [Event(now, "silent", text)]
@@ -160,6 +171,22 @@ class ProtocolSession:
             return repeat_time
         ping = self.commands.last_sent + self._timing.ping
         return ping if self.is_silent else min(ping, self._last_frame + self._silence)
+
+    def ask_order(self, drives: Sequence[int], now: float) -> int:
+        """Ask for the ``drives`` again and again; see :meth:`Link.ask_order`."""
+        if self.stage is not Stage.RUNNING or not self.configuration.singly:
+            return 0
+        self._order = self._order % 255 + 1
+        identity = self._order if drives else 0
+        order = SetOrder(0, self.configuration.identity, identity, bytes(drives))
+        encode(order)  # one that does not fit a message is refused here, not when it is sent
+        self.commands.ask(order, now)
+        return identity
+
+    def after_seek(self) -> None:
+        """What comes next is of another place in a recording."""
+        self.frames.expect_any()
+        self._drives.forget()
 
     def stop(self, now: float) -> int:
         """Send STOP, whatever is going on; returns its request id."""
@@ -174,32 +201,52 @@ class ProtocolSession:
         change = () if at is None else (Stop(0), SetBaud(0, at))
         self.commands.restart((*change, GetInfo(0), Stop(0)), now)
 
-    def _answered(self, now: float) -> list[Frame | Event]:
+    def _answered(self, now: float) -> list[Received]:
         """The pending command has been answered: what follows."""
         pending = self.commands.pending
         if isinstance(pending, SetBaud):
             self._rate = pending.baud
-        if self.commands.send_next(now):
+        if self.commands.send_next(now) or isinstance(pending, SetOrder):
             return []
         self.stage, self._last_frame, self.is_silent = Stage.RUNNING, now, False
         self.frames.open()
+        self._drives.forget()
         assert self.info is not None
         text = _introduction(self.info, self.board, self.configuration)
         return [Event(now, "connected", text)]
 
-    def _frame(self, frame: Frame, now: float) -> list[Frame | Event]:
+    def _samples(self, samples: Frame | DriveSamples, now: float) -> list[Received]:
         if self.stage is Stage.WAITING:
             self._set_up(now)
-        passed = self.frames.take(frame)
-        if not passed or passed[-1] is not frame:
+        passed: list[Received] = []
+        if whole := isinstance(samples, Frame):
+            passed += self.frames.take(samples)
+        else:
+            passed += self._drives.take(samples)
+        if not passed or isinstance(passed[-1], Event):
             return passed
+        self._unsaid &= whole
         quiet, was_silent = now - self._last_frame, self.is_silent
         self._last_frame, self.is_silent = now, False
         if was_silent:
             passed.insert(0, Event(now, "resumed", f"frames arrive again after {quiet:.1f} s"))
-        return passed
+        if not self._settings.singly:  # nobody has asked for the drives of this recording
+            return [item for item in passed if not isinstance(item, DriveSamples)]
+        return [*self._whole(now), *passed] if whole else passed
 
-    def _hello(self, hello: Hello, now: float) -> list[Frame | Event]:
+    def _whole(self, now: float) -> list[Received]:
+        """Scans come whole though drives were asked for: an event says so once."""
+        unsaid, self._unsaid = self._unsaid, False
+        text = "the board sends whole scans only: a touch shows at the end of its first scan"
+        return [Event(now, "whole-scans", text)] if unsaid else []
+
+    def _go_whole(self, now: float) -> list[Received]:
+        """Set the board up again for whole scans, since drives do not come."""
+        self._settings = replace(self._settings, singly=False)
+        self._set_up(now)
+        return self._whole(now)
+
+    def _hello(self, hello: Hello, now: float) -> list[Received]:
         check_version(hello, self._where)
         if self.stage is Stage.SETTING_UP and self.info is None:
             return []
@@ -241,14 +288,14 @@ class ProtocolSession:
         self.commands.add(self.configuration.commands(info.minor))
         self._answered(now)
 
-    def _held(self, held: HeldScan | HeldPattern | HeldMode, now: float) -> list[Frame | Event]:
+    def _held(self, held: HeldScan | HeldPattern | HeldMode, now: float) -> list[Received]:
         pending = self.commands.pending
         if not isinstance(pending, _ANSWERED[type(held)]) or held.request != pending.request:
             return []
         check_held(held, self.configuration.behind(pending), self._where)
         return self._answered(now)
 
-    def _ack(self, ack: Ack, now: float) -> list[Frame | Event]:
+    def _ack(self, ack: Ack, now: float) -> list[Received]:
         pending = self.commands.pending
         if self.is_silent and pending is None:
             # It hears the heartbeat but does not scan: its HELLO or FAULT was lost.
@@ -261,12 +308,19 @@ class ProtocolSession:
             return []
         if ack.result is Result.OK and isinstance(pending, _QUESTIONS):
             return []  # no answer to a question
-        if ack.result is not Result.OK:
-            raise SourceError(
-                f"the board refused {type(pending).__name__}: {_reason(ack, pending)}",
-                where=self._where,
-            )
-        return self._answered(now)
+        return self._answered(now) if ack.result is Result.OK else self._refused(ack, pending, now)
+
+    def _refused(self, ack: Ack, command: Command, now: float) -> list[Received]:
+        """The board has refused the pending command: goes on without it where that is possible."""
+        if isinstance(command, SetOrder):
+            self.commands.send_next(now)
+            return [Event(now, "order", f"the board refused an order: {_reason(ack, command)}")]
+        if isinstance(command, SetFormat) and self._unsaid:
+            return self._go_whole(now)
+        raise SourceError(
+            f"the board refused {type(command).__name__}: {_reason(ack, command)}",
+            where=self._where,
+        )
 
 
 _QUESTIONS = (GetBoard, *_ANSWERED.values())

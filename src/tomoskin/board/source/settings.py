@@ -39,6 +39,8 @@ class ScanSettings:
         Converter clock divider; 64 is 250 kHz at 16 MHz.
     chop_frequency
         Of an alternating drive, Hz; 0: the drive is direct.
+    singly
+        Whether each drive is sent when it has been read, where the board can; else whole scans.
     """
 
     oversampling: int
@@ -48,6 +50,7 @@ class ScanSettings:
     dead_time: float = 5e-6
     prescaler: int = 64
     chop_frequency: int = 0
+    singly: bool = False
 
     def __post_init__(self) -> None:
         """Check what every board would refuse."""
@@ -68,6 +71,8 @@ class ScanSettings:
     def format(self) -> Format:
         """How samples are sent: one conversion of ten bits is shorter on the line when packed."""
         packs = self.oversampling == 1 and self.adc_bits == _PACKED_BITS
+        if self.singly:
+            return Format.DRIVES_PACKED if packs else Format.DRIVES
         return Format.PACKED if packs else Format.SIXTEEN
 
     def on_board(self, adc_bits: int) -> Self | None:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import dataclasses
 import struct
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from itertools import starmap
 from typing import Any, TypeGuard
 
 import numpy as np
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from tomoskin.board.wire.framing import Deframer, enclose
 from tomoskin.board.wire.messages import ENUMS, FRAMES, RECORDS, STRUCTS, Command, Message
 from tomoskin.board.wire.schema import SCALARS, SCHEMA, FieldSpec, MessageSpec
-from tomoskin.core import Frame, WireError
+from tomoskin.core import DriveSamples, Frame, WireError
 
 _GROUP = 4
 """Samples of ten bits that are packed together: four lower bytes, then their upper halves."""
@@ -90,34 +91,35 @@ def encode(message: Message, *, packed: bool = False) -> bytes:
 
 def encode_payload(message: Message, *, packed: bool = False) -> bytes:
     """Type byte and fields, without checksum."""
-    if isinstance(message, Frame):
+    if isinstance(message, Frame | DriveSamples):
         layout, tail = _samples(message, packed=packed)
         values = tuple(getattr(message, field.name) for field in layout.spec.fields[:-1])
     else:
         layout, values, tail = _BY_RECORD[type(message)], dataclasses.astuple(message), b""
     try:
-        if layout.tail_record is not None and layout.tail is not None:
+        if layout.tail is not None and not isinstance(message, Frame | DriveSamples):
             values, items = values[:-1], values[-1]
-            tail = b"".join(layout.tail.pack(*item) for item in items)
+            records = layout.tail_record is not None
+            tail = b"".join(starmap(layout.tail.pack, items)) if records else items
         return layout.head.pack(layout.spec.type, *values) + tail
     except struct.error as error:
         raise WireError(f"{error} in {message!r}", where=layout.spec.name) from error
 
 
-def _samples(frame: Frame, *, packed: bool) -> tuple[_Layout, bytes]:
-    """The message that a frame goes in, and its samples as they are sent."""
-    samples = frame.samples
+def _samples(frame: Frame | DriveSamples, *, packed: bool) -> tuple[_Layout, bytes]:
+    """The message that samples go in, and these as they are sent."""
+    samples, name = frame.samples, "FRAME" if isinstance(frame, Frame) else "DRIVE_SAMPLES"
     if samples.dtype != np.dtype("<u2") or samples.ndim != 1:
         raise WireError(
             f"expected samples (n,) of uint16, got {samples.shape} of {samples.dtype}",
-            where="FRAME",
+            where=name,
         )
     if frame.sums is not None:
         both = np.column_stack([samples, frame.sums]).astype("<u2")
-        return _LAYOUTS["FRAME_CHOPPED"], both.tobytes()
+        return _LAYOUTS[f"{name}_CHOPPED"], both.tobytes()
     if packed:
-        return _LAYOUTS["FRAME_PACKED"], pack(samples).tobytes()
-    return _LAYOUTS["FRAME"], samples.tobytes()
+        return _LAYOUTS[f"{name}_PACKED"], pack(samples).tobytes()
+    return _LAYOUTS[name], samples.tobytes()
 
 
 def decode_payload(payload: bytes, host_time: float) -> Message | None:
@@ -134,9 +136,9 @@ def decode_payload(payload: bytes, host_time: float) -> Message | None:
         return None
     if name in FRAMES:
         return _frame(name, values, np.frombuffer(payload, np.uint8, offset=size), host_time)
-    if layout.tail is not None and layout.tail_record is not None:
-        record = layout.tail_record
-        values.append(tuple(record(*item) for item in layout.tail.iter_unpack(payload[size:])))
+    if layout.tail is not None:
+        record, rest = layout.tail_record, payload[size:]
+        values.append(tuple(record(*i) for i in layout.tail.iter_unpack(rest)) if record else rest)
     made: Message = RECORDS[name](*values[1:])
     return made
 
@@ -146,24 +148,30 @@ def _fits(layout: _Layout, length: int) -> bool:
     return rest >= 0 and (rest % layout.tail.size == 0 if layout.tail else rest == 0)
 
 
-def _frame(name: str, values: list[Any], data: NDArray[np.uint8], host_time: float) -> Frame | None:
-    """A frame of the samples in ``data``; None where so many bytes hold no samples."""
-    sequence, ticks, configuration, flags, drops = values[1:]
-    if name == "FRAME_PACKED":
+def _frame(
+    name: str, values: list[Any], data: NDArray[np.uint8], host_time: float
+) -> Frame | DriveSamples | None:
+    """A frame or drive of the samples in ``data``; None where so many bytes hold no samples."""
+    _, sequence, ticks, *rest = values
+    if name.endswith("_PACKED"):
         if len(data) % (_GROUP + 1) == 1:
             return None
         samples = unpack(data)
     else:
         samples = data.view("<u2")
-    frame = Frame(sequence, ticks, host_time, configuration, flags, drops, samples)
-    if name != "FRAME_CHOPPED":
-        return frame
-    return None if len(samples) % 2 else replace(frame, samples=samples[::2], sums=samples[1::2])
+    values = [sequence, ticks, host_time, *rest, samples]
+    if name.endswith("_CHOPPED"):
+        if len(samples) % 2:
+            return None
+        values[-1:] = samples[::2], samples[1::2]
+    made: Frame | DriveSamples = FRAMES[name](*values)
+    return made
 
 
 def is_command(message: Message) -> TypeGuard[Command]:
     """Whether ``message`` goes to the device."""
-    return not isinstance(message, Frame) and _BY_RECORD[type(message)].spec.to_device
+    layout = _BY_RECORD.get(type(message))
+    return layout is not None and layout.spec.to_device
 
 
 class Decoder:

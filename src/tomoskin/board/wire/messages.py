@@ -1,7 +1,7 @@
 """The messages as frozen records, made of the schema; ``messages.pyi`` says the same to a reader.
 
-``scripts/firmware_header.py`` writes that file. A field u8[n] is bytes; a frame, packed or not, is
-a :class:`Frame`, which also knows when the host read it.
+``scripts/firmware_header.py`` writes that file. A field u8[n] is bytes; samples, packed or
+not, are a :class:`Frame` or :class:`DriveSamples`, which also know when the host read them.
 """
 
 from __future__ import annotations
@@ -13,10 +13,14 @@ from operator import or_
 from typing import Any
 
 from tomoskin.board.wire.schema import SCALARS, SCHEMA, FieldSpec
-from tomoskin.core import Frame
+from tomoskin.core import DriveSamples, Frame
 
-FRAMES = ("FRAME", "FRAME_PACKED", "FRAME_CHOPPED")
-"""Messages that hold a frame."""
+FRAMES: dict[str, type] = {
+    f"{name}{form}": record
+    for name, record in (("FRAME", Frame), ("DRIVE_SAMPLES", DriveSamples))
+    for form in ("", "_PACKED", "_CHOPPED")
+}
+"""Messages that hold samples, and the records that they become."""
 
 _NAMES = {
     "SCAN": "HeldScan",
@@ -77,9 +81,7 @@ for _name, _group in SCHEMA.structs.items():
     STRUCTS[_name] = _record(_name, _group.text, _group.fields)
 
 RECORDS: dict[str, type] = {
-    message.name: Frame
-    if message.name in FRAMES
-    else _record(message.name, message.text, message.fields)
+    message.name: FRAMES.get(message.name) or _record(message.name, message.text, message.fields)
     for message in SCHEMA.messages
 }
 """The record of each message by its name in the schema."""

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from enum import Enum, IntEnum, IntFlag
 from typing import Any
 
-from tomoskin.core import Frame
+from tomoskin.core import DriveSamples, Frame
 
-FRAMES: tuple[str, ...]
+FRAMES: dict[str, type]
 RECORDS: dict[str, type[Any]]
 STRUCTS: dict[str, type[Any]]
 ENUMS: dict[str, type[Enum]]
@@ -34,6 +34,7 @@ class Result(IntEnum):
     BUSY = 10
     CURRENT_TOO_HIGH = 11
     CHOP_TOO_FAST = 12
+    NOT_SINGLY = 13
 
 class FaultCode(IntEnum):
     """Why the board went to its safe state by itself."""
@@ -60,6 +61,8 @@ class Format(IntEnum):
 
     SIXTEEN = 0
     PACKED = 1
+    DRIVES = 2
+    DRIVES_PACKED = 3
 
 class DriveMode(IntEnum):
     """How a pair of electrodes is driven."""
@@ -282,6 +285,15 @@ class GetMode:
 
     request: int
 
+@dataclass(frozen=True, slots=True)
+class SetOrder:
+    """Which drives are scanned, again and again, from the end of the drive under way on."""
+
+    request: int
+    configuration: int
+    order: int
+    drives: bytes
+
 Command = (
     GetInfo
     | Ping
@@ -298,8 +310,9 @@ Command = (
     | GetBoard
     | SetMode
     | GetMode
+    | SetOrder
 )
 
 _Report = Hello | Info | Ack | Fault | HeldScan | HeldPattern | BoardLimits | HeldMode
 
-Message = Command | _Report | Frame
+Message = Command | _Report | Frame | DriveSamples

@@ -157,5 +157,5 @@ SCHEMA = Schema.read(
 )
 """The schema that this host was made with."""
 
-OLDER = {(1, 0): 0x8B6ABBBD, (1, 1): 0xF17AB758}
+OLDER = {(1, 0): 0x8B6ABBBD, (1, 1): 0xF17AB758, (1, 2): 0x6B98E2FE}
 """Hashes of the published versions, by major and minor, that this host speaks besides its own."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from itertools import chain, islice
 
 from tomoskin.board.wire import SCHEMA, Deframer, decode_payload, encode
-from tomoskin.core import DataError, Event, Frame, Mark, MarkedFrame, StrPath
+from tomoskin.core import DataError, DriveSamples, Event, Frame, Mark, MarkedFrame, StrPath
 from tomoskin.files.session.session_reader import SessionReader, end_time, start_time
 from tomoskin.sensing.track import Span, touch_spans
 
@@ -200,7 +200,8 @@ def _from_frame(data: bytes, frame: Frame) -> bytes:
     while (end := data.find(b"\0", place)) >= 0:
         for payload in Deframer(SCHEMA.from_device_bytes).feed(data[place : end + 1]):
             message = decode_payload(payload, frame.host_time)
-            if isinstance(message, Frame) and message.sequence == frame.sequence:
-                return data[place:]
+            match message:
+                case Frame(sequence=frame.sequence) | DriveSamples(sequence=frame.sequence):
+                    return data[place:]
         place = end + 1
     return data

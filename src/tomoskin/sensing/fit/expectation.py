@@ -237,6 +237,12 @@ class ResidualResponse:
             self._left, self._doubts = np.array(counts).reshape(-1, len(matrix)), doubts
         return self._left
 
+    def doubtful(self, n_meas: int) -> tuple[tuple[float, ...], FloatArray]:
+        """The deviations of what may be left, and directions (k, n_meas) V as long as these."""
+        doubts = tuple(foot.doubt(self._since) for foot in self._feet)
+        left = [d * foot.shapes[0] for d, foot in zip(doubts, self._feet, strict=True) if d]
+        return doubts, np.array(left).reshape(-1, n_meas)
+
     def idle(self, data: FloatArray) -> None:
         """Take ``data`` (n_meas,) V of a frame in which nothing touched, less what was known."""
         self._since = self._seconds

@@ -1,0 +1,112 @@
+"""Drives that a board sends one by one, checked, and the frames that full turns of them make."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tomoskin.board.source.command_queue import SequenceFilter
+from tomoskin.core import DriveSamples, Event, Frame
+
+_MODULUS = 2**32
+
+Received = Frame | DriveSamples | Event
+"""What comes from a board: scans, drives of them where these are sent one by one, and events."""
+
+
+class Assembler:
+    """Passes drives on at once, and behind the last of a full turn its frame.
+
+    A drive that is late, doubled, or of another scan is left out and counted, as a frame is. A turn
+    that lacks a drive makes no frame and is counted as lost, unless a new order cut it short.
+    """
+
+    def __init__(self, frames: SequenceFilter, n_drives: int) -> None:
+        """``frames`` is the filter that drives and frames go through."""
+        self._frames, self._n_drives = frames, n_drives
+        self.forget()
+
+    def forget(self) -> None:
+        """What comes next does not follow what came before."""
+        self._last: DriveSamples | None = None
+        self._turn: list[DriveSamples] | None = None
+        """The drives of a full turn that lacks none so far."""
+
+    def take(self, drive: DriveSamples) -> list[Received]:
+        """The drive and the frame that it completes, or nothing; and an event if some is wrong."""
+        events = self._frames.refuse(drive)
+        if events is not None:
+            return [*events]
+        last, counters = self._last, self._frames.counters
+        ahead = (drive.sequence - last.sequence) % _MODULUS if last else 1
+        if last and ahead == 0 and _head(drive) != _head(last):
+            counters.foreign += 1
+            self._turn = None
+            return []
+        if last and (ahead >= _MODULUS // 2 or (ahead == 0 and drive.place <= last.place)):
+            counters.stale += 1
+            return []
+        self._last = drive
+        if ahead == 0 and last:
+            return self._go_on(drive, last)
+        cut = last is not None and self._is_cut(last) and ahead == 1
+        return self._begin(drive, cut=cut)
+
+    def _is_cut(self, last: DriveSamples) -> bool:
+        """Whether the turn that ``last`` was of is a full one that lacks its end alone."""
+        return self._turn is not None and last.place < self._n_drives - 1
+
+    def _begin(self, drive: DriveSamples, *, cut: bool) -> list[Received]:
+        """The first drive of a turn; ``cut``: the turn before could not come to its end."""
+        self._turn = None
+        if drive.order:
+            lost = self._frames.skip(drive, cut=cut)
+            return [*lost, *self._missing(drive, drive.place), drive]
+        if drive.place:
+            return [drive]
+        self._turn = []
+        return self._complete(drive)
+
+    def _go_on(self, drive: DriveSamples, last: DriveSamples) -> list[Received]:
+        """A further drive of the turn of ``last``."""
+        missing = drive.place - last.place - 1
+        if drive.order:
+            return [*self._missing(drive, missing), drive]
+        if missing:
+            self._turn = None
+        return [drive] if self._turn is None else self._complete(drive)
+
+    def _missing(self, drive: DriveSamples, count: int) -> list[Event]:
+        """Drives of another order than a full turn are missing before this one."""
+        if not count:
+            return []
+        self._frames.counters.lost += 1
+        text = f"{count} drive{'s' if count > 1 else ''} lost in scan {drive.sequence}"
+        return [Event(drive.host_time, "lost", text)]
+
+    def _complete(self, drive: DriveSamples) -> list[Received]:
+        """The drive, which lacks none before it, and the frame if it is the last."""
+        assert self._turn is not None
+        self._turn.append(drive)
+        if drive.place < self._n_drives - 1:
+            return [drive]
+        return [drive, *self._frames.take(_frame(self._turn))]
+
+
+def _head(drive: DriveSamples) -> tuple[int, int, int]:
+    """What all drives of a turn have in common."""
+    return drive.order, drive.flags, drive.drops
+
+
+def _frame(turn: list[DriveSamples]) -> Frame:
+    """The frame of a full turn: that which a board sends whole."""
+    first, sums = turn[0], [drive.sums for drive in turn if drive.sums is not None]
+    return Frame(
+        sequence=first.sequence,
+        ticks=first.ticks,
+        host_time=turn[-1].host_time,
+        configuration=first.configuration,
+        flags=first.flags,
+        drops=first.drops,
+        samples=np.concatenate([drive.samples for drive in turn]),
+        sums=np.concatenate(sums) if sums else None,
+    )
