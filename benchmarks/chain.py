@@ -1,29 +1,41 @@
-"""From a board of 400 frames/s to touches, page and recording, on one core: a minute."""
+"""From boards to touches, page and recording: one of 400 frames/s on one core, eight at once."""
 
 from __future__ import annotations
 
+import contextlib
 import math
+import multiprocessing
 import os
+import pty
+import select
 import subprocess
 import sys
 import tempfile
 import threading
 import time
+import tty
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from bench_rig import load_example, served
+from bench_rig import Rig, load_example, served
 from report import Report, progress, table
-from tomoskin.board.source import SerialTransport
-from tomoskin.core import FloatArray
+from tomoskin.board.source import Configuration, ScanSettings, SerialTransport
+from tomoskin.board.wire import encode
+from tomoskin.core import FloatArray, Frame
 from tomoskin.files.session import SessionReader
+from tomoskin.files.session.replay_board import ReplayBoard
+from tomoskin.model.pattern import Scan
+from tomoskin.model.robot import Place
 from tomoskin.model.skin import Skin
-from tomoskin.pipeline import Prepared, prepare
+from tomoskin.pipeline import FrameResult, Prepared, prepare
 from tomoskin.run import LiveSkin, Runner, commands
+from tomoskin.run.robot_run import Member, RobotRun
 from tomoskin.twin import Press, TwinSettings, TwinSkin
 from tomoskin.twin.emulator.board_process import SkinMemory
 from tomoskin.twin.emulator.program import BUILD, make_firmware
@@ -116,7 +128,7 @@ def _ran(prepared: Prepared, folder: Path, seconds: float) -> tuple[dict[str, An
                 calls.append((contacts.sequence, contacts.host_time, now, touches))
 
     file = folder / "chain.mcap"
-    with board(prepared.skin, folder) as port:
+    with board(prepared.skin, folder) as (port, _):
         runner = Runner(prepared, lambda: SerialTransport(port))
         runner.ask(commands.Record(file))
         runner.start()
@@ -156,8 +168,8 @@ def _ran(prepared: Prepared, folder: Path, seconds: float) -> tuple[dict[str, An
 
 
 @contextmanager
-def board(skin: Skin, folder: Path) -> Iterator[str]:
-    """The port of the host-built board, before a sheet on which presses go round."""
+def board(skin: Skin, folder: Path) -> Iterator[tuple[str, subprocess.Popen[str]]]:
+    """The port and process of the host-built board; on its sheet presses go round."""
     make_firmware(("make", "cc"), "make gcc", "fast")
     settings = TwinSettings.preset("textile", SEED)
     sheets = _sheets(skin, settings)
@@ -172,7 +184,7 @@ def board(skin: Skin, folder: Path) -> Iterator[str]:
     thread = threading.Thread(target=_press, args=(memory, sheets, done))
     thread.start()
     try:
-        yield port
+        yield port, process
     finally:
         done.set()
         thread.join()
@@ -227,3 +239,165 @@ def elsewhere(words: list[str]) -> subprocess.Popen[str]:
     if others:
         os.sched_setaffinity(process.pid, others)
     return process
+
+
+BOARDS, BOARDS_SKIN, BOARDS_SEED, RATE = 8, "textile-disc-16", 11, 100.0
+BOARDS_SECONDS, BOARDS_PROMISED = 600.0, 10.0
+"""ms from the last byte of a frame to its message, 99 of 100."""
+
+CYCLE = (200, 200, 100, 100)
+"""Frames with no, one, two and no presses."""
+
+BOTH = (
+    Press(0.02, 0.01, force=4.0, radius=0.012),
+    Press(-0.03, 0.01, force=4.0, radius=0.012),
+)
+
+
+def run_boards() -> Iterator[Report]:
+    """Eight boards of 16 electrodes in one program, recorded and shown, for ten minutes."""
+    yield boards(BOARDS, RATE, BOARDS_SECONDS)
+
+
+def boards(count: int, rate: float, seconds: float) -> Report:
+    """The program with so many boards of ``rate`` frames/s for ``seconds`` after the reference."""
+    prepared = prepare(Skin.load(BOARDS_SKIN))
+    progress("frames, tables of the fit")
+    sent = _frames(prepared.skin, rate)
+    prepared.warm_up()
+    progress(f"{seconds:.0f} s")
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        _played(prepared.skin, sent, count, rate) as ports,
+    ):
+        row = _several(prepared, Path(folder) / "boards.mcap", ports, rate, seconds)
+    return table(
+        f"{count} boards of 16 electrodes in one program",
+        [{"frames/s a board": f"{rate:g}"} | row],
+        f"frames of the twin on ptys, presses and none, {BOARDS_SKIN}, seed {BOARDS_SEED}; one "
+        "recording, one page",
+        f"written → message: promised are 99 of 100 within {BOARDS_PROMISED:g} ms",
+        f"load of the machine {os.getloadavg()[0]:.0f}",
+    )
+
+
+def _several(
+    prepared: Prepared, file: Path, ports: list[tuple[str, Any]], rate: float, seconds: float
+) -> dict[str, Any]:
+    members = [
+        Member(Place(f"skin{k}"), prepared, partial(SerialTransport, port))
+        for k, (port, _) in enumerate(ports)
+    ]
+    ages: list[float] = []
+
+    def take(begun: Any, result: FrameResult) -> None:
+        ages.append(time.monotonic() - begun.value - result.sequence / rate)
+
+    with RobotRun(members) as run, contextlib.ExitStack() as stack:
+        run.start()
+        run.record(file)
+        for runner, (_, begun) in zip(run.runners.values(), ports, strict=True):
+            stack.enter_context(runner.audience.subscribe("ages", partial(take, begun)))
+        stack.enter_context(page(next(iter(run.runners.values()))))
+        threading.Event().wait(LEAD)
+        first, dropped = len(ages), _dropped(run)
+        began, before = time.process_time(), time.monotonic()
+        threading.Event().wait(seconds)
+        used, took = time.process_time() - began, time.monotonic() - before
+        measured, dropped = 1e3 * np.array(ages[first:]), _dropped(run) - dropped
+    recorded = lost = 0
+    for name in run.runners:
+        with SessionReader(file, name) as session:
+            numbers = [item.frame.sequence for item in session.frames()]
+        recorded += len(numbers)
+        lost += numbers[-1] - numbers[0] + 1 - len(numbers)
+    return {
+        "recorded": recorded,
+        "lost": lost,
+        "without touches": dropped,
+        "written → message: p50, ms": f"{np.median(measured):.2f}",
+        "p99": f"{np.percentile(measured, 99):.2f}",
+        "longest": f"{measured.max():.1f}",
+        "processor a frame, ms": f"{1e3 * used / len(measured):.2f}",
+        "of one core": f"{100 * used / took:.0f} %",
+    }
+
+
+def _dropped(run: RobotRun) -> int:
+    return sum(state.dropped for state in run.statuses().values())
+
+
+def _frames(skin: Skin, rate: float) -> list[Frame]:
+    """A cycle of frames of the twin, presses and none."""
+    rig, frames = Rig(skin, "textile", BOARDS_SEED), list[Frame]()
+    identity = Configuration.of(Scan.of(skin.pattern()), ScanSettings.of(skin)).identity
+    for presses, count in zip(((), BOTH[:1], BOTH, ()), CYCLE, strict=True):
+        rig.board.sheet.set_presses(presses)
+        frames += [rig.at((len(frames) + k) / rate) for k in range(count)]
+    return [replace(frame, configuration=identity) for frame in frames]
+
+
+@contextmanager
+def _played(
+    skin: Skin, frames: list[Frame], count: int, rate: float
+) -> Iterator[list[tuple[str, Any]]]:
+    """The ports of so many boards that another process plays, and when each began, s."""
+    players = [Player(skin, frames, number, rate) for number in range(count)]
+    process = multiprocessing.get_context("fork").Process(target=_play, args=(players,))
+    process.start()
+    try:
+        yield [(os.ttyname(player.far), player.begun) for player in players]
+    finally:
+        process.kill()
+        process.join()
+
+
+class Player:
+    """A board behind a pty that sends frames again and again, by a clock."""
+
+    def __init__(self, skin: Skin, frames: list[Frame], number: int, rate: float) -> None:
+        self.near, self.far = pty.openpty()
+        for end in (self.near, self.far):
+            tty.setraw(end)
+        os.set_blocking(self.near, False)
+        device = {"channels": skin.n_electrodes, "unique_id": f"{number + 1:016x}"}
+        self.board = ReplayBoard(skin, device)
+        self.begun = multiprocessing.get_context("fork").Value("d", math.inf, lock=False)
+        self._frames, self._rate, self._ticks = frames, rate, skin.readout.tick_rate
+        self._number, self._phase = 0, number / rate / BOARDS
+
+    @property
+    def due(self) -> float:
+        """When the next frame is to be sent, s."""
+        return float(self.begun.value) + self._number / self._rate
+
+    def send(self) -> None:
+        """Send the next frame; where nobody reads it is lost, as with a board."""
+        ticks = round(self._number / self._rate * self._ticks)
+        frame = self._frames[self._number % len(self._frames)]
+        data = encode(replace(frame, sequence=self._number, ticks=ticks))
+        self._number += 1
+        with contextlib.suppress(BlockingIOError):
+            os.write(self.near, data)
+
+    def answer(self) -> None:
+        """Answer what is asked; a started board sends its first frame a moment later."""
+        was = self.board.scanning
+        self.board.obey(os.read(self.near, 4096))
+        os.write(self.near, self.board.answer())
+        if self.board.scanning and not was:
+            self._number = 0
+            self.begun.value = time.monotonic() + 0.02 + self._phase
+        elif not self.board.scanning:
+            self.begun.value = math.inf
+
+
+def _play(players: list[Player]) -> None:
+    by_end = {player.near: player for player in players}
+    while True:
+        for player in players:
+            while player.due <= time.monotonic():
+                player.send()
+        wait = min(min(player.due for player in players) - time.monotonic(), 0.2)
+        for end in select.select(list(by_end), [], [], max(wait, 0))[0]:
+            by_end[end].answer()

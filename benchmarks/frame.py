@@ -5,40 +5,24 @@ from __future__ import annotations
 import gc
 import time
 import tracemalloc
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from bench_rig import Rig
-from report import Report, clock, progress, table
+from report import Report, clock, table
 from tomoskin.board.wire import Decoder, encode
-from tomoskin.core import FloatArray, Frame
+from tomoskin.core import Frame
 from tomoskin.model.pattern import Pattern, Scan
-from tomoskin.model.robot import Place
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Pipeline, Prepared, prepare
-from tomoskin.run.sinks import Contacts, Stream
 from tomoskin.twin import Press
 
 SKINS, CELLS, TIME_CONSTANTS = ("textile-disc-8", "textile-disc-16"), (660, 3000), ("0 s", "0.2 s")
 BY_FIT = (1, 2, 3)
 IDLE, PRESSED, REPEATS, FIT_REPEATS = 30, 60, 40, 10
 SETTLED, SEED = 20, 1
-
-SEVERAL, BOARDS, SEVERAL_SEED = "textile-disc-16", 8, 11
-RATE, PROMISED = 100.0, 5.0
-"""Frames/s of each board, and ms from bytes to touches, 99 of 100."""
-
-RATES = (10.0, 20.0, 30.0, 40.0, 50.0, 75.0, 100.0)
-CYCLE = (200, 200, 100, 100)
-"""Frames with no, one, two and no presses."""
-
-BOTH = (
-    Press(0.02, 0.01, force=4.0, radius=0.012),
-    Press(-0.03, 0.01, force=4.0, radius=0.012),
-)
 
 
 def run() -> Iterator[Report]:
@@ -135,82 +119,6 @@ def _chunks(prepared: Prepared, presses: int) -> tuple[list[bytes], list[bytes]]
         ).tolist()
         pressed.append(encode(rig.frame(Press(p.real, p.imag, 4.0, 0.012) for p in places)))
     return idle, pressed
-
-
-def run_several() -> Iterator[Report]:
-    """Eight skins in one program: what a frame costs, and whether every touch is on time."""
-    prepared = prepare(Skin.load(SEVERAL))
-    prepared.warm_up()
-    progress("processor time")
-    costs = processor_times(prepared, frames_of(prepared))
-    yield table(
-        f"{BOARDS} skins of 16 electrodes on one core that does nothing else",
-        ({"frames/s a board": f"{rate:g}"} | queued(costs, rate) for rate in RATES),
-        "from a frame's bytes to its contacts: processor times of the frames as they were "
-        f"measured, and the wait for the frames of the others in a queue; promised: {PROMISED} "
-        "ms",
-    )
-
-
-def frames_of(prepared: Prepared) -> list[Frame]:
-    """A cycle of frames of the twin, presses and none."""
-    rig, frames = Rig(prepared.skin, "textile", SEVERAL_SEED), list[Frame]()
-    for presses, count in zip(((), BOTH[:1], BOTH, ()), CYCLE, strict=True):
-        rig.board.sheet.set_presses(presses)
-        frames += [rig.at((len(frames) + k) / RATE) for k in range(count)]
-    return frames
-
-
-def processor_times(prepared: Prepared, frames: Sequence[Frame]) -> FloatArray:
-    """(n,) s for each frame to be decoded, to become touches, and these contacts.
-
-    In a second cycle, when the sheet and the alpha are found.
-    """
-    pipeline, decoder, times = Pipeline(prepared), Decoder(), []
-    stream = Stream.of(prepared, "skin", 0.0, Place("skin"))
-    for number in range(2 * len(frames)):
-        ticks = round(number / RATE * prepared.skin.readout.tick_rate)
-        data = encode(replace(frames[number % len(frames)], sequence=number, ticks=ticks))
-        began = time.thread_time()
-        (frame,) = decoder.feed(data, number / RATE)
-        assert isinstance(frame, Frame)
-        result = pipeline.push(frame)
-        if result is not None:
-            _ = Contacts.of(stream, result).touches
-        times.append(time.thread_time() - began)
-    return np.array(times[len(frames) :])
-
-
-def queued(costs: FloatArray, rate: float, seconds: float = 60.0) -> dict[str, str]:
-    """Load, and percentiles of the ages alone and beside a board that floods."""
-    random = np.random.default_rng(SEVERAL_SEED)
-    beats = np.arange(int(seconds * rate)) / rate
-    arrivals = np.sort(np.concatenate([beats + random.random() / rate for _ in range(BOARDS)]))
-    work = random.choice(costs, len(arrivals))
-    load = BOARDS * rate * float(costs.mean())
-    row = {"of one core, %": f"{100 * load:.0f}"}
-    if load >= 1:
-        return row
-    flood = random.choice(costs, int(seconds / costs.min()))
-    for name, other in (("", None), ("beside a flooding one: ", flood)):
-        median, p99 = 1e3 * np.percentile(ages_of(arrivals, work, other), (50, 99))
-        row |= {f"{name}median, ms": f"{median:.1f}", f"{name}99 of 100, ms": f"{p99:.1f}"}
-    return row
-
-
-def ages_of(arrivals: FloatArray, work: FloatArray, flood: FloatArray | None = None) -> FloatArray:
-    """(n,) s from each frame's arrival to the end of its ``work``, in turns (Lindley 1952).
-
-    ``flood``: frames of one more board, which asks for a turn as soon as it has had one.
-    """
-    ages, free, asked, count = np.empty(len(arrivals)), 0.0, 0.0, 0
-    for k, (came, takes) in enumerate(zip(arrivals, work, strict=True)):
-        while flood is not None and asked <= came:
-            free = asked = max(free, asked) + flood[count]
-            count += 1
-        free = max(free, came) + takes
-        ages[k] = free - came
-    return ages
 
 
 BAUD, READ = 1_000_000, 4096

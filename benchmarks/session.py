@@ -32,10 +32,10 @@ LONG, PACED = 600, 20
 
 HOUR, HOUR_RATE = 3600, 100.0
 SEED, SEEKS = 1, 40
-MOST_WAITING = 64 << 20
-"""Bytes that may wait for the disk, as in a run."""
+MOST_WAITING = 50_000
+"""Messages that may wait for the disk, as in a run."""
 
-_BATCH, _KINDS = 200, 500
+_BATCH, _KINDS = 2000, 500
 """Frames put at once where they are not paced; different frames, which come again and again."""
 
 

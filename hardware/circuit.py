@@ -16,15 +16,20 @@ ROOT = Path(netlist.__file__).resolve().parent
 class Circuit:
     """A board's parts and nets."""
 
-    channels: int
+    board: str
     parts: dict[str, netlist.Part]
     nets: netlist.Nets
 
     @classmethod
-    def read(cls, channels: int) -> Circuit:
-        """That of ``hardware/board-<channels>.net``."""
-        text = (ROOT / f"board-{channels}.net").read_text(encoding="utf-8")
-        return cls(channels, *netlist.parse(text))
+    def read(cls, board: str) -> Circuit:
+        """That of ``hardware/<board>.net``."""
+        text = (ROOT / f"{board}.net").read_text(encoding="utf-8")
+        return cls(board, *netlist.parse(text))
+
+    @property
+    def channels(self) -> int:
+        """How many electrodes it has."""
+        return int(self.board.rsplit("-", 1)[1])
 
     @cached_property
     def net_of(self) -> dict[tuple[str, str], str]:

@@ -32,9 +32,12 @@ TOOLS = STEP / "tools"
 PYTHON = "/usr/bin/python3"
 """KiCad's own, with pcbnew."""
 
-BOARDS = (8, 16)
-COPPER = "F.Cu,In1.Cu,In2.Cu,B.Cu"
-LAYERS = f"{COPPER},F.Paste,F.Mask,B.Mask,F.Silkscreen,B.Silkscreen,Edge.Cuts"
+BOARDS = {"board-8": (1000, 1000, 1), "board-16": (1500, 900, 1.65), "pico-16": (1200, 1000, 1)}
+"""The projects; width and height of their pictures, pixels, and zoom."""
+
+LAYERS = "F.Paste,F.Mask,B.Mask,F.Silkscreen,B.Silkscreen,Edge.Cuts"
+"""Beside the copper."""
+
 PAGES = "1,2,3,4,5,6,7"
 """Of the schematic, up to the first channel: the others are the same sheet."""
 POSITIONS = ["Designator", "Val", "Package", "Mid X", "Mid Y", "Rotation", "Layer"]
@@ -57,13 +60,13 @@ def kicad(*words: object) -> None:
         raise BoardError(f"kicad-cli {' '.join(map(str, words[:3]))}: {done.stdout}{done.stderr}")
 
 
-def check(channels: int) -> None:
+def check(name: str) -> None:
     """Electrical and design rules, and whether layout and schematic are one; BoardError else."""
     with tempfile.TemporaryDirectory() as folder:
         for kind, file in (("sch erc", "kicad_sch"), ("pcb drc", "kicad_pcb")):
             report = Path(folder) / "report.txt"
             options = ["--schematic-parity"] if file == "kicad_pcb" else []
-            board = KICAD / f"board-{channels}.{file}"
+            board = KICAD / f"{name}.{file}"
             try:
                 kicad(
                     *kind.split(),
@@ -79,21 +82,20 @@ def check(channels: int) -> None:
                 raise BoardError(f"{board.name}: {said[:3000]}") from error
 
 
-def listed(channels: int) -> tuple[dict[str, Part], Nets]:
+def listed(name: str) -> tuple[dict[str, Part], Nets]:
     """Parts and nets of a schematic."""
-    return read(KICAD / f"board-{channels}.kicad_sch")
+    return read(KICAD / f"{name}.kicad_sch")
 
 
-def make(channels: int) -> list[Path]:
+def make(name: str) -> list[Path]:
     """Write all files of a board; their paths, without those in build/."""
-    name = f"board-{channels}"
     board, schematic = KICAD / f"{name}.kicad_pcb", KICAD / f"{name}.kicad_sch"
-    parts, nets = listed(channels)
+    parts, nets = listed(name)
     (ROOT / f"{name}.net").write_text(written(parts, nets), encoding="utf-8")
     (ROOT / f"{name}.csv").write_text(bill(parts), encoding="utf-8")
     kicad("sch", "export", "pdf", "--pages", PAGES, "--output", ROOT / f"{name}.pdf", schematic)
-    pictures = [_picture(board, side, channels) for side in ("top", "bottom")]
-    if channels == BOARDS[0]:
+    pictures = [_picture(board, side) for side in ("top", "bottom")]
+    if name == "board-8":
         pictures.append(_first_page(schematic))
     STEP.mkdir(parents=True, exist_ok=True)
     kicad(
@@ -132,9 +134,9 @@ def _interactive(board: Path) -> None:
         raise BoardError(f"{board.name}: no interactive bill: {done.stderr[-1000:]}")
 
 
-def _picture(board: Path, side: str, channels: int) -> Path:
+def _picture(board: Path, side: str) -> Path:
     file = PICTURES / f"{board.stem}-{side}.png"
-    width, height, zoom = (1000, 1000, 1) if channels == 8 else (1500, 900, 1.65)
+    width, height, zoom = BOARDS[board.stem]
     size = ("--width", width, "--height", height, "--zoom", zoom)
     kicad("pcb", "render", "--side", side, *size, "--background", "opaque", "--output", file, board)
     return file
@@ -154,7 +156,8 @@ def _first_page(schematic: Path) -> Path:
 def _pack(packed: Path, board: Path, bill_file: Path) -> None:
     with tempfile.TemporaryDirectory() as folder:
         to = Path(folder)
-        kicad("pcb", "export", "gerbers", "--layers", LAYERS, "--output", to, board)
+        layers = ",".join([*copper_layers(board), LAYERS])
+        kicad("pcb", "export", "gerbers", "--layers", layers, "--output", to, board)
         kicad(
             "pcb",
             "export",
@@ -192,6 +195,12 @@ def _pack(packed: Path, board: Path, bill_file: Path) -> None:
                 )
 
 
+def copper_layers(board: Path) -> list[str]:
+    """Names of a layout's layers of copper, from the front."""
+    text = board.read_text(encoding="utf-8")
+    return re.findall(r'^\t\t\(\d+ "(\S+\.Cu)"', text, re.MULTILINE)
+
+
 def positions(text: str) -> str:
     """KiCad's table of positions, its columns named as assembly houses name them."""
     out = io.StringIO()
@@ -205,7 +214,7 @@ def positions(text: str) -> str:
 
 def sources() -> list[Path]:
     """What outputs are made of."""
-    ends = (".kicad_sch", ".kicad_pcb")
+    ends = (".kicad_sch", ".kicad_pcb", ".kicad_sym")
     return [*sorted(f for f in KICAD.iterdir() if f.suffix in ends), ROOT / "parts.toml"]
 
 
@@ -240,11 +249,11 @@ def main() -> int:
     """Check, and make all."""
     outputs: list[Path] = []
     try:
-        for channels in BOARDS:
-            check(channels)
-            print(f"board-{channels}: electrical and design rules, parity: nothing found")
+        for name in BOARDS:
+            check(name)
+            print(f"{name}: electrical and design rules, parity: nothing found")
             if sys.argv[1:] != ["--check"]:
-                outputs += make(channels)
+                outputs += make(name)
     except BoardError as error:
         print(error, file=sys.stderr)
         return 1

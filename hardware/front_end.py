@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 import tomllib
-from pathlib import Path
 
+import bill
+from circuit import Circuit
 from results import FILE as MEGA
 from results import Figures
 from spice import run
 
-PARTS = Path(__file__).resolve().parent / "front_end.toml"
 PICO = tomllib.loads(MEGA.read_text(encoding="utf-8"))["pico"]
 """Its record, whose gain, reference and current the decks and the schematic are held to."""
 
@@ -26,21 +26,31 @@ CONVERTER_NOISE = 0.46
 OWN_NOISE = 2.9
 """The same of the RP2040's own converter, whose 8.7 effective bits are 54 dB."""
 
-_LOADS = (0.5, 1, 5, 10, 20, 30, 40, 50, 60, 80, 100)
+DUMP = 22
+"""Ω through which the current flows while no source is enabled."""
+
+_LOADS = (0.2, 0.5, 1, 5, 10, 20, 30, 41, 50, 60, 80, 100)
 
 
 def drive() -> Figures:
-    """Accuracy of the current from 0.5 to 20 ohm, and the most that it drives, ohm."""
+    """Error of the current from 0.2 to 41 ohm (contacts of 0.1 to 20), and the most load, ohm."""
     said = run("pico_drive", sense=SENSE, loads=" ".join(map(str, _LOADS)))
     amperes = dict(zip(_LOADS, said["amperes"], strict=True))
     held = [load for load in _LOADS if abs(amperes[load] / AMPERES - 1) < 0.01]
-    error = max(abs(amperes[load] / AMPERES - 1) for load in _LOADS if load <= 20)
+    error = max(abs(amperes[load] / AMPERES - 1) for load in _LOADS if load <= 41)
     return {"current_error": error, "load": max(held)}
 
 
-def settling(step: float = 1 / GAIN) -> float:
-    """Seconds after the multiplexer until half an LSB, for a step of V at the input."""
-    said = run("pico_settling", step=step, gain=GAIN, half=LSB / 2)
+def beginning(contact: float, dead: str, dump: float = DUMP) -> Figures:
+    """A drive after a dead time: peak over the current, seconds until it stays within 1 %."""
+    said = run("pico_dump", sense=SENSE, contact=contact, dead=dead, dump=dump)
+    begin = 20e-6 + float(dead.rstrip("u")) * 1e-6
+    return {"peak": said["peak"][0] / said["last"][0], "settling": said["settled"][0] - begin}
+
+
+def settling(step: float = 1 / GAIN, contact: float = 20) -> float:
+    """Seconds after the multiplexer until half an LSB, for a step of V behind contacts of ohm."""
+    said = run("pico_settling", step=step, contact=contact, gain=GAIN, half=LSB / 2)
     return said["settled"][0] - 20e-6
 
 
@@ -66,8 +76,9 @@ def mega_noise() -> Figures:
 
 def cost(electrodes: int = 16) -> float:
     """Euros of the parts of one front end of 16 or 32 electrodes, with the Pico."""
-    table = tomllib.loads(PARTS.read_text(encoding="utf-8"))["part"]
-    tree = electrodes > 16
-    return float(
-        sum((row["count"] + tree * row.get("tree", 0)) * row["each"] for row in table.values())
-    )
+    parts = bill.total(Circuit.read("pico-16").parts, 1)
+    if electrodes == 16:
+        return parts
+    tree = tomllib.loads(bill.PARTS.read_text(encoding="utf-8"))["tree"]
+    more = sum(count * bill.known()[name].each[0] for name, count in tree.items())
+    return parts + float(more)

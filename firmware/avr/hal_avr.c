@@ -15,6 +15,8 @@
 #include <avr/io.h>
 #include <avr/sleep.h>
 #include <avr/wdt.h>
+#include <stddef.h>
+#include <string.h>
 #include <util/delay_basic.h>
 
 static_assert(CHANNELS <= 16u, "a Mega's board has at most 16 channels; a Pico's has 32");
@@ -28,8 +30,10 @@ static_assert(CHANNELS <= 16u, "a Mega's board has at most 16 channels; a Pico's
 struct identity {
     uint32_t current; /* uA */
     uint8_t unique_id[8];
+    uint16_t checksum; /* CRC-16 of what is before it, as on the line */
 };
-static EEMEM struct identity identity;
+static EEMEM struct identity stored;
+static struct identity identity; /* what of it may be used */
 
 /* What a reset leaves as it was, but power coming up does not. */
 #define NOINIT __attribute__((section(".noinit")))
@@ -61,7 +65,28 @@ void first_of_all(void) {
     wdt_disable();
 }
 
+/* A single wrong bit could make 100 mA of 10: what is damaged is not used. */
+static void read_identity(void) {
+    const uint8_t *byte = (const uint8_t *)&identity;
+    uint16_t crc = 0xFFFFu;
+    bool written = false;
+    eeprom_read_block(&identity, &stored, sizeof identity);
+    for (uint8_t at = 0u; at < sizeof identity; at++) {
+        written = written || byte[at] != 0xFFu;
+        if (at < offsetof(struct identity, checksum)) {
+            crc = crc16_by_table(crc, byte[at]);
+        }
+    }
+    if (!written) {
+        identity.current = BOARD_CURRENT_UA;
+    } else if (crc != identity.checksum) {
+        (void)memset(&identity, 0xFF, sizeof identity);
+        identity.current = CURRENT_DAMAGED;
+    }
+}
+
 void hal_init(void) {
+    read_identity();
     remembers = memory == REMEMBERED;
     memory = REMEMBERED;
     ADDRESS_PORT = 0u;
@@ -122,12 +147,27 @@ const struct hal_board hal_board = {
 };
 
 void hal_unique_id(uint8_t *id) {
-    eeprom_read_block(id, identity.unique_id, sizeof identity.unique_id);
+    (void)memcpy(id, identity.unique_id, sizeof identity.unique_id);
 }
 
 uint32_t hal_current(void) {
-    uint32_t current = eeprom_read_dword(&identity.current);
-    return current == UINT32_MAX ? BOARD_CURRENT_UA : current;
+    return identity.current;
+}
+
+static void take_byte(void) {
+    uint8_t byte = UDR0;
+    uint8_t next = (uint8_t)((receive_end + 1u) % RECEIVE_SIZE);
+    if (next != receive_first) {
+        received[receive_end] = byte;
+        receive_end = next;
+    }
+    awake = true;
+}
+
+void hal_listen(void) {
+    while ((UCSR0A & _BV(RXC0)) != 0u) {
+        take_byte();
+    }
 }
 
 void hal_switches_disable(void) {
@@ -162,7 +202,10 @@ uint32_t hal_ticks(void) {
 
 void hal_delay_us(uint16_t us) {
     while (us-- != 0u) {
-        _delay_loop_1(5); /* 15 cycles, and 4 for the loop */
+        if ((UCSR0A & _BV(RXC0)) != 0u) {
+            take_byte();
+        }
+        _delay_loop_1(3); /* 9 cycles, and 9 for loop and line */
     }
 }
 
@@ -317,13 +360,7 @@ ISR(ADC_vect) {
 }
 
 ISR(USART0_RX_vect) {
-    uint8_t byte = UDR0;
-    uint8_t next = (uint8_t)((receive_end + 1u) % RECEIVE_SIZE);
-    if (next != receive_first) {
-        received[receive_end] = byte;
-        receive_end = next;
-    }
-    awake = true;
+    take_byte();
 }
 
 ISR(USART0_UDRE_vect) {

@@ -53,6 +53,7 @@ static unsigned sink = OFF;
 static avr_cycle_count_t opened;
 static avr_cycle_count_t passed; /* until when the electrodes have charged */
 static uint16_t code; /* of the conversion */
+static avr_cycle_count_t heard; /* when interrupts were on last, or the line was looked at; 0: not yet */
 static uint8_t out[4096];
 static size_t n_out;
 
@@ -293,6 +294,7 @@ static void on_reset(struct avr_t *machine) {
     n_out = 0;
     may_feed = true;
     has_reset = true;
+    heard = 0;
     if (watch != NULL) {
         watch->resets++;
     }
@@ -340,6 +342,7 @@ static void build_board(const char *path) {
         give_up("simavr has no atmega2560");
     }
     firmware.frequency = CLOCK;
+    firmware.eesize = 0; /* it has never been written, as that of a new board */
     avr_load_firmware(avr, &firmware);
     avr->vcc = avr->avcc = avr->aref = 5000;
     avr->sleep = no_sleep;
@@ -365,10 +368,17 @@ static void build_board(const char *path) {
                             NULL);
 }
 
+/* Whether the instruction is LDS from UCSR0A. */
+static bool looks_at_line(avr_flashaddr_t at) {
+    const uint8_t *word = avr->flash + at;
+    return (word[1] & 0xFEu) == 0x90u && (word[0] & 0x0Fu) == 0u && word[2] == 0xC0u && word[3] == 0u;
+}
+
 /* One instruction, and the time until the next one may run. */
 static void run(void) {
     avr_flashaddr_t at = avr->pc;
     avr_cycle_count_t before = avr->cycle;
+    bool listening = avr->sreg[S_I] != 0;
     int state = avr_run(avr);
     if (state == cpu_Done || state == cpu_Crashed) {
         give_up("the firmware has crashed");
@@ -382,6 +392,12 @@ static void run(void) {
     }
     if (stack >= 0x200u && stack < watch->lowest_stack) { /* not yet set up: 0 */
         watch->lowest_stack = stack;
+    }
+    if (opened != 0 && heard != 0 && before - heard > watch->longest_deaf) {
+        watch->longest_deaf = before - heard;
+    }
+    if (listening || looks_at_line(at)) {
+        heard = avr->cycle; /* it may have slept until now */
     }
 }
 

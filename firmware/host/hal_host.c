@@ -145,6 +145,8 @@ uint32_t hal_ticks(void) {
     return (uint32_t)((now_ns() - started) / NS_PER_TICK);
 }
 
+void hal_listen(void) {} /* the line waits by itself */
+
 void hal_delay_us(uint16_t us) {
     if (event_time != 0u) {
         event_time += us * UINT64_C(1000);

@@ -33,7 +33,8 @@ struct verdict config_set_scan(const uint8_t *payload) {
     if (n_drives > MOST_DRIVES) {
         return verdict(RESULT_TOO_MANY_DRIVES, MOST_DRIVES);
     }
-    if (hal_current() > get_u32(payload + AT_SET_SCAN_CURRENT_LIMIT)) {
+    uint32_t current = hal_current();
+    if (current == CURRENT_DAMAGED || current > get_u32(payload + AT_SET_SCAN_CURRENT_LIMIT)) {
         return verdict(RESULT_CURRENT_TOO_HIGH, 0u);
     }
     if (identity == 0u) {

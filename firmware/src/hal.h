@@ -28,7 +28,9 @@ struct hal_board {
 };
 extern const struct hal_board hal_board;
 
-/* (eight bytes) tells one board from another; and the setting of its current limiter in uA. */
+/* (eight bytes) tells one board from another; and the setting of its current limiter in uA, or
+   CURRENT_DAMAGED where its memory holds something that nobody has written. */
+#define CURRENT_DAMAGED UINT32_MAX
 void hal_unique_id(uint8_t *id);
 uint32_t hal_current(void);
 
@@ -74,6 +76,10 @@ static inline uint16_t crc16_step(uint16_t crc, uint8_t byte) {
     return (uint16_t)((uint16_t)(crc << 8) ^ (uint16_t)((uint16_t)x << 12) ^
                       (uint16_t)((uint16_t)x << 5) ^ x);
 }
+
+/* Between lock and unlock, and in scan_on_..., it is called every 20 us or sooner: where bytes come by
+   an interrupt, the line has no more room than for two. */
+void hal_listen(void);
 
 /* Between lock and unlock no scan_on_... comes. Not nested; not from scan_on_.... */
 void hal_lock(void);

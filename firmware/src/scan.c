@@ -15,7 +15,8 @@
 #define FOR_FRAMES (FRAMES * ROOM(MOST_FRAME))
 #define FOR_DRIVES (DRIVES * ROOM(MOST_DRIVE_SAMPLES))
 
-/* Longer dead times are waited for by the timer, not in the interrupt. */
+/* Longer dead times are waited for by the timer, not in the interrupt, where time for frames and
+   the main loop is lost. The line is listened to meanwhile. */
 #define LONGEST_BUSY_US 50u
 #define SLACK_TICKS (2u * TICKS_PER_MS)
 
@@ -129,6 +130,7 @@ static uint8_t oldest(void) {
 
 static void begin_message(void) {
     struct frame *frame = &slots[filling];
+    hal_listen();
     scan.drive = order.count == 0u ? scan.place : order.drives[scan.place];
     frame->started = hal_ticks();
     frame->order = scan.order;
@@ -150,7 +152,9 @@ static void connect(uint16_t dead_time) {
     uint8_t sink = reversed() ? drive->source : drive->sink;
     scan.rest = drive->mask;
     scan.channel = 0u;
+    hal_listen();
     scan.allowed = allowed_ticks(drive);
+    hal_listen();
     if (!switches_set(source, sink, dead_time)) {
         fail(FAULT_SWITCH_REFUSED, scan.drive);
         return;
@@ -220,15 +224,19 @@ static void put_demodulated(void) {
     for (channel_set rest = config.drives[scan.drive].mask; rest != 0u; rest >>= 1, channel++) {
         if ((rest & 1u) != 0u) {
             put_sample(demodulator_difference(channel));
+            hal_listen();
             put_sample(demodulator_sum(channel));
+            hal_listen();
         }
     }
     demodulator_clear();
+    hal_listen();
 }
 
 /* The next direction of the drive, or the next drive. */
 static void end_direction(void) {
     switches_off();
+    hal_listen();
     if (++scan.direction < scan.directions) {
         begin_drive();
         return;
@@ -284,6 +292,7 @@ void scan_on_sample(uint16_t sum) {
     scan.rest >>= 1;
     scan.channel++;
     bool more = next_channel(); /* it runs while this one is booked */
+    hal_listen();
     if (scan.directions == 1u) {
         put_sample(sum);
     } else {
@@ -322,6 +331,7 @@ void scan_start(void) {
     scan.on_ticks = on_ticks();
     order.identity = order.count = 0u;
     share();
+    hal_listen();
     demodulator_clear();
     hal_adc_prepare(config.prescaler, config_conversions());
     begin_turn();

@@ -67,11 +67,11 @@ class Board : public testing::Test {
     unsigned detail = 0;
     std::vector<Bytes> meanwhile;  // what came with the answers
 
-    unsigned set_scan(unsigned n_drives) {
+    unsigned set_scan(unsigned n_drives, uint32_t limit = 100'000) {
         machine.dead_ns = dead * uint64_t{1000};
         return ask({MSG_SET_SCAN, 5, 0, low(n_drives), high(n_drives), low(settling), high(settling),
-                    low(settling >> 16), 0, low(dead), high(dead), low(oversampling), 64, 0xA0, 0x86,
-                    1, 0});
+                    low(settling >> 16), 0, low(dead), high(dead), low(oversampling), 64, low(limit),
+                    high(limit), low(limit >> 16), high(limit >> 16)});
     }
     unsigned set_drive(unsigned number, Drive d) {
         return ask({MSG_SET_PATTERN, 5, 0, low(number), high(number), d.source, d.sink, low(d.mask),

@@ -145,6 +145,7 @@ const struct hal_board hal_board = {"machine", 5000, 4000, 1000, 0, 813};
 void hal_init(void) {}
 uint8_t hal_reset_cause(void) { return machine.reset_cause; }
 void hal_unique_id(uint8_t *id) { std::fill(id, id + 8, uint8_t{7}); }
+void hal_listen(void) {}
 uint32_t hal_current(void) { return machine.current; }
 
 void hal_switches_disable(void) {

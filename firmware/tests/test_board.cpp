@@ -287,6 +287,8 @@ TEST_F(Board, RefusesWhatItCannotDo) {
     EXPECT_EQ(ask({0x55, 5}), RESULT_UNKNOWN_COMMAND);
     machine.current = 100'001;
     EXPECT_EQ(set_scan(3), RESULT_CURRENT_TOO_HIGH);
+    machine.current = CURRENT_DAMAGED;
+    EXPECT_EQ(set_scan(3, UINT32_MAX), RESULT_CURRENT_TOO_HIGH);
 }
 
 TEST_F(Board, TooManySamplesAreRefused) {

@@ -22,7 +22,7 @@ for _row in range(16):
     HEADERS["J64"] |= {3 + 2 * _row: f"D{52 - 2 * _row}", 4 + 2 * _row: f"D{53 - 2 * _row}"}
 
 
-@pytest.fixture(scope="module", params=[8, 16])
+@pytest.fixture(scope="module", params=["board-8", "board-16"])
 def circuit(request):
     return Circuit.read(request.param)
 
@@ -117,7 +117,7 @@ def test_what_is_known_of_parts_is_dated_and_in_production():
 
 
 def test_the_committed_bill_is_that_of_the_netlist(circuit):
-    committed = (ROOT / f"board-{circuit.channels}.csv").read_text(encoding="utf-8")
+    committed = (ROOT / f"{circuit.board}.csv").read_text(encoding="utf-8")
     assert committed == bill.bill(circuit.parts)
 
 

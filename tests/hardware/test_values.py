@@ -9,7 +9,7 @@ from circuit import Circuit
 from spice import DECKS
 
 TEXT = (DECKS / "circuits.lib").read_text(encoding="utf-8")
-BOARD = Circuit.read(8)
+BOARD = Circuit.read("board-8")
 GND, TWELVE = ("GND", ""), ("+12V", "")
 
 

@@ -37,3 +37,19 @@ def test_a_page_that_vanishes_is_written_to_no_more(runner):
 
     asyncio.run(serve())
     assert written == ["websocket.send"]
+
+
+def test_frames_wake_the_loop_only_where_a_page_asks_for_one(runner, monkeypatch):
+    async def serve():
+        hub, woken = Hub(runner), []
+        async with hub.running():
+            loop = asyncio.get_running_loop()
+            monkeypatch.setattr(loop, "call_soon_threadsafe", woken.append)
+            for asked in (False, True):
+                hub.awaited = asked
+                for _ in range(20):
+                    runner.audience.wake()
+                    await asyncio.sleep(0)
+                assert len(woken) == asked
+
+    asyncio.run(serve())

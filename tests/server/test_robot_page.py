@@ -9,16 +9,18 @@ from contextlib import closing
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from run.test_robot_run import Watch
 from server.serving import PATIENCE, Site
 from server.watching import Watched
-from tomoskin.core import WallClock
+from tomoskin.core import SkinError, WallClock
 from tomoskin.files.session import split_targets
 from tomoskin.model.robot import Robot
 from tomoskin.run import Member, RobotRun, Runner
 from tomoskin.server import Hub, Overview, Server, listen, robot_application, serve_requests
 from tomoskin.server.access import AccessPolicy
+from tomoskin.server.overview import Stance
 from tomoskin.server.server import STATIC
 from tomoskin.twin import Press, TwinSettings, make_twin
 
@@ -113,19 +115,50 @@ def test_touches_are_told_in_the_frame_of_the_robot(site, pressed):
     with site.connect() as page:
         scene = json.loads(page.recv(PATIENCE))
         assert [skin["frame"] for skin in scene["skins"]] == ["fore", "fore"]
-        assert scene["bones"] == pytest.approx([0, 0, 0, 0.3, 0, 0.1])
-        links = np.array(scene["links"]).reshape(-1, 3)
-        assert links.min(axis=0) == pytest.approx([0.26, -0.04, 0.06], abs=1e-4)
-        assert links.max(axis=0) == pytest.approx([0.34, 0.04, 0.14], abs=1e-4)
+        assert scene["bones"] == [0, 1]
+        assert scene["poses"] == [
+            1,
+            0,
+            0,
+            0,
+            0,
+            1,
+            0,
+            0,
+            0,
+            0,
+            1,
+            0,
+            1,
+            0,
+            0,
+            0.3,
+            0,
+            1,
+            0,
+            0,
+            0,
+            0,
+            1,
+            0.1,
+        ]
+        (link,) = scene["links"]
+        assert link["link"] == 1
+        corners = np.array(link["corners"]).reshape(-1, 3)
+        assert corners.min(axis=0) == pytest.approx([-0.04, -0.04, -0.04], abs=1e-4)
+        assert corners.max(axis=0) == pytest.approx([0.04, 0.04, 0.04], abs=1e-4)
         (undrawn,) = scene["undrawn"]
         assert undrawn.startswith("fore: package://arm/fore.dae: expected a file ending in")
         middle = np.array(scene["skins"][1]["corners"]).reshape(-1, 3).mean(axis=0)
-        assert middle == pytest.approx([0.3, 0, 0.05], abs=0.005)
+        assert scene["skins"][1]["link"] == 1
+        assert middle == pytest.approx([0, 0, -0.05], abs=0.005)
         state = json.loads(page.recv(PATIENCE))
         assert state["skins"]["left"]["problem"] is None
         while not isinstance(told := page.recv(PATIENCE), bytes):
             pass
         skins = json.loads(told)["skins"]
+        assert json.loads(told)["poses"] == scene["poses"]
+        assert "no joint states are given" in skins["right"]["pose_problem"]
     assert skins["left"]["touches"] == []
     (touch,) = skins["right"]["touches"]
     x, y = PLACE
@@ -142,7 +175,27 @@ def test_of_a_board_that_is_lost_no_touch_is_shown(site, pressed, monkeypatch):
     with site.connect() as page:
         while not isinstance(told := page.recv(PATIENCE), bytes):
             pass
-    assert json.loads(told)["skins"]["right"] == {"valid": False, "touches": []}
+    shown = json.loads(told)["skins"]["right"]
+    assert (shown["valid"], shown["touches"]) == (False, [])
+
+
+def test_links_are_drawn_as_their_joints_stand_else_as_they_stood_last(folder):
+    states = {1.0: {"elbow": 0.0}, 2.0: {"elbow": np.pi / 2}}
+
+    def joints(utc):
+        def position(name):
+            if utc not in states:
+                raise SkinError("pose unknown")
+            return states[utc][name]
+
+        return position
+
+    stance = Stance(Robot.load(folder / "robot.toml").moved_by(joints))
+    for utc, rotation in ((0.0, 0.0), (2.0, np.pi / 2), (3.0, np.pi / 2), (1.0, 0.0)):
+        pose = stance.poses(utc)["fore"]
+        assert pose.position == pytest.approx([0.3, 0, 0.1])
+        turned = Rotation.from_rotvec([rotation, 0, 0]).as_matrix()  # a URDF's own axis is x
+        assert pose.rotation == pytest.approx(turned)
 
 
 def test_below_it_each_skin_has_its_own_page(site):

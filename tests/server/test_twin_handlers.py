@@ -49,7 +49,7 @@ def twin(prepared):
 
     runner = Runner(prepared, opener)
     runner.start()
-    Watch(runner).until(lambda: runner.twin.breakable)
+    Watch(runner).until(lambda: runner.flow.twin.breakable)
     hub = Hub(runner)
     TwinHandlers(hub)
     yield hub, transports

@@ -76,7 +76,7 @@ def test_the_twin_is_bent_by_keys_and_its_bend_is_read_beside_a_touch(opened):
     bend(opened, 39)
     opened.test_id("bend-angle").press("ArrowRight")
     asked = (Bent(Hinge(TRUE, WIDTH)),)
-    Watch(opened.site.runner).until(lambda: opened.site.runner.twin.pose.pose == asked)
+    Watch(opened.site.runner).until(lambda: opened.site.runner.flow.twin.pose.pose == asked)
     opened.until(
         "last.bend?.state === 'bend' && "
         f"Math.abs(window.tomoskin.last.bend.angle - {TRUE}) < {ROUGH}"
@@ -90,7 +90,7 @@ def test_the_twin_is_bent_by_keys_and_its_bend_is_read_beside_a_touch(opened):
     opened.lifted()
     opened.test_id("lay-flat").click()
     opened.until("last.bend?.state === 'idle'")
-    assert opened.site.runner.twin.pose.pose == ()
+    assert opened.site.runner.flow.twin.pose.pose == ()
     assert opened.site.runner.status().bend.state == "idle"
     stretched(opened)
 

@@ -444,22 +444,30 @@ export interface TwinRefused {
   readonly message: string;
 }
 
-/** A robot's skins and links in the frame of its root. */
+/** A robot's links and skins. */
 export interface RobotScene {
   readonly type: "robot";
   readonly name: string;
   readonly bones: readonly number[];
-  readonly links: readonly number[];
+  readonly links: readonly DrawnLink[];
   readonly undrawn: readonly string[];
   readonly skins: readonly PlacedShape[];
+  readonly poses: readonly number[];
   readonly version: string;
 }
 
-/** A skin on a robot: the frame of its touches, and the corners of its triangles. */
+/** What of a robot's link is drawn: the corners of its triangles, in its frame. */
+export interface DrawnLink {
+  readonly link: number;
+  readonly corners: readonly number[];
+}
+
+/** A skin on a robot: the frame of its touches, and the corners of its triangles in it. */
 export interface PlacedShape {
   readonly name: string;
   readonly frame: string;
   readonly source: string;
+  readonly link: number | null;
   readonly corners: readonly number[];
 }
 
@@ -738,15 +746,17 @@ export interface UseCalibration {
 /** The newest touches on each skin of a robot; sent as JSON in bytes, the newest only. */
 export interface RobotTouches {
   readonly skins: Readonly<Record<string, TouchesOfSkin>>;
+  readonly poses: readonly number[];
 }
 
 /** The touches on one skin, and whether its data can be relied on. */
 export interface TouchesOfSkin {
   readonly valid: boolean;
   readonly touches: readonly SpaceTouch[];
+  readonly pose_problem: string | null;
 }
 
-/** A touch in the frame of the robot's root; ``force`` N, null where nothing gives it. */
+/** A touch where the robot is drawn, in the frame of its root. */
 export interface SpaceTouch {
   readonly id: number;
   readonly position: readonly [number, number, number];

@@ -1,7 +1,7 @@
 /** The page of a robot: from metres to pixels, whichever way it is turned. */
 
 import { describe, expect, it } from "vitest";
-import { cameraOf, isFacing, toPicture } from "../src/robot/model";
+import { cameraOf, follow, home, isFacing, robot, toPicture, world, worldOf } from "../src/robot/model";
 import { touchLines } from "../src/robot/Skins";
 import { parts } from "../src/robot/solids";
 
@@ -43,6 +43,33 @@ describe("a camera", () => {
   });
 });
 
+describe("a robot that moves", () => {
+  const [rest, turned] = [[1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0], [0, -1, 0, 0.5, 1, 0, 0, 0, 0, 0, 1, 0.2]];
+  const scene = {
+    bones: [0, 1],
+    links: [{ link: 1, corners: [1, 0, 0, 0, 2, 0] }],
+    skins: [{ link: 1, corners: [0, 0, 1] }, { link: null, corners: [7, 8, 9] }],
+  };
+
+  it("takes with a link what lies on it, and nothing else", () => {
+    expect(worldOf(scene as never, [...rest, ...turned])).toEqual({
+      bones: [0, 0, 0, 0.5, 0, 0.2],
+      links: [0.5, 1, 0.2, -1.5, 0, 0.2],
+      skins: [[0.5, 0, 1.2], [7, 8, 9]],
+    });
+  });
+
+  it("is made anew only where a link has moved", () => {
+    robot.value = { ...scene, poses: [...rest, ...rest] } as never;
+    follow({ skins: {}, poses: [...rest, ...turned] });
+    const before = world.value;
+    follow({ skins: {}, poses: [...rest, ...turned] });
+    expect(world.value).toBe(before);
+    expect(world.value?.links).toEqual([0.5, 1, 0.2, -1.5, 0, 0.2]);
+    expect(home.value?.links).toEqual([1, 0, 0, 0, 2, 0]);
+  });
+});
+
 describe("a colour", () => {
   it("is the same however the build has written it", () => {
     expect(parts("#ffffff")).toEqual([1, 1, 1]);
@@ -56,15 +83,20 @@ describe("the row of a skin", () => {
 
   it("says where each touch is, and how hard where that is known", () => {
     const found = (force: number | null, more_than: number | null = null) =>
-      ({ valid: true, touches: [{ ...touch, force, more_than }] }) as never;
+      ({ valid: true, touches: [{ ...touch, force, more_than }], pose_problem: null }) as never;
     expect(touchLines(found(4.56))).toEqual(["touch 3 at 300, \u221220, 50 mm, 4.6 N"]);
     expect(touchLines(found(null))).toEqual(["touch 3 at 300, \u221220, 50 mm"]);
     expect(touchLines(found(9.1, 8))).toEqual(["touch 3 at 300, \u221220, 50 mm, > 8.0 N"]);
-    expect(touchLines({ valid: true, touches: [] })).toEqual(["no touch"]);
+    expect(touchLines({ valid: true, touches: [], pose_problem: null })).toEqual(["no touch"]);
+  });
+
+  it("says no place where it is not known where the link is", () => {
+    const found = { valid: true, touches: [{ ...touch, force: 2, more_than: null }], pose_problem: "pose unknown: why" };
+    expect(touchLines(found as never)).toEqual(["touch 3, 2.0 N"]);
   });
 
   it("never says that nothing touches a skin that is not read", () => {
-    expect(touchLines({ valid: false, touches: [] })).toEqual(["not known"]);
+    expect(touchLines({ valid: false, touches: [], pose_problem: null })).toEqual(["not known"]);
     expect(touchLines(undefined)).toEqual(["not known"]);
   });
 });

@@ -149,6 +149,8 @@ def configure(
     if asked is None and name is None:
         typer.echo(f"{port}: {say_board(held)}")
         return
+    if asked is None and held.damaged:
+        raise typer.BadParameter(f"expected --current too: the board holds {say_identity(held)}")
     identity = held.change(asked, name)
     check_current(identity.current, BOARDS[board], of_skin)
     with Bar("writing"):

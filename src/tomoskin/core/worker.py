@@ -30,9 +30,9 @@ _log = logging.getLogger(__name__)
 class Consumer(Protocol):
     """Takes messages from its worker's thread, which it may hold up.
 
-    :meth:`admit`, :meth:`size` and :meth:`durable` are called by whoever puts a message, and must
-    be quick. Who inherits from this gets the simplest consumer: what waits is counted, all of it
-    is worth something, and with a failure it ends.
+    :meth:`admit` and :meth:`durable` are called by whoever puts a message, and must be quick. Who
+    inherits from this gets the simplest consumer: all that waits is worth something, and with a
+    failure it ends.
     """
 
     kind: str
@@ -47,13 +47,11 @@ class Consumer(Protocol):
     ready: str = ""
     """What is said when it has been opened; "": nothing."""
 
+    gathering: float = 0.0
+    """Seconds for which messages may wait to be taken together; 0: each wakes the thread."""
+
     def admit(self, message: Any) -> Any:
         """What of ``message`` is to wait for it; None: it is not meant for it."""
-
-    def size(self, item: Any) -> int:
-        """How much of the worker's capacity an item takes."""
-        del item
-        return 1
 
     def durable(self, item: Any) -> bool:
         """Whether an item is still worth something after the consumer was away."""
@@ -86,11 +84,10 @@ C = TypeVar("C", bound=Consumer)
 
 @dataclass(frozen=True, slots=True)
 class Capacity:
-    """How much may wait for a consumer.
+    """How many items may wait for a consumer.
 
-    ``most`` together, by the consumer's own measure. Of more the ``keeps`` stay: before the newest
-    the oldest make room, the oldest stay and what comes is left out. ``grace``: seconds for what
-    waits at the end.
+    Of more than ``most`` the ``keeps`` stay: before the newest the oldest make room, the oldest
+    stay and what comes is left out. ``grace``: seconds for what waits at the end.
     """
 
     most: int
@@ -119,8 +116,8 @@ class Worker(Generic[C]):
         self.opening: Future[None] = Future()
         self.ending: Future[None] = Future()
         self._capacity, self._say = capacity, say
-        self._waiting: deque[tuple[int, Any]] = deque()
-        self._came = self._went = self._behind = 0  # sizes; each is written by one side
+        self._waiting: deque[Any] = deque()
+        self._behind = 0
         self._news = threading.Condition()
         self._ready = self._is_idle = False
         self._asked: float | None = None
@@ -145,7 +142,7 @@ class Worker(Generic[C]):
             if not self._ready and not self.consumer.durable(item):
                 self.left_out += 1
                 return
-            lost = self._add(self.consumer.size(item), item)
+            lost = self._add(item)
             first = lost > 0 and self._behind == 0
             self.left_out += lost
             self._behind += lost
@@ -175,17 +172,16 @@ class Worker(Generic[C]):
         asked = self._asked
         return 0.0 if asked is None else time.monotonic() - asked
 
-    def _add(self, size: int, item: Any) -> int:
+    def _add(self, item: Any) -> int:
         """Let ``item`` wait; how many messages are left out for it."""
-        most = self._capacity.most
-        if self._capacity.keeps == "oldest" and self._came - self._went + size > most:
+        most, waiting = self._capacity.most, self._waiting
+        if self._capacity.keeps == "oldest" and len(waiting) >= most:
             return 1
-        self._came += size
-        self._waiting.append((size, item))
+        waiting.append(item)
         lost = 0
-        while self._came - self._went > most and self._waiting:
+        while len(waiting) > most:
             with contextlib.suppress(IndexError):  # it has been taken at this very moment
-                self._came -= self._waiting.popleft()[0]
+                waiting.popleft()
                 lost += 1
         return lost
 
@@ -229,10 +225,9 @@ class Worker(Generic[C]):
         """What waits and is of no worth later is left out."""
         with self._news:
             self._ready = False
-            kept = [(size, item) for size, item in self._waiting if self.consumer.durable(item)]
+            kept = deque(filter(self.consumer.durable, self._waiting))
             self.left_out += len(self._waiting) - len(kept)
-            self._waiting, self._went = deque(kept), 0
-            self._came = sum(size for size, _ in kept)
+            self._waiting = kept
         pause = self.consumer.handle_failure(error)
         if pause is None and not self.opening.done():
             self.opening.set_exception(error)
@@ -253,22 +248,22 @@ class Worker(Generic[C]):
                 self._call(self.consumer.tend)
                 self._tended = time.monotonic()
             try:
-                size, item = self._waiting.popleft()  # needs no lock
+                return self._waiting.popleft()  # needs no lock
             except IndexError:
                 if not self._wait():
                     return None
-            else:
-                self._went += size
-                return item
         return None
 
     def _wait(self) -> bool:
-        """Wait for a message, until the routine is due; False where there will be no more."""
-        patience = self._tended + _ROUTINE - time.monotonic()
+        """Wait for messages, until the routine is due; False where there will be no more."""
+        patience, gathering = self._tended + _ROUTINE - time.monotonic(), self.consumer.gathering
         with self._news:
-            self._is_idle = True
-            self._news.wait_for(lambda: self._waiting or self._deadline is not None, patience)
-            self._is_idle = False
+            if gathering:
+                self._news.wait_for(lambda: self._deadline is not None, min(gathering, patience))
+            else:
+                self._is_idle = True
+                self._news.wait_for(lambda: self._waiting or self._deadline is not None, patience)
+                self._is_idle = False
             return bool(self._waiting) or self._deadline is None
 
     def _report_gap(self) -> None:

@@ -1,5 +1,6 @@
 """The one frame flow, pure: a reference is collected, then frames are followed to touches."""
 
+from tomoskin.pipeline.drives import DriveResult
 from tomoskin.pipeline.electrode_order import order_fault
 from tomoskin.pipeline.finding import located_alone, voltage_covariance
 from tomoskin.pipeline.following import Setting
@@ -16,6 +17,7 @@ from tomoskin.pipeline.sharp import sharpened
 __all__ = [
     "ALONE",
     "REFERENCE_FRAMES",
+    "DriveResult",
     "FrameResult",
     "Gathered",
     "Idle",

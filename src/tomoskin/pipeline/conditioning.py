@@ -215,6 +215,16 @@ class BaselineDifferences:
         problem = None if times is None else _gain_text(times)
         return Conditioned(differences, n_excluded, health, problem)
 
+    def newest(self, values: FloatArray) -> FloatArray | None:
+        """Difference data of ``values`` (n_meas,) V that are newer than the newest frame.
+
+        None where that had another gain.
+        """
+        if self._has_gain:
+            return None
+        mean = self._baseline.mean
+        return difference(values, mean, self.prepared.operator.difference)
+
     def learn(
         self, time: float, moved: FloatArray | float, *, touched: bool, noise: bool = True
     ) -> Learnt:
@@ -288,6 +298,11 @@ class GivenDifferences:
         given = Differences.of(filled, np.zeros((len(excluded), 0)), excluded)
         differences = replace(given, change=change, from_rest=change)
         return Conditioned(differences, n_excluded)
+
+    def newest(self, values: FloatArray) -> FloatArray | None:
+        """None: given differences come in whole frames."""
+        del values
+        return None
 
     def learn(
         self, time: float, moved: FloatArray | float, *, touched: bool, noise: bool = True

@@ -59,8 +59,8 @@ class FitFinder:
 
     Attributes
     ----------
-    model
-        The sheet on which touches are fitted.
+    model, spots
+        The sheet on which touches are fitted, and what fits them.
     like_touch
         Whether the newest frame may hold a touch, though none was found.
     rises
@@ -74,7 +74,7 @@ class FitFinder:
     ) -> None:
         self.model, self.like_touch, self.rises = model, False, False
         self.problem: str | None = None
-        self._spots, self._volts, self._pace, self._interval = spots, volts, pace, interval
+        self.spots, self._volts, self._pace, self._interval = spots, volts, pace, interval
 
     @classmethod
     def making(
@@ -106,18 +106,18 @@ class FitFinder:
         if prepared.spots is None or prepared.spots is self.model:
             gain = _gain(self.model, prepared, reference)
             noise = yield from _noise(prepared, reference, gain)
-            yield from self._spots.renewing(noise, gain)
+            yield from self.spots.renewing(noise, gain)
             self._volts = _voltage_ratio(self.model, reference)
             return self
         other = yield from FitFinder.making(
             prepared.spots, prepared, reference, self._pace, self._interval
         )
-        yield from other._spots.preparing(self._spots)
+        yield from other.spots.preparing(self.spots)
         return other
 
     def push(self, view: FrameView) -> list[Detection]:
         """Detections of a frame, strongest first."""
-        differences, spots, watch = view.differences, self._spots, self._spots.watch
+        differences, spots, watch = view.differences, self.spots, self.spots.watch
         detections = spots.push(
             differences.whole, differences.unknown, differences.jumps, differences.wander
         )
@@ -128,7 +128,7 @@ class FitFinder:
 
     def learn(self, *, touched: bool) -> bool:
         """See :meth:`SpotFinder.learn`; whether what touches have left does not show any more."""
-        self._spots.learn(touched=touched)
+        self.spots.learn(touched=touched)
         return not touched
 
     def strongest(self, dv: FloatArray) -> Detection | None:
@@ -136,13 +136,13 @@ class FitFinder:
         lost = ~np.isfinite(dv)
         if lost.all():
             return None
-        found = self._spots.push(np.where(lost, 0.0, dv), np.eye(len(dv))[:, lost])
+        found = self.spots.push(np.where(lost, 0.0, dv), np.eye(len(dv))[:, lost])
         return found[0] if found else None
 
     @property
     def others(self) -> FloatArray:
         """(k, n_meas) V: for each detection of the newest frame what all others change."""
-        return self._volts * self._spots.others()
+        return self._volts * self.spots.others()
 
 
 Finder = RegionFinder | FitFinder

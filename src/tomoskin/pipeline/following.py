@@ -17,6 +17,7 @@ from tomoskin.pipeline.conditioning import (
     Conditioning,
     GivenDifferences,
 )
+from tomoskin.pipeline.drives import DriveResult, DriveWatch
 from tomoskin.pipeline.finding import (
     FinderSteps,
     FitConditions,
@@ -116,6 +117,8 @@ class Following:
         conditions = FitConditions(prepared, reference, fitted, interval)
         self._applied = {k: c.apply(conditions) for k, c in prepared.calibrations.items()}
         self._tuning = None if reference is None else tune(prepared, reference, excluded)
+        self._interval = interval if interval > 0 else prepared.longest_scan
+        self._drives: DriveWatch | None = None
 
     @classmethod
     def from_rest(
@@ -166,6 +169,7 @@ class Following:
             return self._without_touches(measured, failed)
         reach("tracking")
         touches = self._tracker.update(detections, measured.time, measured.host_time)
+        self._confirm(touches, measured.time)
         if self._finder.learn(touched=bool(self._tracker.traces)):
             self._tracker.residuals.forget()
         readings = {}
@@ -182,6 +186,36 @@ class Following:
             noise=not (detections or self._finder.like_touch),
         )
         return self._result(measured, conditioned, view.image, touches, readings)
+
+    def push_drive(
+        self, drive: int, values: FloatArray, clock: tuple[float, float]
+    ) -> DriveResult | None:
+        """Take ``values`` (n_meas,) V of which those of a drive are new; what is known then, or
+        None where drives tell nothing. ``clock``: see :meth:`DriveWatch.push`."""
+        if not isinstance(self._finder, FitFinder):
+            return None
+        dv = self.conditioning.newest(values)
+        if dv is None:
+            return None
+        if self._drives is None or self._drives.finder is not self._finder.spots:
+            skin, kinds = self.prepared.skin, self.prepared.calibrations.values()
+            self._drives = DriveWatch(
+                self._finder.spots, self.prepared.pattern, skin.touch.snr, self._interval,
+                follows=not any(c.kind.locates for c in kinds),
+            )  # fmt: skip
+        result = self._drives.push(drive, dv, clock, self._tracker.ledger.numbered)
+        if result is None:
+            return None
+        finger = self._tracker.slides.of_finger
+        return replace(result, touches=tuple(map(finger, result.touches)))
+
+    def _confirm(self, touches: tuple[Touch, ...], time: float) -> None:
+        """Let drives know what a frame shows."""
+        if self._drives is None:
+            return
+        finger = self._tracker.slides.of_finger
+        withdrawn = self._drives.confirm([_sheet_of(t, finger(t)) for t in touches], time)
+        self._tracker.ledger.numbered += withdrawn  # no number is given twice
 
     def _detected(self, time: float, differences: Differences) -> tuple[FrameView, list[Detection]]:
         """What a frame shows, and the touches in it."""
@@ -273,6 +307,13 @@ class Following:
             scanned=measured.scanned,
             scan_time=measured.scan_time,
         )
+
+
+def _sheet_of(touch: Touch, ahead: Touch) -> Touch:
+    """A touch where the sheet's response is, of one at the finger, and of that as much ahead."""
+    finger, more = touch.detection, ahead.detection
+    sheet = replace(finger, x=2 * finger.x - more.x, y=2 * finger.y - more.y)
+    return replace(touch, detection=sheet)
 
 
 def _imaging(

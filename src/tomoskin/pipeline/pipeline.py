@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from tomoskin.board.source import ScanTimer
-from tomoskin.core import Frame, Mark, Voltages, reach
+from tomoskin.core import DriveSamples, Frame, Mark, Voltages, reach
 from tomoskin.imaging import AlphaChoice
+from tomoskin.pipeline.drives import DriveResult
 from tomoskin.pipeline.following import Following, Setting
 from tomoskin.pipeline.frame_result import FrameResult, ReferenceState
 from tomoskin.pipeline.prepare import Prepared
@@ -52,6 +53,8 @@ class Pipeline:
         self.tick_rate = prepared.readout.tick_rate
         self.refused = 0
         self._clock = ScanTimer()
+        self._samples = np.zeros(prepared.scan.n_samples, np.uint16)
+        self._sums = self._samples.copy()
         self.take_reference()
 
     def take_reference(self) -> None:
@@ -138,6 +141,25 @@ class Pipeline:
         rate = self.tick_rate or given.readout.tick_rate
         scan = self._clock.middle(frame, given.longest_scan, rate)
         return self.follow(given.readout(frame, rate, scan))
+
+    def push_drive(self, part: DriveSamples) -> DriveResult | None:
+        """Take one drive, before the frame that it becomes a part of.
+
+        What is known of touches then, or None where drives tell nothing.
+        """
+        state, given = self._state, self._given
+        drives = given.scan.sample_drive == part.drive
+        if not isinstance(state, Following) or len(part.samples) != np.count_nonzero(drives):
+            return None
+        self._samples[drives] = part.samples
+        if part.sums is not None:
+            self._sums[drives] = part.sums
+        sums = None if part.sums is None else self._sums
+        values, railed = given.readout.rows(self._samples, sums)
+        if railed[given.pattern.drive_index == part.drive].any():
+            return None
+        time = part.ticks / (self.tick_rate or given.readout.tick_rate)
+        return state.push_drive(part.drive, values, (time, part.host_time))
 
     def follow(self, measured: Voltages) -> FrameResult:
         """Take one frame whose voltages are known already: what :meth:`push` does with counts."""

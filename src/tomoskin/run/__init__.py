@@ -15,7 +15,7 @@ from tomoskin.run.labelled_frames import (
 )
 from tomoskin.run.live_skin import LiveSkin, open_skin, prepared_for
 from tomoskin.run.recordings import FILE_NAME
-from tomoskin.run.robot_run import Member, RobotRun, open_robot
+from tomoskin.run.robot_run import Member, RobotRun, open_robot, with_joints
 from tomoskin.run.runner import Runner
 from tomoskin.run.scripted import simulate
 from tomoskin.run.status import ReplayStatus, Status
@@ -50,4 +50,5 @@ __all__ = [
     "processors",
     "simulate",
     "way_to_bend",
+    "with_joints",
 ]

@@ -134,7 +134,7 @@ class Audience:
         self.place, self.turns, self.memory = place, turns or Turns(), memory
         self.obey: Callable[[str, Path], str] | None = None
         self._calls: list[Callable[[], None]] = []
-        self._subscribers: list[Worker[Subscriber]] = []
+        self._subscribers: tuple[Worker[Subscriber], ...] = ()
         self._lock = threading.Lock()
 
     @contextlib.contextmanager
@@ -160,28 +160,25 @@ class Audience:
         worker = Worker(Subscriber(name, call), Capacity(MOST_WAITING, "newest", 0.0), self.say)
         worker.start()
         with self._lock:
-            self._subscribers.append(worker)
+            self._subscribers += (worker,)
         try:
             yield
         finally:
             with self._lock:
-                self._subscribers.remove(worker)
+                self._subscribers = tuple(one for one in self._subscribers if one is not worker)
             worker.end()
 
     def say(self, kind: str, text: str) -> None:
         """Note an event of this moment that concerns no run."""
         self.events.add(Event(self.clock(), kind, text))
 
-    def put(self, message: RunMessage) -> None:
-        """Give ``message`` to those who subscribe; keep an event; wake others at either."""
+    def put(self, message: FrameResult | Event) -> None:
+        """Give ``message`` to those who subscribe; keep an event; wake all others."""
         if isinstance(message, Event):
             self.events.add(message)
-        with self._lock:
-            subscribers = tuple(self._subscribers)
-        for worker in subscribers:
+        for worker in self._subscribers:
             worker.put(message)
-        if isinstance(message, FrameResult | Event):
-            self.wake()
+        self.wake()
 
     def wake(self) -> None:
         """There is something new to look at."""
@@ -240,11 +237,13 @@ class Publisher:
             worker.start()
 
     def put(self, message: RunMessage) -> None:
-        """Give ``message`` to every consumer; events from any thread, the rest from one."""
+        """Have it recorded; give results and events to all who listen. Events from any thread,
+        the rest from one."""
         self.recordings.put(message)
-        for worker in self._sinks:
-            worker.put(message)
-        self._audience.put(message)
+        if isinstance(message, FrameResult | Event):
+            for worker in self._sinks:
+                worker.put(message)
+            self._audience.put(message)
 
     def say(self, kind: str, text: str) -> None:
         """Publish an event of this moment; from any thread."""

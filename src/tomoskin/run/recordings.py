@@ -101,8 +101,8 @@ class PreRoll:
         return tuple(self._since), number, True
 
 
-MOST_WAITING = 64 << 20
-"""Bytes that may wait for the disk: about a minute of the fastest board."""
+MOST_WAITING = 50_000
+"""Messages that may wait for the disk: about a minute of the fastest board."""
 
 Say = Callable[[str, str], None]
 

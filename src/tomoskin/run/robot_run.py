@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import wait
-from contextlib import AbstractContextManager, ExitStack, suppress
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -25,7 +25,7 @@ from tomoskin.run.commands import Opener
 from tomoskin.run.live_skin import LiveSkin
 from tomoskin.run.publisher import Turns
 from tomoskin.run.runner import Runner
-from tomoskin.run.sinks import Sink, make_sink
+from tomoskin.run.sinks import Sink, joint_states, make_sink
 from tomoskin.run.status import Status
 
 _OFTEN = 0.25
@@ -157,13 +157,6 @@ class RobotRun:
             found[name] = replace(status, problem=problem, source=status.source or name)
         return found
 
-    def watch(self, call: Callable[[], None]) -> AbstractContextManager[object]:
-        """While the block lasts, ``call`` is called at each result of any skin."""
-        stack = ExitStack()
-        for runner in self.runners.values():
-            stack.enter_context(runner.audience.watch(call))
-        return stack
-
     def _close_log(self) -> None:
         logs, self._logs = self._logs, {}
         for log in logs.values():
@@ -174,7 +167,7 @@ class RobotRun:
         """What no run can see by itself."""
         begun = epoch()
         while not self._ended.wait(_OFTEN):
-            boards = {name: r.status().board for name, r in self.runners.items()}
+            boards = {name: r.flow.board for name, r in self.runners.items()}
             ids = {name: board.unique_id.hex() for name, board in boards.items() if board}
             problems = board_problems(ids, self._boards)
             for name, text in problems.items():
@@ -199,11 +192,19 @@ def open_robot(file: StrPath, sinks: Sequence[str] = ()) -> RobotRun:
     """
     members = [
         Member.of(placed, Skin.load(placed.skin), [*map(make_sink, sinks)])
-        for placed in Robot.load(file).skins
+        for placed in with_joints(Robot.load(file)).skins
     ]
     run = RobotRun(members, BoardMemory.in_cache())
     run.start()
     return run
+
+
+def with_joints(robot: Robot) -> Robot:
+    """The same, whose skins know where their links are where the file names joint states.
+
+    Raises TomoskinError.
+    """
+    return robot.moved_by(joint_states(robot.joints)) if robot.joints else robot
 
 
 _STEPPED = "the clock of this computer was set by {:+.1f} s: messages keep the time of the start"

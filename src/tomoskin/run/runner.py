@@ -10,7 +10,6 @@ from pathlib import Path
 
 from tomoskin.board.source import Transport
 from tomoskin.core import Event, ModelError, OutputError, SourceError, StrPath, WireError
-from tomoskin.files.session import ReplayTransport
 from tomoskin.model.robot import Place
 from tomoskin.pipeline import Prepared
 from tomoskin.run.board_memory import BoardMemory
@@ -31,9 +30,7 @@ from tomoskin.run.loop import Loop
 from tomoskin.run.publisher import Audience, Turns
 from tomoskin.run.recordings import FILE_NAME
 from tomoskin.run.sinks import Contacts, Sink
-from tomoskin.run.status import Latency, Status
-from tomoskin.run.twin_control import TwinControl
-from tomoskin.sensing.signal import Reference
+from tomoskin.run.status import Status
 
 
 def do(flow: Flow, command: DirectCommand) -> None:
@@ -215,6 +212,11 @@ class Runner:
         return self._loop.flow.status(self._loop.trouble)
 
     @property
+    def flow(self) -> Flow:
+        """The skin and source of this moment, and what becomes of their frames."""
+        return self._loop.flow
+
+    @property
     def prepared(self) -> Prepared:
         """The prepared skin of this moment."""
         return self._loop.flow.prepared
@@ -237,23 +239,3 @@ class Runner:
     def contacts_of(self, news: News) -> Contacts:
         """The contacts of a result that :attr:`news` gave."""
         return self._loop.flow.contacts(news)
-
-    @property
-    def reference(self) -> Reference | None:
-        """What the untouched skin reads; None until that is known."""
-        return self._loop.flow.pipeline.reference
-
-    @property
-    def replay(self) -> ReplayTransport | None:
-        """The recording that is being played; None where the source is another."""
-        return self._loop.flow.marker.replay
-
-    @property
-    def twin(self) -> TwinControl:
-        """What can be done to the source, and what is done to it."""
-        return self._loop.flow.twin
-
-    @property
-    def latency(self) -> Latency:
-        """How long each stage takes; who publishes and paints says so here."""
-        return self._loop.flow.latency

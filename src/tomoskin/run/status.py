@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Literal
 
@@ -78,8 +79,6 @@ class CostMeter:
     def __init__(self, clock: Callable[[], float]) -> None:
         """Begin to measure with ``clock``, which gives seconds."""
         self._clock, self._count = clock, 0
-        self._stage, self._since = _BEGIN, 0.0
-        self._spent: dict[str, list[float]] = {}
         self._kept: list[tuple[float, int, FrameCost]] = []  # a heap by s and number, negative
 
     @property
@@ -90,36 +89,40 @@ class CostMeter:
     @contextmanager
     def of(self, frame: Frame) -> Iterator[None]:
         """Time what the block does with ``frame``."""
-        begun = self._clock()
-        self._spent, self._stage, self._since = {}, _BEGIN, begun
+        marks = [(_BEGIN, self._clock())]
         try:
-            with watch_stages(self._reach):
+            with watch_stages(lambda stage: marks.append((stage, self._clock()))):
                 yield
         finally:
-            self._reach("")
-            self._keep(frame, self._since - begun)
+            marks.append(("", self._clock()))
+            self._keep(frame, marks)
 
-    def _reach(self, stage: str) -> None:
-        now = self._clock()
-        spent = self._spent.setdefault(self._stage, [0.0, 0])
-        spent[0] += now - self._since
-        spent[1] += stage != self._stage
-        self._stage, self._since = stage or self._stage, now
-
-    def _keep(self, frame: Frame, seconds: float) -> None:
+    def _keep(self, frame: Frame, marks: list[tuple[str, float]]) -> None:
         number, self._count = self._count, self._count + 1
         if number % _OFTEN == 0:
             first = number - _SLOW_AMONG
             self._kept = [one for one in self._kept if -one[1] > first]
             heapq.heapify(self._kept)
+        seconds = marks[-1][1] - marks[0][1]
         if len(self._kept) >= _KEPT and seconds <= self._kept[0][0]:
             return
-        stages = [(name, 1e6 * spent, int(times)) for name, (spent, times) in self._spent.items()]
-        cost = FrameCost(number, frame.sequence, frame.host_time, tuple(stages))
+        cost = FrameCost(number, frame.sequence, frame.host_time, _stages(marks))
         if len(self._kept) < _KEPT:
             heapq.heappush(self._kept, (seconds, -number, cost))
         else:
             heapq.heapreplace(self._kept, (seconds, -number, cost))
+
+
+def _stages(marks: list[tuple[str, float]]) -> tuple[tuple[str, float, int], ...]:
+    """Of each stage its name, µs, and how often it began."""
+    spent: dict[str, tuple[float, int]] = {}
+    stage = ""
+    for (reached, since), (_, until) in pairwise(marks):
+        begins = reached not in ("", stage)
+        stage = reached or stage
+        us, times = spent.get(stage, (0.0, 0))
+        spent[stage] = us + 1e6 * (until - since), times + begins
+    return tuple((name, us, times) for name, (us, times) in spent.items())
 
 
 _WINDOW = 512

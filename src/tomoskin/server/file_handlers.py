@@ -42,13 +42,13 @@ class SessionUse:
     @property
     def playing(self) -> str | None:
         """Name of the session that is being played."""
-        replay = self._runner.replay
+        replay = self._runner.flow.marker.replay
         return replay.path.name if replay is not None else None
 
     @property
     def recording(self) -> str | None:
         """Name of the session that is being recorded."""
-        path = self._runner.status().recording
+        path = self._runner.flow.out.recordings.path
         return path.name if path is not None else None
 
     def check_ended(self, name: str) -> None:

@@ -85,14 +85,14 @@ class GuideHandlers:
 
     def _pause(self) -> bool:
         """Have the flow wait while no page shows it or a recording is played; True for a change."""
-        flow, on = self._flow, bool(self._shown_by) and self._hub.runner.replay is None
+        flow, on = self._flow, bool(self._shown_by) and self._hub.runner.flow.marker.replay is None
         if flow is None or flow.paused != on:
             return False
         flow.show(on=on)
         return True
 
     def _begin(self, page: Page, kind: FlowKind) -> None:
-        if self._hub.runner.replay is not None:
+        if self._hub.runner.flow.marker.replay is not None:
             raise WireError("presses need a live source: go back to live first")
         flow = _FLOWS[kind](self._hub.runner.prepared)
         self._leave()
@@ -123,7 +123,7 @@ class GuideHandlers:
     def _look(self, flow: GuidedFlow, loop: asyncio.AbstractEventLoop, result: FrameResult) -> None:
         """Hand over a frame; in a thread of its own."""
         with flow.lock:
-            played = self._hub.runner.replay is not None  # its presses were on no dot
+            played = self._hub.runner.flow.marker.replay is not None  # its presses were on no dot
             news = None if flow.paused or played else flow.see(result)
         if news is not None:
             with contextlib.suppress(RuntimeError):  # the loop has ended

@@ -89,7 +89,7 @@ class TwinHandlers:
 
     def greeting(self) -> Sequence[TwinState]:
         """What is wrong now, and how the sheet is bent."""
-        twin, skin = self._hub.runner.twin, self._hub.runner.prepared.skin
+        twin, skin = self._hub.runner.flow.twin, self._hub.runner.prepared.skin
         asked, bends = twin.pose.asked, way_to_bend(skin.surface)
         extent = np.ptp(skin.outline.polyline(skin.outline.length / 60), axis=0)
         now = TwinState.of(
@@ -110,8 +110,8 @@ class TwinHandlers:
 
     def _pose(self, page: Page, request: SetPose) -> None:
         """Raise WireError where the source has no sheet to bend."""
-        if not self._hub.runner.twin.bendable:
-            raise WireError(f"{self._hub.runner.status().source} cannot be bent on the page")
+        if not self._hub.runner.flow.twin.bendable:
+            raise WireError(f"{self._hub.runner.flow.source} cannot be bent on the page")
         self._newest = request
         self._hub.tasks.keep(self._bring(page, request))
 

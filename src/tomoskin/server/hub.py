@@ -44,7 +44,7 @@ def run_handlers(runner: Runner, folder: Path, tasks: Tasks) -> Handlers:
         runner.submit(commands.HoldPresses(page, _on_skin(request, runner.prepared.skin)))
 
     def paint(page: Page, request: Painted) -> None:
-        runner.latency.set_paint(page, request.p50_s, request.p99_s)
+        runner.flow.latency.set_paint(page, request.p50_s, request.p99_s)
 
     def record(_: Page, request: SetRecording) -> None:
         tasks.keep(_record(runner, folder, on=request.on))
@@ -73,7 +73,7 @@ def _unresolved(runner: Runner) -> UnresolvedMap:
     health = newest.result.health if newest else None
     lost = np.zeros(prepared.pattern.n_meas, bool) if health is None else health.lost
     try:
-        part = Unresolved.of(prepared, runner.status().choice.alpha, np.flatnonzero(lost))
+        part = Unresolved.of(prepared, runner.flow.pipeline.choice.alpha, np.flatnonzero(lost))
     except TomoskinError as error:
         return UnresolvedMap(values=None, radius_m=0.0, problem=error.message)
     return UnresolvedMap(values=part.values.round(3).tolist(), radius_m=part.radius, problem="")
@@ -131,7 +131,6 @@ class Hub(Host):
         self._handlers: dict[type, Handler] = {}
         self._greetings: list[Callable[[], Sequence[Message]]] = []
         self._farewells: list[Callable[[Page], None]] = []
-        self._wake_is_due = False
         self._next_event = 0
         self._timeline: PlayedTimeline | None = None
         self._past: deque[EventNote] = deque(maxlen=_FIRST_EVENTS)
@@ -161,13 +160,9 @@ class Hub(Host):
         loop = asyncio.get_running_loop()
 
         def announce() -> None:
-            if not self._wake_is_due:
-                self._wake_is_due = True
-                loop.call_soon_threadsafe(wake)
-
-        def wake() -> None:
-            self._wake_is_due = False
-            self.wake()
+            if self.awaited:
+                self.awaited = False
+                loop.call_soon_threadsafe(self.wake)
 
         async with during(self._tick()):
             self._read_timeline()
@@ -191,13 +186,13 @@ class Hub(Host):
     def note_sent(self, frame: bytes) -> None:
         """Note how long it took until a page's connection had ``frame``."""
         if self._made is not None and self._made[1] is frame:
-            self.runner.latency.add_published(time.monotonic() - self._made[0].ready)
+            self.runner.flow.latency.add_published(time.monotonic() - self._made[0].ready)
 
     def leave(self, page: Page, why: str = "") -> None:
         """Serve ``page`` no longer, and lift what it pressed."""
         super().leave(page)
         self.runner.submit(commands.HoldPresses(page, ()))
-        self.runner.latency.forget(page)
+        self.runner.flow.latency.forget(page)
         for farewell in self._farewells:
             farewell(page)
         if why:
@@ -227,20 +222,20 @@ class Hub(Host):
 
     def _now(self) -> tuple[Message, Message]:
         """The scene, made when it is first asked for, and the state."""
-        runner, status = self.runner, self.runner.status()
+        runner, status, replay = self.runner, self.runner.status(), self.runner.flow.marker.replay
         if self._scene is None:
             self._scene = views.scene(
                 runner.prepared,
                 status.source,
                 limit=self._limit,
-                pressable=runner.twin.pressable,
-                truth=runner.replay is not None and bool(runner.replay.truth),
+                pressable=runner.flow.twin.pressable,
+                truth=replay is not None and bool(replay.truth),
             )
         return self._scene, views.state(status)
 
     def _read_timeline(self) -> None:
         """Of a replay: tell every page what happened in the recording, once that has been read."""
-        if (replay := self.runner.replay) is not None:
+        if (replay := self.runner.flow.marker.replay) is not None:
             self.tasks.keep(self._tell_timeline(replay.path))
 
     async def _tell_timeline(self, path: Path) -> None:
@@ -257,5 +252,6 @@ class Hub(Host):
             self._next_event, happened = self.runner.events.since(self._next_event)
             news = [views.event(event) for event in happened]
             self._past.extend(news)
-            self.tell(*news, views.state(self.runner.status()))
+            if self.pages:
+                self.tell(*news, views.state(self.runner.status()))
             await asyncio.sleep(_STATE_PERIOD)

@@ -7,18 +7,20 @@ import contextlib
 import math
 import time
 from collections.abc import AsyncIterator, Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from tomoskin import __version__
-from tomoskin.core import FloatArray, Force, WireError, encode_json
-from tomoskin.files.messages import Stream
+from tomoskin.core import FloatArray, Force, SkinError, WireError, encode_json
+from tomoskin.files.messages import Contacts, Stream
 from tomoskin.model.robot import PlacedSkin, Pose, Robot
-from tomoskin.run import FILE_NAME, RobotRun, Runner, StrictRequest, commands
+from tomoskin.run import FILE_NAME, RobotRun, StrictRequest, commands
 from tomoskin.server.page_connection import Host, Page, Tasks, during
 from tomoskin.server.page_messages import (
+    DrawnLink,
     PlacedShape,
     RobotScene,
     RobotState,
@@ -28,7 +30,6 @@ from tomoskin.server.page_messages import (
     TouchesOfSkin,
 )
 from tomoskin.server.requests import SetRecording
-from tomoskin.server.views import flat
 
 PERIOD = 1 / 20
 """Seconds between two looks at the touches."""
@@ -56,9 +57,8 @@ class Overview(Host):
         streams = {
             n: Stream.of(r.prepared, n, 0.0, placed[n].place) for n, r in run.runners.items()
         }
-        poses = {n: robot.link_pose(placed[n].place) for n in run.runners}
-        self._poses, self._touches = poses, b""
-        self._scene = scene(robot, streams, poses)
+        self._stance, self._touches = Stance(robot), b""
+        self._scene = scene(robot, streams)
 
     @contextlib.asynccontextmanager
     async def running(self) -> AsyncIterator[None]:
@@ -118,14 +118,43 @@ class Overview(Host):
 
     def _renew(self) -> None:
         """Take the newest results; the same object where nothing has changed."""
-        runners = {n: r for n, r in self.run.runners.items() if r.newest}
-        made = encode_json(RobotTouches(skins={n: self._on(n, r) for n, r in runners.items()}))
+        newest = {n: r.contacts for n, r in self.run.runners.items() if r.newest}
+        poses = self._stance.poses(max((c.utc or 0.0 for c in newest.values()), default=0.0))
+        skins = {name: _on(contacts, poses) for name, contacts in newest.items()}
+        made = encode_json(RobotTouches(skins=skins, poses=_flat(poses)))
         if made != self._touches:
             self._touches = made
 
-    def _on(self, name: str, runner: Runner) -> TouchesOfSkin:
-        contacts, pose = runner.contacts, self._poses[name]
-        touches = [
+
+class Stance:
+    """Where the links of a ``robot`` are drawn.
+
+    A joint is where its newest state says; else where it was last, and at zero before that.
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        self._urdf, self._joints = robot.urdf, robot.skins[0].place.joints
+        self._last: dict[str, float] = {}
+        self._rest = self._urdf.poses() if self._urdf else {}
+
+    def poses(self, utc: float) -> dict[str, Pose]:
+        """Of each link in the frame of the root at a time, s since 1970."""
+        if self._urdf is None or self._joints is None:
+            return self._rest
+        return self._urdf.poses(partial(self._position, self._joints(utc)))
+
+    def _position(self, positions: Callable[[str], float], joint: str) -> float:
+        with contextlib.suppress(SkinError):
+            self._last[joint] = positions(joint)
+        return self._last.get(joint, 0.0)
+
+
+def _on(contacts: Contacts, poses: Mapping[str, Pose]) -> TouchesOfSkin:
+    pose = poses.get(contacts.frame_id, Pose())
+    return TouchesOfSkin(
+        valid=contacts.valid,
+        pose_problem=contacts.link and contacts.link.problem,
+        touches=[
             SpaceTouch(
                 id=contact.touch.id,
                 position=_rounded(pose(np.array([contact.position]))[0]),
@@ -135,35 +164,41 @@ class Overview(Host):
                 more_than=_more_than(contact.touch.detection.force),
             )
             for contact in contacts.touches
-        ]
-        return TouchesOfSkin(valid=contacts.valid, touches=touches)
+        ],
+    )
 
 
-def scene(robot: Robot, streams: Mapping[str, Stream], poses: Mapping[str, Pose]) -> RobotScene:
-    """Skins and links in the frame of the robot's root, m; coordinates lie flat as x0, y0, z0, …
+def scene(robot: Robot, streams: Mapping[str, Stream]) -> RobotScene:
+    """Links and skins, each in its own frame, m; coordinates lie flat as x0, y0, z0, …
 
     Where a link is shown by its shape no bone is, and what cannot be shown is said.
     """
     urdf = robot.urdf
-    solids = {s.link: s for s in urdf.solids()} if urdf else {}
-    shown = [name for name, solid in solids.items() if len(solid.triangles)]
-    links = (solids[n].triangles.reshape(-1, 3) for n in shown)
-    corners = [urdf.pose(n)(points) for n, points in zip(shown, links, strict=True)] if urdf else []
-    undrawn = [f"{link}: {why}" for link, solid in solids.items() for why in solid.problems]
+    solids = urdf.solids() if urdf else ()
+    shown = {solid.link: solid.triangles for solid in solids if len(solid.triangles)}
+    number = {link: k for k, link in enumerate(urdf.links)} if urdf else {}
+    bones = urdf.bones(without=shown) if urdf else ()
     return RobotScene(
         name=robot.name,
-        bones=flat(urdf.bones(without=shown)) if urdf else [],
-        links=_rounded(np.concatenate([np.zeros((0, 3)), *corners]).ravel()),
-        undrawn=undrawn,
-        skins=[_skin(s, streams[s.name], poses[s.name]) for s in robot.skins],
+        bones=[number[link] for ends in bones for link in ends],
+        links=[DrawnLink(number[n], _rounded(corners.ravel())) for n, corners in shown.items()],
+        undrawn=[f"{solid.link}: {why}" for solid in solids for why in solid.problems],
+        skins=[_skin(s, streams[s.name], number.get(s.place.link)) for s in robot.skins],
+        poses=_flat(urdf.poses()) if urdf else [],
         version=__version__,
     )
 
 
-def _skin(skin: PlacedSkin, stream: Stream, pose: Pose) -> PlacedShape:
-    corners = np.zeros((0, 3)) if stream.corners is None else stream.corners.reshape(-1, 3)
+def _skin(skin: PlacedSkin, stream: Stream, link: int | None) -> PlacedShape:
+    corners = np.zeros(0) if stream.corners is None else stream.corners.ravel()
     frame = stream.naming.frame_id
-    return PlacedShape.of(skin, frame=frame, corners=_rounded(pose(corners).ravel()))
+    return PlacedShape.of(skin, frame=frame, link=link, corners=_rounded(corners))
+
+
+def _flat(poses: Mapping[str, Pose]) -> Any:
+    """Three rows of four numbers of each."""
+    rows = [np.column_stack([pose.rotation, pose.position]).ravel() for pose in poses.values()]
+    return _rounded(np.concatenate([np.zeros(0), *rows]))
 
 
 def states(run: RobotRun) -> RobotState:

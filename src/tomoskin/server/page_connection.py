@@ -85,10 +85,13 @@ class Host(ABC):
     ----------
     pages
         The pages that are served.
+    awaited
+        Whether a page asks to be woken by the next frame.
     """
 
     def __init__(self) -> None:
         self.pages: set[Page] = set()
+        self.awaited = False
 
     @abstractmethod
     def first(self) -> Iterable[Message]:
@@ -191,6 +194,7 @@ class Page:
             while True:
                 await self._due.wait()
                 self._due.clear()
+                self._host.awaited = True  # before it looks: what comes meanwhile wakes it
                 following = loop.time() + FRAME_PERIOD
                 async with asyncio.timeout(PATIENCE):
                     await self._send()

@@ -375,27 +375,40 @@ class FlowNow(Message, frozen=True, tag="flow"):
 # A robot.
 
 
+class DrawnLink(MessagePart, frozen=True):
+    """What of a robot's link is drawn: the corners of its triangles, in its frame."""
+
+    link: int
+    corners: Flat
+
+
 class PlacedShape(MessagePart, frozen=True):
-    """A skin on a robot: the frame of its touches, and the corners of its triangles."""
+    """A skin on a robot: the frame of its touches, and the corners of its triangles in it.
+
+    ``link``: the number of the link whose frame that is; null where it lies on none.
+    """
 
     name: str
     frame: str
     source: str
+    link: int | None
     corners: Flat
 
 
 class RobotScene(Message, frozen=True, tag="robot"):
-    """A robot's skins and links in the frame of its root.
+    """A robot's links and skins.
 
-    ``bones``: both ends of the line from each link to the next; ``links``: corners of the triangles
-    of the links that have a shape; ``undrawn``: which have none, and why.
+    ``bones``: numbers of links, two a line; ``links``: those that have a shape; ``undrawn``: which
+    have none, and why; ``poses``: of each link in the frame of the root, three rows of four
+    numbers: the rotation, and the position in m.
     """
 
     name: str
-    bones: Flat
-    links: Flat
+    bones: list[int]
+    links: list[DrawnLink]
     undrawn: list[str]
     skins: list[PlacedShape]
+    poses: Flat
     version: str
 
 
@@ -420,9 +433,10 @@ class RobotState(Message, frozen=True, tag="robot-state"):
 
 
 class SpaceTouch(MessagePart, frozen=True):
-    """A touch in the frame of the robot's root; ``force`` N, null where nothing gives it.
+    """A touch where the robot is drawn, in the frame of its root.
 
-    ``more_than``: N that it is more than, where it is beyond what was taught; else null.
+    ``force``: N, null where nothing gives it; ``more_than``: N that it is more than, where it is
+    beyond what was taught; else null.
     """
 
     id: int
@@ -434,16 +448,24 @@ class SpaceTouch(MessagePart, frozen=True):
 
 
 class TouchesOfSkin(MessagePart, frozen=True):
-    """The touches on one skin, and whether its data can be relied on."""
+    """The touches on one skin, and whether its data can be relied on.
+
+    ``pose_problem``: why it is not known where the link is, so that positions are not either.
+    """
 
     valid: bool
     touches: list[SpaceTouch]
+    pose_problem: str | None
 
 
 class RobotTouches(MessagePart, frozen=True):
-    """The newest touches on each skin of a robot; sent as JSON in bytes, the newest only."""
+    """The newest touches on each skin of a robot; sent as JSON in bytes, the newest only.
+
+    ``poses``: as in the scene, where the links are now.
+    """
 
     skins: dict[str, TouchesOfSkin]
+    poses: Flat
 
 
 PAGE_MESSAGES = (

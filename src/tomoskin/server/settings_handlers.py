@@ -120,10 +120,10 @@ class AutomaticAlpha:
     def of(self, runner: Runner) -> float | None:
         """What would be chosen now; None where that cannot be said yet."""
         if runner.prepared.light_touch is not None:
-            return runner.status().choice.alpha
+            return runner.flow.pipeline.choice.alpha
         if self._chooser is None or self._chooser[0] is not runner.prepared.problem:
             return None
-        reference, noise = runner.reference, runner.prepared.predicted_noise()
+        reference, noise = runner.flow.pipeline.reference, runner.prepared.predicted_noise()
         if reference is not None and reference.noise_is_known and reference.noise.any():
             noise = runner.prepared.difference_noise(reference)
         return self._chooser[1](noise).alpha
@@ -200,7 +200,7 @@ class SettingsHandlers:
         """Raise SourceError where the source cannot follow ``skin``."""
         if skin.body == self._hub.runner.prepared.skin.body:
             return
-        if self._hub.runner.replay is not None:
+        if self._hub.runner.flow.marker.replay is not None:
             raise SourceError(
                 "a recording keeps its sheet and its scan: go back to live to change them"
             )
@@ -264,8 +264,8 @@ class SettingsHandlers:
         prepared = prepare(skin, runner.prepared)
         prepared.warm_up()
         if skin.body == runner.prepared.skin.body:
-            if runner.reference is not None:
-                prepared = tuned_image(prepared, runner.reference)
+            if runner.flow.pipeline.reference is not None:
+                prepared = tuned_image(prepared, runner.flow.pipeline.reference)
             scaled = prepared, colour_limit(prepared)
             self._took = time.monotonic() - start
             runner.ask(commands.Adopt(prepared))
@@ -283,7 +283,7 @@ class SettingsHandlers:
             document=skin.document,
             n_electrodes=skin.n_electrodes,
             automatic_alpha=self._automatic.of(self._hub.runner),
-            alpha=self._hub.runner.status().choice.alpha,
+            alpha=self._hub.runner.flow.pipeline.choice.alpha,
             undo=len(self._history.past),
             redo=len(self._history.future),
             busy=self._working,
@@ -315,7 +315,7 @@ def _change(runner: Runner, prepared: Prepared, open_source: commands.Opener) ->
     A source that is pressed from here is simulated: it is opened beside the old one, which goes on
     meanwhile. Anything else may be the same port.
     """
-    if not runner.twin.pressable:
+    if not runner.flow.twin.pressable:
         runner.ask(commands.Change(prepared, open_source))
         return
     ahead = [open_source()]

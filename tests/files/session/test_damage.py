@@ -466,7 +466,7 @@ from tomoskin.core import Capacity, Mark, MarkedFrame, Worker
 from tomoskin.files.session import Recorder, SessionWriter
 path = Path(sys.argv[1])
 recorder = Recorder(path, lambda: SessionWriter(path, SKIN), None, print)
-worker = Worker(recorder, Capacity(1 << 20, "oldest"), print)
+worker = Worker(recorder, Capacity(1 << 12, "oldest"), print)
 worker.start()
 worker.opening.result()
 for number in range(20):

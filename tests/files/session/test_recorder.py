@@ -209,7 +209,7 @@ def test_a_slow_disk_loses_messages_but_delays_nobody(tmp_path, said, start, mon
     monkeypatch.setattr(Path, "open", lambda self, *_, **__: Slow(str(self), "x"))
     session = SessionWriter(path, SKIN)
     monkeypatch.undo()
-    worker = start(path, make=lambda: session, most=50_000)
+    worker = start(path, make=lambda: session, most=100)
     Slow.go.clear()
     record(worker, 2000)  # returns although nothing can be written
     assert "the disk is too slow" in said.wait_for("recording-behind")

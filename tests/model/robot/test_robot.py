@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -60,11 +62,11 @@ def test_a_robot_is_read_with_its_files_beside_it(files):
     assert right.source == f"replay:{files / 'run.mcap@2'}"
     assert left.calibrations == (files / "touch.npz", files / "bend.npz")
     assert right.calibrations == (files / "force.npz",)
-    assert robot.link_pose(left.place).position == pytest.approx([0, 0.3, 0.2])
-    assert robot.link_pose(right.place).position.tolist() == [0, 0, 0]
-    assert robot.urdf.bones() == pytest.approx(
-        np.array([[[0, 0, 0], [0, 0, 0.2]], [[0, 0, 0.2], [0, 0.3, 0.2]]])
-    )
+    assert robot.urdf.pose("fore").position == pytest.approx([0, 0.3, 0.2])
+    assert right.place.in_root(0.0) is None
+    assert robot.urdf.root == "base"
+    assert robot.urdf.bones() == (("base", "upper"), ("upper", "fore"))
+    assert robot.urdf.bones(without=["base"]) == (("upper", "fore"),)
 
 
 @pytest.mark.parametrize("angles", [(0.1, 0, 0), (0, 0.5, -2), (3, -1, 0.2)])
@@ -110,6 +112,7 @@ def test_a_moved_surface_is_the_surface_moved():
         ('"arm.urdf"', '"leg.urdf"', "no such file|cannot be read"),
         ('board = "0102"', 'board = "x1"', "hexadecimal"),
         ('board = "0102"', 'bord = "0102"', 'did you mean "board"'),
+        ('urdf = "arm.urdf"', 'joints = "ros2"', "needs the key urdf"),
         ('["10 mm", "0 mm", "30 mm"]', "[1, 2, 3]", "without a unit"),
         ('"bend.npz"', "3", '1 "left" calibration: entry 1: expected text'),
     ],
@@ -151,12 +154,10 @@ def test_one_port_by_two_paths_is_one_port(files):
         ('<link name="fore"/>', '<link name="fore"/><link name="fore"/>', "twice"),
         ('<link name="fore"/>', '<link name="fore"/><link name="table"/>', "got 2: base, table"),
         ('parent link="base"', 'parent link="fore"', "got 2|ring|got 0"),
-        ('xyz="0.3 0 0"', 'xyz="${length} 0 0"', "got a xacro"),
         (
-            '<robot name="arm">',
-            '<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">'
-            '<xacro:macro name="finger"><link name="tip"/></xacro:macro>',
-            "got a xacro.*expand xacro first",
+            'xyz="0.3 0 0"',
+            'xyz="${length} 0 0"',
+            "needs the package xacro|expanded by xacro: .*length",
         ),
         ('xyz="0.3 0 0"', 'xyz="0.3 0"', "three numbers"),
         ('xyz="0.3 0 0"', 'xyz="nan 0 0"', "three numbers"),
@@ -168,6 +169,118 @@ def test_a_bad_urdf_is_refused(files, old, new, said):
     (files / "arm.urdf").write_text(URDF.replace(old, new))
     with pytest.raises(SkinError, match=said):
         Urdf.read(files / "arm.urdf")
+
+
+XACRO = """<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">
+<xacro:arg name="length" default="0.3"/>
+<xacro:property name="half" value="${$(arg length) / 2}"/>
+<xacro:macro name="arm" params="name parent *origin"><link name="${name}"/>
+  <joint name="to_${name}" type="fixed"><parent link="${parent}"/><child link="${name}"/>
+  <xacro:insert_block name="origin"/></joint></xacro:macro>
+<link name="base"/>
+<xacro:arm name="fore" parent="base"><origin xyz="${half} 0 0" rpy="0 0 ${pi / 2}"/></xacro:arm>
+</robot>"""
+
+
+@pytest.fixture
+def xacro():
+    return pytest.importorskip("xacro", reason="a xacro: python -m pip install '.[xacro]'")
+
+
+def test_a_xacro_is_expanded(files, xacro):
+    assert xacro
+    (files / "arm.urdf.xacro").write_text(XACRO)
+    urdf = Urdf.read(files / "arm.urdf.xacro")
+    assert urdf.links == ("base", "fore")
+    assert urdf.joints["fore"].name == "to_fore"
+    assert urdf.pose("fore").position == pytest.approx([0.15, 0, 0])
+    turned = Rotation.from_euler("z", np.pi / 2).as_matrix()
+    assert urdf.pose("fore").rotation == pytest.approx(turned, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("${half}", "${third}", r"arm\.urdf\.xacro: cannot be expanded by xacro: .*third"),
+        ("${half}", "1 ${half}", "three numbers"),
+        ('xacro:arm name="fore" parent="base"', 'xacro:leg name="fore"', "cannot be expanded"),
+        ('parent="base"', 'parent="bass"', 'there is no link "bass"'),
+    ],
+)
+def test_a_xacro_that_cannot_be_meant(files, xacro, old, new, said):
+    assert xacro
+    text = XACRO.replace(old, new)
+    text = text.replace("</xacro:arm>", "</xacro:leg>") if "leg" in new else text
+    (files / "arm.urdf.xacro").write_text(text)
+    with pytest.raises(SkinError, match=said):
+        Urdf.read(files / "arm.urdf.xacro")
+
+
+def test_without_the_package_a_xacro_says_what_to_install(files, monkeypatch):
+    monkeypatch.setitem(sys.modules, "xacro", None)
+    (files / "arm.urdf.xacro").write_text(XACRO)
+    with pytest.raises(SkinError, match=r"arm\.urdf\.xacro: needs the package xacro.*xacro"):
+        Urdf.read(files / "arm.urdf.xacro")
+
+
+MOVING = """<robot name="hand"><link name="base"/><link name="a"/><link name="b"/><link name="c"/>
+<joint name="turn" type="continuous"><parent link="base"/><child link="a"/>
+  <origin xyz="0.1 0 0" rpy="0.3 0 0.2"/><axis xyz="0 3 4"/></joint>
+<joint name="slide" type="prismatic"><parent link="a"/><child link="b"/>
+  <origin xyz="0 0 0.2" rpy="0 1 0"/></joint>
+<joint name="follow" type="revolute"><parent link="b"/><child link="c"/>
+  <axis xyz="0 0 1"/><mimic joint="turn" multiplier="-2" offset="0.5"/></joint></robot>"""
+
+
+def homogeneous(rotation, position):
+    whole = np.eye(4)
+    whole[:3, :3], whole[:3, 3] = rotation.as_matrix(), position
+    return whole
+
+
+def test_joints_move_links_about_and_along_their_axes(files):
+    (files / "hand.urdf").write_text(MOVING)
+    urdf, none = Urdf.read(files / "hand.urdf"), Rotation.identity()
+    positions = {"turn": 0.7, "slide": 0.05}
+    pose = urdf.pose("c", positions.__getitem__)
+    expected = (
+        homogeneous(Rotation.from_euler("xyz", (0.3, 0, 0.2)), (0.1, 0, 0))
+        @ homogeneous(Rotation.from_rotvec(0.7 * np.array([0, 0.6, 0.8])), (0, 0, 0))
+        @ homogeneous(Rotation.from_euler("xyz", (0, 1, 0)), (0, 0, 0.2))
+        @ homogeneous(none, (0.05, 0, 0))
+        @ homogeneous(Rotation.from_rotvec((0, 0, 0.5 - 2 * 0.7)), (0, 0, 0))
+    )
+    assert pose.rotation == pytest.approx(expected[:3, :3])
+    assert pose.position == pytest.approx(expected[:3, 3])
+    every = urdf.poses(positions.__getitem__)
+    assert [*every] == ["base", "a", "b", "c"]
+    assert every["c"].position == pytest.approx(pose.position)
+    assert urdf.poses()["c"].position == pytest.approx(urdf.pose("c").position)
+
+
+def test_a_joint_that_no_number_tells_has_no_pose(files):
+    (files / "hand.urdf").write_text(MOVING.replace("continuous", "floating"))
+    urdf = Urdf.read(files / "hand.urdf")
+    with pytest.raises(SkinError, match='a joint state has no position of the floating "turn"'):
+        urdf.pose("a", {}.__getitem__)
+    assert urdf.pose("a").position.tolist() == [0.1, 0, 0]  # at rest
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("continuous", "revolut", 'joint "turn": expected a type of revolute, .*got "revolut"'),
+        ('xyz="0 3 4"', 'xyz="0 0 0"', 'joint "turn": expected an axis with a direction'),
+        ('xyz="0 3 4"', 'xyz="0 3"', "three numbers in <axis> xyz"),
+        ('mimic joint="turn"', 'mimic joint="trun"', 'expected a joint to mimic, got "trun"'),
+        ('multiplier="-2"', 'multiplier="x"', "a number in <mimic> multiplier"),
+    ],
+)
+def test_a_joint_that_cannot_be_meant(files, old, new, said):
+    assert old in MOVING
+    (files / "hand.urdf").write_text(MOVING.replace(old, new))
+    with pytest.raises(SkinError, match=said):
+        Urdf.read(files / "hand.urdf")
 
 
 def test_a_mesh_lies_on_its_link(files):

@@ -34,7 +34,7 @@ STORE.register(
 STORE.register(
     get_types_from_msg("tactile_msgs/TactileContact[] contacts", "tactile_msgs/msg/TactileContacts")
 )
-NUMBERS = {"octet": types.byte, "bool": bool, "string": str}
+NUMBERS = {"octet": types.byte, "char": types.uint8, "bool": bool, "string": str}
 
 
 @functools.cache

@@ -27,6 +27,8 @@ from tomoskin.run.sinks import make_sink
 
 PEER = Path(__file__).with_name("ros_peer.py")
 CLIENT = Path(__file__).with_name("ros_client.py")
+GRAPH = Path(__file__).with_name("ros_graph.py")
+PARAMETERS = "list_parameters", "get_parameters", "describe_parameters", "set_parameters"
 LOOPBACK = (
     "<CycloneDDS><Domain><General><Interfaces><NetworkInterface name='lo'/></Interfaces>"
     "<AllowMulticast>false</AllowMulticast></General><Discovery>"
@@ -154,9 +156,10 @@ def test_the_report_of_a_run_says_how_its_board_is(program, domain, prepared, id
     assert 'no parent of its frame "skin" is published' in said[0]
 
 
-def asked(domain, service):
+def asked(domain, service, kind="std_srvs/Trigger", **fields):
     """The reply that a node gets from a service."""
-    command = [sys.executable, str(CLIENT), domain, service]
+    fields = fields or {"structure_needs_at_least_one_member": 0}
+    command = [sys.executable, str(CLIENT), domain, service, kind, json.dumps(fields)]
     done = subprocess.run(command, check=True, capture_output=True, text=True, timeout=PATIENCE)
     return json.loads(done.stdout)
 
@@ -189,6 +192,50 @@ def test_nodes_ask_for_a_reference_and_for_recordings(domain, prepared, idle, tm
             assert not session.torn
     finally:
         runner.stop()
+
+
+@pytest.mark.parametrize(("release", "size"), [("jazzy", 16), ("humble", 24)])
+def test_the_graph_has_a_node_with_its_topics_and_services(program, domain, stream, release, size):
+    sink = make_sink(f"ros2:namespace=left/arm,release={release}")
+    begin(sink, replace(stream, obey=print))
+    for text in program(str(GRAPH), domain, f"ROS2_{release.upper()}").lines(lambda _: None):
+        line = json.loads(text)
+        if "" not in line["topics"]:  # all its ends have been discovered
+            break
+    sink.close()
+    assert (line["node"], line["size"]) == (["/left", "arm"], size)
+    assert line["own"]
+    own = {f"rt{name}" if name[0] == "/" else f"rt/left/arm/{name}" for name in TOPICS}
+    services = {"take_reference", *PARAMETERS}
+    own |= {f"rq/left/arm/{name}Request" for name in services}
+    own |= {f"rr/left/arm/{name}Reply" for name in services}
+    assert set(line["topics"]) == own
+
+
+def test_parameters_can_be_read_and_not_set(domain, stream):
+    sink = make_sink("ros2:parent=tool0")
+    begin(sink, stream)
+
+    def parameters(does, **fields):
+        name = does.replace("P", "_p").lower()
+        return asked(domain, f"/tomoskin/{name}", f"rcl_interfaces/{does}", **fields)
+
+    names = parameters("ListParameters", prefixes=[], depth=0)["result"]["names"]
+    assert names == ["skin", "source", "frame_id", "parent", "electrodes", "measurements"]
+    some = parameters("ListParameters", prefixes=["skin"], depth=0)["result"]["names"]
+    assert some == ["skin"]
+    got = parameters("GetParameters", names=["skin", "electrodes", "none", "parent"])["values"]
+    assert [(v["type"], v["string_value"], v["integer_value"]) for v in got] == [
+        (4, stream.skin, 0), (2, "", 8), (0, "", 0), (4, "tool0", 0),
+    ]  # fmt: skip
+    (described,) = parameters("DescribeParameters", names=["electrodes"])["descriptors"]
+    assert (described["name"], described["type"], described["read_only"]) == ("electrodes", 2, True)
+    assert described["description"] == "Number of electrodes"
+    (refused,) = parameters("SetParameters", parameters={"skin": "other"})["results"]
+    assert not refused["successful"]
+    assert "read-only" in refused["reason"]
+    assert parameters("GetParameters", names=["skin"])["values"][0]["string_value"] == stream.skin
+    sink.close()
 
 
 def test_without_a_folder_nobody_may_have_it_record(domain, prepared, idle):
@@ -227,10 +274,11 @@ def test_the_listener_of_the_documentation_hears_touches(listener, domain, strea
 @pytest.mark.parametrize(
     ("argument", "said"),
     [
-        ("node", "expected domain=…, namespace=…, frame=…, parent=…, at=…, folder=…"),
+        ("node", "expected domain=…, namespace=…, frame=…, parent=…, at=…, folder=…, release=…"),
         ("namespace=left arm", "expected a namespace"),
         ("namespace=/arm", "expected a namespace"),
         ("frame=", "expected domain"),
+        ("release=foxy", "expected release=jazzy or humble, got .foxy."),
         ("domain=233", "expected a domain from 0 to 232"),
         ("domain=x", "expected a domain"),
         ("at=0/0/0", "expected parent"),

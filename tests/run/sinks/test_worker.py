@@ -264,3 +264,23 @@ def test_a_consumer_that_fails_for_good_ends(news):
     worker.put(2)
     worker.join()
     assert (worker.taken, worker.left_out) == (0, 0)
+
+
+def test_a_consumer_that_lets_messages_gather_is_not_woken_by_each(news, monkeypatch):
+    class Gathering(Jar):
+        gathering = 0.05
+
+    jar = Gathering()
+    jar.go.release(100)
+    worker, woken = Worker(jar, Capacity(100, "oldest"), news), []
+    worker.start()
+    worker.opening.result(PATIENCE)
+    with monkeypatch.context() as patch:
+        patch.setattr(worker._news, "notify", lambda: woken.append(worker.taken))
+        for number in range(50):
+            worker.put(number)
+            threading.Event().wait(0.002)
+    worker.end()
+    worker.ending.result(PATIENCE)
+    assert jar.items == list(range(50))
+    assert woken == []

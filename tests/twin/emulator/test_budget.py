@@ -12,10 +12,13 @@ from tomoskin.board.source import Link, ScanSettings, SerialTransport
 from tomoskin.model.pattern import Pattern, Scan
 from tomoskin.twin.emulator.program import Programs
 from twin.emulator.test_emulator import frames_of
-from twin.emulator.watch import Watch, symbol
+from twin.emulator.watch import CLOCK, Watch, symbol
 
 MOST_FLASH, MOST_RAM, MEMORY = 16 * 1024, 4 * 1024, 8 * 1024
 MOST_STACK = 256
+TWO_BYTES = 20e-6
+"""s at 1 MBd: the processor holds two and the one that is coming; simavr holds more."""
+
 # Electrodes, conversions summed (one: packed), most cycles to enclose a frame.
 ENCLOSED = [(8, 1, 5_000), (8, 4, 5_000), (16, 1, 7_500), (16, 4, 13_000)]
 
@@ -50,3 +53,25 @@ def test_cycles_to_enclose_a_frame_and_the_stack(
     assert calls > 10
     assert 1_000 < (function + shifts) / calls < most
     assert 30 < after.stack < MOST_STACK
+
+
+@pytest.mark.parametrize(
+    ("electrodes", "settings"),
+    [
+        (8, ScanSettings(1, 200e-6, 0.1, 10)),
+        (16, ScanSettings(4, 200e-6, 0.1, 10, dead_time=50e-6)),
+        (8, ScanSettings(16, 200e-6, 0.1, 10, chop_frequency=300)),
+    ],
+)
+def test_the_line_is_never_left_alone_for_longer_than_it_can_hold_bytes(
+    programs: Programs, tmp_path: Path, electrodes: int, settings: ScanSettings
+) -> None:
+    watch, scan = tmp_path / "watch", Scan.of(Pattern.adjacent(electrodes))
+    options = ("-f", "-w", str(watch), str(programs.elf))
+    with (
+        running(programs.emulator, tmp_path / "port", *options) as board,
+        Link(SerialTransport(board.path), scan, settings) as link,
+    ):
+        frames_of(link, 30)
+        deaf = Watch.read(watch).deaf
+    assert 0 < deaf / CLOCK < TWO_BYTES

@@ -7,13 +7,16 @@ from contextlib import closing
 
 import pytest
 
-from firmware.boards import built, running
+from firmware.boards import SCAN, SETTINGS, built, running
 from firmware.conftest import need
-from tomoskin.board.source import SerialTransport
+from tomoskin.board.source import Link, SerialTransport
 from tomoskin.cli import main
+from tomoskin.core import SourceError
 from tomoskin.twin.emulator import program
+from tomoskin.twin.emulator.board_process import BoardIdentity
 from tomoskin.twin.emulator.flash import ask_info
 from twin.emulator.bootloader import Mega
+from twin.emulator.test_emulator import frames_of
 
 
 @pytest.fixture
@@ -49,6 +52,24 @@ def test_the_firmware_reads_what_configure_has_written(mega, tomoskin, programs,
     ):
         info = ask_info(transport)
     assert (info.current, info.unique_id) == (20_000, b"left-arm")
+
+
+@pytest.mark.parametrize("bit", [0, 20, 70, 100])
+def test_a_memory_with_one_wrong_bit_is_named_and_not_used(tomoskin, programs, tmp_path, bit):
+    held = bytearray(BoardIdentity(0.01, b"left-arm").pack())
+    held[bit // 8] ^= 1 << bit % 8
+    (tmp_path / "eeprom").write_bytes(held)
+    options = ("-e", str(tmp_path / "eeprom"), str(programs.elf))
+    with running(programs.emulator, tmp_path / "port", *options) as board:
+        with (
+            pytest.raises(SourceError, match="damaged: its checksum"),
+            Link(SerialTransport(board.path), SCAN, SETTINGS) as link,
+        ):
+            frames_of(link, 1)
+        shown = tomoskin("firmware", "configure", board.path)[1]
+        code, _, refused = tomoskin("firmware", "configure", board.path, "--id", "arm")
+    assert "damaged" in shown
+    assert (code, "--current too" in refused) == (2, True)
 
 
 def test_what_is_not_named_stays_and_a_board_gets_an_id(mega, tomoskin):

@@ -20,7 +20,7 @@ class Watch:
 
     ``spent`` in the instruction at each word of flash; ``net`` (16,) of pairs, by the lower
     channel: from the other one to it, less from it to the other. ``said``: from the end of a drive
-    to the last byte of the newest message.
+    to the last byte of the newest message; ``deaf``: without interrupts.
     """
 
     cycle: int
@@ -31,15 +31,17 @@ class Watch:
     resets: int
     lowest_stack: int
     said: int
+    deaf: int
     spent: np.ndarray
     net: np.ndarray
 
     @classmethod
     def read(cls, path: Path) -> Watch:
         words = np.fromfile(path, "<u8")
-        cycle, connected, since, on, off, resets, stack, said = words[:8].tolist()
-        spent, net = words[8:-CHANNELS], words[-CHANNELS:].astype(np.int64)
-        return cls(cycle, bool(connected), since, on, off, resets, stack, said, spent, net)
+        cycle, connected, since, on, off, resets, stack, said, deaf = words[:9].tolist()
+        net = words[-CHANNELS:].astype(np.int64)
+        on_off = (cycle, bool(connected), since, on, off)
+        return cls(*on_off, resets, stack, said, deaf, words[9:-CHANNELS], net)
 
     @property
     def on(self) -> int:

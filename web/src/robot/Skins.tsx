@@ -10,13 +10,15 @@ export function touchLines(found: SkinTouches[string] | undefined): string[] {
   return found.touches.map(({ id, position, force, more_than: least }) => {
     const place = position.map((value) => millimetres(value, 0)).join(", ");
     const newtons = least === null ? fixed(force, 1) : `> ${fixed(least, 1)}`;
-    return `touch ${id} at ${place} mm${force === null ? "" : `, ${newtons} N`}`;
+    const at = found.pose_problem === null ? ` at ${place} mm` : "";
+    return `touch ${id}${at}${force === null ? "" : `, ${newtons} N`}`;
   });
 }
 
 function Row({ name, frame }: { name: string; frame: string }) {
   const state = states.value?.skins[name];
   const trouble = state?.problem ?? (state && !state.ready ? "the untouched skin is being measured" : null);
+  const lost = touches.value[name]?.pose_problem;
   const rate = state ? `${state.fps.toFixed(0)} frames/s, ${state.lost} lost` : "";
   return (
     <li data-testid={`skin-${name}`} class={trouble ? "amber" : ""}>
@@ -27,6 +29,7 @@ function Row({ name, frame }: { name: string; frame: string }) {
         {touchLines(touches.value[name]).map((line) => <span key={line}>{line}</span>)}
       </span>
       {trouble && <p role="status">{trouble}</p>}
+      {lost && <p>{lost}</p>}
     </li>
   );
 }

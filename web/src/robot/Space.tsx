@@ -4,7 +4,7 @@ import { effect, signal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { theme } from "../theme";
 import { paintMarks } from "./marks";
-import { cameraOf, orbit, robot, touches } from "./model";
+import { cameraOf, home, orbit, robot, touches, world } from "./model";
 import { Solids } from "./solids";
 
 const TURN = 0.008;
@@ -28,23 +28,23 @@ function painting(image: HTMLCanvasElement, marks: HTMLCanvasElement): () => voi
   const solids = gl && new Solids(gl);
   const stops = [
     effect(() => {
-      const scene = robot.value;
-      solids?.set(scene?.links ?? [], scene?.skins.flatMap((skin) => skin.corners) ?? []);
+      const now = world.value;
+      solids?.set(now?.links ?? [], now?.skins.flat() ?? []);
     }),
     effect(() => {
       const [width, height] = size.value;
-      const scene = robot.value;
-      if (!scene || !pen || width === 0) return;
+      const [scene, now, first] = [robot.value, world.value, home.value];
+      if (!scene || !now || !first || !pen || width === 0) return;
       const fine = Math.min(2, window.devicePixelRatio || 1);
       for (const canvas of [image, marks]) {
         if (canvas.width !== Math.round(width * fine)) canvas.width = Math.round(width * fine);
         if (canvas.height !== Math.round(height * fine)) canvas.height = Math.round(height * fine);
       }
       pen.setTransform(fine, 0, 0, fine, 0, 0);
-      const all = [...scene.bones, ...scene.links, ...scene.skins.flatMap((skin) => skin.corners)];
-      const camera = cameraOf(all, orbit.value, width, height);
+      const camera = cameraOf([...first.bones, ...first.links, ...first.skins.flat()], orbit.value, width, height);
       solids?.paint(camera, theme.value);
-      paintMarks(pen, camera, scene, touches.value, theme.value);
+      const names = scene.skins.map((skin) => skin.name);
+      paintMarks(pen, camera, now, names, touches.value, theme.value);
     }),
   ];
   return () => stops.forEach((stop) => stop());

@@ -9,7 +9,7 @@ import { render } from "preact";
 import { Connection, type LinkState, socketAddress } from "../socket";
 import { typeface } from "../theme";
 import type { RobotMessage, RobotTouches } from "../wire";
-import { robot, states, touches } from "./model";
+import { follow, robot, states } from "./model";
 import { Skins } from "./Skins";
 import { Space } from "./Space";
 
@@ -23,7 +23,7 @@ const connection = new Connection<RobotMessage>(socketAddress(window.location), 
     else error.value = message.message;
   },
   frame(bytes) {
-    touches.value = (JSON.parse(new TextDecoder().decode(bytes)) as RobotTouches).skins;
+    follow(JSON.parse(new TextDecoder().decode(bytes)) as RobotTouches);
   },
   link(state) {
     link.value = state;

@@ -1,8 +1,7 @@
 /** What is drawn over the robot's skins: links, names, and touches with their numbers. */
 
 import type { Theme } from "../theme";
-import type { RobotScene } from "../wire";
-import { type Camera, isFacing, type SkinTouches, toPicture } from "./model";
+import { type Camera, isFacing, type SkinTouches, toPicture, type World } from "./model";
 
 const DOT = 7;
 const ARROW = 0.03;
@@ -10,13 +9,14 @@ const ARROW = 0.03;
 export function paintMarks(
   pen: CanvasRenderingContext2D,
   camera: Camera,
-  scene: RobotScene,
+  world: World,
+  names: readonly string[],
   found: SkinTouches,
   theme: Theme,
 ): void {
   pen.clearRect(0, 0, camera.width, camera.height);
-  bones(pen, camera, scene.bones, theme);
-  for (const skin of scene.skins) label(pen, camera, skin.corners, skin.name, theme);
+  bones(pen, camera, world.bones, theme);
+  world.skins.forEach((corners, k) => label(pen, camera, corners, names[k], theme));
   for (const { touches } of Object.values(found)) {
     for (const touch of touches) {
       const [x, y] = toPicture(camera, ...touch.position);

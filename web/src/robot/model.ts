@@ -1,6 +1,6 @@
 /** What the page of a robot is told: skins in space, how each is doing, and the touches on them. */
 
-import { signal } from "@preact/signals";
+import { computed, signal } from "@preact/signals";
 import type { RobotScene, RobotState, RobotTouches } from "../wire";
 import { FIRST_ORBIT, type Orbit, rotation } from "../sheet/solid";
 
@@ -9,7 +9,46 @@ export type SkinTouches = RobotTouches["skins"];
 export const robot = signal<RobotScene | null>(null);
 export const states = signal<RobotState | null>(null);
 export const touches = signal<SkinTouches>({});
+/** Where the links are now, as in the scene; empty before the first message. */
+export const poses = signal<readonly number[]>([]);
 export const orbit = signal<Orbit>(FIRST_ORBIT);
+
+/** All that is drawn, m in the root's frame; coordinates lie flat as x0, y0, z0, … */
+export interface World {
+  readonly bones: readonly number[];
+  readonly links: readonly number[];
+  /** Of each skin, in the order of the scene. */
+  readonly skins: readonly (readonly number[])[];
+}
+
+/** Corners of link number ``link`` in the root's frame; on no link they stay. */
+export function placed(corners: readonly number[], all: readonly number[], link: number | null): number[] {
+  if (link === null) return [...corners];
+  const m = all.slice(12 * link, 12 * link + 12);
+  return corners.map((_, k) => {
+    const [row, at] = [4 * (k % 3), k - (k % 3)];
+    return m[row] * corners[at] + m[row + 1] * corners[at + 1] + m[row + 2] * corners[at + 2] + m[row + 3];
+  });
+}
+
+export function worldOf(scene: RobotScene, all: readonly number[]): World {
+  return {
+    bones: scene.bones.flatMap((link) => placed([0, 0, 0], all, link)),
+    links: scene.links.flatMap(({ link, corners }) => placed(corners, all, link)),
+    skins: scene.skins.map(({ link, corners }) => placed(corners, all, link)),
+  };
+}
+
+/** The robot as it stands now, and as it stood when it came: what the picture has room for. */
+export const world = computed(() => robot.value && worldOf(robot.value, poses.value.length ? poses.value : robot.value.poses));
+export const home = computed(() => robot.value && worldOf(robot.value, robot.value.poses));
+
+/** Take the newest touches and where the links are; what moves not is not made again. */
+export function follow(message: RobotTouches): void {
+  touches.value = message.skins;
+  const same = poses.value.length === message.poses.length && poses.value.every((x, k) => x === message.poses[k]);
+  if (!same) poses.value = message.poses;
+}
 
 /** From metres in the robot's root frame to pixels: right, down, and towards the eye. */
 export interface Camera {

@@ -1,6 +1,6 @@
 """Where bytes come from, and the protocol session with the board behind them."""
 
-from tomoskin.board.source.agreement import BOARDS_SINCE
+from tomoskin.board.source.agreement import BOARDS_SINCE, current_damaged
 from tomoskin.board.source.assembler import Received
 from tomoskin.board.source.boards import (
     BOARDS,
@@ -52,6 +52,7 @@ __all__ = [
     "board_named",
     "choose_periods",
     "chop_limit",
+    "current_damaged",
     "list_ports",
     "open_source",
     "read_options",

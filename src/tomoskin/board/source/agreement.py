@@ -108,6 +108,11 @@ def check_version(board: Hello | Info, where: str) -> None:
     raise WireError(spoken + "this tomoskin is older", where=where, hint=_UPDATE_HOST)
 
 
+def current_damaged(current: int) -> bool:
+    """Whether a board says instead of its current (µA) that what it has stored is damaged."""
+    return current == 0xFFFFFFFF
+
+
 def fit_board(info: Info, scan: Scan, asked: ScanSettings, where: str) -> ScanSettings:
     """What to set on this board for what is ``asked``; SourceError says what it lacks."""
     if not TICK_RATES[0] <= info.tick_rate <= TICK_RATES[1]:
@@ -139,6 +144,12 @@ def fit_board(info: Info, scan: Scan, asked: ScanSettings, where: str) -> ScanSe
             f"this one speaks {info.major}.{info.minor}",
             where=where,
             hint=f'{_UPDATE_BOARD}, or set [drive] mode = "direct"',
+        )
+    if current_damaged(info.current):
+        raise SourceError(
+            "the current that the board's memory holds is damaged: its checksum is wrong",
+            where=where,
+            hint='tomoskin firmware configure PORT --current "…" writes it again',
         )
     if info.current > round(settings.current_limit * 1e6):
         raise SourceError(

@@ -28,6 +28,7 @@ from tomoskin.files.messages.policy_forms import (
 )
 from tomoskin.files.messages.reporter import Every, Item, Reporter
 from tomoskin.files.messages.ros_types import (
+    NODE_TYPES,
     TYPES,
     Field,
     dds_name,
@@ -42,6 +43,7 @@ __all__ = [
     "FIELDS",
     "KEPT",
     "NAMES",
+    "NODE_TYPES",
     "NO_REFERENCE",
     "SLOTS",
     "TOPICS",

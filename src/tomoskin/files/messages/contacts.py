@@ -14,10 +14,10 @@ from typing import Any, Self
 
 import numpy as np
 
-from tomoskin.core import Detection, Event, FloatArray, Force, Image, Touch
+from tomoskin.core import Detection, Event, FloatArray, Force, Image, SkinError, Touch
 from tomoskin.files.messages.stream import Stream
 from tomoskin.model.mesh import Surface
-from tomoskin.model.robot import quaternion
+from tomoskin.model.robot import Place, Pose, quaternion
 from tomoskin.pipeline import FrameResult
 from tomoskin.sensing.track import TouchEvent
 
@@ -39,6 +39,44 @@ Vector = tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class LinkPose:
+    """Where the link of a robot that a skin lies on was at some time.
+
+    Attributes
+    ----------
+    root
+        Name of the robot's root frame.
+    pose
+        Of the link in that frame; None where it is not known.
+    problem
+        Why it is not known, or None.
+    """
+
+    root: str
+    pose: Pose | None
+    problem: str | None = None
+
+    @classmethod
+    def of(cls, place: Place | None, utc: float | None) -> Self | None:
+        """At a time, s since 1970; None of a skin that lies on no link."""
+        if place is None or place.urdf is None:
+            return None
+        try:
+            return cls(place.urdf.root, place.in_root(utc))
+        except SkinError as error:
+            return cls(place.urdf.root, None, str(error))
+
+    def content(self) -> dict[str, Any]:
+        """The pose and what is wrong with it, as plain values by name."""
+        pose = self.pose and {
+            "frame_id": self.root,
+            "position": self.pose.position.tolist(),
+            "orientation": self.pose.quaternion(),
+        }
+        return {"root": pose, "root_problem": self.problem}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Contact:
     """One touch in space.
 
@@ -52,27 +90,42 @@ class Contact:
         Unit vectors: along the sheet's x, across it, and away from the body.
     slope
         (3, 2): derivative of the position by the sheet's x and y.
+    link
+        Where that frame is on the robot; None where there is none.
     """
 
     touch: Touch
     position: Vector
     axes: tuple[Vector, Vector, Vector] = field(repr=False)
     slope: FloatArray = field(repr=False)
+    link: LinkPose | None = field(default=None, repr=False)
 
     @classmethod
-    def of(cls, touch: Touch, surface: Surface) -> Self:
+    def of(cls, touch: Touch, surface: Surface, link: LinkPose | None = None) -> Self:
         """Of a touch of the sheet that lies on ``surface``; plain numbers, which is faster."""
         uv = [[touch.detection.x, touch.detection.y]]
         slope = surface.jacobian(uv)[0]
         along, up = map(_unit, slope.T.tolist())
         normal = _unit(_cross(along, up))
         x, y, z = surface.point(uv)[0].tolist()
-        return cls(touch, (x, y, z), (along, _cross(normal, along), normal), slope)
+        return cls(touch, (x, y, z), (along, _cross(normal, along), normal), slope, link)
 
     @property
     def normal(self) -> Vector:
         """(3,) unit vector, away from the body."""
         return self.axes[2]
+
+    @property
+    def root_position(self) -> Vector | None:
+        """(3,) m in the root frame of the robot; None where the pose of the link is not known."""
+        pose = self.link and self.link.pose
+        return tuple(pose(np.array(self.position)).tolist()) if pose else None
+
+    @property
+    def root_normal(self) -> Vector | None:
+        """(3,) unit vector in that frame; None where the pose of the link is not known."""
+        pose = self.link and self.link.pose
+        return tuple((pose.rotation @ self.normal).tolist()) if pose else None
 
     @property
     def orientation(self) -> Vector:
@@ -116,17 +169,18 @@ class Contact:
         return np.cross(self.position, self.push)
 
     def content(self) -> dict[str, Any]:
-        """As plain values by name: on the sheet, and in space."""
+        """As plain values by name: on the sheet, in space, and on a robot in its root frame."""
         spread = self.covariance
-        return (
-            _NO_FORCE
-            | touch_row(self.touch)
-            | {
-                "position": self.position,
-                "normal": self.normal,
-                "covariance": None if spread is None else spread.tolist(),
-            }
-        )
+        content = {
+            **_NO_FORCE,
+            **touch_row(self.touch),
+            "position": self.position,
+            "normal": self.normal,
+            "covariance": None if spread is None else spread.tolist(),
+        }
+        if self.link is not None:
+            content |= {"root_position": self.root_position, "root_normal": self.root_normal}
+        return content
 
     def _in_space(self, sheet: FloatArray) -> FloatArray:
         """(3, 3) of a covariance (2, 2) on the sheet."""
@@ -256,7 +310,12 @@ class Contacts:
     @cached_property
     def touches(self) -> tuple[Contact, ...]:
         """The touches in space, in the order of their identities."""
-        return tuple(Contact.of(touch, self.stream.surface) for touch in self.tracked)
+        return tuple(Contact.of(t, self.stream.surface, self.link) for t in self.tracked)
+
+    @cached_property
+    def link(self) -> LinkPose | None:
+        """Where the link of the robot was at that time; None where the skin lies on none."""
+        return LinkPose.of(self.stream.place, self.utc)
 
     @property
     def events(self) -> tuple[Event, ...]:
@@ -279,6 +338,7 @@ class Contacts:
             "latency_s": self.latency,
             "valid": self.valid,
             "problem": self.problem,
+            **(self.link.content() if self.link else {}),
         }
 
     def content(self) -> dict[str, Any]:
@@ -290,7 +350,7 @@ class Contacts:
         return [
             {"time_s": event.host_time, "event": event.kind}
             | self.header()
-            | Contact.of(event.touch, self.stream.surface).content()
+            | Contact.of(event.touch, self.stream.surface, self.link).content()
             for event in self.happened
         ]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import hashlib
 import json
+import re
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,24 +20,27 @@ _IDS = {
 }  # fmt: skip
 _NESTED, _FIXED, _ENDLESS = 1, 48, 144
 _LAYOUTS = {
-    "uint8": "B", "byte": "B", "bool": "?", "int32": "i", "uint32": "I", "float32": "f",
-    "float64": "d",
+    "uint8": "B", "byte": "B", "bool": "?", "int32": "i", "uint32": "I", "int64": "q",
+    "uint64": "Q", "float32": "f", "float64": "d",
 }  # fmt: skip
 _CDR = b"\x00\x01\x00\x00"
 
 
-def _read_types() -> dict[str, dict[str, str]]:
-    text = (files(__package__) / "ros_types.msg").read_text(encoding="utf-8")
+def _read_types(file: str) -> dict[str, dict[str, str]]:
+    text = (files(__package__) / file).read_text(encoding="utf-8")
     types = {}
     for block in text.strip().split("\n\n"):
-        title, *lines = block.replace("/", "/msg/").splitlines()
+        title, *lines = re.sub("/(?!srv/|[A-Z][a-zA-Z]+_)", "/msg/", block).splitlines()
         fields = [line.split() for line in lines]
         types[title.removeprefix("MSG: ")] = {name: kind for kind, name in fields}
     return types
 
 
-TYPES = _read_types()
+TYPES = _read_types("ros_types.msg")
 """Fields of each message by name, in order: a number, ``string``, another message, or an array."""
+
+NODE_TYPES = TYPES | _read_types("ros_node.msg")
+"""The same with what the services of a node take and give, as ``rmw_cyclonedds`` sends it."""
 
 
 @dataclass(frozen=True)
@@ -119,7 +123,7 @@ def _used_by(kind: str) -> set[str]:
 
 
 def _put_message(out: bytearray, kind: str, value: Mapping[str, Any]) -> None:
-    for name, text in TYPES[kind].items():
+    for name, text in NODE_TYPES[kind].items():
         field = Field.of(text)
         given = value.get(name, _absent(field))
         if field.length is None:
@@ -132,11 +136,11 @@ def _absent(field: Field) -> Any:
     """What stands for a field that is not given."""
     if field.length is not None:
         return field.length * (0,)
-    return {} if field.kind in TYPES else "" if field.kind == "string" else 0
+    return {} if field.kind in NODE_TYPES else "" if field.kind == "string" else 0
 
 
 def _put(out: bytearray, kind: str, value: Any) -> None:
-    if kind in TYPES:
+    if kind in NODE_TYPES:
         _put_message(out, kind, value)
     elif kind == "string":
         data = value.encode() + b"\0"

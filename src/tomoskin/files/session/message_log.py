@@ -85,14 +85,16 @@ class MessageLog:
 
     def describe(self, name: str, about: Mapping[str, str]) -> None:
         """Put named strings inside: what the file says of itself."""
-        with self._writing() as file:
+        file = self._file
+        with file.lock, errors_of(self.path):
             file.container.describe(self._prefix + name, about)
 
     def put(self, channel: int, host_time: float, data: bytes) -> None:
         """Add a message that is logged at ``host_time``."""
         log_time = self.log_time(host_time)
         self._now = host_time
-        with self._writing() as file:
+        file = self._file
+        with file.lock, errors_of(self.path):
             file.container.message(self._first + channel, log_time, data)
             if log_time - file.flushed >= _SECOND:
                 file.container.flush()
@@ -101,12 +103,14 @@ class MessageLog:
     def attach(self, name: str, media_type: str, data: bytes) -> None:
         """Put a file inside: a calibration, a photograph."""
         log_time = self.log_time(self._now)
-        with self._writing() as file:
+        file = self._file
+        with file.lock, errors_of(self.path):
             file.container.attach(self._prefix + name, media_type, data, log_time)
 
     def settle(self) -> None:
         """Write the open chunk, and see that the file is still in its folder."""
-        with self._writing() as file:
+        file = self._file
+        with file.lock, errors_of(self.path):
             file.container.flush()
             file.flushed = self.log_time(self._now)
         if not file.container.is_linked:
@@ -114,7 +118,8 @@ class MessageLog:
 
     def close(self) -> None:
         """End the file with its index; a second call does nothing."""
-        with self._writing() as file:
+        file = self._file
+        with file.lock, errors_of(self.path):
             file.users -= self._is_open
             self._is_open = False
             if not file.users:
@@ -129,11 +134,6 @@ class MessageLog:
                 where=str(self.path),
             )
         return round(seconds * 1e9)
-
-    @contextmanager
-    def _writing(self) -> Iterator[_File]:
-        with self._file.lock, errors_of(self.path):
-            yield self._file
 
 
 @dataclass

@@ -22,9 +22,6 @@ IMAGE_PERIOD = 0.2
 CLOCK_PERIOD = 10.0
 """Seconds between two fits of the device's clock."""
 
-_OBJECT = 256
-"""Bytes that a waiting message is taken for, beside its data."""
-
 _log = logging.getLogger(__name__)
 
 
@@ -82,6 +79,7 @@ class Recorder(Consumer):
     """
 
     kind, slow = "recording", "the disk is too slow, and messages are lost"
+    gathering = 0.1
 
     def __init__(
         self,
@@ -113,18 +111,32 @@ class Recorder(Consumer):
         parts += map(event_of, message.events)
         return parts or None
 
-    def size(self, item: list[_Part]) -> int:
-        """Bytes that it takes while it waits."""
-        return sum(map(_size, item))
-
     def open(self) -> None:
         """Make the file. Raises DataError."""
         self._session, self._made = self._make(), True
 
     def take(self, item: list[_Part]) -> None:
         """Write what was admitted of one message. Raises DataError."""
+        session = self._session
         for part in item:
-            self._write(part)
+            match part:
+                case RawRead():
+                    session.raw(part.host_time, part.data)
+                case MarkedFrame():
+                    self._fit_clock(part)
+                    session.frame(part.frame, part.mark)
+                case RecordedTouches():
+                    session.touches(part.host_time, part.sequence, part.touches)
+                case FrameResult() if self._pixels is not None:
+                    session.image(part.host_time, part.image, self._pixels, part.touches)
+                case Event():
+                    session.event(part)
+                case Truth():
+                    session.truth(part.host_time, part.presses, part.bends)
+                case BoardInfo():
+                    session.device(part.host_time, part.info, part.name)
+                case RunSettings():
+                    session.settings(part.host_time, part.values)
 
     def tend(self) -> None:
         """Write the open chunk, to lose a second at most. Raises DataError."""
@@ -148,27 +160,6 @@ class Recorder(Consumer):
             why = f"internal error, {type(error).__name__}: {error}"
         self._say("recording-stopped", f"the recording has ended: {why}")
 
-    def _write(self, part: _Part) -> None:
-        session = self._session
-        match part:
-            case RawRead():
-                session.raw(part.host_time, part.data)
-            case MarkedFrame():
-                self._fit_clock(part)
-                session.frame(part.frame, part.mark)
-            case RecordedTouches():
-                session.touches(part.host_time, part.sequence, part.touches)
-            case FrameResult() if self._pixels is not None:
-                session.image(part.host_time, part.image, self._pixels, part.touches)
-            case Event():
-                session.event(part)
-            case Truth():
-                session.truth(part.host_time, part.presses, part.bends)
-            case BoardInfo():
-                session.device(part.host_time, part.info, part.name)
-            case RunSettings():
-                session.settings(part.host_time, part.values)
-
     def _fit_clock(self, item: MarkedFrame) -> None:
         """Now and then a fit of the device's clock."""
         frame = item.frame
@@ -178,19 +169,3 @@ class Recorder(Consumer):
         if frame.host_time >= self._next_fit and (fit := self._clock.fit) is not None:
             self._session.clock(frame.host_time, fit)
             self._next_fit = frame.host_time + CLOCK_PERIOD
-
-
-def _size(part: _Part) -> int:
-    match part:
-        case RawRead():
-            return _OBJECT + len(part.data)
-        case MarkedFrame():
-            return _OBJECT + part.frame.samples.nbytes
-        case FrameResult():
-            return _OBJECT + part.image.values.nbytes + part.voltages.nbytes
-        case RecordedTouches():
-            return _OBJECT + 200 * len(part.touches)
-        case Truth():
-            return _OBJECT + 100 * (len(part.presses) + len(part.bends))
-        case _:
-            return _OBJECT

@@ -1,12 +1,21 @@
 """Skins on a robot: which there are, and where on its links they lie."""
 
-from tomoskin.model.robot.pose import Place, Pose, pose_numbers, quaternion
-from tomoskin.model.robot.robot import FRAME, SECTIONS, PlacedSkin, Robot, add_skin
+from tomoskin.model.robot.pose import Pose, pose_numbers, quaternion
+from tomoskin.model.robot.robot import (
+    FRAME,
+    SECTIONS,
+    JointPositions,
+    Place,
+    PlacedSkin,
+    Robot,
+    add_skin,
+)
 from tomoskin.model.robot.urdf import LinkSolid, Urdf
 
 __all__ = [
     "FRAME",
     "SECTIONS",
+    "JointPositions",
     "LinkSolid",
     "Place",
     "PlacedSkin",

@@ -1,4 +1,4 @@
-"""Where one frame of coordinates lies in another, and a surface that is moved with its frame."""
+"""Where one frame of coordinates lies in another."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from tomoskin.core import FloatArray
-from tomoskin.model.mesh import Surface
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,39 +78,3 @@ def quaternion(axes: ArrayLike) -> tuple[float, ...]:
     """X, y, z, w of the rotation to three ``axes`` (3, 3), one a row."""
     xyzw: list[float] = Rotation.from_matrix(np.transpose(axes)).as_quat().tolist()
     return tuple(xyzw)
-
-
-@dataclass(frozen=True)
-class Moved(Surface):
-    """A ``surface`` in the outer frame of a ``pose``."""
-
-    surface: Surface
-    pose: Pose
-
-    def point(self, uv: ArrayLike) -> FloatArray:
-        """Points (n, 3) m of the surface."""
-        return self.pose(self.surface.point(uv))
-
-    def jacobian(self, uv: ArrayLike) -> FloatArray:
-        """Derivatives (n, 3, 2) of the points."""
-        return np.asarray(self.pose.rotation @ self.surface.jacobian(uv))
-
-    def check(self, uv: ArrayLike) -> None:
-        """Check the surface that is moved."""
-        self.surface.check(uv)
-
-
-@dataclass(frozen=True, slots=True)
-class Place:
-    """Which of a robot's skins it is, and where: ``pose`` in the frame ``link``.
-
-    ``link`` is "" where it is not known: coordinates are then the skin's own.
-    """
-
-    name: str
-    link: str = ""
-    pose: Pose = field(default_factory=Pose)
-
-    def moved(self, surface: Surface) -> Surface:
-        """The skin's ``surface`` in the coordinates of the link."""
-        return Moved(surface, self.pose) if self.link else surface

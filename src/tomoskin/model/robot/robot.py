@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from tomoskin.core import SkinError, StrPath
-from tomoskin.model.robot.pose import Place, Pose
-from tomoskin.model.robot.urdf import Urdf
+from tomoskin.core import FloatArray, SkinError, StrPath
+from tomoskin.model.mesh import Surface
+from tomoskin.model.robot.pose import Pose
+from tomoskin.model.robot.urdf import Positions, Urdf
 from tomoskin.model.section import (
     OneOrMore,
     Quantity,
@@ -42,12 +44,80 @@ _RPY = Row({"roll": _ANGLE, "pitch": _ANGLE, "yaw": _ANGLE})
 _FILE = Text(1000)
 
 
+@dataclass(frozen=True)
+class Moved(Surface):
+    """A ``surface`` in the outer frame of a ``pose``."""
+
+    surface: Surface
+    pose: Pose
+
+    def point(self, uv: ArrayLike) -> FloatArray:
+        """Points (n, 3) m of the surface."""
+        return self.pose(self.surface.point(uv))
+
+    def jacobian(self, uv: ArrayLike) -> FloatArray:
+        """Derivatives (n, 3, 2) of the points."""
+        return np.asarray(self.pose.rotation @ self.surface.jacobian(uv))
+
+    def check(self, uv: ArrayLike) -> None:
+        """Check the surface that is moved."""
+        self.surface.check(uv)
+
+
+JointPositions = Callable[[float], Positions]
+"""How a robot stands at a time, s since 1970."""
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Which of a robot's skins it is, and where: ``pose`` in the frame ``link``.
+
+    ``link`` is "" where it is not known: coordinates are then the skin's own. ``urdf`` is the
+    robot's, and ``joints`` says how it stands.
+    """
+
+    name: str
+    link: str = ""
+    pose: Pose = field(default_factory=Pose)
+    urdf: Urdf | None = None
+    joints: JointPositions | None = None
+
+    def moved(self, surface: Surface) -> Surface:
+        """The skin's ``surface`` in the coordinates of the link."""
+        return Moved(surface, self.pose) if self.link else surface
+
+    def in_root(self, utc: float | None) -> Pose | None:
+        """The pose of the link in the robot's root frame at a time, s since 1970.
+
+        None where there is no link. Raises SkinError where the pose is not known.
+        """
+        if self.urdf is None:
+            return None
+        if self.joints is None or utc is None:
+            return self.urdf.pose(self.link, _not_told)
+        return self.urdf.pose(self.link, self.joints(utc))
+
+
+def _not_told(joint: str) -> float:
+    raise SkinError(
+        f'pose unknown: the joint "{joint}" may move, and no joint states are given',
+        hint='name its joint states in the section [robot], as in joints = "ros2"',
+    )
+
+
 class RobotSection(Section, section="robot"):
     """What the robot is called, and its model."""
 
     name: str = key(Text(64), "A title of one line, for people.", default="robot")
     urdf: str | None = key(
         _FILE, "The URDF with its links. The path is relative to this file.", default=None
+    )
+    joints: str | None = key(
+        _FILE,
+        "Where positions of its joints come from: `ros2` for the topic `/joint_states`, or an MCAP "
+        "file of ROS 2 that holds it.",
+        default=None,
+        needs="urdf",
     )
 
 
@@ -109,12 +179,21 @@ class PlacedSkin:
 
 @dataclass(frozen=True, slots=True)
 class Robot:
-    """A robot's skins; ``urdf`` None: where its links are is not known."""
+    """A robot's skins.
+
+    Attributes
+    ----------
+    urdf
+        Its links; None: not known.
+    joints
+        What tells how they stand: "ros2…", or the path of a file; "": nothing.
+    """
 
     source: str
     name: str
     skins: tuple[PlacedSkin, ...]
     urdf: Urdf | None = None
+    joints: str = ""
 
     @classmethod
     def load(cls, path: StrPath) -> Self:
@@ -143,11 +222,15 @@ class Robot:
                 f"expected 1 to {MOST_SKINS} sections [[skin]], got {len(skins)}", where=source
             )
         _check_different(skins, source)
-        return cls(source, robot.name, skins, urdf)
+        joints = robot.joints or ""
+        if joints.partition(":")[0] not in ("", "ros2"):
+            joints = str(Path(folder) / joints)
+        return cls(source, robot.name, skins, urdf, joints)
 
-    def link_pose(self, place: Place) -> Pose:
-        """Of the frame that a skin's touches are told in, in that of the robot's root."""
-        return self.urdf.pose(place.link) if self.urdf and place.link else Pose()
+    def moved_by(self, joints: JointPositions) -> Self:
+        """The same, whose skins know by ``joints`` where their links are."""
+        skins = (replace(s, place=replace(s.place, joints=joints)) for s in self.skins)
+        return replace(self, skins=tuple(skins))
 
 
 def add_skin(path: StrPath, given: Mapping[str, Any], urdf: str | None = None) -> str:
@@ -182,7 +265,7 @@ def _placed(given: SkinSection, where: str, folder: Path, urdf: Urdf | None) -> 
     zero = np.zeros(3)
     pose = Pose.of(given.position or zero, given.angles or zero)
     return PlacedSkin(
-        place=Place(given.name, given.link or "", pose),
+        place=Place(given.name, given.link or "", pose, urdf if given.link else None),
         skin=str(folder / given.skin) if given.skin.endswith(".toml") else given.skin,
         source=_from(folder, given.source),
         board=given.board,

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Container
-from dataclasses import dataclass
+from collections.abc import Callable, Container
+from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Self
 from xml.etree import ElementTree
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from tomoskin.core import FloatArray, GeometryError, SkinError, StrPath
+from tomoskin.core import FloatArray, GeometryError, SkinError, StrPath, needed
 from tomoskin.model.robot.link_shapes import (
     MOST_TRIANGLES,
     LinkShape,
     name_of,
+    numbers_of,
     origin_of,
     read_shapes,
     thinned,
@@ -27,14 +29,52 @@ _LARGEST = 20_000_000
 """A URDF has at most so many bytes."""
 
 
+_TURNS, _SLIDES, _STANDS = ("revolute", "continuous"), ("prismatic",), ("fixed", "")
+_UNTOLD = ("floating", "planar")
+"""Kinds of joints whose position is not one number, so that no joint state says it."""
+
+Positions = Callable[[str], float]
+"""The position of a joint by its name, rad or m; raises SkinError where it is not known."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class UrdfJoint:
-    """What holds the link ``child`` to the link ``parent``: its frame's pose there, at rest."""
+    """What holds the link ``child`` to the link ``parent``.
+
+    Attributes
+    ----------
+    pose
+        Of the child's frame in the parent's, at position zero.
+    kind
+        The type that the URDF says.
+    axis
+        (3,) unit vector in the child's frame, about or along which it moves.
+    mimics
+        A joint that it follows; its position is that of the joint times ``factor``, and ``offset``.
+    """
 
     name: str
     parent: str
     child: str
     pose: Pose
+    kind: str = ""
+    axis: FloatArray = field(default_factory=lambda: np.array([1.0, 0.0, 0.0]))
+    mimics: str = ""
+    factor: float = 1.0
+    offset: float = 0.0
+
+    def moved(self, positions: Positions) -> Pose:
+        """The pose of the child's frame in the parent's. Raises SkinError."""
+        if self.kind in _STANDS:
+            return self.pose
+        if self.kind in _UNTOLD:
+            raise SkinError(
+                f'pose unknown: a joint state has no position of the {self.kind} "{self.name}"'
+            )
+        way = self.factor * positions(self.mimics or self.name) + self.offset
+        if self.kind in _SLIDES:
+            return self.pose @ Pose(way * self.axis)
+        return self.pose @ Pose(rotation=Rotation.from_rotvec(way * self.axis).as_matrix())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,12 +112,12 @@ class Urdf:
 
     @classmethod
     def read(cls, path: StrPath) -> Self:
-        """From a file.
+        """From a file; a xacro is expanded.
 
         Raises
         ------
         SkinError
-            When it cannot be read, is no URDF, or its links are no tree.
+            When it cannot be read or expanded, is no URDF, or its links are no tree.
         """
         path = Path(path)
         text = read_text(path, "a URDF", _LARGEST)
@@ -88,20 +128,11 @@ class Urdf:
                 where=where,
                 hint="remove <!ENTITY …>",
             )
-        try:
-            root = ElementTree.fromstring(text)
-        except ElementTree.ParseError as error:
-            raise SkinError(
-                f"is not valid XML, so it is not a URDF: {error}", where=where
-            ) from None
-        macro = next((e.tag for e in root.iter() if "xacro}" in e.tag), "")
-        if root.tag != "robot" or macro or "${" in text:
-            raise SkinError(
-                "expected <robot> with its links, got "
-                + (f"<{root.tag}>" if root.tag != "robot" else "a xacro with macros"),
-                where=where,
-                hint="expand xacro first: xacro ROBOT.xacro > ROBOT.urdf",
-            )
+        root = _parsed(text, where)
+        if "${" in text or any("xacro}" in element.tag for element in root.iter()):
+            root = _parsed(_expanded(path), where)
+        if root.tag != "robot":
+            raise SkinError(f"expected <robot> with its links, got <{root.tag}>", where=where)
         links = tuple(name_of(link, where) for link in root.findall("link"))
         joints = [_joint(joint, where) for joint in root.findall("joint")]
         shapes = tuple(read_shapes(root, path))
@@ -120,12 +151,34 @@ class Urdf:
                 hint=f'did you mean "{close[0]}"?' if close else f"its links: {known}",
             )
 
-    def pose(self, link: str) -> Pose:
-        """Of a link's frame in that of the root, every joint at zero."""
+    @property
+    def root(self) -> str:
+        """The link that no joint holds."""
+        return next(link for link in self.links if link not in self.joints)
+
+    def pose(self, link: str, positions: Positions | None = None) -> Pose:
+        """Of a link's frame in that of the root; without ``positions`` every joint is at zero.
+
+        Raises SkinError where the position of a joint is not known.
+        """
         pose = Pose()
         while (joint := self.joints.get(link)) is not None:
-            pose, link = joint.pose @ pose, joint.parent
+            pose = (joint.moved(positions) if positions else joint.pose) @ pose
+            link = joint.parent
         return pose
+
+    def poses(self, positions: Positions | None = None) -> dict[str, Pose]:
+        """Those of all links, in the order of the file, as :meth:`pose` has each."""
+        poses = {self.root: Pose()}
+
+        def pose(link: str) -> Pose:
+            if link not in poses:
+                joint = self.joints[link]
+                own = joint.moved(positions) if positions else joint.pose
+                poses[link] = pose(joint.parent) @ own
+            return poses[link]
+
+        return {link: pose(link) for link in self.links}
 
     @property
     def meshes(self) -> dict[str, Pose]:
@@ -144,11 +197,10 @@ class Urdf:
         most = MOST_TRIANGLES // max(1, sum(map(len, drawn)))
         return tuple(_solid(shapes, most) for shapes in drawn if shapes)
 
-    def bones(self, without: Container[str] = ()) -> FloatArray:
-        """(n, 2, 3) m: from each link's origin, but those ``without``, to those that it holds."""
-        joints = [joint for joint in self.joints.values() if joint.parent not in without]
-        ends = [(self.pose(j.parent), self.pose(j.child)) for j in joints]
-        return np.array([[a.position, b.position] for a, b in ends]).reshape(-1, 2, 3)
+    def bones(self, without: Container[str] = ()) -> tuple[tuple[str, str], ...]:
+        """Each link, but those ``without``, with each that it holds."""
+        joints = self.joints.values()
+        return tuple((j.parent, j.child) for j in joints if j.parent not in without)
 
     def _check(self, joints: list[UrdfJoint]) -> None:
         if len(set(self.links)) < len(self.links) or len(self.joints) < len(joints):
@@ -158,6 +210,11 @@ class Urdf:
         for joint in joints:
             for end in (joint.parent, joint.child):
                 self.check_link(end, f'{self.source}: joint "{joint.name}"')
+            if joint.mimics and joint.mimics not in {other.name for other in joints}:
+                raise SkinError(
+                    f'expected a joint to mimic, got "{joint.mimics}"',
+                    where=f'{self.source}: joint "{joint.name}"',
+                )
         roots = [link for link in self.links if link not in self.joints]
         if len(roots) > 1 or not self.links:
             raise SkinError(
@@ -173,11 +230,51 @@ class Urdf:
                 raise SkinError(f'the joints before link "{start}" form a ring', where=self.source)
 
 
+def _parsed(text: str, where: str) -> ElementTree.Element:
+    try:
+        return ElementTree.fromstring(text)
+    except ElementTree.ParseError as error:
+        raise SkinError(f"is not valid XML, so it is not a URDF: {error}", where=where) from None
+
+
+def _expanded(path: Path) -> str:
+    """The URDF that a xacro makes, with its arguments' own defaults."""
+    xacro = needed("xacro", "xacro", path, SkinError)
+    try:
+        return str(xacro.process_file(str(path)).toxml())
+    except Exception as error:  # of any kind, since the file's expressions are Python's
+        raise SkinError(f"cannot be expanded by xacro: {error}", where=str(path)) from error
+
+
 def _joint(element: ElementTree.Element, where: str) -> UrdfJoint:
     name = name_of(element, where)
     ends = [element.find(end) for end in ("parent", "child")]
     parent, child = ("" if end is None else end.get("link", "") for end in ends)
-    return UrdfJoint(name, parent, child, origin_of(element, f'{where}: joint "{name}"'))
+    where = f'{where}: joint "{name}"'
+    kind = element.get("type", "")
+    known = (*_TURNS, *_SLIDES, *_STANDS, *_UNTOLD)
+    if kind not in known:
+        raise SkinError(
+            f'expected a type of {", ".join(filter(None, known))}, got "{kind}"', where=where
+        )
+    mimic, axis = element.find("mimic"), np.array(_number(element, "axis", "xyz", "1 0 0", where))
+    if not (length := np.linalg.norm(axis)) > 0:
+        raise SkinError("expected an axis with a direction, got 0 0 0", where=where)
+    return UrdfJoint(
+        name, parent, child, origin_of(element, where), kind, axis / length,
+        "" if mimic is None else mimic.get("joint", ""),
+        _number(element, "mimic", "multiplier", "1", where)[0],
+        _number(element, "mimic", "offset", "0", where)[0],
+    )  # fmt: skip
+
+
+def _number(
+    element: ElementTree.Element, tag: str, key: str, default: str, where: str
+) -> list[float]:
+    """As many finite numbers as ``default`` has, of a part of ``element`` or by default."""
+    part = element.find(tag)
+    text = default if part is None else part.get(key, default)
+    return numbers_of(text, 3 if " " in default else 1, f"<{tag}> {key}", where)
 
 
 def _solid(shapes: list[LinkShape], most: int) -> LinkSolid:

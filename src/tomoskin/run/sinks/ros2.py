@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import functools
-import os
-from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,17 +11,22 @@ from tomoskin.files.messages import (
     KEPT,
     NAMES,
     TOPICS,
-    TYPES,
-    Field,
     Item,
     Naming,
     Stream,
-    dds_name,
-    encode_cdr,
     ros_messages,
     type_hash,
 )
-from tomoskin.run.sinks.ros2_services import Action, TriggerServices
+from tomoskin.run.sinks.ros2_node import (
+    GID_SIZES,
+    Node,
+    Service,
+    encoded_as,
+    parameter_services,
+    ros_domain,
+    struct_of,
+    trigger,
+)
 from tomoskin.run.sinks.sink import Sink, options_of
 
 _WHERE = "sink ros2"
@@ -32,8 +35,6 @@ _DEPTH = 10
 
 _BLOCKING = 100_000_000
 """Ns that a write may wait for a slow subscriber."""
-
-_MOST_DOMAINS = 232
 
 
 class Ros2Sink(Sink):
@@ -50,12 +51,17 @@ class Ros2Sink(Sink):
         Of topics and frame.
     folder
         Where recordings go that nodes ask for; None: nowhere, and nobody may ask.
+    release
+        Of :data:`~tomoskin.run.sinks.ros2_node.GID_SIZES`: whose nodes see its name in the graph.
     """
 
-    def __init__(self, domain: int, naming: Naming, folder: Path | None = None) -> None:
+    def __init__(
+        self, domain: int, naming: Naming, folder: Path | None = None, release: str = "jazzy"
+    ) -> None:
         self.name = f"ros2 /{naming.namespace}, domain {domain}"
         self.naming, self._domain, self._folder = naming, domain, folder
-        self._services: TriggerServices | None = None
+        self._release = release
+        self._node: Node | None = None
         self._dds = {
             name: needed(f"cyclonedds.{name}", "ros2", _WHERE, SinkError)
             for name in ("core", "domain", "pub", "sub", "topic", "idl")
@@ -72,9 +78,9 @@ class Ros2Sink(Sink):
             self._writers = {
                 topic: self._writer(participant, stream.naming, topic) for topic in TOPICS
             }
-            if stream.obey is not None:
-                actions = _actions(stream, stream.obey, self._folder)
-                self._services = TriggerServices(self._dds, participant, actions)
+            name, services = stream.naming.namespace, _services(stream, self._folder)
+            self._node = Node(self._dds, participant, name, services)
+            self._node.announce(GID_SIZES[self._release], self._writers.values())
         except core.DDSException as error:
             raise SinkError(
                 f"cannot join domain {self._domain}: {error}",
@@ -94,14 +100,13 @@ class Ros2Sink(Sink):
             writer = self._writers[message.topic]
             if message.topic not in KEPT and not writer.get_matched_subscriptions():
                 continue  # bytes are the dear part, and nobody listens
-            data = encode_cdr(TOPICS[message.topic], message.value)
-            writer.write(_encoded(writer.data_type)(data), message.stamp)
+            writer.write(encoded_as(TOPICS[message.topic], message.value), message.stamp)
 
     def close(self) -> None:
         """Leave: with the last reference to a writer its participant goes too."""
-        if self._services is not None:
-            self._services.close()
-        self._services, self._writers = None, {}
+        if self._node is not None:
+            self._node.close()
+        self._node, self._writers = None, {}
 
     def _writer(self, participant: Any, naming: Naming, topic: str) -> Any:
         core, kind = self._dds["core"], TOPICS[topic]
@@ -120,67 +125,46 @@ class Ros2Sink(Sink):
         )
 
 
-def _actions(
-    stream: Stream, obey: Callable[[str, Path], str], folder: Path | None
-) -> dict[str, Action]:
-    """What nodes may ask for, by the names of services."""
-
+def _services(stream: Stream, folder: Path | None) -> dict[str, Service]:
+    """What nodes may ask for, by the full names of services."""
+    services = parameter_services(
+        {
+            "skin": (stream.skin, "Name of the skin"),
+            "source": (stream.source, "Where its frames come from"),
+            "frame_id": (stream.naming.frame_id, "Frame of positions"),
+            "parent": (stream.parent, "Link that the skin is known to lie on"),
+            "electrodes": (stream.pattern.n_electrodes, "Number of electrodes"),
+            "measurements": (stream.pattern.n_meas, "Number of voltages in a frame"),
+        }
+    )
     requests = {"take_reference": "reference"}
     if folder is not None:
         requests |= {"start_recording": "record", "stop_recording": "stop"}
-    return {
-        stream.naming.topic(name): functools.partial(obey, request, folder or Path())
-        for name, request in requests.items()
-    }
+    if stream.obey is not None:
+        for name, request in requests.items():
+            services[name] = trigger(functools.partial(stream.obey, request, folder or Path()))
+    return {stream.naming.topic(name): service for name, service in services.items()}
 
 
 def open_ros2(argument: str) -> Ros2Sink:
-    """``ros2``, ``ros2:domain=N,namespace=NAME,frame=NAME,parent=NAME,at=X/Y/Z,folder=DIR``.
+    """``ros2``, ``ros2:domain=N,namespace=NAME,frame=NAME,parent=NAME,at=X/Y/Z,folder=DIR``,
+    ``release=humble``.
 
     Raises SinkError.
 
     Without ``domain`` it is the environment's ROS_DOMAIN_ID, as for ROS 2 itself.
     """
-    options = options_of(filter(None, argument.split(",")), ("domain", *NAMES, "folder"), _WHERE)
+    options = options_of(
+        filter(None, argument.split(",")), ("domain", *NAMES, "folder", "release"), _WHERE
+    )
     folder = Path(options["folder"]) if "folder" in options else None
     if folder is not None and not folder.is_dir():
         raise SinkError(f'expected a folder that exists, got "{folder}"', where=_WHERE)
-    text = options.get("domain", os.environ.get("ROS_DOMAIN_ID") or "0")
-    if not (text.isascii() and text.isdigit() and int(text) <= _MOST_DOMAINS):
-        raise SinkError(f'expected a domain from 0 to {_MOST_DOMAINS}, got "{text}"', where=_WHERE)
-    return Ros2Sink(int(text), Naming.of(options, _WHERE), folder)
-
-
-@functools.cache
-def struct_of(kind: str) -> Any:
-    """CycloneDDS' class of a message by its name (:data:`~tomoskin.files.messages.TYPES`)."""
-    idl = needed("cyclonedds.idl", "ros2", _WHERE, SinkError)
-    fields = {name: _type_of(Field.of(text)) for name, text in TYPES[kind].items()}
-    name = dds_name(kind)
-    return idl.make_idl_struct(name.rpartition(":")[2], name.replace("::", "."), fields)
-
-
-def _type_of(field: Field) -> Any:
-    types = needed("cyclonedds.idl.types", "ros2", _WHERE, SinkError)
-    plain: Mapping[str, Any] = {"string": str, "bool": bool}
-    if field.kind in TYPES:
-        kind = struct_of(field.kind)
-    else:
-        kind = plain.get(field.kind) or getattr(types, field.kind)
-    if field.length is None:
-        return kind
-    return types.array[kind, field.length] if field.length else types.sequence[kind]
-
-
-@functools.cache
-def _encoded(struct: Any) -> Any:
-    """A message that has been encoded already: CycloneDDS asks a sample for its bytes."""
-
-    class Encoded(struct):  # type: ignore[misc]
-        def __init__(self, encoded: bytes) -> None:
-            self.encoded = encoded
-
-        def serialize(self, **_: Any) -> bytes:
-            return self.encoded
-
-    return Encoded
+    release = options.get("release", "jazzy")
+    if release not in GID_SIZES:
+        raise SinkError(
+            f'expected release={" or ".join(GID_SIZES)}, got "{release}"',
+            where=_WHERE,
+            hint="humble is for Humble, jazzy for Iron and all later ones",
+        )
+    return Ros2Sink(ros_domain(options, _WHERE), Naming.of(options, _WHERE), folder, release)

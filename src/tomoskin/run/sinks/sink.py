@@ -8,7 +8,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass
 from importlib.metadata import entry_points
-from typing import Any
 
 from tomoskin.core import Capacity, Consumer, Event, Say, SinkError, TomoskinError, Worker, meant
 from tomoskin.files.messages import Item, Naming, Reporter, Stream
@@ -144,12 +143,11 @@ class SinkConsumer(Consumer):
         self._newest: FrameResult | None = None
         self._delay = _FIRST_DELAY
 
-    def admit(self, message: Any) -> FrameResult | Event | None:
-        """Results and events, and nothing else of a run."""
+    def admit(self, message: FrameResult | Event) -> FrameResult | Event:
+        """Take all that comes, and know the newest result."""
         if isinstance(message, FrameResult):
             self._newest = message
-            return message
-        return message if isinstance(message, Event) else None
+        return message
 
     def durable(self, item: FrameResult | Event) -> bool:
         """Events are news however late."""

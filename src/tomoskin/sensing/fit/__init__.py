@@ -7,7 +7,10 @@ from tomoskin.sensing.fit.bounds import (
     resolution_bounds,
     variants,
 )
-from tomoskin.sensing.fit.finder import SpotFinder
+from tomoskin.sensing.fit.drive_evidence import DriveEvidence, Initiation, Onset
+from tomoskin.sensing.fit.drive_filter import DriveFilter, MovingTouch
+from tomoskin.sensing.fit.drive_order import drives_needed, telling_order, watch_order
+from tomoskin.sensing.fit.finder import NoiseKey, SpotFinder
 from tomoskin.sensing.fit.noise import (
     Whitener,
     common_mode_variance,
@@ -24,6 +27,12 @@ __all__ = [
     "EXHAUSTIVE",
     "LIVE",
     "Demand",
+    "DriveEvidence",
+    "DriveFilter",
+    "Initiation",
+    "MovingTouch",
+    "NoiseKey",
+    "Onset",
     "Pace",
     "ResolutionBounds",
     "Response",
@@ -33,11 +42,14 @@ __all__ = [
     "Spots",
     "Whitener",
     "common_mode_variance",
+    "drives_needed",
     "idle_covariance",
     "measured_covariance",
     "position_bound",
     "resolution_bounds",
     "row_covariance",
     "spots_of",
+    "telling_order",
     "variants",
+    "watch_order",
 ]

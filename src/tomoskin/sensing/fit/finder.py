@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from tomoskin.core import Detection, FloatArray, IntArray, reach
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.skin import Skin
+from tomoskin.sensing.fit.excess import Excess
 from tomoskin.sensing.fit.expectation import Expectation, ResidualResponse
 from tomoskin.sensing.fit.hypotheses import CommonModeJump, Explained, Jumps, Rival, challenged
 from tomoskin.sensing.fit.policy import (
@@ -43,6 +44,11 @@ _REST = 0.5
 
 _SWELLS = 0.08
 """Standard deviation of the logarithm of a touch's radius from frame to frame."""
+
+
+NoiseKey = tuple[FloatArray, FloatArray, FloatArray, Excess, tuple[float, ...]]
+"""What the noise of the newest measurements depends on: nuisance directions, jumps, noise of idle
+frames, excess; and how much of what touches may have left behind is not known."""
 
 
 class SpotFinder:
@@ -155,6 +161,52 @@ class SpotFinder:
         else:
             self._residual.idle(self._data)
 
+    @property
+    def model(self) -> SpotModel:
+        """The sheet that touches are fitted on."""
+        return self._model
+
+    @property
+    def unit(self) -> float:
+        """Conductivity of the untouched sheet, S."""
+        return self._unit
+
+    @property
+    def sign(self) -> str:
+        """The sign of touches, as in a skin's ``[touch]``."""
+        return self._policy.sign
+
+    def newest_key(self) -> NoiseKey:
+        """What :meth:`newest_noise` depends on."""
+        return *self._sight.newest, self.watch.excess, self._residual.doubts
+
+    def newest_noise(self) -> tuple[FloatArray, FloatArray]:
+        """See :meth:`Sight.of_newest`; with what touches may have left behind."""
+        noise, jumps = self._sight.of_newest(self.watch.excess)
+        left = self._residual.doubtful(len(noise))
+        return noise + left.T @ left, jumps
+
+    def change(self, dv: FloatArray) -> FloatArray:
+        """(n_meas,) V of the model, of difference data less what touches have left behind."""
+        return self._residual.without(dv / self._sight.scale)
+
+    def shown(self, spot: FloatArray, spread: FloatArray, ratio: float) -> Detection:
+        """A ``spot`` (4,) as a detection; its position has the covariance ``spread`` (2, 2) m²."""
+        x, y, log_radius, content = spot.tolist()
+        radius = math.exp(log_radius)
+        (xx, xy), (_, yy) = spread.tolist()
+        return Detection(
+            x=x,
+            y=y,
+            sd_x=math.sqrt(xx),
+            sd_y=math.sqrt(yy),
+            area=math.pi * radius**2,
+            peak=self._unit * math.expm1(content / (FILLING * radius**2)),
+            cells=self._cells.within(x, y, radius),
+            cov_xy=xy,
+            snr=ratio,
+        )
+
     def others(self) -> FloatArray:
         """(k, n_meas) V of the model: for each touch of the newest frame what all others change."""
         whole = self._change @ self._model.solver.table.basis
@@ -259,20 +311,11 @@ class SpotFinder:
         # a touch is told against the untouched skin
         content += self._residual.beneath(x, y, radius)
         spread = detected.covariance[4 * k : 4 * k + 2, 4 * k : 4 * k + 2]
-        (xx, xy), (_, yy) = (spread + self._rim.doubt(x, y, radius)).tolist()
-        return Detection(
-            x=x,
-            y=y,
-            sd_x=math.sqrt(xx),
-            sd_y=math.sqrt(yy),
-            area=math.pi * radius**2,
-            peak=self._unit * math.expm1(content / (FILLING * radius**2)),
-            cells=self._cells.within(x, y, radius),
-            cov_xy=xy,
-            snr=ratio,
-            weak=is_weak(self._policy, ratio, float(detected.fresh[k]), float(detected.beside[k])),
-            close=bool(detected.close[k]),
+        weak = is_weak(self._policy, ratio, float(detected.fresh[k]), float(detected.beside[k]))
+        detection = self.shown(
+            np.array([x, y, log_radius, content]), spread + self._rim.doubt(x, y, radius), ratio
         )
+        return replace(detection, weak=weak, close=bool(detected.close[k]))
 
 
 def joined(detected: SpotDetections) -> SpotDetections:

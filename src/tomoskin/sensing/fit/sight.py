@@ -20,6 +20,10 @@ _MASKS = 8
 """Nuisance subspaces whose whitening is kept."""
 
 
+_UNKNOWN = 1e6
+"""Variance along what is excluded, in parts of the largest one."""
+
+
 class Seen(NamedTuple):
     """How frames of one noise are seen: the table, candidates, channels and jumps."""
 
@@ -92,6 +96,22 @@ class Sight:
         if newest is None or not all(map(is_, now, newest[0])):
             newest = self._newest = now, self._made(excess)
         return newest[1]
+
+    @property
+    def newest(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Nuisance directions, jumps and idle noise of the newest frame."""
+        return self._nuisance, self._jumps, self._noise
+
+    def of_newest(self, excess: Excess) -> tuple[FloatArray, FloatArray]:
+        """The noise of the newest measurements, (n_meas, n_meas) V² of the
+        model, in which what is excluded is unknown; and jumps (n_meas, j) V."""
+        nuisance, jumps = self._scaled(self.scale)
+        noise = excess.added(self._noise, self._channels)
+        if nuisance.shape[1]:
+            size = np.linalg.norm(nuisance, axis=0)
+            unknown = nuisance / np.where(size > 0, size, 1.0)
+            noise = noise + _UNKNOWN * np.diag(noise).max() * unknown @ unknown.T
+        return noise, jumps
 
     def _made(self, excess: Excess) -> Seen:
         scaled = self._scaled(self.scale)

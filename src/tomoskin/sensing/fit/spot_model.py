@@ -171,12 +171,24 @@ class SpotModel:
     @cached_property
     def solver(self) -> Solver:
         """What fits spots by a table of what one does."""
-        return _solver(self.response, self.tabulation.table, self.prior)
+        return self._solver_of(self.tabulation.table)
 
     @cached_property
     def reduced(self) -> Reduced:
         """What stands for the exact model on this sheet."""
         return finished(Reduced.making(self.response, self.tabulation.certificate, self.prior))
+
+    @cached_property
+    def sheet(self) -> SheetDomain:
+        """Where touches may be."""
+        return SheetDomain(self.response.spots.mesh)
+
+    def _solver_of(self, table: ResponseTable) -> Solver:
+        """A solver of the native engine where that runs."""
+        core = self.response.state.model.engine.core
+        if core is None:
+            return NumpySolver(table, self.sheet, self.prior)
+        return NativeSolver(core, table, self.sheet, self.prior)
 
     def warm_up(self) -> None:
         """Do what takes seconds the first time, and half a second later on, before frames come."""
@@ -214,19 +226,10 @@ class SpotModel:
         yield
         reduced = yield from Reduced.making(response, certificate, self.prior)
         yield
-        solver = _solver(response, table, self.prior)
+        solver = made._solver_of(table)
         vars(made).update(candidates=candidates, reduced=reduced, solver=solver)
         table.__dict__["typical"] = yield from table.typifying()
         return made
-
-
-def _solver(response: Response, table: ResponseTable, prior: SpotPrior) -> Solver:
-    """Of the native engine where that runs."""
-    sheet = SheetDomain(response.spots.mesh)
-    core = response.state.model.engine.core
-    if core is None:
-        return NumpySolver(table, sheet, prior)
-    return NativeSolver(core, table, sheet, prior)
 
 
 def _mesh(skin: Skin) -> Mesh:

@@ -1,7 +1,7 @@
 """Detections of successive frames → touches that keep their identity, and what happens to them."""
 
 from tomoskin.sensing.track.motion import SlideCorrection, TrackSettings
-from tomoskin.sensing.track.policy import HELD, RESIDUAL
+from tomoskin.sensing.track.policy import GATE, HELD, RESIDUAL
 from tomoskin.sensing.track.touch_table import (
     ELAPSED,
     Span,
@@ -18,6 +18,7 @@ from tomoskin.sensing.track.tracker import Tracker
 
 __all__ = [
     "ELAPSED",
+    "GATE",
     "HELD",
     "RESIDUAL",
     "SlideCorrection",

@@ -14,7 +14,8 @@ from typing import IO, Protocol, Self
 
 import numpy as np
 
-from tomoskin.board.wire import Info
+from tomoskin.board.source import current_damaged
+from tomoskin.board.wire import Info, crc16
 from tomoskin.core import FloatArray, SourceError, StrPath
 
 MOST_ELECTRODES = 32
@@ -119,7 +120,7 @@ class SkinMemory:
         self._map.close()
 
 
-_EEPROM = struct.Struct("<I8s")
+_EEPROM, _CHECKSUM = struct.Struct("<I8s"), struct.Struct("<H")
 _NEVER_WRITTEN = b"\xff" * 8
 
 
@@ -140,6 +141,11 @@ class BoardIdentity:
         """The identity that the firmware reports."""
         return cls(info.current / 1e6, info.unique_id, board)
 
+    @property
+    def damaged(self) -> bool:
+        """Whether what its memory holds is not what was written."""
+        return current_damaged(round(self.current * 1e6))
+
     def change(self, current: float | None, name: str | None) -> Self:
         """With what is not None; a board that never had an id gets one."""
         unique_id = self.unique_id if name is None else name.encode().ljust(8, b"\0")
@@ -150,8 +156,9 @@ class BoardIdentity:
         )
 
     def pack(self) -> bytes:
-        """As the firmware reads it: µA, then the id."""
-        return _EEPROM.pack(round(self.current * 1e6), self.unique_id)
+        """As the firmware reads it: µA, the id, and the checksum of both."""
+        data = _EEPROM.pack(round(self.current * 1e6), self.unique_id)
+        return data + _CHECKSUM.pack(crc16(data))
 
 
 class BoardPrograms(Protocol):

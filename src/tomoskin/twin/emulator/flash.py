@@ -130,7 +130,9 @@ def say_board(identity: BoardIdentity) -> str:
 
 
 def say_identity(identity: BoardIdentity) -> str:
-    """``100 mA, id left-arm (6c6566742d61726d)``."""
+    """``100 mA, id left-arm (6c6566742d61726d)``, or that what it holds is damaged."""
+    if identity.damaged:
+        return "a current and an id that are damaged (their checksum is wrong): --current sets them"
     text = identity.unique_id.rstrip(b"\0")
     name = f"{text.decode()} " if text.isascii() and text.decode().isprintable() else ""
     number = f"({identity.unique_id.hex()})" if name.strip() else identity.unique_id.hex()

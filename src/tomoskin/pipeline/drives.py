@@ -1,0 +1,269 @@
+"""Touches before a scan ends: what each drive tells, beside the frames.
+
+Frames alone decide what is recorded and learnt: nothing here changes what becomes of them. Drives
+say earlier that a touch has begun or is lifted, and where it is now. The next frames confirm a
+touch that has begun, or withdraw it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tomoskin.core import Detection, FloatArray, Touch
+from tomoskin.model.pattern import Pattern
+from tomoskin.sensing.fit import (
+    DriveEvidence,
+    DriveFilter,
+    Initiation,
+    MovingTouch,
+    NoiseKey,
+    Onset,
+    SpotFinder,
+)
+from tomoskin.sensing.fit.spot import CONTENT, FILLING
+from tomoskin.sensing.track import GATE, RESIDUAL
+
+_LIFTED = 5.0
+"""Logarithm of the odds from which a touch is lifted; or only as much is there as may be left."""
+
+_MOST = 4.0
+"""The most that one drive says of that: a single one may be wrong."""
+
+_CONFIRMED = 2
+"""Frames in which a touch that has begun must show, or it is withdrawn. The scan of the first one
+may have seen it come down."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DriveResult:
+    """What is known once a drive has been read.
+
+    Attributes
+    ----------
+    drive
+        Its number.
+    host_time
+        Host monotonic seconds at which its last byte was read.
+    touches
+        Where they are now.
+    provisional
+        Identities of those that no frame has confirmed.
+    """
+
+    drive: int
+    host_time: float
+    touches: tuple[Touch, ...]
+    provisional: tuple[int, ...] = ()
+
+
+@dataclass(slots=True, eq=False)
+class _Followed:
+    """A touch as frames have it, and as drives have it; ``full``: its content in the frame.
+
+    ``odds``: their logarithm that it is lifted, and the device time, s, at which it was; ``frames``
+    of a provisional one: those without it.
+    """
+
+    touch: Touch
+    moving: MovingTouch
+    full: float
+    odds: float = 0.0
+    lifted: float | None = None
+    frames: int | None = None
+
+    def take(self, moving: MovingTouch, gone: float) -> None:
+        """Take a drive, and what it says of the odds."""
+        self.moving = moving
+        if self.frames is None and self.lifted is None:
+            self.odds = max(self.odds + min(gone, _MOST), 0.0)
+            left = RESIDUAL.holds(abs(float(moving.spot[CONTENT])), abs(self.full))
+            self.lifted = moving.time if left or self.odds > _LIFTED else None
+
+    def stands(self, touch: Touch, time: float) -> bool:
+        """Whether a frame whose scan began at ``time`` s has a ``touch`` that is not lifted: it was
+        in that frame, and is more than what is left of it."""
+        before, now = self.touch.detection, touch.detection
+        if self.lifted is None or time < self.lifted or now.snr == before.snr:
+            return self.lifted is None
+        return not RESIDUAL.holds(now.snr, before.snr)
+
+
+class DriveWatch:
+    """What drives tell between frames; one for each finder.
+
+    Parameters
+    ----------
+    finder
+        Of the frames.
+    pattern
+        Of the skin.
+    snr
+        Ratio at which a touch begins.
+    interval
+        Between frames, s.
+    follows
+        Whether positions are those of a fit, which drives tell too.
+    """
+
+    def __init__(
+        self, finder: SpotFinder, pattern: Pattern, snr: float, interval: float, *, follows: bool
+    ) -> None:
+        self.finder, self._follows = finder, follows
+        self._drives, self._snr = pattern.drive_index, snr
+        self._length = interval / pattern.n_drive
+        self._key: NoiseKey | None = None
+        self._blocked = True
+        self._making: Generator[None, None, DriveEvidence] | None = None
+        self._initiation: Initiation | None = None
+        self._evidence: DriveEvidence | None = None
+        self._filter: DriveFilter | None = None
+        self._followed: dict[int, _Followed] = {}
+
+    def push(
+        self, drive: int, dv: FloatArray, clock: tuple[float, float], numbered: int
+    ) -> DriveResult | None:
+        """Take a drive; what is known then, or None before drives tell anything.
+
+        ``dv`` (n_meas,) difference data of which those of this drive are new; ``clock``: device
+        and host time, s, of its start and of its last byte; ``numbered``: the last identity given.
+        """
+        if not self._ready() or self._evidence is None or self._filter is None:
+            return None
+        rows, (time, host_time) = self._evidence.rows[drive], clock
+        data = self.finder.change(dv)[rows]
+        if not self._followed and self._initiation is not None:
+            onset = self._initiation.push(drive, data)
+            if onset is not None:
+                self._begin(onset, time, host_time, numbered + 1)
+        else:
+            self._follow(rows, data, time)
+        shown = {n: f for n, f in self._followed.items() if f.lifted is None}
+        touches = tuple([self._shown(each, time) for each in shown.values()])
+        new = tuple([number for number, each in shown.items() if each.frames is not None])
+        return DriveResult(drive, host_time, touches, new)
+
+    def confirm(self, touches: Sequence[Touch], time: float) -> int:
+        """Take the ``touches`` of a frame whose scan began at ``time`` s of the board; how many
+        provisional ones are withdrawn."""
+        before = self._followed
+        new = [number for number, each in before.items() if each.frames is not None]
+        self._followed = {t.id: self._going_on(t, before, time) for t in touches}
+        withdrawn = 0
+        for number in new if not touches else []:
+            each = before[number]
+            each.frames = (each.frames or 0) + 1
+            if each.frames < _CONFIRMED:
+                self._followed[number] = each
+            withdrawn += each.frames == _CONFIRMED
+        if before and not self._followed and self._initiation is not None:
+            self._initiation.forget()
+        return withdrawn
+
+    def _ready(self) -> bool:
+        """Whether the noise is that of now; a piece of work where it is not."""
+        key = self.finder.newest_key()
+        if self._key is None or not _is_same(key, self._key):
+            begun = self._initiation is not None and self._initiation.begun
+            if not begun:  # a frame into which a touch comes down looks like more noise
+                self._blocked |= self._key is None or _says_less(key, self._key)
+            self._key, model = key, self.finder.model
+            noise, jumps = self.finder.newest_noise()
+            every = noise + jumps @ jumps.T
+            self._making = DriveEvidence.making(model.candidates, every, self._drives)
+            sign, sheet = self.finder.sign, model.sheet
+            self._filter = DriveFilter(model.solver, model.prior, sign, sheet, noise)
+        if self._making is not None:
+            try:
+                next(self._making)
+            except StopIteration as end:
+                self._evidence, self._making, self._blocked = end.value, None, False
+                self._initiation = self._renewed(end.value)
+        return not self._blocked or bool(self._followed)
+
+    def _renewed(self, evidence: DriveEvidence) -> Initiation:
+        threshold = evidence.threshold(1 / self._length, self._snr)
+        made = Initiation(evidence, threshold, self.finder.sign)
+        if self._initiation is not None:
+            made.go_on(self._initiation)
+        return made
+
+    def _begin(self, onset: Onset, time: float, host_time: float, number: int) -> None:
+        prior = self.finder.model.prior
+        spot = np.array([*onset.middle, prior.middle[2], onset.spot[CONTENT]])
+        middle = time + self._length / 2
+        moving = MovingTouch.begin(middle, spot, onset.covariance, prior)
+        detection = self.finder.shown(moving.spot, onset.covariance, onset.ratio)
+        kind = "decrease" if spot[CONTENT] < 0 else "increase"
+        since = host_time - onset.drives * self._length
+        touch = Touch(number, kind, since, detection)
+        self._followed[number] = _Followed(touch, moving, spot[CONTENT], frames=0)
+
+    def _follow(self, rows: slice, data: FloatArray, time: float) -> None:
+        """Let each touch take its part of the data: what the others do not change."""
+        if self._filter is None:
+            return
+        moved = {n: f.moving.at(time + self._length / 2) for n, f in self._followed.items()}
+        changes = {n: self._filter.changes(touch, rows) for n, touch in moved.items()}
+        every = np.sum(list(changes.values()), axis=0)
+        for number, each in self._followed.items():
+            own = data - every + changes[number]
+            each.take(*self._filter.pushed(moved[number], rows, own))
+
+    def _going_on(self, touch: Touch, before: Mapping[int, _Followed], time: float) -> _Followed:
+        """A touch of a frame whose scan began at ``time`` s: as the drives have it where they
+        agree, else as the frame has it."""
+        known = before.get(touch.id)
+        if known is None:
+            known = next((each for each in before.values() if each.frames is not None), None)
+        middle = time + self._length * self._drives[-1] / 2
+        spot = self._spot(touch.detection)
+        if known is not None and not known.stands(touch, time):
+            return known
+        if known is not None and known.lifted is None:
+            where, spread = known.moving.position()
+            off = where - [touch.detection.x, touch.detection.y]
+            off = off - known.moving.state[2:4] * (known.moving.time - middle)
+            both = spread + _spread(touch.detection)
+            if off @ np.linalg.solve(both, off) < GATE:
+                return _Followed(touch, known.moving, spot[CONTENT], known.odds)
+        prior = self.finder.model.prior
+        moving = MovingTouch.begin(middle, spot, _spread(touch.detection), prior)
+        return _Followed(touch, moving, spot[CONTENT])
+
+    def _spot(self, detection: Detection) -> FloatArray:
+        radius = math.sqrt(detection.area / math.pi)
+        part = max(detection.peak / self.finder.unit, -0.999)
+        content = FILLING * radius**2 * math.log1p(part)
+        return np.array([detection.x, detection.y, math.log(radius), content])
+
+    def _shown(self, each: _Followed, time: float) -> Touch:
+        """A touch where it is at the end of a drive that began at ``time`` s."""
+        if each.frames is None and not self._follows:
+            return each.touch
+        now = each.moving.at(time + self._length)
+        where, spread = now.position()
+        spot = now.spot
+        spot[:2] = where
+        detection = self.finder.shown(spot, spread, each.touch.detection.snr)
+        return replace(each.touch, detection=detection)
+
+
+def _is_same(key: NoiseKey, before: NoiseKey) -> bool:
+    same = all(one is other for one, other in zip(key[:-1], before[:-1], strict=True))
+    return same and key[-1] == before[-1]
+
+
+def _says_less(key: NoiseKey, before: NoiseKey) -> bool:
+    """Whether drives told less in the noise of a ``key`` than in that ``before``: then they must
+    not be read by that."""
+    (*_, left), (*_, known) = key, before
+    return key[0] is not before[0] or key[3] is not before[3] or sum(left) > sum(known)
+
+
+def _spread(detection: Detection) -> FloatArray:
+    xy = detection.cov_xy
+    return np.array([[detection.sd_x**2, xy], [xy, detection.sd_y**2]])
