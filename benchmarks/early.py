@@ -42,7 +42,7 @@ IDLE, HELD, AFTER = 14, 5, 6
 LATE = 0.15
 """Seconds of a course that do not count."""
 
-UNTOUCHED = 500
+UNTOUCHED = 300
 NOISES = ("as the skin file says", "hum, 3 times the noise", "drift, 1 % in 300 s, and walk")
 PART = 0.4
 """Of the drives that are read."""
