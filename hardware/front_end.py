@@ -80,4 +80,5 @@ def cost(electrodes: int = 16) -> float:
     if electrodes == 16:
         return parts
     tree = tomllib.loads(bill.PARTS.read_text(encoding="utf-8"))["tree"]
-    return parts + sum(count * bill.known()[name].each[0] for name, count in tree.items())
+    more = sum(count * bill.known()[name].each[0] for name, count in tree.items())
+    return parts + float(more)

@@ -30,8 +30,8 @@ def net(part: str, pin: int) -> str:
 
 
 def number(value: str) -> float:
-    digits = value.split()[0].rstrip("knpu")
-    return float(digits) * UNITS[value.split()[0][len(digits) :]]
+    digits = value.split(maxsplit=1)[0].rstrip("knpu")
+    return float(digits) * UNITS[value.split(maxsplit=1)[0][len(digits) :]]
 
 
 def between(letter: str, one: str, other: str) -> list[float]:
