@@ -154,7 +154,7 @@ lock-uv:
 lock-runtime:
 	@$(COMPILE) pyproject.toml --extra plot requirements/build.in -o requirements/runtime.txt
 lock-dev:
-	@$(COMPILE) pyproject.toml --extra mesh --extra plot --extra parquet --extra hdf5 --extra foxglove --extra mqtt --extra lsl --extra ros2 --extra cluster requirements/dev.in -c requirements/runtime.txt -o requirements/dev.txt
+	@$(COMPILE) pyproject.toml --extra mesh --extra plot --extra parquet --extra hdf5 --extra foxglove --extra mqtt --extra lsl --extra ros2 --extra cluster --extra xacro requirements/dev.in -c requirements/runtime.txt -o requirements/dev.txt
 lock-docs:
 	@$(COMPILE) requirements/docs.in -c requirements/dev.txt -o requirements/docs.txt
 lock-bench:

@@ -128,7 +128,7 @@ def _ran(prepared: Prepared, folder: Path, seconds: float) -> tuple[dict[str, An
                 calls.append((contacts.sequence, contacts.host_time, now, touches))
 
     file = folder / "chain.mcap"
-    with board(prepared.skin, folder) as port:
+    with board(prepared.skin, folder) as (port, _):
         runner = Runner(prepared, lambda: SerialTransport(port))
         runner.ask(commands.Record(file))
         runner.start()
@@ -168,8 +168,8 @@ def _ran(prepared: Prepared, folder: Path, seconds: float) -> tuple[dict[str, An
 
 
 @contextmanager
-def board(skin: Skin, folder: Path) -> Iterator[str]:
-    """The port of the host-built board, before a sheet on which presses go round."""
+def board(skin: Skin, folder: Path) -> Iterator[tuple[str, subprocess.Popen[str]]]:
+    """The port and process of the host-built board; on its sheet presses go round."""
     make_firmware(("make", "cc"), "make gcc", "fast")
     settings = TwinSettings.preset("textile", SEED)
     sheets = _sheets(skin, settings)
@@ -184,7 +184,7 @@ def board(skin: Skin, folder: Path) -> Iterator[str]:
     thread = threading.Thread(target=_press, args=(memory, sheets, done))
     thread.start()
     try:
-        yield port
+        yield port, process
     finally:
         done.set()
         thread.join()

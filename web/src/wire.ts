@@ -449,7 +449,7 @@ export interface RobotScene {
   readonly type: "robot";
   readonly name: string;
   readonly bones: readonly number[];
-  readonly links: readonly LinkShape[];
+  readonly links: readonly DrawnLink[];
   readonly undrawn: readonly string[];
   readonly skins: readonly PlacedShape[];
   readonly poses: readonly number[];
@@ -457,7 +457,7 @@ export interface RobotScene {
 }
 
 /** What of a robot's link is drawn: the corners of its triangles, in its frame. */
-export interface LinkShape {
+export interface DrawnLink {
   readonly link: number;
   readonly corners: readonly number[];
 }

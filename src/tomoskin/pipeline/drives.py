@@ -27,10 +27,10 @@ from tomoskin.sensing.fit import (
 from tomoskin.sensing.fit.spot import CONTENT, FILLING
 from tomoskin.sensing.track import GATE, RESIDUAL
 
-_LIFTED = 8.0
-"""Logarithm of the odds from which a touch is lifted."""
+_LIFTED = 5.0
+"""Logarithm of the odds from which a touch is lifted; or only as much is there as may be left."""
 
-_MOST = 6.0
+_MOST = 4.0
 """The most that one drive says of that: a single one may be wrong."""
 
 _CONFIRMED = 2
@@ -62,7 +62,7 @@ class DriveResult:
 
 @dataclass(slots=True, eq=False)
 class _Followed:
-    """A touch as frames have it, and as drives have it.
+    """A touch as frames have it, and as drives have it; ``full``: its content in the frame.
 
     ``odds``: their logarithm that it is lifted, and the device time, s, at which it was; ``frames``
     of a provisional one: those without it.
@@ -70,6 +70,7 @@ class _Followed:
 
     touch: Touch
     moving: MovingTouch
+    full: float
     odds: float = 0.0
     lifted: float | None = None
     frames: int | None = None
@@ -79,7 +80,8 @@ class _Followed:
         self.moving = moving
         if self.frames is None and self.lifted is None:
             self.odds = max(self.odds + min(gone, _MOST), 0.0)
-            self.lifted = moving.time if self.odds > _LIFTED else None
+            left = RESIDUAL.holds(abs(float(moving.spot[CONTENT])), abs(self.full))
+            self.lifted = moving.time if left or self.odds > _LIFTED else None
 
     def stands(self, touch: Touch, time: float) -> bool:
         """Whether a frame whose scan began at ``time`` s has a ``touch`` that is not lifted: it was
@@ -163,14 +165,13 @@ class DriveWatch:
 
     def _ready(self) -> bool:
         """Whether the noise is that of now; a piece of work where it is not."""
-        key, noise, jumps = self.finder.newest_noise()
-        if (
-            not self._key
-            or any(a is not b for a, b in zip(key[:-1], self._key[:-1], strict=True))
-            or (key[-1] != self._key[-1])
-        ):
-            self._blocked |= not self._key or _says_less(key, self._key)
+        key = self.finder.newest_key()
+        if self._key is None or not _is_same(key, self._key):
+            begun = self._initiation is not None and self._initiation.begun
+            if not begun:  # a frame into which a touch comes down looks like more noise
+                self._blocked |= self._key is None or _says_less(key, self._key)
             self._key, model = key, self.finder.model
+            noise, jumps = self.finder.newest_noise()
             every = noise + jumps @ jumps.T
             self._making = DriveEvidence.making(model.candidates, every, self._drives)
             sign, sheet = self.finder.sign, model.sheet
@@ -198,7 +199,8 @@ class DriveWatch:
         detection = self.finder.shown(moving.spot, onset.covariance, onset.ratio)
         kind = "decrease" if spot[CONTENT] < 0 else "increase"
         since = host_time - onset.drives * self._length
-        self._followed[number] = _Followed(Touch(number, kind, since, detection), moving, frames=0)
+        touch = Touch(number, kind, since, detection)
+        self._followed[number] = _Followed(touch, moving, spot[CONTENT], frames=0)
 
     def _follow(self, rows: slice, data: FloatArray, time: float) -> None:
         """Let each touch take its part of the data: what the others do not change."""
@@ -218,6 +220,7 @@ class DriveWatch:
         if known is None:
             known = next((each for each in before.values() if each.frames is not None), None)
         middle = time + self._length * self._drives[-1] / 2
+        spot = self._spot(touch.detection)
         if known is not None and not known.stands(touch, time):
             return known
         if known is not None and known.lifted is None:
@@ -226,15 +229,16 @@ class DriveWatch:
             off = off - known.moving.state[2:4] * (known.moving.time - middle)
             both = spread + _spread(touch.detection)
             if off @ np.linalg.solve(both, off) < GATE:
-                return _Followed(touch, known.moving, known.odds)
-        return _Followed(touch, self._moving(touch.detection, middle))
+                return _Followed(touch, known.moving, spot[CONTENT], known.odds)
+        prior = self.finder.model.prior
+        moving = MovingTouch.begin(middle, spot, _spread(touch.detection), prior)
+        return _Followed(touch, moving, spot[CONTENT])
 
-    def _moving(self, detection: Detection, time: float) -> MovingTouch:
+    def _spot(self, detection: Detection) -> FloatArray:
         radius = math.sqrt(detection.area / math.pi)
         part = max(detection.peak / self.finder.unit, -0.999)
         content = FILLING * radius**2 * math.log1p(part)
-        spot = np.array([detection.x, detection.y, math.log(radius), content])
-        return MovingTouch.begin(time, spot, _spread(detection), self.finder.model.prior)
+        return np.array([detection.x, detection.y, math.log(radius), content])
 
     def _shown(self, each: _Followed, time: float) -> Touch:
         """A touch where it is at the end of a drive that began at ``time`` s."""
@@ -248,12 +252,16 @@ class DriveWatch:
         return replace(each.touch, detection=detection)
 
 
+def _is_same(key: NoiseKey, before: NoiseKey) -> bool:
+    same = all(one is other for one, other in zip(key[:-1], before[:-1], strict=True))
+    return same and key[-1] == before[-1]
+
+
 def _says_less(key: NoiseKey, before: NoiseKey) -> bool:
     """Whether drives told less in the noise of a ``key`` than in that ``before``: then they must
     not be read by that."""
     (*_, left), (*_, known) = key, before
-    other = key[0] is not before[0] or key[3] is not before[3]
-    return other or len(left) != len(known) or any(a > b for a, b in zip(left, known, strict=True))
+    return key[0] is not before[0] or key[3] is not before[3] or sum(left) > sum(known)
 
 
 def _spread(detection: Detection) -> FloatArray:

@@ -20,7 +20,7 @@ from tomoskin.model.robot import PlacedSkin, Pose, Robot
 from tomoskin.run import FILE_NAME, RobotRun, StrictRequest, commands
 from tomoskin.server.page_connection import Host, Page, Tasks, during
 from tomoskin.server.page_messages import (
-    LinkShape,
+    DrawnLink,
     PlacedShape,
     RobotScene,
     RobotState,
@@ -153,7 +153,7 @@ def _on(contacts: Contacts, poses: Mapping[str, Pose]) -> TouchesOfSkin:
     pose = poses.get(contacts.frame_id, Pose())
     return TouchesOfSkin(
         valid=contacts.valid,
-        pose_problem=contacts.root_problem,
+        pose_problem=contacts.link and contacts.link.problem,
         touches=[
             SpaceTouch(
                 id=contact.touch.id,
@@ -181,7 +181,7 @@ def scene(robot: Robot, streams: Mapping[str, Stream]) -> RobotScene:
     return RobotScene(
         name=robot.name,
         bones=[number[link] for ends in bones for link in ends],
-        links=[LinkShape(number[n], _rounded(corners.ravel())) for n, corners in shown.items()],
+        links=[DrawnLink(number[n], _rounded(corners.ravel())) for n, corners in shown.items()],
         undrawn=[f"{solid.link}: {why}" for solid in solids for why in solid.problems],
         skins=[_skin(s, streams[s.name], number.get(s.place.link)) for s in robot.skins],
         poses=_flat(urdf.poses()) if urdf else [],

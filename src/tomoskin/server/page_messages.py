@@ -375,7 +375,7 @@ class FlowNow(Message, frozen=True, tag="flow"):
 # A robot.
 
 
-class LinkShape(MessagePart, frozen=True):
+class DrawnLink(MessagePart, frozen=True):
     """What of a robot's link is drawn: the corners of its triangles, in its frame."""
 
     link: int
@@ -405,7 +405,7 @@ class RobotScene(Message, frozen=True, tag="robot"):
 
     name: str
     bones: list[int]
-    links: list[LinkShape]
+    links: list[DrawnLink]
     undrawn: list[str]
     skins: list[PlacedShape]
     poses: Flat

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -152,12 +154,10 @@ def test_one_port_by_two_paths_is_one_port(files):
         ('<link name="fore"/>', '<link name="fore"/><link name="fore"/>', "twice"),
         ('<link name="fore"/>', '<link name="fore"/><link name="table"/>', "got 2: base, table"),
         ('parent link="base"', 'parent link="fore"', "got 2|ring|got 0"),
-        ('xyz="0.3 0 0"', 'xyz="${length} 0 0"', "got a xacro"),
         (
-            '<robot name="arm">',
-            '<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">'
-            '<xacro:macro name="finger"><link name="tip"/></xacro:macro>',
-            "got a xacro.*expand xacro first",
+            'xyz="0.3 0 0"',
+            'xyz="${length} 0 0"',
+            "needs the package xacro|expanded by xacro: .*length",
         ),
         ('xyz="0.3 0 0"', 'xyz="0.3 0"', "three numbers"),
         ('xyz="0.3 0 0"', 'xyz="nan 0 0"', "three numbers"),
@@ -169,6 +169,58 @@ def test_a_bad_urdf_is_refused(files, old, new, said):
     (files / "arm.urdf").write_text(URDF.replace(old, new))
     with pytest.raises(SkinError, match=said):
         Urdf.read(files / "arm.urdf")
+
+
+XACRO = """<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">
+<xacro:arg name="length" default="0.3"/>
+<xacro:property name="half" value="${$(arg length) / 2}"/>
+<xacro:macro name="arm" params="name parent *origin"><link name="${name}"/>
+  <joint name="to_${name}" type="fixed"><parent link="${parent}"/><child link="${name}"/>
+  <xacro:insert_block name="origin"/></joint></xacro:macro>
+<link name="base"/>
+<xacro:arm name="fore" parent="base"><origin xyz="${half} 0 0" rpy="0 0 ${pi / 2}"/></xacro:arm>
+</robot>"""
+
+
+@pytest.fixture
+def xacro():
+    return pytest.importorskip("xacro", reason="a xacro: python -m pip install '.[xacro]'")
+
+
+def test_a_xacro_is_expanded(files, xacro):
+    assert xacro
+    (files / "arm.urdf.xacro").write_text(XACRO)
+    urdf = Urdf.read(files / "arm.urdf.xacro")
+    assert urdf.links == ("base", "fore")
+    assert urdf.joints["fore"].name == "to_fore"
+    assert urdf.pose("fore").position == pytest.approx([0.15, 0, 0])
+    turned = Rotation.from_euler("z", np.pi / 2).as_matrix()
+    assert urdf.pose("fore").rotation == pytest.approx(turned, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("${half}", "${third}", r"arm\.urdf\.xacro: cannot be expanded by xacro: .*third"),
+        ("${half}", "1 ${half}", "three numbers"),
+        ('xacro:arm name="fore" parent="base"', 'xacro:leg name="fore"', "cannot be expanded"),
+        ('parent="base"', 'parent="bass"', 'there is no link "bass"'),
+    ],
+)
+def test_a_xacro_that_cannot_be_meant(files, xacro, old, new, said):
+    assert xacro
+    text = XACRO.replace(old, new)
+    text = text.replace("</xacro:arm>", "</xacro:leg>") if "leg" in new else text
+    (files / "arm.urdf.xacro").write_text(text)
+    with pytest.raises(SkinError, match=said):
+        Urdf.read(files / "arm.urdf.xacro")
+
+
+def test_without_the_package_a_xacro_says_what_to_install(files, monkeypatch):
+    monkeypatch.setitem(sys.modules, "xacro", None)
+    (files / "arm.urdf.xacro").write_text(XACRO)
+    with pytest.raises(SkinError, match=r"arm\.urdf\.xacro: needs the package xacro.*xacro"):
+        Urdf.read(files / "arm.urdf.xacro")
 
 
 MOVING = """<robot name="hand"><link name="base"/><link name="a"/><link name="b"/><link name="c"/>

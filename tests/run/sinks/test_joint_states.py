@@ -112,7 +112,7 @@ def test_without_states_only_a_link_that_stands_has_a_pose(tmp_path):
     write_bag(tmp_path / "joints.mcap", [0.0], lambda t: t)
     stream = placed(tmp_path, "joints.mcap")
     alone = replace(stream, place=replace(stream.place, joints=None))
-    problem = contacts_at(0.0, stream=alone).root_problem
+    problem = contacts_at(0.0, stream=alone).link.problem
     assert 'the joint "elbow" may move, and no joint states are given' in problem
     assert 'joints = "ros2"' in problem
     text = URDF.replace("revolute", "fixed").replace("prismatic", "fixed")
@@ -120,8 +120,8 @@ def test_without_states_only_a_link_that_stands_has_a_pose(tmp_path):
     (tmp_path / "robot.toml").write_text(ROBOT.replace('joints = "JOINTS"', ""))
     fixed = Robot.load(tmp_path / "robot.toml").skins[0].place
     contacts = contacts_at(0.0, TOUCH, stream=replace(stream, place=fixed))
-    assert contacts.root_problem is None
-    assert contacts.root.position == pytest.approx([0.3, 0, 0.2])
+    assert contacts.link.problem is None
+    assert contacts.link.pose.position == pytest.approx([0.3, 0, 0.2])
 
 
 def test_an_angle_that_starts_anew_is_not_halfway(tmp_path):

@@ -17,7 +17,7 @@ import numpy as np
 from tomoskin.core import Detection, Event, FloatArray, Force, Image, SkinError, Touch
 from tomoskin.files.messages.stream import Stream
 from tomoskin.model.mesh import Surface
-from tomoskin.model.robot import Pose, Urdf, quaternion
+from tomoskin.model.robot import Place, Pose, quaternion
 from tomoskin.pipeline import FrameResult
 from tomoskin.sensing.track import TouchEvent
 
@@ -39,6 +39,44 @@ Vector = tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class LinkPose:
+    """Where the link of a robot that a skin lies on was at some time.
+
+    Attributes
+    ----------
+    root
+        Name of the robot's root frame.
+    pose
+        Of the link in that frame; None where it is not known.
+    problem
+        Why it is not known, or None.
+    """
+
+    root: str
+    pose: Pose | None
+    problem: str | None = None
+
+    @classmethod
+    def of(cls, place: Place | None, utc: float | None) -> Self | None:
+        """At a time, s since 1970; None of a skin that lies on no link."""
+        if place is None or place.urdf is None:
+            return None
+        try:
+            return cls(place.urdf.root, place.in_root(utc))
+        except SkinError as error:
+            return cls(place.urdf.root, None, str(error))
+
+    def content(self) -> dict[str, Any]:
+        """The pose and what is wrong with it, as plain values by name."""
+        pose = self.pose and {
+            "frame_id": self.root,
+            "position": self.pose.position.tolist(),
+            "orientation": self.pose.quaternion(),
+        }
+        return {"root": pose, "root_problem": self.problem}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Contact:
     """One touch in space.
 
@@ -52,25 +90,25 @@ class Contact:
         Unit vectors: along the sheet's x, across it, and away from the body.
     slope
         (3, 2): derivative of the position by the sheet's x and y.
-    root
-        The pose of that frame in the root frame of the robot; None where it is not known.
+    link
+        Where that frame is on the robot; None where there is none.
     """
 
     touch: Touch
     position: Vector
     axes: tuple[Vector, Vector, Vector] = field(repr=False)
     slope: FloatArray = field(repr=False)
-    root: Pose | None = field(default=None, repr=False)
+    link: LinkPose | None = field(default=None, repr=False)
 
     @classmethod
-    def of(cls, touch: Touch, surface: Surface, root: Pose | None = None) -> Self:
+    def of(cls, touch: Touch, surface: Surface, link: LinkPose | None = None) -> Self:
         """Of a touch of the sheet that lies on ``surface``; plain numbers, which is faster."""
         uv = [[touch.detection.x, touch.detection.y]]
         slope = surface.jacobian(uv)[0]
         along, up = map(_unit, slope.T.tolist())
         normal = _unit(_cross(along, up))
         x, y, z = surface.point(uv)[0].tolist()
-        return cls(touch, (x, y, z), (along, _cross(normal, along), normal), slope, root)
+        return cls(touch, (x, y, z), (along, _cross(normal, along), normal), slope, link)
 
     @property
     def normal(self) -> Vector:
@@ -80,12 +118,14 @@ class Contact:
     @property
     def root_position(self) -> Vector | None:
         """(3,) m in the root frame of the robot; None where the pose of the link is not known."""
-        return tuple(self.root(np.array(self.position)).tolist()) if self.root else None
+        pose = self.link and self.link.pose
+        return tuple(pose(np.array(self.position)).tolist()) if pose else None
 
     @property
     def root_normal(self) -> Vector | None:
         """(3,) unit vector in that frame; None where the pose of the link is not known."""
-        return tuple((self.root.rotation @ self.normal).tolist()) if self.root else None
+        pose = self.link and self.link.pose
+        return tuple((pose.rotation @ self.normal).tolist()) if pose else None
 
     @property
     def orientation(self) -> Vector:
@@ -129,17 +169,18 @@ class Contact:
         return np.cross(self.position, self.push)
 
     def content(self) -> dict[str, Any]:
-        """As plain values by name: on the sheet, and in space."""
+        """As plain values by name: on the sheet, in space, and on a robot in its root frame."""
         spread = self.covariance
-        return (
-            _NO_FORCE
-            | touch_row(self.touch)
-            | {
-                "position": self.position,
-                "normal": self.normal,
-                "covariance": None if spread is None else spread.tolist(),
-            }
-        )
+        content = {
+            **_NO_FORCE,
+            **touch_row(self.touch),
+            "position": self.position,
+            "normal": self.normal,
+            "covariance": None if spread is None else spread.tolist(),
+        }
+        if self.link is not None:
+            content |= {"root_position": self.root_position, "root_normal": self.root_normal}
+        return content
 
     def _in_space(self, sheet: FloatArray) -> FloatArray:
         """(3, 3) of a covariance (2, 2) on the sheet."""
@@ -269,31 +310,12 @@ class Contacts:
     @cached_property
     def touches(self) -> tuple[Contact, ...]:
         """The touches in space, in the order of their identities."""
-        return tuple(map(self._contact, self.tracked))
-
-    @property
-    def root(self) -> Pose | None:
-        """The pose of the link in the root frame of the robot at that time.
-
-        None where there is no link, and where it is not known how the robot stood.
-        """
-        return self._root[0]
-
-    @property
-    def root_problem(self) -> str | None:
-        """Why the pose of the link is not known, or None."""
-        return self._root[1]
+        return tuple(Contact.of(t, self.stream.surface, self.link) for t in self.tracked)
 
     @cached_property
-    def _root(self) -> tuple[Pose | None, str | None]:
-        place = self.stream.place
-        try:
-            return (None if place is None else place.in_root(self.utc)), None
-        except SkinError as error:
-            return None, str(error)
-
-    def _contact(self, touch: Touch) -> Contact:
-        return Contact.of(touch, self.stream.surface, self.root)
+    def link(self) -> LinkPose | None:
+        """Where the link of the robot was at that time; None where the skin lies on none."""
+        return LinkPose.of(self.stream.place, self.utc)
 
     @property
     def events(self) -> tuple[Event, ...]:
@@ -316,45 +338,21 @@ class Contacts:
             "latency_s": self.latency,
             "valid": self.valid,
             "problem": self.problem,
-            **self._root_header(),
+            **(self.link.content() if self.link else {}),
         }
-
-    def _root_header(self) -> dict[str, Any]:
-        """Of a skin on a robot's link: where that is in the frame of the root, or why not."""
-        if self._urdf is None:
-            return {}
-        pose = None
-        if self.root is not None:
-            pose = {
-                "frame_id": self._urdf.root,
-                "position": self.root.position.tolist(),
-                "orientation": self.root.quaternion(),
-            }
-        return {"root": pose, "root_problem": self.root_problem}
 
     def content(self) -> dict[str, Any]:
         """Everything as plain values by name, the touches too."""
-        return self.header() | {"touches": [self._content(touch) for touch in self.touches]}
+        return self.header() | {"touches": [touch.content() for touch in self.touches]}
 
     def happenings(self) -> list[dict[str, Any]]:
         """Each thing that happened to a touch, with that touch, as plain values by name."""
         return [
             {"time_s": event.host_time, "event": event.kind}
             | self.header()
-            | self._content(self._contact(event.touch))
+            | Contact.of(event.touch, self.stream.surface, self.link).content()
             for event in self.happened
         ]
-
-    def _content(self, contact: Contact) -> dict[str, Any]:
-        """Of a touch; of one on a robot's link also where it is in the frame of the root."""
-        if self._urdf is None:
-            return contact.content()
-        in_root = {"root_position": contact.root_position, "root_normal": contact.root_normal}
-        return contact.content() | in_root
-
-    @property
-    def _urdf(self) -> Urdf | None:
-        return self.stream.place.urdf if self.stream.place else None
 
 
 def without_frame(stream: Stream, problem: str, host_time: float) -> Contacts:

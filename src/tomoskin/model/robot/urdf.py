@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tomoskin.core import FloatArray, GeometryError, SkinError, StrPath
+from tomoskin.core import FloatArray, GeometryError, SkinError, StrPath, needed
 from tomoskin.model.robot.link_shapes import (
     MOST_TRIANGLES,
     LinkShape,
@@ -112,12 +112,12 @@ class Urdf:
 
     @classmethod
     def read(cls, path: StrPath) -> Self:
-        """From a file.
+        """From a file; a xacro is expanded.
 
         Raises
         ------
         SkinError
-            When it cannot be read, is no URDF, or its links are no tree.
+            When it cannot be read or expanded, is no URDF, or its links are no tree.
         """
         path = Path(path)
         text = read_text(path, "a URDF", _LARGEST)
@@ -128,20 +128,11 @@ class Urdf:
                 where=where,
                 hint="remove <!ENTITY …>",
             )
-        try:
-            root = ElementTree.fromstring(text)
-        except ElementTree.ParseError as error:
-            raise SkinError(
-                f"is not valid XML, so it is not a URDF: {error}", where=where
-            ) from None
-        macro = next((e.tag for e in root.iter() if "xacro}" in e.tag), "")
-        if root.tag != "robot" or macro or "${" in text:
-            raise SkinError(
-                "expected <robot> with its links, got "
-                + (f"<{root.tag}>" if root.tag != "robot" else "a xacro with macros"),
-                where=where,
-                hint="expand xacro first: xacro ROBOT.xacro > ROBOT.urdf",
-            )
+        root = _parsed(text, where)
+        if "${" in text or any("xacro}" in element.tag for element in root.iter()):
+            root = _parsed(_expanded(path), where)
+        if root.tag != "robot":
+            raise SkinError(f"expected <robot> with its links, got <{root.tag}>", where=where)
         links = tuple(name_of(link, where) for link in root.findall("link"))
         joints = [_joint(joint, where) for joint in root.findall("joint")]
         shapes = tuple(read_shapes(root, path))
@@ -237,6 +228,22 @@ class Urdf:
                 link = self.joints[link].parent if link in self.joints else ""
             if link in self.joints:
                 raise SkinError(f'the joints before link "{start}" form a ring', where=self.source)
+
+
+def _parsed(text: str, where: str) -> ElementTree.Element:
+    try:
+        return ElementTree.fromstring(text)
+    except ElementTree.ParseError as error:
+        raise SkinError(f"is not valid XML, so it is not a URDF: {error}", where=where) from None
+
+
+def _expanded(path: Path) -> str:
+    """The URDF that a xacro makes, with its arguments' own defaults."""
+    xacro = needed("xacro", "xacro", path, SkinError)
+    try:
+        return str(xacro.process_file(str(path)).toxml())
+    except Exception as error:  # of any kind, since the file's expressions are Python's
+        raise SkinError(f"cannot be expanded by xacro: {error}", where=str(path)) from error
 
 
 def _joint(element: ElementTree.Element, where: str) -> UrdfJoint:

@@ -128,6 +128,11 @@ class Initiation:
         self._order: tuple[int, ...] = ()
         self._since: int | None = None
 
+    @property
+    def begun(self) -> bool:
+        """Whether a touch has begun that is to be told."""
+        return self._since is not None
+
     def go_on(self, other: Initiation) -> None:
         """Go on where an ``other`` one of the same skin is."""
         self._data, self._order, self._since = other._data, other._order, other._since

@@ -47,8 +47,8 @@ _SWELLS = 0.08
 
 
 NoiseKey = tuple[FloatArray, FloatArray, FloatArray, Excess, tuple[float, ...]]
-"""What the noise of the newest measurements depends on: see :meth:`Sight.of_newest`; and how much
-of what touches may have left behind is not known."""
+"""What the noise of the newest measurements depends on: nuisance directions, jumps, noise of idle
+frames, excess; and how much of what touches may have left behind is not known."""
 
 
 class SpotFinder:
@@ -176,11 +176,15 @@ class SpotFinder:
         """The sign of touches, as in a skin's ``[touch]``."""
         return self._policy.sign
 
-    def newest_noise(self) -> tuple[NoiseKey, FloatArray, FloatArray]:
+    def newest_key(self) -> NoiseKey:
+        """What :meth:`newest_noise` depends on."""
+        return *self._sight.newest, self.watch.excess, self._residual.doubts
+
+    def newest_noise(self) -> tuple[FloatArray, FloatArray]:
         """See :meth:`Sight.of_newest`; with what touches may have left behind."""
-        key, noise, jumps = self._sight.of_newest(self.watch.excess)
-        doubts, left = self._residual.doubtful(len(noise))
-        return (*key, doubts), noise + left.T @ left, jumps
+        noise, jumps = self._sight.of_newest(self.watch.excess)
+        left = self._residual.doubtful(len(noise))
+        return noise + left.T @ left, jumps
 
     def change(self, dv: FloatArray) -> FloatArray:
         """(n_meas,) V of the model, of difference data less what touches have left behind."""

@@ -1,0 +1,197 @@
+"""From the stamp of a frame to who listens to a sink, in another process: two minutes."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from bench_rig import served
+from chain import LEAD, SETTLING, SKIN, board, elsewhere
+from report import Report, Row, progress, table
+from tomoskin.board.source import SerialTransport
+from tomoskin.core import DataError
+from tomoskin.model.skin import Skin
+from tomoskin.pipeline import Prepared, prepare
+from tomoskin.run import LiveSkin, Runner
+from tomoskin.run.sinks import make_sink
+
+SECONDS = 10.0
+LOSSES = 10
+
+SINKS = {
+    "ros2": "ros2:domain=77",
+    "mqtt": "mqtt://127.0.0.1:{}",
+    "foxglove": "foxglove:{}",
+    "lsl": "lsl",
+}
+"""How each is asked for; where a subscriber finds it, in braces."""
+
+PROMISED = 4.0, 15.0
+"""ms from stamp to subscriber, median and 99 of 100."""
+
+LOST = 0.5
+"""s in which every sink says that a board is lost."""
+
+_CLIENT = Path(__file__).with_name("sink_client.py")
+_LOOPBACK = (
+    "<CycloneDDS><Domain><General><Interfaces><NetworkInterface name='lo'/></Interfaces>"
+    "<AllowMulticast>false</AllowMulticast></General><Discovery>"
+    "<ParticipantIndex>auto</ParticipantIndex><Peers><Peer address='127.0.0.1'/></Peers>"
+    "</Discovery></Domain></CycloneDDS>"
+)
+
+Messages = list[tuple[float, float, bool]]
+"""When each came, the time that it is of, and whether touches are valid; s since 1970."""
+
+
+def run() -> Iterator[Report]:
+    """From the stamp of a frame to who listens to a sink, in another process: two minutes."""
+    prepared, rows = _prepared(), []
+    for kind in ("control loop", *SINKS):
+        progress(kind)
+        with _listened(prepared, () if kind == "control loop" else (kind,)) as (heard, _):
+            time.sleep(LEAD)
+            before = time.time()
+            time.sleep(SECONDS)
+            rows.append(_row(kind, heard[kind], before))
+    yield table(
+        "from the middle of a scan to a subscriber",
+        rows,
+        "one sink at a time, and its subscriber in a process of its own; "
+        f"the firmware with a Pico's timing on a pty, 404 frames/s; {SKIN}; presses that go round",
+        f"promised: median {PROMISED[0]:g} ms, 99 of 100 within {PROMISED[1]:g} ms",
+        f"load of the machine {os.getloadavg()[0]:.1f}",
+    )
+
+
+def run_lost() -> Iterator[Report]:
+    """Seconds from the end of a board's process to every sink that says so."""
+    prepared, rows = _prepared(), []
+    for number in range(LOSSES):
+        progress(f"loss {number + 1} of {LOSSES}")
+        with _listened(prepared, (*SINKS, "page")) as (heard, kill):
+            time.sleep(LEAD / 2)
+            gone = time.time()
+            kill()
+            time.sleep(2 * LOST)
+            rows.append({name: _told(messages, gone) for name, messages in heard.items()})
+    yield table(
+        f"ms until a board whose process was killed is told, {LOSSES} times",
+        [
+            {"sink": kind, "median": _ms(np.median(s)), "longest": _ms(np.max(s))}
+            for kind in rows[0]
+            if (s := [row[kind] for row in rows])
+        ],
+        "all sinks at once",
+        f"promised: within {1e3 * LOST:.0f} ms; load of the machine {os.getloadavg()[0]:.1f}",
+    )
+
+
+def _row(name: str, messages: Messages, before: float) -> Row:
+    ms = np.array(
+        [1e3 * (came - stamp) for came, stamp, valid in messages if came > before and valid]
+    )
+    return {
+        "sink": name,
+        "messages/s": f"{len(ms) / SECONDS:.0f}",
+        "median, ms": f"{np.median(ms):.2f}",
+        "99 of 100": f"{np.percentile(ms, 99):.2f}",
+        "longest": f"{ms.max():.1f}",
+    }
+
+
+def _told(messages: Messages, gone: float) -> float:
+    """s after ``gone`` of the first message that says so; infinite where none does."""
+    return next((came - gone for came, _, valid in messages if came > gone and not valid), np.inf)
+
+
+def _ms(seconds: float) -> str:
+    return f"{1e3 * seconds:.0f}"
+
+
+def _prepared() -> Prepared:
+    prepared = prepare(Skin.load(SKIN).altered({"readout": {"settling": SETTLING}}))
+    prepared.warm_up()
+    return prepared
+
+
+@contextmanager
+def _listened(
+    prepared: Prepared, kinds: Sequence[str]
+) -> Iterator[tuple[dict[str, Messages], Callable[[], None]]]:
+    """What a control loop and subscribers hear of a board that runs; what kills the board."""
+    os.environ["CYCLONEDDS_URI"] = _LOOPBACK
+    heard: dict[str, Messages] = {name: [] for name in ("control loop", *kinds)}
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        ports = {kind: _free_port() for kind in kinds}
+        if "mqtt" in kinds:
+            stack.enter_context(_broker(folder, ports["mqtt"]))
+        tty, process = stack.enter_context(board(prepared.skin, folder))
+        sinks = [make_sink(SINKS[kind].format(ports[kind])) for kind in kinds if kind in SINKS]
+        runner = Runner(prepared, lambda: SerialTransport(tty), sinks=sinks)
+        runner.start()
+        stack.callback(runner.stop)
+        for kind in kinds:
+            address = str(ports[kind])
+            if kind == "page":
+                policy = stack.enter_context(served(runner))
+                address = f"ws://127.0.0.1:{policy.port}/ws?token={policy.token}"
+            client = elsewhere([sys.executable, str(_CLIENT), kind, address])
+            stack.callback(client.wait)
+            stack.callback(client.kill)
+            threading.Thread(target=_note, args=(client, heard[kind]), daemon=True).start()
+        ended = threading.Event()
+        stack.callback(ended.set)
+        loop = threading.Thread(target=_loop, args=(runner, heard["control loop"], ended))
+        loop.start()
+        while not all(any(valid for *_, valid in messages) for messages in heard.values()):
+            time.sleep(0.1)
+        yield heard, process.kill
+
+
+def _note(client: subprocess.Popen[str], messages: Messages) -> None:
+    for line in client.stdout or ():
+        came, stamp, valid = line.split()
+        messages.append((float(came), float(stamp), valid == "1"))
+
+
+def _loop(runner: Runner, messages: Messages, ended: threading.Event) -> None:
+    skin = LiveSkin(runner)
+    while not ended.is_set():
+        contacts = skin.wait(0.1)
+        now = time.time()
+        messages.append((now, now - contacts.age_s, contacts.valid))
+
+
+def _free_port() -> int:
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        return int(listener.getsockname()[1])
+
+
+@contextmanager
+def _broker(folder: Path, port: int) -> Iterator[None]:
+    """While mosquitto listens at ``port``."""
+    program = shutil.which("mosquitto") or shutil.which("mosquitto", path="/usr/sbin")
+    if program is None:
+        raise DataError("needs mosquitto (Debian: apt-get install mosquitto)", where="bench sinks")
+    settings = folder / "broker.conf"
+    settings.write_text(f"listener {port} 127.0.0.1\nallow_anonymous true\nuser root\n")
+    process = subprocess.Popen([program, "-c", str(settings)], stderr=subprocess.DEVNULL)
+    try:
+        time.sleep(1.0)
+        yield
+    finally:
+        process.kill()
+        process.wait()
