@@ -248,8 +248,9 @@ class DriveWatch:
         where, spread = now.position()
         spot = now.spot
         spot[:2] = where
-        detection = self.view.shown(spot, spread, each.touch.detection.snr)
-        return replace(each.touch, detection=detection)
+        frame = each.touch.detection
+        detection = self.view.shown(spot, spread, frame.snr)
+        return replace(each.touch, detection=replace(detection, force=frame.force))
 
 
 def _is_same(key: NoiseKey, before: NoiseKey) -> bool:
