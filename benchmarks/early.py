@@ -83,6 +83,7 @@ class DriveRig:
         self.board = make_electronics(skin, twin, record.adc_bits)
         self.pipeline, self.time, self.number = Pipeline(prepared), 0.0, 0
         self.pipeline.tick_rate = TICKS
+        self.known: tuple[Touch, ...] = ()
         self.period = sum(each.seconds for each in self.tables)
 
     def drive(self, number: int, course: Course, steps: Sequence[float]) -> Any:
@@ -109,12 +110,14 @@ class DriveRig:
             parts.append(counts)
             head = self.number, round(start * TICKS), self.time, 0, 0, 0
             result = self.pipeline.push_drive(DriveSamples(*head, 0, drive, drive, counts))
-            if seen is not None and result is not None:
-                seen.drives.append((self.time, result.touches))
+            if seen is not None:
+                seen.drives.append((self.time, self.known if result is None else result.touches))
         head = self.number, round(began * TICKS), self.time, 0, 0, 0
         frame = self.pipeline.push(Frame(*head, np.concatenate(parts)))
-        if seen is not None and frame is not None:
-            seen.frames.append((self.time, frame.touches))
+        if frame is not None:
+            self.known = frame.touches
+        if seen is not None:
+            seen.frames.append((self.time, self.known))
 
 
 Shown = list[tuple[float, tuple[Touch, ...]]]
