@@ -14,6 +14,7 @@ from functools import lru_cache
 import numpy as np
 
 from tomoskin.core import FloatArray
+from tomoskin.sensing.fit.drive_evidence import Onset
 from tomoskin.sensing.fit.problem import Solver
 from tomoskin.sensing.fit.solver import SheetDomain
 from tomoskin.sensing.fit.spot import CONTENT, LOG_RADIUS, N_PARAMETERS, X, Y
@@ -65,6 +66,17 @@ class MovingTouch:
         others = (_TRACK.speed, _TRACK.speed, prior.spread, spot[CONTENT], 1.0, 1.0)
         spread[range(2, _SIZE), range(2, _SIZE)] = np.square(others)
         return cls(time, state, spread)
+
+    @classmethod
+    def of_onset(cls, time: float, onset: Onset, prior: SpotPrior) -> MovingTouch:
+        """A touch that has begun: nothing is known of its radius."""
+        spot = np.array([*onset.middle, prior.middle[LOG_RADIUS], onset.spot[CONTENT]])
+        return cls.begin(time, spot, onset.covariance, prior)
+
+    @property
+    def content(self) -> float:
+        """The content, m²."""
+        return float(self.state[5])
 
     @property
     def spot(self) -> FloatArray:
