@@ -9,7 +9,7 @@ import pytest
 
 from run.board import pressed, samples_of
 from tomoskin.core import DriveSamples, Frame
-from tomoskin.pipeline import DriveResult, FrameResult, Pipeline
+from tomoskin.pipeline import DriveResult, FrameResult, Pipeline, Prepared
 
 SECONDS, NEEDED = 0.056, 20
 
@@ -23,7 +23,7 @@ def touched(prepared):
 class Turns:
     """A board that sends its drives, if ``parts``, and frames."""
 
-    prepared: object
+    prepared: Prepared
     parts: bool = True
     number: int = 0
     drives: list[DriveResult | None] = field(default_factory=list)

@@ -18,13 +18,13 @@ from tomoskin.model.pattern import Pattern
 from tomoskin.sensing.fit import (
     DriveEvidence,
     DriveFilter,
+    DriveView,
     Initiation,
     MovingTouch,
     NoiseKey,
     Onset,
-    SpotFinder,
 )
-from tomoskin.sensing.fit.spot import CONTENT, FILLING
+from tomoskin.sensing.fit.spot import CONTENT
 from tomoskin.sensing.track import GATE, RESIDUAL
 
 _LIFTED = 5.0
@@ -33,9 +33,9 @@ _LIFTED = 5.0
 _MOST = 4.0
 """The most that one drive says of that: a single one may be wrong."""
 
-_CONFIRMED = 2
-"""Frames in which a touch that has begun must show, or it is withdrawn. The scan of the first one
-may have seen it come down."""
+_FRAMES, _SECONDS = 2, 0.15
+"""Frames, and seconds, within which a touch that has begun must show in frames, or it is withdrawn.
+The scan of the first one may have seen it come down, and quick ones tell little each."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,7 +62,8 @@ class DriveResult:
 
 @dataclass(slots=True, eq=False)
 class _Followed:
-    """A touch as frames have it, and as drives have it; ``full``: its content in the frame.
+    """A touch as frames have it, and as drives have it; ``full``: its content in the frame, and
+    ``begun``: the device time, s, at which a provisional one has.
 
     ``odds``: their logarithm that it is lifted, and the device time, s, at which it was; ``frames``
     of a provisional one: those without it.
@@ -71,6 +72,7 @@ class _Followed:
     touch: Touch
     moving: MovingTouch
     full: float
+    begun: float = 0.0
     odds: float = 0.0
     lifted: float | None = None
     frames: int | None = None
@@ -78,9 +80,11 @@ class _Followed:
     def take(self, moving: MovingTouch, gone: float) -> None:
         """Take a drive, and what it says of the odds."""
         self.moving = moving
-        if self.frames is None and self.lifted is None:
+        if self.lifted is None:
             self.odds = max(self.odds + min(gone, _MOST), 0.0)
-            left = RESIDUAL.holds(abs(float(moving.spot[CONTENT])), abs(self.full))
+            left = self.frames is None and RESIDUAL.holds(
+                abs(float(moving.spot[CONTENT])), abs(self.full)
+            )
             self.lifted = moving.time if left or self.odds > _LIFTED else None
 
     def stands(self, touch: Touch, time: float) -> bool:
@@ -97,12 +101,10 @@ class DriveWatch:
 
     Parameters
     ----------
-    finder
-        Of the frames.
+    view
+        Of the finder of the frames.
     pattern
         Of the skin.
-    snr
-        Ratio at which a touch begins.
     interval
         Between frames, s.
     follows
@@ -110,10 +112,10 @@ class DriveWatch:
     """
 
     def __init__(
-        self, finder: SpotFinder, pattern: Pattern, snr: float, interval: float, *, follows: bool
+        self, view: DriveView, pattern: Pattern, interval: float, *, follows: bool
     ) -> None:
-        self.finder, self._follows = finder, follows
-        self._drives, self._snr = pattern.drive_index, snr
+        self.view, self._follows = view, follows
+        self._drives = pattern.drive_index
         self._length = interval / pattern.n_drive
         self._key: NoiseKey | None = None
         self._blocked = True
@@ -134,7 +136,7 @@ class DriveWatch:
         if not self._ready() or self._evidence is None or self._filter is None:
             return None
         rows, (time, host_time) = self._evidence.rows[drive], clock
-        data = self.finder.change(dv)[rows]
+        data = self.view.change(dv)[rows]
         if not self._followed and self._initiation is not None:
             onset = self._initiation.push(drive, data)
             if onset is not None:
@@ -156,26 +158,26 @@ class DriveWatch:
         for number in new if not touches else []:
             each = before[number]
             each.frames = (each.frames or 0) + 1
-            if each.frames < _CONFIRMED:
+            if each.frames < _FRAMES or time - each.begun < _SECONDS:
                 self._followed[number] = each
-            withdrawn += each.frames == _CONFIRMED
+            else:
+                withdrawn += 1
         if before and not self._followed and self._initiation is not None:
             self._initiation.forget()
         return withdrawn
 
     def _ready(self) -> bool:
         """Whether the noise is that of now; a piece of work where it is not."""
-        key = self.finder.newest_key()
+        key = self.view.key
         if self._key is None or not _is_same(key, self._key):
             begun = self._initiation is not None and self._initiation.begun
             if not begun:  # a frame into which a touch comes down looks like more noise
                 self._blocked |= self._key is None or _says_less(key, self._key)
-            self._key, model = key, self.finder.model
-            noise, jumps = self.finder.newest_noise()
-            every = noise + jumps @ jumps.T
-            self._making = DriveEvidence.making(model.candidates, every, self._drives)
-            sign, sheet = self.finder.sign, model.sheet
-            self._filter = DriveFilter(model.solver, model.prior, sign, sheet, noise)
+            self._key, model = key, self.view.model
+            noise, stays = self.view.noise()
+            self._making = DriveEvidence.making(model.candidates, noise, stays, self._drives)
+            sign = self.view.skin.touch.sign
+            self._filter = DriveFilter(model.solver, model.prior, sign, model.sheet, noise)
         if self._making is not None:
             try:
                 next(self._making)
@@ -185,22 +187,22 @@ class DriveWatch:
         return not self._blocked or bool(self._followed)
 
     def _renewed(self, evidence: DriveEvidence) -> Initiation:
-        threshold = evidence.threshold(1 / self._length, self._snr)
-        made = Initiation(evidence, threshold, self.finder.sign)
+        touch = self.view.skin.touch
+        made = Initiation(evidence, evidence.threshold(1 / self._length, touch.snr), touch.sign)
         if self._initiation is not None:
             made.go_on(self._initiation)
         return made
 
     def _begin(self, onset: Onset, time: float, host_time: float, number: int) -> None:
-        prior = self.finder.model.prior
+        prior = self.view.model.prior
         spot = np.array([*onset.middle, prior.middle[2], onset.spot[CONTENT]])
         middle = time + self._length / 2
         moving = MovingTouch.begin(middle, spot, onset.covariance, prior)
-        detection = self.finder.shown(moving.spot, onset.covariance, onset.ratio)
+        detection = self.view.shown(moving.spot, onset.covariance, onset.ratio)
         kind = "decrease" if spot[CONTENT] < 0 else "increase"
         since = host_time - onset.drives * self._length
         touch = Touch(number, kind, since, detection)
-        self._followed[number] = _Followed(touch, moving, spot[CONTENT], frames=0)
+        self._followed[number] = _Followed(touch, moving, spot[CONTENT], time, frames=0)
 
     def _follow(self, rows: slice, data: FloatArray, time: float) -> None:
         """Let each touch take its part of the data: what the others do not change."""
@@ -229,16 +231,14 @@ class DriveWatch:
             off = off - known.moving.state[2:4] * (known.moving.time - middle)
             both = spread + _spread(touch.detection)
             if off @ np.linalg.solve(both, off) < GATE:
-                return _Followed(touch, known.moving, spot[CONTENT], known.odds)
-        prior = self.finder.model.prior
+                return _Followed(touch, known.moving, spot[CONTENT], odds=known.odds)
+        prior = self.view.model.prior
         moving = MovingTouch.begin(middle, spot, _spread(touch.detection), prior)
         return _Followed(touch, moving, spot[CONTENT])
 
     def _spot(self, detection: Detection) -> FloatArray:
-        radius = math.sqrt(detection.area / math.pi)
-        part = max(detection.peak / self.finder.unit, -0.999)
-        content = FILLING * radius**2 * math.log1p(part)
-        return np.array([detection.x, detection.y, math.log(radius), content])
+        log_radius, content = math.log(detection.area / math.pi) / 2, self.view.content(detection)
+        return np.array([detection.x, detection.y, log_radius, content])
 
     def _shown(self, each: _Followed, time: float) -> Touch:
         """A touch where it is at the end of a drive that began at ``time`` s."""
@@ -248,8 +248,9 @@ class DriveWatch:
         where, spread = now.position()
         spot = now.spot
         spot[:2] = where
-        detection = self.finder.shown(spot, spread, each.touch.detection.snr)
-        return replace(each.touch, detection=detection)
+        frame = each.touch.detection
+        detection = self.view.shown(spot, spread, frame.snr)
+        return replace(each.touch, detection=replace(detection, force=frame.force))
 
 
 def _is_same(key: NoiseKey, before: NoiseKey) -> bool:

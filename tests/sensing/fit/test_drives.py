@@ -28,7 +28,8 @@ AT = np.array([0.03, 0.02])
 @cache
 def evidence() -> DriveEvidence:
     index = sheet().state.model.pattern.drive_index
-    return finished(DriveEvidence.making(model().candidates, covariance(), index))
+    stays = np.zeros_like(covariance())
+    return finished(DriveEvidence.making(model().candidates, covariance(), stays, index))
 
 
 def watch() -> Initiation:
@@ -60,7 +61,9 @@ def test_windows_have_the_size_that_the_whole_has() -> None:
     order = (3, 1, 0, 2, *range(4, DRIVES))
     own, white = evidence(), np.linalg.cholesky(np.linalg.inv(covariance()))
     squares = np.square(own.signatures @ white).sum(axis=1)
-    np.testing.assert_allclose(own.sizes(order)[:, -1], squares, rtol=1e-6)
+    size, variance = own.sizes(order)
+    np.testing.assert_allclose(size[:, -1], squares, rtol=1e-6)
+    np.testing.assert_allclose(variance, size, rtol=1e-6)
 
 
 def test_noise_alone_is_no_touch_and_the_threshold_keeps_its_promise() -> None:

@@ -5,8 +5,26 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
-from tomoskin.core import FloatArray
+from tomoskin.core import FloatArray, IntArray
+
+
+def drive_sizes(
+    changes: FloatArray, covariance: FloatArray, drives: IntArray, excluded: NDArray[np.bool_]
+) -> FloatArray:
+    """(n, n_drive): squared deviations of the noise that each drive has of ``changes``.
+
+    These are (n, n_meas) V. Drives share no noise; what is ``excluded`` (n_meas,) tells nothing.
+    """
+    sizes = np.zeros((len(changes), int(drives.max()) + 1))
+    for drive in range(sizes.shape[1]):
+        rows = np.flatnonzero((drives == drive) & ~excluded)
+        if len(rows):
+            own = changes[:, rows]
+            solved = np.linalg.lstsq(covariance[np.ix_(rows, rows)], own.T, rcond=1e-10)[0]
+            sizes[:, drive] = np.einsum("nr,rn->n", own, solved)
+    return sizes
 
 
 def watch_order(sizes: FloatArray) -> list[int]:
