@@ -153,7 +153,7 @@ def _on(contacts: Contacts, poses: Mapping[str, Pose]) -> TouchesOfSkin:
     pose = poses.get(contacts.frame_id, Pose())
     return TouchesOfSkin(
         valid=contacts.valid,
-        pose_problem=contacts.link and contacts.link.problem,
+        pose_problem=contacts.link.problem if contacts.link else None,
         touches=[
             SpaceTouch(
                 id=contact.touch.id,
