@@ -1,7 +1,7 @@
 """From the KiCad projects to what one uploads: ``python hardware/fabricate.py``, or ``make board``.
 
 It runs the rule checks, then writes netlists, bills of materials, and for each board a zip
-(Gerbers, drill files, bill, positions), the schematic as PDF, pictures of both sides, and into
+(Gerbers, drill files, bill, positions, assembly drawing), the schematic as PDF, pictures of both sides, and into
 build/board STEP and an interactive bill (a page that shows each part on the board).
 ``outputs.toml`` holds the hashes of sources and outputs, so that without KiCad a test can say
 whether they belong together. ``--check`` only checks.
@@ -37,6 +37,9 @@ BOARDS = {"board-8": (1000, 1000, 1), "board-16": (1500, 900, 1.65), "pico-16": 
 
 LAYERS = "F.Paste,F.Mask,B.Mask,F.Silkscreen,B.Silkscreen,Edge.Cuts"
 """Beside the copper."""
+
+ASSEMBLY = "F.Fab,F.Courtyard,Edge.Cuts"
+"""Of the drawing that says which part is where."""
 
 PAGES = "1,2,3,4,5,6,7"
 """Of the schematic, up to the first channel: the others are the same sheet."""
@@ -188,6 +191,8 @@ def _pack(packed: Path, board: Path, bill_file: Path) -> None:
         )
         raw.unlink()
         shutil.copy(bill_file, to / f"{board.stem}-bom.csv")
+        drawing = ("--mode-single", "--black-and-white", "--exclude-value", "--layers", ASSEMBLY)
+        kicad("pcb", "export", "pdf", *drawing, "--output", to / f"{board.stem}-assembly.pdf", board)
         with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
             for file in sorted(to.iterdir()):
                 archive.writestr(

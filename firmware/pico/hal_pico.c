@@ -33,12 +33,13 @@ static uint32_t cycles_since(uint32_t from) {
 
 static void set_up_pins(void) {
     REGISTER(SIO_OUT_CLR) = OUTPUTS;
-    REGISTER(SIO_OUT_SET) = LATCH;
-    REGISTER(SIO_OE_SET) = OUTPUTS;
+    REGISTER(SIO_OUT_SET) = LATCH | (1u << REGULATOR_PIN);
+    REGISTER(SIO_OE_SET) = OUTPUTS | (1u << REGULATOR_PIN);
     for (uint32_t pin = FIRST_OUTPUT; pin <= LAST_OUTPUT; pin++) {
         REGISTER(PAD(pin)) = PAD_OUTPUT;
         REGISTER(GPIO_CTRL(pin)) = GPIO_SIO;
     }
+    REGISTER(GPIO_CTRL(REGULATOR_PIN)) = GPIO_SIO;
     REGISTER(PAD(AMPLIFIER_PIN)) = PAD_ANALOGUE;
 }
 

@@ -16,6 +16,9 @@
 #define LAST_OUTPUT 19u
 #define OUTPUTS 0x000FFFFCu
 
+/* Of the module itself: high keeps its regulator from bursts, since the converter divides by 3.3 V. */
+#define REGULATOR_PIN 23u
+
 #define AMPLIFIER_PIN 26u
 #define AMPLIFIER_INPUT 0u /* of the converter */
 

@@ -236,11 +236,11 @@ static void put_demodulated(void) {
 /* The next direction of the drive, or the next drive. */
 static void end_direction(void) {
     switches_off();
-    hal_listen();
     if (++scan.direction < scan.directions) {
         begin_drive();
         return;
     }
+    hal_listen();
     if (scan.directions > 1u) {
         put_demodulated();
     }

@@ -83,8 +83,8 @@ MUTANTS = {
     "a command run twice": ("commands.c", "if (!again)", "if (true || !again)"),
     "limiter not looked at": (
         "config.c",
-        "hal_current() > get_u32",
-        "hal_current() > 1u + get_u32",
+        "current > get_u32",
+        "current > 1u + get_u32",
     ),
     "a rate never given up": ("board.c", "board.old_baud = board.baud;", "board.old_baud = 0u;"),
     "checksum not looked at": ("framing.c", " || crc16(in->block, size) != 0u", ""),

@@ -92,3 +92,31 @@ def test_the_stack_up_is_in_the_boards():
         )
         found = {(float(a), float(b)) for a, b in re.findall(prepreg, text)}
         assert found == {(layer.height, layer.permittivity) for layer in LAYERS.values()}
+
+
+PICO = Copper.read(KICAD / "pico-16.kicad_pcb")
+
+
+def test_the_picos_lines_resist_less_than_contacts():
+    """From each electrode's pin to the switch of the source, and to that of the sink."""
+    channels = [*range(19, 27), *range(11, 3, -1)]
+    for number, channel in enumerate(channels, start=1):
+        for switch in ("U2", "U3"):
+            (ohms,) = PICO.potentials(("J1", str(number)), (switch, str(channel)))
+            assert ohms < 0.25
+
+
+def test_the_picos_tracks_change_its_current_by_less_than_its_parts_may():
+    """What 50 mA lose between reference and sense resistor, and between this and where it is read."""
+    _, above = PICO.potentials(("U1", "40"), ("R1", "1"), ("U8", "1"))
+    whole, part = PICO.potentials(("R1", "2"), ("Q1", "2"), ("R3", "1"))
+    assert (abs(above) + whole - part) * 0.05 / 1.225 < 2e-3
+
+
+def test_the_picos_distances_and_heat_have_room():
+    project = json.loads((KICAD / "pico-16.kicad_pro").read_text(encoding="utf-8"))
+    (rules,) = project["net_settings"]["classes"]
+    assert rules["clearance"] >= parasitics.spacing(10)  # from -5 V to 5 V
+    assert project["board"]["design_settings"]["rule_severities"]["clearance"] == "error"
+    width, layer = PICO.narrowest()["E1"]
+    assert heating(0.05, width, LAYERS[layer]) < 1

@@ -100,6 +100,7 @@ def test_the_zip_holds_what_a_factory_asks_for(board):
     assert len([name for name in names if "_Cu." in name]) == len(copper)
     assert [one for one in layers if not any(one in name for name in names)] == []
     assert sum(name.endswith(".drl") for name in names) == 2
+    assert f"{board}-assembly.pdf" in names
     circuit = Circuit.read(board)
     assert bought == bill.bill(circuit.parts)
     placed = {line.split(",")[0].strip('"') for line in positions[1:]}

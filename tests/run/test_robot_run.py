@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 
 import numpy as np
 import pytest
@@ -46,7 +46,9 @@ class Watch:
             self._news.notify_all()
 
     def until(self, true):
-        with self._run.watch(self), self._news:
+        with ExitStack() as stack, self._news:
+            for runner in self._run.runners.values():
+                stack.enter_context(runner.audience.watch(self))
             assert self._news.wait_for(true, PATIENCE)
 
 

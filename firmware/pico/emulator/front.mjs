@@ -9,6 +9,7 @@ const FIVE_BITS = 31;
 const SOURCE_ENABLE = 17;
 const SINK_ENABLE = 18;
 const LATCH = 19;
+const REGULATOR = 23;
 const AMPLIFIER = 0;
 const NONE = -1;
 const LEAST_DEAD_NS = 1000;
@@ -75,6 +76,9 @@ export class Front {
     }
     if (isOn && !wasOn && this.now() - this.opened < LEAST_DEAD_NS) {
       this.complain('dead time too short');
+    }
+    if (isOn && !this.#high(REGULATOR)) {
+      this.complain('the regulator may burst');
     }
     if (isOn && source === sink) {
       this.complain('source = sink');

@@ -147,7 +147,7 @@ def _run_skin(prepared: Prepared, source: str, sinks: Sequence[Any], served: Ser
         runner = Runner(prepared, opener, sinks=sinks, memory=BoardMemory.in_cache())
         with recording_to(runner, served.record) as stopped:
             app = application(_hub_of(runner, source, served.folder), policy)
-            served.serve(app, listener, policy, f"{runner.status().source} is live")
+            served.serve(app, listener, policy, f"{runner.flow.source} is live")
     now = plain_values(state(runner.status()))
     kept = ("frames", "p50_ms", "p99_ms", "stages", "bend", "class", "calibration")
     served.end({name: now[name] for name in kept}, stopped)

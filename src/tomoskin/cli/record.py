@@ -20,7 +20,7 @@ from tomoskin.cli.output import Bar, JsonFlag, remark, tell
 from tomoskin.core import DataError
 
 if TYPE_CHECKING:
-    from tomoskin.run import Runner, Status
+    from tomoskin.run import ReplayStatus, Runner
 
 _OFTEN = 0.1
 _TROUBLES = frozenset({"no-answer", "source-lost", "silent", "fault", "internal"})
@@ -64,7 +64,7 @@ def record(
     runner = Runner(prepared, lambda: open_source(source, chosen), sinks=sinks)
     with ended_by_signals(), recording_to(runner, file) as stopped:
         if seconds is None and frames is None and not json:
-            typer.echo(f"{runner.status().source} is recorded to {file} until Ctrl-C", err=True)
+            typer.echo(f"{runner.flow.source} is recorded to {file} until Ctrl-C", err=True)
         _wait(runner, seconds, frames)
         if (doubt := runner.status().problem) is not None:
             remark(doubt)
@@ -156,8 +156,8 @@ def _wait(runner: Runner, seconds: float | None, frames: int | None) -> None:
     nothing = threading.Event()
     elapsed = 0.0
     with Bar("recording") as bar:
-        while (status := runner.status()).recording is not None:
-            shares = [(elapsed, seconds), (status.frames, frames), *_played(status)]
+        while (flow := runner.flow).out.recordings.path is not None:
+            shares = [(elapsed, seconds), (flow.latency.frames, frames), *_played(flow.played)]
             limits = [(part, limit) for part, limit in shares if limit is not None]
             for part, limit in limits:
                 if part >= limit:
@@ -168,9 +168,8 @@ def _wait(runner: Runner, seconds: float | None, frames: int | None) -> None:
             elapsed += _OFTEN
 
 
-def _played(status: Status) -> list[tuple[float, float | None]]:
+def _played(replay: ReplayStatus | None) -> list[tuple[float, float | None]]:
     """How far a replay is, if that is known: not of one that begins again at its end."""
-    replay = status.replay
     if replay is None or replay.loop:
         return []
     if replay.end_s <= 0 and not replay.ended:

@@ -18,19 +18,19 @@ from tomoskin.model.pattern import Pattern
 from tomoskin.sensing.fit import (
     DriveEvidence,
     DriveFilter,
+    DriveView,
     Initiation,
     MovingTouch,
     NoiseKey,
     Onset,
-    SpotFinder,
 )
-from tomoskin.sensing.fit.spot import CONTENT, FILLING
+from tomoskin.sensing.fit.spot import CONTENT
 from tomoskin.sensing.track import GATE, RESIDUAL
 
-_LIFTED = 8.0
-"""Logarithm of the odds from which a touch is lifted."""
+_LIFTED = 5.0
+"""Logarithm of the odds from which a touch is lifted; or only as much is there as may be left."""
 
-_MOST = 6.0
+_MOST = 4.0
 """The most that one drive says of that: a single one may be wrong."""
 
 _CONFIRMED = 2
@@ -62,7 +62,7 @@ class DriveResult:
 
 @dataclass(slots=True, eq=False)
 class _Followed:
-    """A touch as frames have it, and as drives have it.
+    """A touch as frames have it, and as drives have it; ``full``: its content in the frame.
 
     ``odds``: their logarithm that it is lifted, and the device time, s, at which it was; ``frames``
     of a provisional one: those without it.
@@ -70,6 +70,7 @@ class _Followed:
 
     touch: Touch
     moving: MovingTouch
+    full: float
     odds: float = 0.0
     lifted: float | None = None
     frames: int | None = None
@@ -79,7 +80,8 @@ class _Followed:
         self.moving = moving
         if self.frames is None and self.lifted is None:
             self.odds = max(self.odds + min(gone, _MOST), 0.0)
-            self.lifted = moving.time if self.odds > _LIFTED else None
+            left = RESIDUAL.holds(abs(float(moving.spot[CONTENT])), abs(self.full))
+            self.lifted = moving.time if left or self.odds > _LIFTED else None
 
     def stands(self, touch: Touch, time: float) -> bool:
         """Whether a frame whose scan began at ``time`` s has a ``touch`` that is not lifted: it was
@@ -95,12 +97,10 @@ class DriveWatch:
 
     Parameters
     ----------
-    finder
-        Of the frames.
+    view
+        Of the finder of the frames.
     pattern
         Of the skin.
-    snr
-        Ratio at which a touch begins.
     interval
         Between frames, s.
     follows
@@ -108,10 +108,10 @@ class DriveWatch:
     """
 
     def __init__(
-        self, finder: SpotFinder, pattern: Pattern, snr: float, interval: float, *, follows: bool
+        self, view: DriveView, pattern: Pattern, interval: float, *, follows: bool
     ) -> None:
-        self.finder, self._follows = finder, follows
-        self._drives, self._snr = pattern.drive_index, snr
+        self.view, self._follows = view, follows
+        self._drives = pattern.drive_index
         self._length = interval / pattern.n_drive
         self._key: NoiseKey | None = None
         self._blocked = True
@@ -132,7 +132,7 @@ class DriveWatch:
         if not self._ready() or self._evidence is None or self._filter is None:
             return None
         rows, (time, host_time) = self._evidence.rows[drive], clock
-        data = self.finder.change(dv)[rows]
+        data = self.view.change(dv)[rows]
         if not self._followed and self._initiation is not None:
             onset = self._initiation.push(drive, data)
             if onset is not None:
@@ -163,18 +163,16 @@ class DriveWatch:
 
     def _ready(self) -> bool:
         """Whether the noise is that of now; a piece of work where it is not."""
-        key, noise, jumps = self.finder.newest_noise()
-        if (
-            not self._key
-            or any(a is not b for a, b in zip(key[:-1], self._key[:-1], strict=True))
-            or (key[-1] != self._key[-1])
-        ):
-            self._blocked |= not self._key or _says_less(key, self._key)
-            self._key, model = key, self.finder.model
-            every = noise + jumps @ jumps.T
-            self._making = DriveEvidence.making(model.candidates, every, self._drives)
-            sign, sheet = self.finder.sign, model.sheet
-            self._filter = DriveFilter(model.solver, model.prior, sign, sheet, noise)
+        key = self.view.key
+        if self._key is None or not _is_same(key, self._key):
+            begun = self._initiation is not None and self._initiation.begun
+            if not begun:  # a frame into which a touch comes down looks like more noise
+                self._blocked |= self._key is None or _says_less(key, self._key)
+            self._key, model = key, self.view.model
+            noise, stays = self.view.noise()
+            self._making = DriveEvidence.making(model.candidates, noise, stays, self._drives)
+            sign = self.view.skin.touch.sign
+            self._filter = DriveFilter(model.solver, model.prior, sign, model.sheet, noise)
         if self._making is not None:
             try:
                 next(self._making)
@@ -184,21 +182,22 @@ class DriveWatch:
         return not self._blocked or bool(self._followed)
 
     def _renewed(self, evidence: DriveEvidence) -> Initiation:
-        threshold = evidence.threshold(1 / self._length, self._snr)
-        made = Initiation(evidence, threshold, self.finder.sign)
+        touch = self.view.skin.touch
+        made = Initiation(evidence, evidence.threshold(1 / self._length, touch.snr), touch.sign)
         if self._initiation is not None:
             made.go_on(self._initiation)
         return made
 
     def _begin(self, onset: Onset, time: float, host_time: float, number: int) -> None:
-        prior = self.finder.model.prior
+        prior = self.view.model.prior
         spot = np.array([*onset.middle, prior.middle[2], onset.spot[CONTENT]])
         middle = time + self._length / 2
         moving = MovingTouch.begin(middle, spot, onset.covariance, prior)
-        detection = self.finder.shown(moving.spot, onset.covariance, onset.ratio)
+        detection = self.view.shown(moving.spot, onset.covariance, onset.ratio)
         kind = "decrease" if spot[CONTENT] < 0 else "increase"
         since = host_time - onset.drives * self._length
-        self._followed[number] = _Followed(Touch(number, kind, since, detection), moving, frames=0)
+        touch = Touch(number, kind, since, detection)
+        self._followed[number] = _Followed(touch, moving, spot[CONTENT], frames=0)
 
     def _follow(self, rows: slice, data: FloatArray, time: float) -> None:
         """Let each touch take its part of the data: what the others do not change."""
@@ -218,6 +217,7 @@ class DriveWatch:
         if known is None:
             known = next((each for each in before.values() if each.frames is not None), None)
         middle = time + self._length * self._drives[-1] / 2
+        spot = self._spot(touch.detection)
         if known is not None and not known.stands(touch, time):
             return known
         if known is not None and known.lifted is None:
@@ -226,15 +226,14 @@ class DriveWatch:
             off = off - known.moving.state[2:4] * (known.moving.time - middle)
             both = spread + _spread(touch.detection)
             if off @ np.linalg.solve(both, off) < GATE:
-                return _Followed(touch, known.moving, known.odds)
-        return _Followed(touch, self._moving(touch.detection, middle))
+                return _Followed(touch, known.moving, spot[CONTENT], known.odds)
+        prior = self.view.model.prior
+        moving = MovingTouch.begin(middle, spot, _spread(touch.detection), prior)
+        return _Followed(touch, moving, spot[CONTENT])
 
-    def _moving(self, detection: Detection, time: float) -> MovingTouch:
-        radius = math.sqrt(detection.area / math.pi)
-        part = max(detection.peak / self.finder.unit, -0.999)
-        content = FILLING * radius**2 * math.log1p(part)
-        spot = np.array([detection.x, detection.y, math.log(radius), content])
-        return MovingTouch.begin(time, spot, _spread(detection), self.finder.model.prior)
+    def _spot(self, detection: Detection) -> FloatArray:
+        log_radius, content = math.log(detection.area / math.pi) / 2, self.view.content(detection)
+        return np.array([detection.x, detection.y, log_radius, content])
 
     def _shown(self, each: _Followed, time: float) -> Touch:
         """A touch where it is at the end of a drive that began at ``time`` s."""
@@ -244,16 +243,20 @@ class DriveWatch:
         where, spread = now.position()
         spot = now.spot
         spot[:2] = where
-        detection = self.finder.shown(spot, spread, each.touch.detection.snr)
+        detection = self.view.shown(spot, spread, each.touch.detection.snr)
         return replace(each.touch, detection=detection)
+
+
+def _is_same(key: NoiseKey, before: NoiseKey) -> bool:
+    same = all(one is other for one, other in zip(key[:-1], before[:-1], strict=True))
+    return same and key[-1] == before[-1]
 
 
 def _says_less(key: NoiseKey, before: NoiseKey) -> bool:
     """Whether drives told less in the noise of a ``key`` than in that ``before``: then they must
     not be read by that."""
     (*_, left), (*_, known) = key, before
-    other = key[0] is not before[0] or key[3] is not before[3]
-    return other or len(left) != len(known) or any(a > b for a, b in zip(left, known, strict=True))
+    return key[0] is not before[0] or key[3] is not before[3] or sum(left) > sum(known)
 
 
 def _spread(detection: Detection) -> FloatArray:

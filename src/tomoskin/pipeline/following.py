@@ -197,12 +197,11 @@ class Following:
         dv = self.conditioning.newest(values)
         if dv is None:
             return None
-        if self._drives is None or self._drives.finder is not self._finder.spots:
-            skin, kinds = self.prepared.skin, self.prepared.calibrations.values()
-            self._drives = DriveWatch(
-                self._finder.spots, self.prepared.pattern, skin.touch.snr, self._interval,
-                follows=not any(c.kind.locates for c in kinds),
-            )  # fmt: skip
+        view = self._finder.spots.view
+        if self._drives is None or self._drives.view is not view:
+            follows = not any(c.kind.locates for c in self.prepared.calibrations.values())
+            pattern = self.prepared.pattern
+            self._drives = DriveWatch(view, pattern, self._interval, follows=follows)
         result = self._drives.push(drive, dv, clock, self._tracker.ledger.numbered)
         if result is None:
             return None

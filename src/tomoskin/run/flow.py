@@ -22,7 +22,7 @@ from tomoskin.pipeline import FrameResult, Pipeline, Prepared, ReferenceState
 from tomoskin.run.board_memory import Recall
 from tomoskin.run.intake import Intake, Marker, replay_status
 from tomoskin.run.publisher import Audience, Publisher
-from tomoskin.run.status import CostMeter, Latency, Status
+from tomoskin.run.status import CostMeter, Latency, ReplayStatus, Status
 from tomoskin.run.twin_control import TwinControl, described
 from tomoskin.twin import Press, Probe
 
@@ -174,9 +174,11 @@ class Flow:
         contacts = Contacts.of(stream, newest.result, played)
         return contacts if trouble is None else contacts.outdated(trouble)
 
-    def dropped(self) -> int:
-        """Frames that the device or this host left out."""
-        return self.intake.losses.dropped + self.intake.skipped + self.pipeline.refused
+    @property
+    def played(self) -> ReplayStatus | None:
+        """Where a replay is; None where the source is another."""
+        replay = self.marker.replay
+        return replay_status(replay, ended=self._ended) if replay else None
 
     def status(self, trouble: str | None) -> Status:
         """How it is doing now; ``trouble``: why there is no source, or None."""
@@ -192,10 +194,10 @@ class Flow:
             paused=self.marker.held,
             recording=self.out.recordings.path,
             sinks=self.out.sink_reports(),
-            replay=replay_status(replay, ended=self._ended) if replay else None,
+            replay=self.played,
             frames=self.latency.frames,
             fps=self.latency.rate(now),
-            dropped=self.dropped(),
+            dropped=_dropped(self),
             corrupt=losses.corrupt,
             gaps=losses.gaps,
             p50=p50,
@@ -262,6 +264,11 @@ class Flow:
         self.out.put(result)
 
 
+def _dropped(flow: Flow) -> int:
+    """Frames that the device or this host left out."""
+    return flow.intake.losses.dropped + flow.intake.skipped + flow.pipeline.refused
+
+
 def _board(flow: Flow) -> dict[str, object]:
     """How the board is doing now, by name; from any thread."""
     info, losses, newest = flow.board, flow.intake.losses, flow.newest
@@ -271,7 +278,7 @@ def _board(flow: Flow) -> dict[str, object]:
         "board_name": flow.board_name,
         "firmware": ".".join(map(str, info.firmware)) if info else "",
         "frames_per_s": round(flow.latency.rate(flow.now()), 1),
-        "dropped": flow.dropped(),
+        "dropped": _dropped(flow),
         "corrupt": losses.corrupt,
         "missing": losses.gaps,
         "electrodes": (health.text if health else None) or "good",

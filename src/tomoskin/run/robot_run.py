@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import wait
-from contextlib import AbstractContextManager, ExitStack, suppress
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -156,13 +156,6 @@ class RobotRun:
             problem = status.problem or problems.get(name)
             found[name] = replace(status, problem=problem, source=status.source or name)
         return found
-
-    def watch(self, call: Callable[[], None]) -> AbstractContextManager[object]:
-        """While the block lasts, ``call`` is called at each result of any skin."""
-        stack = ExitStack()
-        for runner in self.runners.values():
-            stack.enter_context(runner.audience.watch(call))
-        return stack
 
     def _close_log(self) -> None:
         logs, self._logs = self._logs, {}

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
-from tomoskin.board.source import Configuration, Link, ScanSettings, Transport
+from tomoskin.board.source import Configuration, Link, ScanSettings
 from tomoskin.core import DataError, Event, Frame, Mark, StrPath, VirtualClock
 from tomoskin.files.session import Advance, SessionWriter, no_report
 from tomoskin.model.pattern import Scan
@@ -82,28 +82,16 @@ def simulate(
         return _Run(script, skin, settings, writer).to_the_end(advance)
 
 
-class _Recorded:
-    """A transport whose bytes go over the script's line, and into the file as they arrive."""
+class _Wired:
+    """A transport whose bytes go over the script's line."""
 
-    def __init__(self, twin: TwinTransport, seed: int, clock: VirtualClock, writer: SessionWriter):
-        self.name = twin.name
-        self.line = Line(LineSettings(), seed)
-        self._twin, self._clock, self._writer = twin, clock, writer
+    def __init__(self, twin: TwinTransport, seed: int) -> None:
+        self.name, self.line, self._twin = twin.name, Line(LineSettings(), seed), twin
+        self.write, self.close = twin.write, twin.close
 
     def read(self, timeout: float) -> bytes:
         """What arrives of the twin's next bytes."""
-        data = self.line.carry(self._twin.read(timeout))
-        if data:
-            self._writer.raw(self._clock.now(), data)
-        return data
-
-    def write(self, data: bytes) -> None:
-        """Send ``data`` to the twin behind the recording."""
-        self._twin.write(data)
-
-    def close(self) -> None:
-        """Switch the twin behind the recording off."""
-        self._twin.close()
+        return self.line.carry(self._twin.read(timeout))
 
 
 class _Run:
@@ -115,7 +103,7 @@ class _Run:
         self._script, self._settings, self._writer = script, settings, writer
         self._clock = VirtualClock()
         self._twin = make_twin(skin, settings, self._clock)
-        self._wire = _Recorded(self._twin, settings.seed, self._clock, writer)
+        self._wire = _Wired(self._twin, settings.seed)
         self._scan, self._asked = Scan.of(skin.pattern()), ScanSettings.of(skin)
         self._frame_time = Configuration.of(self._scan, self._asked).scan_time
         contact = settings.contact
@@ -128,8 +116,9 @@ class _Run:
     def to_the_end(self, advance: Advance) -> Simulated:
         """Connect, idle for the lead-in, then follow the script."""
         script, clock = self._script, self._clock
-        transport: Transport = self._wire
-        with Link(transport, self._scan, self._asked, clock=clock.now) as link:
+        with Link(
+            self._wire, self._scan, self._asked, clock=clock.now, tap=self._writer.raw
+        ) as link:
             self._writer.device(clock.now(), link.connect())
             idle = _idle_frames(script, self._frame_time)
             self._writer.settings(clock.now(), _described(script, self._settings, idle))

@@ -48,7 +48,7 @@ class SessionUse:
     @property
     def recording(self) -> str | None:
         """Name of the session that is being recorded."""
-        path = self._runner.status().recording
+        path = self._runner.flow.out.recordings.path
         return path.name if path is not None else None
 
     def check_ended(self, name: str) -> None:

@@ -111,7 +111,7 @@ class TwinHandlers:
     def _pose(self, page: Page, request: SetPose) -> None:
         """Raise WireError where the source has no sheet to bend."""
         if not self._hub.runner.flow.twin.bendable:
-            raise WireError(f"{self._hub.runner.status().source} cannot be bent on the page")
+            raise WireError(f"{self._hub.runner.flow.source} cannot be bent on the page")
         self._newest = request
         self._hub.tasks.keep(self._bring(page, request))
 

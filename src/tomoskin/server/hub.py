@@ -73,7 +73,7 @@ def _unresolved(runner: Runner) -> UnresolvedMap:
     health = newest.result.health if newest else None
     lost = np.zeros(prepared.pattern.n_meas, bool) if health is None else health.lost
     try:
-        part = Unresolved.of(prepared, runner.status().choice.alpha, np.flatnonzero(lost))
+        part = Unresolved.of(prepared, runner.flow.pipeline.choice.alpha, np.flatnonzero(lost))
     except TomoskinError as error:
         return UnresolvedMap(values=None, radius_m=0.0, problem=error.message)
     return UnresolvedMap(values=part.values.round(3).tolist(), radius_m=part.radius, problem="")

@@ -120,7 +120,7 @@ class AutomaticAlpha:
     def of(self, runner: Runner) -> float | None:
         """What would be chosen now; None where that cannot be said yet."""
         if runner.prepared.light_touch is not None:
-            return runner.status().choice.alpha
+            return runner.flow.pipeline.choice.alpha
         if self._chooser is None or self._chooser[0] is not runner.prepared.problem:
             return None
         reference, noise = runner.flow.pipeline.reference, runner.prepared.predicted_noise()
@@ -283,7 +283,7 @@ class SettingsHandlers:
             document=skin.document,
             n_electrodes=skin.n_electrodes,
             automatic_alpha=self._automatic.of(self._hub.runner),
-            alpha=self._hub.runner.status().choice.alpha,
+            alpha=self._hub.runner.flow.pipeline.choice.alpha,
             undo=len(self._history.past),
             redo=len(self._history.future),
             busy=self._working,

@@ -343,6 +343,20 @@ def test_drives_of_a_recording_that_nobody_has_asked_for_make_frames_only():
     assert same(replace(frame, host_time=0.5), frame_at(0))
 
 
+def test_a_line_that_never_carries_a_full_turn_is_asked_for_whole_scans():
+    clock = ManualClock()
+    board = Asked(clock)
+    with singly(board, clock) as link:
+        link.connect()
+        for turn in range(30):
+            board.say(*(drive_of(turn, k) for k in range(N) if k != 4))
+        got = poll_until(link, lambda items: len(events(items)) == 22)
+        assert link.frames.lost == 20
+    assert [event.kind for event in events(got)[-2:]] == ["whole-scans", "connected"]
+    assert {event.kind for event in events(got)[:-2]} == {"lost"}
+    assert frames(got) == []
+
+
 def test_a_seek_begins_anew():
     line = Line()
     line.take(*(drive_of(7, k) for k in range(3)))
@@ -350,4 +364,4 @@ def test_a_seek_begins_anew():
     line.assembler.forget()
     got = line.take(*(drive_of(2, k) for k in range(N)))
     assert same(got[-1], frame_at(2))
-    assert line.filter.counters.lost == 0
+    assert line.filter.counters.lost == 7  # those before the first

@@ -112,6 +112,11 @@ MUTANTS: dict[str, Change] = {
         "",
     ),
     "a pulled plug ignored": ("pico/usb.c", "return configured && !suspended;", "return true;"),
+    "a regulator that bursts": (
+        "pico/hal_pico.c",
+        "    REGISTER(GPIO_CTRL(REGULATOR_PIN)) = GPIO_SIO;\n",
+        "",
+    ),
     "USB before the scan": ("pico/hal_pico.c", "#define LOWEST 0xC0u", "#define LOWEST 0x00u"),
     "host silence ignored": ("src/board.c", "if (board.hello_due ||", "if (true ||"),
     "a bit of the address to read": (

@@ -18,15 +18,26 @@ class Assembler:
 
     A drive that is late, doubled, or of another scan is left out and counted, as a frame is. A turn
     that lacks a drive makes no frame and is counted as lost, unless a new order cut it short.
+
+    ``broken`` is how many full turns in a row have lacked a drive; ``unsaid`` whether drives are
+    asked for, none has come yet, and nobody has been told so.
     """
 
-    def __init__(self, frames: SequenceFilter, n_drives: int) -> None:
+    def __init__(self, frames: SequenceFilter, n_drives: int, *, asked: bool = True) -> None:
         """``frames`` is the filter that drives and frames go through."""
         self._frames, self._n_drives = frames, n_drives
+        self.unsaid = asked
         self.forget()
+
+    def say_whole(self, now: float) -> list[Received]:
+        """Scans come whole though drives were asked for: an event says so once."""
+        unsaid, self.unsaid = self.unsaid, False
+        text = "the board sends whole scans only: a touch shows at the end of its first scan"
+        return [Event(now, "whole-scans", text)] if unsaid else []
 
     def forget(self) -> None:
         """What comes next does not follow what came before."""
+        self.broken = 0
         self._last: DriveSamples | None = None
         self._turn: list[DriveSamples] | None = None
         """The drives of a full turn that lacks none so far."""
@@ -46,25 +57,23 @@ class Assembler:
             counters.stale += 1
             return []
         self._last = drive
-        if ahead == 0 and last:
-            return self._go_on(drive, last)
-        cut = last is not None and self._is_cut(last) and ahead == 1
-        return self._begin(drive, cut=cut)
+        return self._go_on(drive, last) if last and ahead == 0 else self._begin(drive, last, ahead)
 
-    def _is_cut(self, last: DriveSamples) -> bool:
-        """Whether the turn that ``last`` was of is a full one that lacks its end alone."""
-        return self._turn is not None and last.place < self._n_drives - 1
-
-    def _begin(self, drive: DriveSamples, *, cut: bool) -> list[Received]:
-        """The first drive of a turn; ``cut``: the turn before could not come to its end."""
+    def _begin(self, drive: DriveSamples, last: DriveSamples | None, ahead: int) -> list[Received]:
+        """The first drive of a turn that is so many ``ahead`` of that of ``last``."""
+        whole = self._turn is not None and len(self._turn) == self._n_drives
+        # a full turn that lacks its end alone, with a new order right behind it
+        cut = self._turn is not None and not whole and drive.order != 0 and ahead == 1
+        if last and last.order == 0 and not whole and not cut:
+            self.broken += 1
         self._turn = None
+        items: list[Received] = [*self._frames.reach(drive, cut=cut)]
         if drive.order:
-            lost = self._frames.skip(drive, cut=cut)
-            return [*lost, *self._missing(drive, drive.place), drive]
+            return [*items, *self._missing(drive, drive.place), drive]
         if drive.place:
-            return [drive]
+            return [*items, drive]
         self._turn = []
-        return self._complete(drive)
+        return items + self._complete(drive)
 
     def _go_on(self, drive: DriveSamples, last: DriveSamples) -> list[Received]:
         """A further drive of the turn of ``last``."""
@@ -89,6 +98,7 @@ class Assembler:
         self._turn.append(drive)
         if drive.place < self._n_drives - 1:
             return [drive]
+        self.broken = 0
         return [drive, *self._frames.take(_frame(self._turn))]
 
 

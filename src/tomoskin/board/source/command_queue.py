@@ -65,10 +65,18 @@ class SequenceFilter:
         self.counters.passed += 1
         return [*self._go_on(frame, gap), frame]
 
-    def skip(self, drive: DriveSamples, *, cut: bool) -> list[Event]:
-        """The turn of ``drive`` makes no frame; ``cut``: the one before did not come to its end."""
+    def reach(self, drive: DriveSamples, *, cut: bool) -> list[Event]:
+        """A turn begins with ``drive``, after one that was ``cut`` short or not; what is missing.
+
+        A full turn is still to make its frame, any other makes none.
+        """
         gap = self._gap(drive)
-        return [] if gap >= _MODULUS // 2 else self._go_on(drive, gap - cut)
+        if gap >= _MODULUS // 2:
+            return []
+        events = self._go_on(drive, gap - cut)
+        if drive.order == 0:
+            self._expected = drive.sequence
+        return events
 
     def refuse(self, item: Frame | DriveSamples) -> list[Event] | None:
         """None for what is of this scan; all else is counted, and an event says when it begins."""
@@ -136,6 +144,7 @@ class CommandQueue:
         self._waiting: deque[Command] = deque()
         self._pending: _Pending | None = None
         self._request = 0
+        self._rate: int | None = None
         self._out = bytearray()
 
     @property
@@ -171,6 +180,8 @@ class CommandQueue:
 
     def send_next(self, now: float) -> bool:
         """Send the next command, since the pending one is answered; False where none waits."""
+        if isinstance(self.pending, SetBaud):
+            self._rate = self.pending.baud
         self._pending = None
         if not self._waiting:
             return False
@@ -202,6 +213,11 @@ class CommandQueue:
         pending.tries += 1
         pending.sent = now
         self._send(pending.command, now)
+
+    def take_rate(self) -> int | None:
+        """The serial rate that the board has just changed to, Bd, once."""
+        rate, self._rate = self._rate, None
+        return rate
 
     def take(self) -> bytes:
         """Bytes to be sent to the board, once."""

@@ -14,7 +14,7 @@ from tomoskin.board.source.configuration import Configuration
 from tomoskin.board.source.protocol_session import ProtocolSession, Stage
 from tomoskin.board.source.settings import ScanSettings, Timing
 from tomoskin.board.source.transport import Diagnosable, Fetched, Played, Transport
-from tomoskin.board.wire import Ack, BoardLimits, Decoder, Info
+from tomoskin.board.wire import Ack, BoardLimits, Decoder, Info, SetOrder, Stop, encode
 from tomoskin.core import Frame, SourceError
 from tomoskin.model.pattern import Scan
 
@@ -64,6 +64,7 @@ class Link(AbstractContextManager["Link"]):
         self.counters, self.frames = self._decoder.counters, self._session.frames.counters
         self._watch = ClockWatch()
         self._closed = False
+        self._orders = 0
         self._heard = b""
         self.diagnosis: SourceError | None = None
 
@@ -132,9 +133,15 @@ class Link(AbstractContextManager["Link"]):
         WireError
             For more drives than fit into a message, 55.
         """
-        order = self._session.ask_order(drives, self._clock())
+        if not (self.running and self.configuration.singly):
+            return 0
+        self._orders = self._orders % 255 + 1 if drives else self._orders
+        identity = self._orders if drives else 0
+        order = SetOrder(0, self.configuration.identity, identity, bytes(drives))
+        encode(order)  # one that does not fit a message is refused here, not when it is sent
+        self._session.commands.ask(order, self._clock())
         self._flush()
-        return order
+        return identity
 
     def connect(self) -> Info:
         """Poll until the board scans; what it said of itself. Raises as :meth:`poll` does."""
@@ -156,7 +163,9 @@ class Link(AbstractContextManager["Link"]):
     def stop(self) -> None:
         """Stop the board, as far as it can still be reached; the transport stays open."""
         with contextlib.suppress(SourceError):  # gone already: its heartbeat stops it
-            request = self._session.stop(self._clock())
+            self._session.frames.close()
+            self._session.commands.clear()
+            request = self._session.commands.send(Stop(0), self._clock())
             self._flush()
             end = self._clock() + self._timing.goodbye
             while (now := self._clock()) < end:
@@ -177,7 +186,8 @@ class Link(AbstractContextManager["Link"]):
             self._heard = (self._heard + data)[:_HEARD]
         if data and self._played and self._played.after_seek():
             self._decoder.forget()
-            self._session.after_seek()
+            self._session.frames.expect_any()
+            self._session.drives.forget()
         items = []
         for message in self._decoder.feed(data, now):
             items += self._session.receive(message, now)
@@ -186,7 +196,7 @@ class Link(AbstractContextManager["Link"]):
             doubts = [self._watch.push(frame, info.tick_rate) for frame in frames]
             items += filter(None, doubts)
         if self._rate:
-            self._rate.follow(self._session.take_rate(), silent=self._session.is_silent)
+            self._rate.follow(self._session.commands.take_rate(), silent=self._session.is_silent)
             slower = self._rate.slower(self.counters, running=self.running)
             items += [] if slower is None else [self._session.fall_back(slower, now)]
         self._flush()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from enum import Enum, auto
 
@@ -36,7 +35,6 @@ from tomoskin.board.wire import (
     SetFormat,
     SetOrder,
     Stop,
-    encode,
     type_byte,
 )
 from tomoskin.core import DriveSamples, Event, Frame, SourceError
@@ -48,6 +46,10 @@ _ANSWERED: dict[type[Message], type[Command]] = {
     HeldMode: GetMode,
 }
 """What each answer of what a board holds was asked by."""
+
+
+_MOST_BROKEN = 20
+"""Full turns in a row that lack a drive, after which shorter whole scans are asked for."""
 
 
 class Stage(Enum):
@@ -70,8 +72,8 @@ class ProtocolSession:
         What the scan asks of the board, fitted to the board once that is known.
     commands
         What is to be sent to the board.
-    frames
-        The frames that pass, and counts of those that do not.
+    frames, drives
+        The frames and the drives that pass, and counts of those that do not.
     stage, info, board
         How far it has come, and what the board said of itself; ``board`` from protocol 1.2 on.
     is_silent
@@ -93,8 +95,7 @@ class ProtocolSession:
         self._scan, self._settings, self._timing, self._where = scan, settings, timing, where
         self.configuration = Configuration.of(scan, settings)
         self.frames = SequenceFilter(self.configuration)
-        self._drives = Assembler(self.frames, len(scan.drives))
-        self._order = 0
+        self.drives = Assembler(self.frames, len(scan.drives), asked=settings.singly)
         self.commands = CommandQueue(timing, now, where)
         self.stage = Stage.WAITING
         self.info: Info | None = None
@@ -105,13 +106,6 @@ class ProtocolSession:
         self._silence = max(timing.silence, 4 * self.configuration.scan_time)
         self._since = self._last_frame = now
         self._resets = 0
-        self._rate: int | None = None
-        self._unsaid = settings.singly
-
-    def take_rate(self) -> int | None:
-        """The serial rate that the board has just changed to, once."""
-        rate, self._rate = self._rate, None
-        return rate
 
     def fall_back(self, rate: int, now: float) -> Event:
         """Set the board up again at a slower ``rate``, Bd: the line damages what it carries."""
@@ -157,7 +151,7 @@ class ProtocolSession:
         if not self._overdue:  # a busy host may not have read yet what has come
             self._overdue = True
             return []
-        if self._unsaid and self.configuration.singly:
+        if self.drives.unsaid and self.configuration.singly:
             return self._go_whole(now)
         self.is_silent = True
         text = f"no frame for {now - self._last_frame:.1f} s: check the board's power and cable"
@@ -172,28 +166,6 @@ class ProtocolSession:
         ping = self.commands.last_sent + self._timing.ping
         return ping if self.is_silent else min(ping, self._last_frame + self._silence)
 
-    def ask_order(self, drives: Sequence[int], now: float) -> int:
-        """Ask for the ``drives`` again and again; see :meth:`Link.ask_order`."""
-        if self.stage is not Stage.RUNNING or not self.configuration.singly:
-            return 0
-        self._order = self._order % 255 + 1
-        identity = self._order if drives else 0
-        order = SetOrder(0, self.configuration.identity, identity, bytes(drives))
-        encode(order)  # one that does not fit a message is refused here, not when it is sent
-        self.commands.ask(order, now)
-        return identity
-
-    def after_seek(self) -> None:
-        """What comes next is of another place in a recording."""
-        self.frames.expect_any()
-        self._drives.forget()
-
-    def stop(self, now: float) -> int:
-        """Send STOP, whatever is going on; returns its request id."""
-        self.frames.close()
-        self.commands.clear()
-        return self.commands.send(Stop(0), now)
-
     def _set_up(self, now: float, at: int | None = None) -> None:
         self.stage = Stage.SETTING_UP
         self.info = self.board = self._met = None
@@ -204,13 +176,12 @@ class ProtocolSession:
     def _answered(self, now: float) -> list[Received]:
         """The pending command has been answered: what follows."""
         pending = self.commands.pending
-        if isinstance(pending, SetBaud):
-            self._rate = pending.baud
         if self.commands.send_next(now) or isinstance(pending, SetOrder):
             return []
         self.stage, self._last_frame, self.is_silent = Stage.RUNNING, now, False
         self.frames.open()
-        self._drives.forget()
+        self.drives.forget()
+        self.drives.broken = 0
         assert self.info is not None
         text = _introduction(self.info, self.board, self.configuration)
         return [Event(now, "connected", text)]
@@ -222,29 +193,26 @@ class ProtocolSession:
         if whole := isinstance(samples, Frame):
             passed += self.frames.take(samples)
         else:
-            passed += self._drives.take(samples)
+            passed += self.drives.take(samples)
         if not passed or isinstance(passed[-1], Event):
             return passed
-        self._unsaid &= whole
+        self.drives.unsaid &= whole
         quiet, was_silent = now - self._last_frame, self.is_silent
         self._last_frame, self.is_silent = now, False
         if was_silent:
             passed.insert(0, Event(now, "resumed", f"frames arrive again after {quiet:.1f} s"))
+        if self.drives.broken >= _MOST_BROKEN and self.configuration.singly:
+            return passed + self._go_whole(now)
         if not self._settings.singly:  # nobody has asked for the drives of this recording
             return [item for item in passed if not isinstance(item, DriveSamples)]
-        return [*self._whole(now), *passed] if whole else passed
-
-    def _whole(self, now: float) -> list[Received]:
-        """Scans come whole though drives were asked for: an event says so once."""
-        unsaid, self._unsaid = self._unsaid, False
-        text = "the board sends whole scans only: a touch shows at the end of its first scan"
-        return [Event(now, "whole-scans", text)] if unsaid else []
+        return self.drives.say_whole(now) + passed if whole else passed
 
     def _go_whole(self, now: float) -> list[Received]:
-        """Set the board up again for whole scans, since drives do not come."""
+        """Set the board up again for whole scans, since drives do not come, or not all."""
+        self.drives.unsaid = True
         self._settings = replace(self._settings, singly=False)
         self._set_up(now)
-        return self._whole(now)
+        return self.drives.say_whole(now)
 
     def _hello(self, hello: Hello, now: float) -> list[Received]:
         check_version(hello, self._where)
@@ -315,7 +283,7 @@ class ProtocolSession:
         if isinstance(command, SetOrder):
             self.commands.send_next(now)
             return [Event(now, "order", f"the board refused an order: {_reason(ack, command)}")]
-        if isinstance(command, SetFormat) and self._unsaid:
+        if isinstance(command, SetFormat) and self.drives.unsaid:
             return self._go_whole(now)
         raise SourceError(
             f"the board refused {type(command).__name__}: {_reason(ack, command)}",

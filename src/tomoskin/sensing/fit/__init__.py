@@ -10,7 +10,8 @@ from tomoskin.sensing.fit.bounds import (
 from tomoskin.sensing.fit.drive_evidence import DriveEvidence, Initiation, Onset
 from tomoskin.sensing.fit.drive_filter import DriveFilter, MovingTouch
 from tomoskin.sensing.fit.drive_order import drives_needed, telling_order, watch_order
-from tomoskin.sensing.fit.finder import NoiseKey, SpotFinder
+from tomoskin.sensing.fit.drive_view import DriveView, NoiseKey
+from tomoskin.sensing.fit.finder import SpotFinder
 from tomoskin.sensing.fit.noise import (
     Whitener,
     common_mode_variance,
@@ -29,6 +30,7 @@ __all__ = [
     "Demand",
     "DriveEvidence",
     "DriveFilter",
+    "DriveView",
     "Initiation",
     "MovingTouch",
     "NoiseKey",

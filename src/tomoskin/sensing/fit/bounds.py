@@ -15,6 +15,7 @@ from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Mesh, triangulate
 from tomoskin.model.pattern import Scan
 from tomoskin.model.skin import Skin
+from tomoskin.sensing.fit.drive_order import drive_sizes, drives_needed, watch_order
 from tomoskin.sensing.fit.noise import Whitener, row_covariance
 from tomoskin.sensing.fit.spot import CONTENT, N_PARAMETERS, Response, spots_of
 from tomoskin.sensing.segment import Region
@@ -158,6 +159,10 @@ class ResolutionBounds:
         (n_cells,) whether a cell counts for the figures.
     headroom
         What the skin asks of the board; what saturates does not count.
+    watch
+        Drives in the order in which an untouched skin is watched best.
+    needed
+        How many of them notice the press at all the positions inside; None: not even all do.
     """
 
     mesh: Mesh
@@ -165,6 +170,8 @@ class ResolutionBounds:
     faintest: FloatArray
     inside: FloatArray
     headroom: Headroom
+    watch: tuple[int, ...]
+    needed: int | None
 
     @cached_property
     def rms(self) -> FloatArray:
@@ -204,7 +211,8 @@ def resolution_bounds(
     model = ForwardModel(fine, skin.pattern(), skin.contact_impedance, skin.current)
     state = model.at(skin.conductivity)
     headroom = Headroom.of(skin, state)
-    response, noise = Response(state), _noise(skin, headroom)
+    covariance = _covariance(skin)
+    response, noise = Response(state), _noise(covariance, headroom)
     radius = demand.on(fine)
     spots = spots_of(coarse.centroids, radius, -1.0)
     area = math.pi * radius**2
@@ -219,19 +227,30 @@ def resolution_bounds(
         least.append(least_content(response, faint[some], noise, demand.ratio))
     progress(len(spots), len(spots))
     faintest = -np.expm1(np.maximum(np.concatenate(least) / area, -700.0))
+    inside = _inside(skin, coarse.centroids)
+    changes = response.changes([spot[None] for spot in spots[inside]])
+    drives = model.pattern.drive_index
+    sizes = drive_sizes(changes, covariance, drives, headroom.saturated)
+    watch = watch_order(sizes)
+    needed = drives_needed(sizes, watch, demand.ratio)
     return ResolutionBounds(
-        coarse, np.concatenate(bounds), faintest, _inside(skin, coarse.centroids), headroom
+        coarse, np.concatenate(bounds), faintest, inside, headroom, tuple(watch), needed
     )
 
 
-def _noise(skin: Skin, headroom: Headroom) -> Whitener:
+def _covariance(skin: Skin) -> FloatArray:
+    """(n_meas, n_meas) V² of a frame less a reference, by the read-out alone."""
+    scan = Scan.of(skin.pattern())
+    sample = Readout.of(scan, skin.readout).noise / math.sqrt(2)
+    return row_covariance(scan, sample) * (1 + 1 / REFERENCE_FRAMES)
+
+
+def _noise(covariance: FloatArray, headroom: Headroom) -> Whitener:
     """Raises ModelError where too little is left of what the model expects."""
     excluded = headroom.saturated
     if np.count_nonzero(~excluded) < N_PARAMETERS and (problem := headroom.problem):
         raise ModelError(problem)
-    scan = Scan.of(skin.pattern())
-    sample = Readout.of(scan, skin.readout).noise / math.sqrt(2)
-    noise = Whitener.of(row_covariance(scan, sample) * (1 + 1 / REFERENCE_FRAMES))
+    noise = Whitener.of(covariance)
     return noise.without(np.eye(len(excluded))[:, excluded])
 
 

@@ -3,7 +3,8 @@
 The newest sample of each measurement is kept. A touch that began some drives ago shows in the
 measurements of these drives, and in no older one. Which drive it was is not known: so each is
 tried, and the likelihood ratio of the best one counts (Page 1954; Willsky & Jones 1976). Older
-measurements say what all have in common, such as a gain.
+measurements say what all have in common for long, such as a gain. What drives share for a moment,
+such as hum, has another phase in each scan: it is no help, and counts as noise.
 """
 
 from __future__ import annotations
@@ -42,11 +43,12 @@ class DriveEvidence:
     spots, signatures
         The candidates, (n, 4) of content 1 and (n, n_meas) V/m².
     precision
-        (n_meas, n_meas) 1/V², inverse of the covariance of the newest measurements.
+        (n_meas, n_meas) 1/V², of the measurements as if drives shared only what stays.
     firsts
         (n_drive,) number of the first measurement of each drive.
-    gram
-        (n, n_drive, n_drive) products of the signatures' parts by the precision.
+    gram, wavers
+        (n, n_drive, n_drive) products of the signatures' parts by the precision, and the variance
+        of what they match, with all that drives share.
     """
 
     spots: FloatArray
@@ -54,31 +56,39 @@ class DriveEvidence:
     precision: FloatArray
     firsts: IntArray
     gram: FloatArray
+    wavers: FloatArray
 
     @classmethod
     def making(
-        cls, candidates: Candidates, noise: FloatArray, drives: IntArray
+        cls, candidates: Candidates, noise: FloatArray, stays: FloatArray, drives: IntArray
     ) -> Generator[None, None, Self]:
-        """A piece of work for each drive; ``noise`` (n_meas, n_meas) V², ``drives`` (n_meas,)."""
-        signatures, precision = candidates.signatures, np.asarray(np.linalg.inv(noise))
+        """A piece of work for each drive; ``noise`` of a frame and what ``stays`` from frame to
+        frame, (n_meas, n_meas) V², and ``drives`` (n_meas,)."""
+        signatures, apart = candidates.signatures, drives[:, None] != drives
+        precision = np.asarray(np.linalg.inv(np.where(apart, 0.0, noise) + stays))
+        wavering = precision @ (noise + stays) @ precision
         firsts = np.flatnonzero(np.diff(drives, prepend=-1))
-        gram = np.empty((len(signatures), len(firsts), len(firsts)))
+        gram, wavers = np.empty((2, len(signatures), len(firsts), len(firsts)))
         for drive, rows in enumerate(_slices(firsts, len(drives))):
-            yield
-            parts = signatures * (signatures[:, rows] @ precision[rows])
-            gram[:, drive] = np.add.reduceat(parts, firsts, axis=1)
-        return cls(candidates.spots, signatures, precision, firsts, gram)
+            for products, matrix in ((gram, precision), (wavers, wavering)):
+                yield
+                parts = signatures * (signatures[:, rows] @ matrix[rows])
+                products[:, drive] = np.add.reduceat(parts, firsts, axis=1)
+        return cls(candidates.spots, signatures, precision, firsts, gram, wavers)
 
     @cached_property
     def rows(self) -> list[slice]:
         """The measurements of each drive."""
         return _slices(self.firsts, len(self.precision))
 
-    def sizes(self, order: tuple[int, ...]) -> FloatArray:
+    def sizes(self, order: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
         """(n, k) squared deviations of candidates of content 1 in the first one, two, … drives of
-        an ``order`` (k,)."""
-        own = self.gram[:, order][:, :, order]
-        return np.asarray(own.cumsum(axis=1).cumsum(axis=2).diagonal(axis1=1, axis2=2))
+        an ``order`` (k,), and (n, k) variances of what they match there."""
+        gram, wavers = (
+            part[:, order][:, :, order].cumsum(axis=1).cumsum(axis=2).diagonal(axis1=1, axis2=2)
+            for part in (self.gram, self.wavers)
+        )
+        return np.maximum(gram, 1e-300), np.maximum(gram, wavers)
 
     def threshold(self, drives_a_second: float, least: float) -> float:
         """Deviations that noise exceeds :data:`FALSE_AN_HOUR` times in an hour; no less than
@@ -120,13 +130,18 @@ class Initiation:
         self._evidence, self._threshold, self._sign = evidence, threshold, sign
         self._data = np.zeros(len(evidence.precision))
         self._matched = np.zeros(len(evidence.precision))
-        self._sizes: dict[tuple[int, ...], FloatArray] = {}
+        self._sizes: dict[tuple[int, ...], tuple[FloatArray, FloatArray]] = {}
         self.forget()
 
     def forget(self) -> None:
         """Begin anew with an untouched skin: drives that were read tell nothing."""
         self._order: tuple[int, ...] = ()
         self._since: int | None = None
+
+    @property
+    def begun(self) -> bool:
+        """Whether a touch has begun that is to be told."""
+        return self._since is not None
 
     def go_on(self, other: Initiation) -> None:
         """Go on where an ``other`` one of the same skin is."""
@@ -165,11 +180,11 @@ class Initiation:
         if order not in self._sizes:
             if len(self._sizes) >= _ORDERS:
                 self._sizes.clear()
-            self._sizes[order] = np.maximum(self._evidence.sizes(order), 1e-300)
-        size, onto = self._sizes[order], parts[:, order].cumsum(axis=1)
+            self._sizes[order] = self._evidence.sizes(order)
+        (size, variance), onto = self._sizes[order], parts[:, order].cumsum(axis=1)
         if self._sign != "both":
             onto = np.minimum(onto, 0.0) if self._sign == "decrease" else np.maximum(onto, 0.0)
-        return onto / size, np.abs(onto) / np.sqrt(size)
+        return onto / size, np.abs(onto) / np.sqrt(np.maximum(variance, 1e-300))
 
     def _onset(self, content: FloatArray, ratio: FloatArray, drives: int) -> Onset:
         """The position by all candidates, each as likely as the data say; a strong touch differs

@@ -32,7 +32,7 @@ _OTHERWISE = 0.15
 _STEPS = 2
 """Steps of a drive: the response bends."""
 
-_LAGS, _FLOOR = 0.04, 0.002
+_LAGS, _FLOOR = 0.06, 0.0025
 """What a sheet remembers of a touch that moves: seconds by which its response lies behind, and the
 standard deviation that no touch goes below, m. Chosen on the textile discs, seed 9100."""
 

@@ -5,8 +5,26 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
-from tomoskin.core import FloatArray
+from tomoskin.core import FloatArray, IntArray
+
+
+def drive_sizes(
+    changes: FloatArray, covariance: FloatArray, drives: IntArray, excluded: NDArray[np.bool_]
+) -> FloatArray:
+    """(n, n_drive): squared deviations of the noise that each drive has of ``changes``.
+
+    These are (n, n_meas) V. Drives share no noise; what is ``excluded`` (n_meas,) tells nothing.
+    """
+    sizes = np.zeros((len(changes), int(drives.max()) + 1))
+    for drive in range(sizes.shape[1]):
+        rows = np.flatnonzero((drives == drive) & ~excluded)
+        if len(rows):
+            own = changes[:, rows]
+            solved = np.linalg.lstsq(covariance[np.ix_(rows, rows)], own.T, rcond=1e-10)[0]
+            sizes[:, drive] = np.einsum("nr,rn->n", own, solved)
+    return sizes
 
 
 def watch_order(sizes: FloatArray) -> list[int]:
@@ -40,16 +58,18 @@ def drives_needed(sizes: FloatArray, order: Sequence[int], ratio: float) -> int 
     return int(enough[0]) + 1 if len(enough) else None
 
 
-def telling_order(information: FloatArray, prior: FloatArray, count: int) -> list[int]:
+def telling_order(
+    information: FloatArray, prior: FloatArray, count: int, each: int = 4
+) -> list[int]:
     """So many drives, each the one that leaves the smallest ellipses with those before (A-optimal:
     Pukelsheim 1993).
 
-    ``information`` (n_drive, 4k, 4k) of each drive on k touches, and ``prior`` (4k, 4k) what is
-    known before; positions are the first two of each four.
+    ``information`` (n_drive, p, p) of each drive on touches, and ``prior`` (p, p) what is known
+    before; a touch has so many parameters, ``each``, and the first two are its position.
     """
     order: list[int] = []
     known = prior
-    places = [number for number in range(len(prior)) if number % 4 < 2]
+    places = [number for number in range(len(prior)) if number % each < 2]
     while len(order) < min(count, len(information)):
         rest = [drive for drive in range(len(information)) if drive not in order]
         spread = [

@@ -182,7 +182,7 @@ class ResidualResponse:
         self._seconds, self._since = seconds, 0.0
         self._feet: list[FootprintChange] = []
         self._matrix = self._left = np.zeros((0, 0))
-        self._doubts: list[float] | None = None
+        self._doubts: tuple[float, ...] | None = None
 
     def after(self, spots: FloatArray, shapes: Shapes) -> None:
         """Take a frame in which touches ``spots`` (k, 4) were."""
@@ -230,18 +230,22 @@ class ResidualResponse:
             self._matrix, self._doubts = matrix, None
             for foot in self._feet:
                 foot.rows = foot.shapes @ matrix.T
-        doubts = [foot.doubt(self._since) for foot in self._feet]
+        doubts = self.doubts
         if doubts != self._doubts:
             left = [d * foot.rows[0] for d, foot in zip(doubts, self._feet, strict=True)]
             counts = [row for row in left if row @ row > _FAINT**2]
             self._left, self._doubts = np.array(counts).reshape(-1, len(matrix)), doubts
         return self._left
 
-    def doubtful(self, n_meas: int) -> tuple[tuple[float, ...], FloatArray]:
-        """The deviations of what may be left, and directions (k, n_meas) V as long as these."""
-        doubts = tuple(foot.doubt(self._since) for foot in self._feet)
-        left = [d * foot.shapes[0] for d, foot in zip(doubts, self._feet, strict=True) if d]
-        return doubts, np.array(left).reshape(-1, n_meas)
+    @property
+    def doubts(self) -> tuple[float, ...]:
+        """The deviations of what may be left, of each footprint."""
+        return tuple([foot.doubt(self._since) for foot in self._feet])
+
+    def doubtful(self, n_meas: int) -> FloatArray:
+        """Directions (k, n_meas) V of what may be left, each as long as its deviation."""
+        pairs = zip(self.doubts, self._feet, strict=True)
+        return np.array([d * foot.shapes[0] for d, foot in pairs if d]).reshape(-1, n_meas)
 
     def idle(self, data: FloatArray) -> None:
         """Take ``data`` (n_meas,) V of a frame in which nothing touched, less what was known."""

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import math
-from bisect import bisect_left
 from collections.abc import Generator
-from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from dataclasses import replace
+from functools import partial
 from operator import is_
-from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tomoskin.core import Detection, FloatArray, IntArray, reach
+from tomoskin.core import Detection, FloatArray, reach
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.skin import Skin
-from tomoskin.sensing.fit.excess import Excess
+from tomoskin.sensing.fit.drive_view import CellDiscs, DriveView
 from tomoskin.sensing.fit.expectation import Expectation, ResidualResponse
 from tomoskin.sensing.fit.hypotheses import CommonModeJump, Explained, Jumps, Rival, challenged
 from tomoskin.sensing.fit.policy import (
@@ -31,7 +28,7 @@ from tomoskin.sensing.fit.policy import (
 from tomoskin.sensing.fit.problem import Matched, Problem
 from tomoskin.sensing.fit.selection import ForwardSelection, SpotDetections, judged
 from tomoskin.sensing.fit.sight import Sight
-from tomoskin.sensing.fit.spot import CONTENT, FILLING, LOG_RADIUS, N_PARAMETERS
+from tomoskin.sensing.fit.spot import CONTENT, LOG_RADIUS, N_PARAMETERS
 from tomoskin.sensing.fit.spot_fit import Deficit
 from tomoskin.sensing.fit.spot_model import SpotModel
 from tomoskin.sensing.fit.unexplained import FrameWatch
@@ -44,11 +41,6 @@ _REST = 0.5
 
 _SWELLS = 0.08
 """Standard deviation of the logarithm of a touch's radius from frame to frame."""
-
-
-NoiseKey = tuple[FloatArray, FloatArray, FloatArray, Excess, tuple[float, ...]]
-"""What the noise of the newest measurements depends on: see :meth:`Sight.of_newest`; and how much
-of what touches may have left behind is not known."""
 
 
 class SpotFinder:
@@ -73,6 +65,8 @@ class SpotFinder:
     ----------
     watch
         What touches do not explain.
+    view
+        What it knows of measurements that are newer than its frames.
     """
 
     def __init__(
@@ -86,11 +80,10 @@ class SpotFinder:
         pace: Pace = EXHAUSTIVE,
     ) -> None:
         self._model, self._policy = model, DetectionPolicy.of(skin.touch, pace)
-        self._cells, self._rim = CellDiscs.of(mesh), model.reduced.rim
+        self._rim = model.reduced.rim
         self._reach, self._unrest = pace.reach, 1.0
         self._wanders = np.diag(np.square([self._reach, self._reach, _SWELLS]))
         self._residual = ResidualResponse(pace.interval)
-        self._unit = skin.conductivity
         self._before = self._shown = np.zeros((0, N_PARAMETERS))
         self._deficit = Deficit.none(len(model.solver.table.basis))
         self._change = self._deficit.change
@@ -100,6 +93,9 @@ class SpotFinder:
         pattern = model.response.state.model.pattern
         self.watch = FrameWatch(pattern, self._policy)
         self._sight = Sight(model, self.watch.channels, noise, gain)
+        self.view = DriveView(
+            model, skin, CellDiscs.of(mesh), self._sight, self.watch, self._residual
+        )
         self._wander = 0.0
         self._newest_slow: tuple[tuple[FloatArray, ...], FloatArray] | None = None
 
@@ -113,6 +109,7 @@ class SpotFinder:
         yield from self._sight.following(other._sight, self.watch.excess)
         self._before, self._expected = other._before, other._expected
         self._residual, self._jump = other._residual, other._jump
+        self.view = replace(self.view, residual=self._residual)
         self.watch.go_on(other.watch)
 
     @property
@@ -136,7 +133,7 @@ class SpotFinder:
         """
         self._sight.look(nuisance, np.zeros((len(dv), 0)) if jumps is None else jumps)
         self._wander = wander
-        data = self._data = self._residual.without(dv / self._sight.scale)
+        data = self._data = self.view.change(dv)
         self.watch.begin(data, self._sight.of(self.watch.excess).gauge)
         (detected, rival), jump, matched = self._searched(data)
         solver = self._model.solver
@@ -160,48 +157,6 @@ class SpotFinder:
             self._residual.after(self._shown, self._model.shapes)
         else:
             self._residual.idle(self._data)
-
-    @property
-    def model(self) -> SpotModel:
-        """The sheet that touches are fitted on."""
-        return self._model
-
-    @property
-    def unit(self) -> float:
-        """Conductivity of the untouched sheet, S."""
-        return self._unit
-
-    @property
-    def sign(self) -> str:
-        """The sign of touches, as in a skin's ``[touch]``."""
-        return self._policy.sign
-
-    def newest_noise(self) -> tuple[NoiseKey, FloatArray, FloatArray]:
-        """See :meth:`Sight.of_newest`; with what touches may have left behind."""
-        key, noise, jumps = self._sight.of_newest(self.watch.excess)
-        doubts, left = self._residual.doubtful(len(noise))
-        return (*key, doubts), noise + left.T @ left, jumps
-
-    def change(self, dv: FloatArray) -> FloatArray:
-        """(n_meas,) V of the model, of difference data less what touches have left behind."""
-        return self._residual.without(dv / self._sight.scale)
-
-    def shown(self, spot: FloatArray, spread: FloatArray, ratio: float) -> Detection:
-        """A ``spot`` (4,) as a detection; its position has the covariance ``spread`` (2, 2) m²."""
-        x, y, log_radius, content = spot.tolist()
-        radius = math.exp(log_radius)
-        (xx, xy), (_, yy) = spread.tolist()
-        return Detection(
-            x=x,
-            y=y,
-            sd_x=math.sqrt(xx),
-            sd_y=math.sqrt(yy),
-            area=math.pi * radius**2,
-            peak=self._unit * math.expm1(content / (FILLING * radius**2)),
-            cells=self._cells.within(x, y, radius),
-            cov_xy=xy,
-            snr=ratio,
-        )
 
     def others(self) -> FloatArray:
         """(k, n_meas) V of the model: for each touch of the newest frame what all others change."""
@@ -308,7 +263,7 @@ class SpotFinder:
         content += self._residual.beneath(x, y, radius)
         spread = detected.covariance[4 * k : 4 * k + 2, 4 * k : 4 * k + 2]
         weak = is_weak(self._policy, ratio, float(detected.fresh[k]), float(detected.beside[k]))
-        detection = self.shown(
+        detection = self.view.shown(
             np.array([x, y, log_radius, content]), spread + self._rim.doubt(x, y, radius), ratio
         )
         return replace(detection, weak=weak, close=bool(detected.close[k]))
@@ -356,45 +311,3 @@ def _merged(detected: SpotDetections, i: int, j: int) -> SpotDetections:
     close[i], beside[i] = True, min(beside[i], beside[j])
     kept = replace(fit, spots=spots[keep])
     return SpotDetections(kept, ratio[keep], fresh[keep], covariance, close[keep], beside[keep])
-
-
-_MARGIN = 1 + 1e-9
-"""Rounding of a radius."""
-
-
-@dataclass(frozen=True, eq=False)
-class CellDiscs:
-    """Cells along the x axis: a disc meets few of them.
-
-    Attributes
-    ----------
-    cells
-        (n,) their numbers.
-    middles
-        (n,) m, x + iy.
-    """
-
-    cells: IntArray
-    middles: NDArray[np.complex128]
-
-    @classmethod
-    def of(cls, mesh: Mesh) -> Self:
-        """The cells of a mesh, along its x axis."""
-        x, y = mesh.centroids.T
-        order = np.argsort(x, kind="stable")
-        return cls(order, (x + 1j * y)[order])
-
-    def within(self, x: float, y: float, radius: float) -> IntArray:
-        """(m,) those whose middles are no farther than ``radius`` m from ``x``, ``y`` m, or the
-        nearest one."""
-        along, reach = self._along, radius * _MARGIN
-        near = slice(bisect_left(along, x - reach), bisect_left(along, x + reach))
-        found = np.abs(self.middles[near] - complex(x, y)) <= radius
-        if found.any():
-            return np.asarray(self.cells[near].compress(found))
-        away = np.abs(self.middles - complex(x, y))
-        return np.asarray(self.cells[away == away.min()])
-
-    @cached_property
-    def _along(self) -> list[float]:
-        return list(map(float, self.middles.real))

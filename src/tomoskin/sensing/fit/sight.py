@@ -20,8 +20,6 @@ _MASKS = 8
 """Nuisance subspaces whose whitening is kept."""
 
 
-_Key = tuple[FloatArray, FloatArray, FloatArray, Excess]
-
 _UNKNOWN = 1e6
 """Variance along what is excluded, in parts of the largest one."""
 
@@ -99,18 +97,21 @@ class Sight:
             newest = self._newest = now, self._made(excess)
         return newest[1]
 
-    def of_newest(self, excess: Excess) -> tuple[_Key, FloatArray, FloatArray]:
-        """What the noise of the newest measurements depends on: nuisance directions, jumps, idle
-        noise and excess. That, (n_meas, n_meas) V² of the
+    @property
+    def newest(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Nuisance directions, jumps and idle noise of the newest frame."""
+        return self._nuisance, self._jumps, self._noise
+
+    def of_newest(self, excess: Excess) -> tuple[FloatArray, FloatArray]:
+        """The noise of the newest measurements, (n_meas, n_meas) V² of the
         model, in which what is excluded is unknown; and jumps (n_meas, j) V."""
-        key = self._nuisance, self._jumps, self._noise, excess
         nuisance, jumps = self._scaled(self.scale)
         noise = excess.added(self._noise, self._channels)
         if nuisance.shape[1]:
             size = np.linalg.norm(nuisance, axis=0)
             unknown = nuisance / np.where(size > 0, size, 1.0)
             noise = noise + _UNKNOWN * np.diag(noise).max() * unknown @ unknown.T
-        return key, noise, jumps
+        return noise, jumps
 
     def _made(self, excess: Excess) -> Seen:
         scaled = self._scaled(self.scale)

@@ -1,0 +1,130 @@
+"""Drives before their frame: a touch is told early by its number, and frames stay as they are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+
+from run.board import pressed, samples_of
+from tomoskin.core import DriveSamples, Frame
+from tomoskin.pipeline import DriveResult, FrameResult, Pipeline, Prepared
+
+SECONDS, NEEDED = 0.056, 20
+
+
+@pytest.fixture(scope="module")
+def touched(prepared):
+    return samples_of(prepared, pressed(prepared, 0.03, 0.02))
+
+
+@dataclass
+class Turns:
+    """A board that sends its drives, if ``parts``, and frames."""
+
+    prepared: Prepared
+    parts: bool = True
+    number: int = 0
+    drives: list[DriveResult | None] = field(default_factory=list)
+    frames: list[FrameResult | None] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.pipeline = Pipeline(self.prepared, reference_frames=NEEDED)
+        self.drive = self.prepared.scan.sample_drive
+        self.random = np.random.default_rng(5)
+
+    def turn(self, before, after=None, since=0):
+        """One turn of noisy samples, those from drive ``since`` on of what is there ``after``."""
+        samples = np.where(self.drive < since, before, before if after is None else after)
+        noisy = samples + self.random.integers(-2, 3, len(samples))
+        start, count = self.number * SECONDS, int(self.drive.max()) + 1
+        for drive in range(count) if self.parts else ():
+            time = start + drive * SECONDS / count
+            ticks = round(time * 250e3)
+            head = self.number, ticks, time + SECONDS / count, 1, 0, 0, 0, drive, drive
+            mine = noisy[self.drive == drive].astype(np.uint16)
+            self.drives.append(self.pipeline.push_drive(DriveSamples(*head, mine)))
+        head = self.number, round(start * 250e3), start + SECONDS, 1, 0, 0
+        self.frames.append(self.pipeline.push(Frame(*head, noisy.astype(np.uint16))))
+        self.number += 1
+
+    @property
+    def told(self):
+        return [result.touches if result else () for result in self.drives[-8:]]
+
+
+@pytest.fixture
+def turns(prepared, idle):
+    made = Turns(prepared)
+    for _ in range(NEEDED + 40):
+        made.turn(idle)
+    return made
+
+
+def test_a_touch_is_told_by_drives_and_then_by_the_frame(turns, idle, touched):
+    turns.drives.clear()
+    turns.turn(idle, touched, since=2)
+    told = turns.told
+    assert not any(told[:3])
+    assert all(told[5:])
+    (first,) = next(touches for touches in told if touches)
+    assert turns.drives[-1].provisional in ((), (first.id,))
+    for _ in range(3):
+        turns.turn(touched)
+    (touch,) = turns.frames[-1].touches
+    assert touch.id == first.id
+    (last,) = turns.told[-1]
+    assert last.id == touch.id
+    assert turns.drives[-1].provisional == ()
+    assert np.hypot(last.detection.x - 0.03, last.detection.y - 0.02) < 0.006
+
+
+def test_a_touch_that_is_lifted_is_told_before_the_frame_ends(turns, idle, touched):
+    for _ in range(6):
+        turns.turn(touched)
+    turns.turn(touched, idle, since=2)
+    assert turns.told[0]
+    assert not turns.told[-1]
+    for _ in range(6):
+        turns.turn(idle)
+    assert not any(turns.told)
+    assert turns.frames[-1].touches == ()
+
+
+def test_what_no_frame_confirms_is_withdrawn_and_its_number_is_not_given_again(
+    turns, idle, touched
+):
+    number = turns.pipeline.numbered
+    drives = turns.drive
+    glitch = np.where((drives == 2) | (drives == 3), touched, idle)
+    turns.turn(glitch)
+    begun = [touches for touches in turns.told if touches]
+    for _ in range(4):
+        turns.turn(idle)
+    assert not any(turns.told)
+    if begun:
+        assert turns.pipeline.numbered > number
+
+
+def test_frames_are_to_the_bit_what_they_are_without_drives(turns, prepared, idle, touched):
+    alone = Turns(prepared, parts=False)
+    for _ in range(NEEDED + 40):
+        alone.turn(idle)
+    for each in (turns, alone):
+        each.turn(idle, touched, since=3)
+        for _ in range(5):
+            each.turn(touched)
+        each.turn(touched, idle, since=4)
+    for ours, other in zip(turns.frames, alone.frames, strict=True):
+        assert [(t.id, t.detection.x, t.detection.sd_x) for t in ours.touches] == [
+            (t.id, t.detection.x, t.detection.sd_x) for t in other.touches
+        ]
+
+
+def test_drives_tell_nothing_before_a_reference_stands_nor_of_another_scan(prepared, idle):
+    turns = Turns(prepared)
+    turns.turn(idle)
+    assert turns.drives == [None] * len(turns.drives)
+    part = DriveSamples(0, 0, 0.0, 1, 0, 0, 0, 0, 0, np.zeros(3, np.uint16))
+    assert turns.pipeline.push_drive(part) is None
