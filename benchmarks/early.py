@@ -165,10 +165,12 @@ def run(data: Path | None) -> Iterator[Report]:
         )
 
 
-def _place(random: np.random.Generator, name: str, reach: float) -> Floats:
-    if "square" in name:
-        return np.asarray(random.uniform(-0.8 * reach, 0.8 * reach, 2))
-    return evenly(random, 1, reach)[0]
+def _place(random: np.random.Generator, skin: Skin) -> Floats:
+    """Evenly over the inner 85 % of a disc, or of a square."""
+    half = 0.85 * np.ptp(skin.outline.polyline(skin.outline.length / 200), axis=0)[0] / 2
+    if "square" in skin.name:
+        return np.asarray(random.uniform(-half, half, 2))
+    return evenly(random, 1, half)[0]
 
 
 def _drawn(random: np.random.Generator, at: Floats) -> Press:
@@ -191,7 +193,7 @@ def _pressed(name: str, board: str) -> dict[str, Any]:
         progress(f"{name} on {board}, seed {seed}")
         rig, random = _begun(name, board, seed)
         for _ in range(PRESSES):
-            press = _drawn(random, _place(random, name, 0.085))
+            press = _drawn(random, _place(random, Skin.load(name)))
             seen, onset, release = _watched(rig, random, press)
             for way, shown in (("drives", seen.drives), ("frames", seen.frames)):
                 first[way].append(next((t - onset for t, ts in shown if t > onset and ts), np.inf))
@@ -208,7 +210,8 @@ def _pressed(name: str, board: str) -> dict[str, Any]:
     for title, ways in (("first", first), ("release", gone)):
         for way, times in ways.items():
             ends = np.percentile(times, (50, 99), method="higher")
-            row[f"{title}, {way}: p50 / p99 ms"] = " / ".join(f"{1e3 * t:.1f}" for t in ends)
+            told = (f"{1e3 * t:.1f}" if np.isfinite(t) else "later" for t in ends)
+            row[f"{title}, {way}: p50 / p99 ms"] = " / ".join(told)
     return row | {
         "first position off, mm": mm(np.median(errors), digits=0)[0],
         "its deviation, mm": mm(np.median(sizes), digits=0)[0],
@@ -324,7 +327,7 @@ def _standing(name: str) -> dict[str, Any]:
         index = lab.prepared.pattern.drive_index
         count = int(PART * (index.max() + 1))
         for _ in range(PRESSES):
-            press = _drawn(random, _place(random, lab.skin.name, 0.085))
+            press = _drawn(random, _place(random, lab.skin))
             dv = lab.volts((press,)) - lab.reference.mean
             found = lab.by_fit().push(lab.shown(dv))
             if not found:
@@ -355,10 +358,11 @@ def _telling(lab: TwinLab, found: Detection, count: int) -> list[int]:
     spot = np.array([[found.x, found.y, np.log(radius), content]])
     parts = model.solver.expanded(spot)[0] @ model.solver.table.basis
     noise = np.sqrt(lab.prepared.readout.noise**2 + (0.08 * parts[0]) ** 2)
-    slopes = parts[1:5] / noise
+    unknown = parts[5:] * [[model.prior.directed], [model.prior.reshaped]]
+    slopes = np.vstack([parts[1:5], unknown]) / noise
     own = [slopes[:, index == drive] for drive in range(index.max() + 1)]
     information = np.array([each @ each.T for each in own])
-    return telling_order(information, np.diag(model.prior.weights**2), count)
+    return telling_order(information, np.diag([*model.prior.weights**2, 1.0, 1.0]), count, 6)
 
 
 def _fitted_from(lab: TwinLab, dv: Floats, read: Any) -> Detection | None:

@@ -114,6 +114,14 @@ def live(
     source: SourcesOption = None,
     calibration: CalibrationsOption = None,
     sink: SinkOption = None,
+    early: Annotated[
+        bool,
+        typer.Option(
+            "--early",
+            help="Report touches before their scan ends, drive by drive, where the board can. "
+            "Recordings hold whole frames as always.",
+        ),
+    ] = False,
     served: Served,
 ) -> None:
     """Run source, pipeline and server until a signal comes."""
@@ -124,7 +132,7 @@ def live(
 
         check_page()
         if several is not None:
-            _run_robot(several, sink, served)
+            _run_robot(several, sink, served, early=early)
             return
         origin = source[0] if source else "twin"
         sinks = chosen_sinks(sink)
@@ -133,10 +141,12 @@ def live(
             chosen = None if recorded else skin_for_source(skin[0] if skin else None, origin)
             prepared = prepared_for(chosen, origin, calibration or ())
         say_headroom(prepared.headroom)
-        _run_skin(prepared, origin, sinks, served)
+        _run_skin(prepared, origin, sinks, served, early=early)
 
 
-def _run_skin(prepared: Prepared, source: str, sinks: Sequence[Any], served: Served) -> None:
+def _run_skin(
+    prepared: Prepared, source: str, sinks: Sequence[Any], served: Served, *, early: bool
+) -> None:
     from tomoskin.board.source import open_source
     from tomoskin.core import plain_values
     from tomoskin.run import BoardMemory, Runner
@@ -144,7 +154,7 @@ def _run_skin(prepared: Prepared, source: str, sinks: Sequence[Any], served: Ser
 
     opener = partial(open_source, source, prepared.skin)
     with served.listening() as (listener, policy):
-        runner = Runner(prepared, opener, sinks=sinks, memory=BoardMemory.in_cache())
+        runner = Runner(prepared, opener, sinks=sinks, memory=BoardMemory.in_cache(), early=early)
         with recording_to(runner, served.record) as stopped:
             app = application(_hub_of(runner, source, served.folder), policy)
             served.serve(app, listener, policy, f"{runner.flow.source} is live")
@@ -211,7 +221,7 @@ def _named(given: str) -> tuple[str, str]:
     return name, skin
 
 
-def _run_robot(robot: Robot, sinks: list[str] | None, served: Served) -> None:
+def _run_robot(robot: Robot, sinks: list[str] | None, served: Served, *, early: bool) -> None:
     """Run the skins of a robot and their page until a signal comes."""
     from tomoskin.run import BoardMemory, Member, RobotRun, with_joints
 
@@ -224,7 +234,7 @@ def _run_robot(robot: Robot, sinks: list[str] | None, served: Served) -> None:
     for member in members:
         if (problem := member.prepared.headroom.problem) is not None:
             remark(f"{member.place.name}: {problem}")
-    run = RobotRun(members, BoardMemory.in_cache())
+    run = RobotRun(members, BoardMemory.in_cache(), early=early)
     stopped = _serve_robot(robot, run, served)
     facts = {
         name: {"frames": s.frames, "p50_ms": 1e3 * s.p50, "p99_ms": 1e3 * s.p99}

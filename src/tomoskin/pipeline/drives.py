@@ -33,9 +33,9 @@ _LIFTED = 5.0
 _MOST = 4.0
 """The most that one drive says of that: a single one may be wrong."""
 
-_CONFIRMED = 2
-"""Frames in which a touch that has begun must show, or it is withdrawn. The scan of the first one
-may have seen it come down."""
+_FRAMES, _SECONDS = 2, 0.15
+"""Frames, and seconds, within which a touch that has begun must show in frames, or it is withdrawn.
+The scan of the first one may have seen it come down, and quick ones tell little each."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,7 +62,8 @@ class DriveResult:
 
 @dataclass(slots=True, eq=False)
 class _Followed:
-    """A touch as frames have it, and as drives have it; ``full``: its content in the frame.
+    """A touch as frames have it, and as drives have it; ``full``: its content in the frame, and
+    ``begun``: the device time, s, at which a provisional one has.
 
     ``odds``: their logarithm that it is lifted, and the device time, s, at which it was; ``frames``
     of a provisional one: those without it.
@@ -71,6 +72,7 @@ class _Followed:
     touch: Touch
     moving: MovingTouch
     full: float
+    begun: float = 0.0
     odds: float = 0.0
     lifted: float | None = None
     frames: int | None = None
@@ -78,9 +80,11 @@ class _Followed:
     def take(self, moving: MovingTouch, gone: float) -> None:
         """Take a drive, and what it says of the odds."""
         self.moving = moving
-        if self.frames is None and self.lifted is None:
+        if self.lifted is None:
             self.odds = max(self.odds + min(gone, _MOST), 0.0)
-            left = RESIDUAL.holds(abs(float(moving.spot[CONTENT])), abs(self.full))
+            left = self.frames is None and RESIDUAL.holds(
+                abs(float(moving.spot[CONTENT])), abs(self.full)
+            )
             self.lifted = moving.time if left or self.odds > _LIFTED else None
 
     def stands(self, touch: Touch, time: float) -> bool:
@@ -154,9 +158,10 @@ class DriveWatch:
         for number in new if not touches else []:
             each = before[number]
             each.frames = (each.frames or 0) + 1
-            if each.frames < _CONFIRMED:
+            if each.frames < _FRAMES or time - each.begun < _SECONDS:
                 self._followed[number] = each
-            withdrawn += each.frames == _CONFIRMED
+            else:
+                withdrawn += 1
         if before and not self._followed and self._initiation is not None:
             self._initiation.forget()
         return withdrawn
@@ -197,7 +202,7 @@ class DriveWatch:
         kind = "decrease" if spot[CONTENT] < 0 else "increase"
         since = host_time - onset.drives * self._length
         touch = Touch(number, kind, since, detection)
-        self._followed[number] = _Followed(touch, moving, spot[CONTENT], frames=0)
+        self._followed[number] = _Followed(touch, moving, spot[CONTENT], time, frames=0)
 
     def _follow(self, rows: slice, data: FloatArray, time: float) -> None:
         """Let each touch take its part of the data: what the others do not change."""
@@ -226,7 +231,7 @@ class DriveWatch:
             off = off - known.moving.state[2:4] * (known.moving.time - middle)
             both = spread + _spread(touch.detection)
             if off @ np.linalg.solve(both, off) < GATE:
-                return _Followed(touch, known.moving, spot[CONTENT], known.odds)
+                return _Followed(touch, known.moving, spot[CONTENT], odds=known.odds)
         prior = self.view.model.prior
         moving = MovingTouch.begin(middle, spot, _spread(touch.detection), prior)
         return _Followed(touch, moving, spot[CONTENT])
@@ -243,8 +248,9 @@ class DriveWatch:
         where, spread = now.position()
         spot = now.spot
         spot[:2] = where
-        detection = self.view.shown(spot, spread, each.touch.detection.snr)
-        return replace(each.touch, detection=detection)
+        frame = each.touch.detection
+        detection = self.view.shown(spot, spread, frame.snr)
+        return replace(each.touch, detection=replace(detection, force=frame.force))
 
 
 def _is_same(key: NoiseKey, before: NoiseKey) -> bool:

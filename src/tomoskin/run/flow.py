@@ -8,14 +8,14 @@ from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain
 from typing import Any
 
 from tomoskin.board.source import Link, Received, ScanSettings, Transport
 from tomoskin.board.wire import Info
-from tomoskin.core import Event, Frame, Mark, MarkedFrame, TomoskinError
+from tomoskin.core import DriveSamples, Event, Frame, Mark, MarkedFrame, TomoskinError
 from tomoskin.files.messages import NO_REFERENCE, Contacts, without_frame
 from tomoskin.files.session import BoardInfo, RawRead, Truth
 from tomoskin.pipeline import FrameResult, Pipeline, Prepared, ReferenceState
@@ -74,7 +74,7 @@ class Flow:
             prepared, audience, lambda: self.pipeline.numbered, partial(_board, self)
         )
         self.latency, self.costs = Latency(), CostMeter(time.perf_counter)
-        self._clock, self._turns = audience.clock, audience.turns
+        self._clock, self._turns, self._early = audience.clock, audience.turns, audience.early
         self._recall, self.intake = Recall(audience.memory), Intake()
         self._ended = False
 
@@ -101,10 +101,11 @@ class Flow:
         if self.marker.replay:
             self.pipeline.collect(self.marker.replay.reference_frames)
             self.pipeline.number_after(self.marker.replay.touches_before)
+        singly = self._early and self.marker.replay is None
         return Link(
             transport,
             self.prepared.scan,
-            ScanSettings.of(self.prepared.skin),
+            replace(ScanSettings.of(self.prepared.skin), singly=singly),
             clock=self._clock,
             tap=lambda host_time, data: self.out.put(RawRead(host_time, data)),
         )
@@ -133,7 +134,7 @@ class Flow:
                     self.out.say("press-refused", f"a press is left out: {why}")
 
     def take(self, link: Link, items: Sequence[Received]) -> None:
-        """What one read of the link brought: frames and events."""
+        """What one read of the link brought: frames, drives of the next one, and events."""
         intake, out = self.intake, self.out
         frames = intake.take(link, items, self._clock())
         if link.info is not self.board:
@@ -141,15 +142,13 @@ class Flow:
         if items:
             for event in intake.repeats.push(items[-1].host_time, items):
                 out.put(event)
-        late = intake.backlog.late(len(frames), intake.waited) if frames else 0
-        for number, frame in enumerate(frames):
-            mark = self.marker.mark(frame, late=number < late)
-            if mark is not None:
-                for before in out.recordings.again():
-                    self.pipeline.push(*before)
-                out.put(MarkedFrame(frame, mark))
-                with self._turns:
-                    self._take_frame(frame, mark)
+        late = intake.backlog.late(frames, intake.waited) if frames else 0
+        for item in items:
+            if isinstance(item, DriveSamples):
+                self._take_drive(item)
+            elif isinstance(item, Frame):
+                self._mark(item, late=late > 0)
+                late -= 1
         replay = self.marker.replay
         if replay is not None and replay.ended != self._ended:
             self._ended = replay.ended  # when its last frames have been processed, not when read
@@ -236,6 +235,33 @@ class Flow:
             self.pipeline.tick_rate = info.tick_rate
         if self.marker.replay is None:
             self._recall.meet(info, self)
+
+    def _mark(self, frame: Frame, *, late: bool) -> None:
+        mark = self.marker.mark(frame, late=late)
+        if mark is not None:
+            for before in self.out.recordings.again():
+                self.pipeline.push(*before)
+            self.out.put(MarkedFrame(frame, mark))
+            with self._turns:
+                self._take_frame(frame, mark)
+
+    def _take_drive(self, drive: DriveSamples) -> None:
+        """Tell where touches are by now; frames alone are recorded."""
+        newest = self.newest
+        if newest is None or self.marker.held:
+            return
+        with self._turns:
+            known = self.pipeline.push_drive(drive)
+        if known is None or not (known.touches or newest.result.touches):
+            return
+        result = replace(
+            newest.result, host_time=known.host_time, scanned=known.host_time, scan_time=0.0,
+            touches=known.touches, events=(),
+        )  # fmt: skip
+        ready = self._clock()
+        latency = ready - drive.host_time + self.intake.waited
+        self.newest = Snapshot(result, self.twin.truth, latency, ready)
+        self.out.tell(result)
 
     def _take_frame(self, frame: Frame, mark: Mark) -> None:
         intake = self.intake

@@ -221,13 +221,13 @@ class Intake:
         now = self._drops + link.frames.foreign, link.counters.corrupt, link.frames.lost
         return Losses(*map(add, self._earlier, now))
 
-    def take(self, link: Link, items: Sequence[Received], now: float) -> list[Frame]:
-        """The frames of a read of ``link`` that was made at ``now``, host s."""
+    def take(self, link: Link, items: Sequence[Received], now: float) -> int:
+        """Take a read of ``link`` that was made at ``now``, host s; how many frames it brought."""
         self._link, self.polled, self.waited = link, now, link.waited
-        frames = []
+        frames = 0
         for item in items:
             if isinstance(item, Frame):
-                frames.append(item)
+                frames += 1
                 self._drops = item.drops
             elif isinstance(item, Event) and item.kind in _STANDSTILL:
                 self.standstill = item.text

@@ -88,6 +88,7 @@ def open_skin(
     *,
     sinks: Sequence[str] = (),
     max_age: float = MAX_AGE,
+    early: bool = False,
 ) -> LiveSkin:
     """A skin that runs, from now on.
 
@@ -104,6 +105,8 @@ def open_skin(
         Where results go too, as for ``--sink``.
     max_age
         Seconds after which a frame is not valid any more.
+    early
+        Whether drives tell of touches before their scan ends, where the board can.
 
     Raises
     ------
@@ -116,6 +119,7 @@ def open_skin(
         partial(open_source, source, prepared.skin),
         sinks=[*map(make_sink, sinks)],
         memory=BoardMemory.in_cache(),
+        early=early,
     )
     runner.start()
     return LiveSkin(runner, max_age)

@@ -118,6 +118,8 @@ class Audience:
         Taken for each frame; those of a robot's skins share them.
     memory
         Where boards are remembered from one start to the next; None: nowhere.
+    early
+        Whether drives tell of touches before their scan ends, where the board can.
     obey
         Has the run do what a listener asks for, as :class:`~tomoskin.files.messages.Stream` says.
     """
@@ -129,7 +131,10 @@ class Audience:
         place: Place | None = None,
         turns: Turns | None = None,
         memory: BoardMemory | None = None,
+        *,
+        early: bool = False,
     ) -> None:
+        self.early = early
         self.clock, self.sinks, self.events = clock, sinks, EventLog()
         self.place, self.turns, self.memory = place, turns or Turns(), memory
         self.obey: Callable[[str, Path], str] | None = None
@@ -241,9 +246,13 @@ class Publisher:
         the rest from one."""
         self.recordings.put(message)
         if isinstance(message, FrameResult | Event):
-            for worker in self._sinks:
-                worker.put(message)
-            self._audience.put(message)
+            self.tell(message)
+
+    def tell(self, message: FrameResult | Event) -> None:
+        """Give to all who listen what is not recorded."""
+        for worker in self._sinks:
+            worker.put(message)
+        self._audience.put(message)
 
     def say(self, kind: str, text: str) -> None:
         """Publish an event of this moment; from any thread."""

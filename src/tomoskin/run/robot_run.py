@@ -70,11 +70,19 @@ class RobotRun:
         By the names of the skins, in their order: what runs each, and what a program reads.
     """
 
-    def __init__(self, members: Sequence[Member], memory: BoardMemory | None = None) -> None:
+    def __init__(
+        self, members: Sequence[Member], memory: BoardMemory | None = None, *, early: bool = False
+    ) -> None:
         turns = Turns()
         self.runners: Mapping[str, Runner] = {
             m.place.name: Runner(
-                m.prepared, m.open, sinks=m.sinks, place=m.place, turns=turns, memory=memory
+                m.prepared,
+                m.open,
+                sinks=m.sinks,
+                place=m.place,
+                turns=turns,
+                memory=memory,
+                early=early,
             )
             for m in members
         }

@@ -85,6 +85,8 @@ class Runner:
         Which of a robot's skins it is, and what its runs share.
     memory
         Where boards are remembered from one start to the next; None: nowhere.
+    early
+        Whether drives tell of touches before their scan ends, where the board can.
 
     Attributes
     ----------
@@ -105,8 +107,9 @@ class Runner:
         place: Place | None = None,
         turns: Turns | None = None,
         memory: BoardMemory | None = None,
+        early: bool = False,
     ) -> None:
-        self.audience = Audience(clock, tuple(sinks), place, turns, memory)
+        self.audience = Audience(clock, tuple(sinks), place, turns, memory, early=early)
         self.audience.obey = self.obey
         self.events = self.audience.events
         self._loop = Loop(prepared, open_transport, self.audience)

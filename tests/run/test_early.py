@@ -1,0 +1,84 @@
+"""Touches that a run tells of before their scan ends, and a recording that holds whole frames."""
+
+from __future__ import annotations
+
+import threading
+from functools import partial
+
+import pytest
+
+from tomoskin.board.source import open_source
+from tomoskin.files.session import SessionReader, replayed
+from tomoskin.model.skin import Skin
+from tomoskin.pipeline import prepare
+from tomoskin.run import Runner, commands
+from tomoskin.twin import Press
+
+PATIENCE = 300
+PRESS = Press(0.02, 0.01, 3.0, 0.006)
+
+
+@pytest.fixture(scope="module")
+def skin():
+    return Skin.load("textile-disc-8")
+
+
+@pytest.fixture(scope="module")
+def results(skin, tmp_path_factory):
+    """All results of a run that is pressed and released, and its recording."""
+    path = tmp_path_factory.mktemp("early") / "early.mcap"
+    opener = partial(open_source, "twin:seed=3", skin)
+    runner, every, news = Runner(prepare(skin), opener, early=True), [], threading.Condition()
+
+    def take(result):
+        with news:
+            every.append(result)
+            news.notify_all()
+
+    def until(true):
+        with news:
+            assert news.wait_for(lambda: every and true(every[-1]), PATIENCE)
+
+    with runner.audience.subscribe("test", take):
+        runner.start()
+        runner.submit(commands.Record(path)).result(PATIENCE)
+        until(lambda result: result.ready)
+        settled = every[-1].sequence + 40  # the noise that drives need has been worked out
+        until(lambda result: result.sequence > settled)
+        runner.submit(commands.HoldPresses("test", (PRESS,)))
+        until(lambda result: result.touches)
+        pressed = every[-1].sequence + 4
+        until(lambda result: result.touches and result.sequence > pressed)
+        runner.submit(commands.HoldPresses("test", ()))
+        until(lambda result: not result.touches)
+        runner.stop()
+    return every, path
+
+
+def test_drives_tell_of_a_touch_between_frames(results):
+    every, _ = results
+    early = [result for result in every if result.scan_time == 0.0]
+    assert any(result.touches for result in early)
+    assert {t.id for result in early for t in result.touches} >= {
+        t.id for result in every if result.scan_time != 0.0 for t in result.touches
+    }
+
+
+def test_where_a_touch_is_told_of_first_no_frame_has_it_yet(results):
+    every, _ = results
+    first = next(n for n, result in enumerate(every) if result.touches)
+    assert every[first].scan_time == 0.0
+    (touch,) = every[first].touches
+    assert touch.detection.sd_x > 3e-3  # a drive or two do not say more
+
+
+def test_the_recording_holds_the_frames_alone(results):
+    every, path = results
+    frames = {r.sequence: r for r in every if r.scan_time != 0.0}
+    with SessionReader(path) as session:
+        again = {r.sequence: r for r in replayed(prepare(session.skin), session)}
+    shared = frames.keys() & again.keys()
+    assert len(shared) > 40
+    for number in shared:
+        mine = [(t.id, t.detection.x, t.detection.y) for t in frames[number].touches]
+        assert mine == [(t.id, t.detection.x, t.detection.y) for t in again[number].touches]
