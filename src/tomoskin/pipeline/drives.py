@@ -7,7 +7,6 @@ touch that has begun, or withdraw it.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -24,7 +23,6 @@ from tomoskin.sensing.fit import (
     NoiseKey,
     Onset,
 )
-from tomoskin.sensing.fit.spot import CONTENT
 from tomoskin.sensing.track import GATE, RESIDUAL
 
 _LIFTED = 5.0
@@ -82,9 +80,7 @@ class _Followed:
         self.moving = moving
         if self.lifted is None:
             self.odds = max(self.odds + min(gone, _MOST), 0.0)
-            left = self.frames is None and RESIDUAL.holds(
-                abs(float(moving.spot[CONTENT])), abs(self.full)
-            )
+            left = RESIDUAL.holds(abs(moving.content), abs(self.full)) and self.frames is None
             self.lifted = moving.time if left or self.odds > _LIFTED else None
 
     def stands(self, touch: Touch, time: float) -> bool:
@@ -194,15 +190,11 @@ class DriveWatch:
         return made
 
     def _begin(self, onset: Onset, time: float, host_time: float, number: int) -> None:
-        prior = self.view.model.prior
-        spot = np.array([*onset.middle, prior.middle[2], onset.spot[CONTENT]])
-        middle = time + self._length / 2
-        moving = MovingTouch.begin(middle, spot, onset.covariance, prior)
+        moving = MovingTouch.of_onset(time + self._length / 2, onset, self.view.model.prior)
         detection = self.view.shown(moving.spot, onset.covariance, onset.ratio)
-        kind = "decrease" if spot[CONTENT] < 0 else "increase"
-        since = host_time - onset.drives * self._length
-        touch = Touch(number, kind, since, detection)
-        self._followed[number] = _Followed(touch, moving, spot[CONTENT], time, frames=0)
+        kind = "decrease" if moving.content < 0 else "increase"
+        touch = Touch(number, kind, host_time - onset.drives * self._length, detection)
+        self._followed[number] = _Followed(touch, moving, moving.content, time, frames=0)
 
     def _follow(self, rows: slice, data: FloatArray, time: float) -> None:
         """Let each touch take its part of the data: what the others do not change."""
@@ -222,23 +214,18 @@ class DriveWatch:
         if known is None:
             known = next((each for each in before.values() if each.frames is not None), None)
         middle = time + self._length * self._drives[-1] / 2
-        spot = self._spot(touch.detection)
         if known is not None and not known.stands(touch, time):
             return known
+        moving = MovingTouch.begin(
+            middle, self.view.spot(touch.detection), _spread(touch.detection), self.view.model.prior
+        )
         if known is not None and known.lifted is None:
             where, spread = known.moving.position()
             off = where - [touch.detection.x, touch.detection.y]
             off = off - known.moving.state[2:4] * (known.moving.time - middle)
-            both = spread + _spread(touch.detection)
-            if off @ np.linalg.solve(both, off) < GATE:
-                return _Followed(touch, known.moving, spot[CONTENT], odds=known.odds)
-        prior = self.view.model.prior
-        moving = MovingTouch.begin(middle, spot, _spread(touch.detection), prior)
-        return _Followed(touch, moving, spot[CONTENT])
-
-    def _spot(self, detection: Detection) -> FloatArray:
-        log_radius, content = math.log(detection.area / math.pi) / 2, self.view.content(detection)
-        return np.array([detection.x, detection.y, log_radius, content])
+            if off @ np.linalg.solve(spread + _spread(touch.detection), off) < GATE:
+                return _Followed(touch, known.moving, moving.content, odds=known.odds)
+        return _Followed(touch, moving, moving.content)
 
     def _shown(self, each: _Followed, time: float) -> Touch:
         """A touch where it is at the end of a drive that began at ``time`` s."""

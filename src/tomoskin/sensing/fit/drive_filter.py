@@ -14,6 +14,7 @@ from functools import lru_cache
 import numpy as np
 
 from tomoskin.core import FloatArray
+from tomoskin.sensing.fit.drive_evidence import Onset
 from tomoskin.sensing.fit.problem import Solver
 from tomoskin.sensing.fit.solver import SheetDomain
 from tomoskin.sensing.fit.spot import CONTENT, LOG_RADIUS, N_PARAMETERS, X, Y
@@ -66,9 +67,20 @@ class MovingTouch:
         spread[range(2, _SIZE), range(2, _SIZE)] = np.square(others)
         return cls(time, state, spread)
 
+    @classmethod
+    def of_onset(cls, time: float, onset: Onset, prior: SpotPrior) -> MovingTouch:
+        """A touch that has begun: nothing is known of its radius."""
+        spot = np.array([*onset.middle, prior.middle[LOG_RADIUS], onset.spot[CONTENT]])
+        return cls.begin(time, spot, onset.covariance, prior)
+
+    @property
+    def content(self) -> float:
+        """The content of the touch, in m²."""
+        return float(self.state[5])
+
     @property
     def spot(self) -> FloatArray:
-        """(4,) as the table takes it."""
+        """(4,) the spot as the table of responses takes it."""
         return np.asarray(self.state[_SPOT])
 
     def at(self, time: float) -> MovingTouch:

@@ -51,7 +51,7 @@ class DriveView:
 
     @property
     def key(self) -> NoiseKey:
-        """What the noise depends on."""
+        """What the noise of the drives depends on."""
         return *self.sight.newest, self.watch.excess, self.residual.doubts
 
     def noise(self) -> tuple[FloatArray, FloatArray]:
@@ -67,10 +67,12 @@ class DriveView:
         """(n_meas,) V of the model, of difference data less what touches have left behind."""
         return self.residual.without(dv / self.sight.scale)
 
-    def content(self, detection: Detection) -> float:
-        """The content of a touch that is shown, m²."""
+    def spot(self, detection: Detection) -> FloatArray:
+        """(4,) of a touch that is shown."""
         part = max(detection.peak / self.skin.conductivity, -0.999)
-        return FILLING * detection.area / math.pi * math.log1p(part)
+        content = FILLING * detection.area / math.pi * math.log1p(part)
+        log_radius = math.log(detection.area / math.pi) / 2
+        return np.array([detection.x, detection.y, log_radius, content])
 
     def shown(self, spot: FloatArray, spread: FloatArray, ratio: float) -> Detection:
         """A ``spot`` (4,) as a detection; its position has the covariance ``spread`` (2, 2) m²."""
