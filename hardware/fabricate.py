@@ -1,8 +1,8 @@
 """From the KiCad projects to what one uploads: ``python hardware/fabricate.py``, or ``make board``.
 
 It runs the rule checks, then writes netlists, bills of materials, and for each board a zip
-(Gerbers, drill files, bill, positions, assembly drawing), the schematic as PDF, pictures of both sides, and into
-build/board STEP and an interactive bill (a page that shows each part on the board).
+(Gerbers, drill files, bill, positions, assembly drawing), the schematic as PDF, pictures of both
+sides, and into build/board STEP and an interactive bill (a page that shows each part on the board).
 ``outputs.toml`` holds the hashes of sources and outputs, so that without KiCad a test can say
 whether they belong together. ``--check`` only checks.
 """
@@ -192,7 +192,9 @@ def _pack(packed: Path, board: Path, bill_file: Path) -> None:
         raw.unlink()
         shutil.copy(bill_file, to / f"{board.stem}-bom.csv")
         drawing = ("--mode-single", "--black-and-white", "--exclude-value", "--layers", ASSEMBLY)
-        kicad("pcb", "export", "pdf", *drawing, "--output", to / f"{board.stem}-assembly.pdf", board)
+        kicad(
+            "pcb", "export", "pdf", *drawing, "--output", to / f"{board.stem}-assembly.pdf", board
+        )
         with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
             for file in sorted(to.iterdir()):
                 archive.writestr(

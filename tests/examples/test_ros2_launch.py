@@ -59,6 +59,12 @@ def launched(monkeypatch: pytest.MonkeyPatch) -> Any:
     return words
 
 
+@pytest.mark.parametrize(("release", "ending"), [("humble", ",release=humble"), ("jazzy", "")])
+def test_the_name_in_the_graph_is_for_the_release(launched: Any, release: str, ending: str) -> None:
+    words = launched(release=release)
+    assert words[words.index("--sink") + 1] == f"ros2:namespace=tomoskin{ending}"
+
+
 def test_the_command_is_that_of_the_arguments(launched: Any) -> None:
     words = launched(
         source="serial:auto", parent="tool0", at="0/0/0.05", calibrations="a.npz b.npz"

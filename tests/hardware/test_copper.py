@@ -107,7 +107,7 @@ def test_the_picos_lines_resist_less_than_contacts():
 
 
 def test_the_picos_tracks_change_its_current_by_less_than_its_parts_may():
-    """What 50 mA lose between reference and sense resistor, and between this and where it is read."""
+    """What 50 mA lose from reference to sense resistor, and from this to where it is read."""
     _, above = PICO.potentials(("U1", "40"), ("R1", "1"), ("U8", "1"))
     whole, part = PICO.potentials(("R1", "2"), ("Q1", "2"), ("R3", "1"))
     assert (abs(above) + whole - part) * 0.05 / 1.225 < 2e-3

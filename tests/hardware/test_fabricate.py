@@ -109,6 +109,13 @@ def test_the_zip_holds_what_a_factory_asks_for(board):
     assert chips - {"U1"} <= placed  # the Pico itself is soldered by hand
 
 
+@pytest.mark.parametrize("board", fabricate.BOARDS)
+def test_a_machine_that_places_parts_has_three_marks_not_in_a_line(board):
+    where = places(fabricate.KICAD / f"{board}.kicad_pcb")
+    (ax, ay), (bx, by), (cx, cy) = (where[f"FID{n}"] for n in (1, 2, 3))
+    assert abs((bx - ax) * (cy - ay) - (cx - ax) * (by - ay)) > 20**2
+
+
 def test_a_changed_source_is_noticed(monkeypatch, tmp_path):
     text = fabricate.MANIFEST.read_text(encoding="utf-8")
     digest = re.search(r'channel\.kicad_sch" = "(\w+)"', text)[1]

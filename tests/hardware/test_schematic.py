@@ -77,6 +77,11 @@ def test_an_amplifier_reads_against_the_electrode_before_the_sink(circuit):
         assert circuit.net_of["U41", str(inputs[sink])] == wanted
 
 
+def test_the_clamp_behind_10_kohm_leaks_little(circuit):
+    clamps = {circuit.parts[f"D{n}02"].value for n in range(1, circuit.channels + 1)}
+    assert clamps == {"BAV199"}
+
+
 def test_the_dump_closes_at_once_and_opens_late(circuit):
     """The diode lets the gate of the dump's transistor rise at once: its cathode is at the gate."""
     assert circuit.net_of["D21", "1"] == circuit.net_of["Q22", "1"]

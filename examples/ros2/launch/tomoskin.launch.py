@@ -4,6 +4,8 @@ The command ``tomoskin`` must be on the PATH, with the extra ``ros2``. Arguments
 as in ``source:=serial:/dev/ttyACM0 parent:=tool0 at:=0/0/0.05``.
 """
 
+import os
+
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, ExecuteProcess, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
@@ -17,6 +19,7 @@ ARGUMENTS = {
     "parent": ("", "link of the robot that the skin lies on"),
     "at": ("", "pose of the skin there: X/Y/Z or X/Y/Z/ROLL/PITCH/YAW, m and rad"),
     "folder": ("", "where recordings go; without it nodes cannot ask for any"),
+    "release": (os.environ.get("ROS_DISTRO", ""), "of ROS 2, whose nodes see the skin's name"),
     "port": ("8765", "of the page"),
 }
 
@@ -30,6 +33,8 @@ def command(given):
         for file in given["calibrations"].split():
             words += ["--calibration", file]
     options = [f"{k}={given[k]}" for k in ("namespace", "parent", "at", "folder") if given[k]]
+    if given["release"] == "humble":
+        options.append("release=humble")
     sink = f"ros2:{','.join(options)}"
     return ["tomoskin", "live", *words, "--sink", sink, "--port", given["port"]]
 

@@ -116,7 +116,7 @@ def known_benchmarks() -> dict[str, Benchmark]:
 
 
 def load_benchmark(name: str) -> ModuleType:
-    """A module of the folder."""
+    """Import a module of the folder."""
     with _on_path():
         return importlib.import_module(name)
 

@@ -57,8 +57,8 @@ class Flow:
         What the board said of itself, once it has.
     pipeline, marker, twin, out
         What makes results, what marks frames, what presses the source, and where messages go.
-    intake
-        What comes from the source.
+    intake, turns
+        What comes from the source, and when it may compute.
     latency, costs
         How long all that takes, and what the slowest frames took it for.
     """
@@ -74,7 +74,7 @@ class Flow:
             prepared, audience, lambda: self.pipeline.numbered, partial(_board, self)
         )
         self.latency, self.costs = Latency(), CostMeter(time.perf_counter)
-        self._clock, self._turns, self._early = audience.clock, audience.turns, audience.early
+        self._clock, self.turns, self._early = audience.clock, audience.turns, audience.early
         self._recall, self.intake = Recall(audience.memory), Intake()
         self._ended = False
 
@@ -110,10 +110,6 @@ class Flow:
             tap=lambda host_time, data: self.out.put(RawRead(host_time, data)),
         )
 
-    def unlink(self) -> None:
-        """The protocol session is over; another may follow."""
-        self.intake.close()
-
     def adopt(self, prepared: Prepared) -> Future[None] | None:
         """Go on with other settings; nothing is done where they are of another sheet or scan."""
         if prepared.skin.body != self.prepared.skin.body:
@@ -145,7 +141,7 @@ class Flow:
         late = intake.backlog.late(frames, intake.waited) if frames else 0
         for item in items:
             if isinstance(item, DriveSamples):
-                self._take_drive(item)
+                _tell_drive(self, item)
             elif isinstance(item, Frame):
                 self._mark(item, late=late > 0)
                 late -= 1
@@ -242,26 +238,8 @@ class Flow:
             for before in self.out.recordings.again():
                 self.pipeline.push(*before)
             self.out.put(MarkedFrame(frame, mark))
-            with self._turns:
+            with self.turns:
                 self._take_frame(frame, mark)
-
-    def _take_drive(self, drive: DriveSamples) -> None:
-        """Tell where touches are by now; frames alone are recorded."""
-        newest = self.newest
-        if newest is None or self.marker.held:
-            return
-        with self._turns:
-            known = self.pipeline.push_drive(drive)
-        if known is None or not (known.touches or newest.result.touches):
-            return
-        result = replace(
-            newest.result, host_time=known.host_time, scanned=known.host_time, scan_time=0.0,
-            touches=known.touches, events=(),
-        )  # fmt: skip
-        ready = self._clock()
-        latency = ready - drive.host_time + self.intake.waited
-        self.newest = Snapshot(result, self.twin.truth, latency, ready)
-        self.out.tell(result)
 
     def _take_frame(self, frame: Frame, mark: Mark) -> None:
         intake = self.intake
@@ -288,6 +266,25 @@ class Flow:
         self.newest = Snapshot(result, _truth(self, frame), decode + ready - begun, ready)
         self._recall.see(result, self)
         self.out.put(result)
+
+
+def _tell_drive(flow: Flow, drive: DriveSamples) -> None:
+    """Tell where touches are by now; frames alone are recorded."""
+    newest = flow.newest
+    if newest is None or flow.marker.held:
+        return
+    with flow.turns:
+        known = flow.pipeline.push_drive(drive)
+    if known is None or not (known.touches or newest.result.touches):
+        return
+    result = replace(
+        newest.result, host_time=known.host_time, scanned=known.host_time, scan_time=0.0,
+        touches=known.touches, events=(),
+    )  # fmt: skip
+    ready = flow.now()
+    latency = ready - drive.host_time + flow.intake.waited
+    flow.newest = Snapshot(result, flow.twin.truth, latency, ready)
+    flow.out.tell(result)
 
 
 def _dropped(flow: Flow) -> int:

@@ -109,7 +109,7 @@ class Loop:
         except TomoskinError as error:
             self._report("source-lost", str(error))
         finally:
-            flow.unlink()
+            flow.intake.close()  # another session may follow
 
     def _report(self, kind: str, trouble: str) -> None:
         """Say why no frames come, unless that is known already."""

@@ -79,8 +79,7 @@ class RobotRun:
                 m.prepared,
                 m.open,
                 sinks=m.sinks,
-                place=m.place,
-                turns=turns,
+                robot=(m.place, turns),
                 memory=memory,
                 early=early,
             )

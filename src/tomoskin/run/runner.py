@@ -81,8 +81,8 @@ class Runner:
         Host monotonic seconds, the same as in ``Frame.host_time``.
     sinks
         Where results go, beside those who take :attr:`newest`; a slow one delays nobody.
-    place, turns
-        Which of a robot's skins it is, and what its runs share.
+    robot
+        Which of a robot's skins it is, and the turns that its runs share.
     memory
         Where boards are remembered from one start to the next; None: nowhere.
     early
@@ -104,11 +104,11 @@ class Runner:
         *,
         clock: Callable[[], float] = time.monotonic,
         sinks: Sequence[Sink] = (),
-        place: Place | None = None,
-        turns: Turns | None = None,
+        robot: tuple[Place, Turns] | None = None,
         memory: BoardMemory | None = None,
         early: bool = False,
     ) -> None:
+        place, turns = robot or (None, None)
         self.audience = Audience(clock, tuple(sinks), place, turns, memory, early=early)
         self.audience.obey = self.obey
         self.events = self.audience.events

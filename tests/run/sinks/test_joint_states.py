@@ -22,7 +22,8 @@ from tomoskin.files.messages import Stream
 from tomoskin.model.robot import Robot
 from tomoskin.pipeline import prepare
 from tomoskin.run import with_joints
-from tomoskin.run.sinks import JointStates, joint_states
+from tomoskin.run.sinks import joint_states
+from tomoskin.run.sinks.joint_states import JointStates
 
 __all__ = ["domain"]
 

@@ -12,7 +12,7 @@ from threadpoolctl import threadpool_limits
 from tomoskin.core import Detection, FloatArray
 from tomoskin.learning.kind import Progress, silent
 from tomoskin.learning.touch.per_channel import Rotations
-from tomoskin.learning.touch.posterior import Estimates, doubt
+from tomoskin.learning.touch.posterior import Estimates
 from tomoskin.learning.touch.presses import Features, Presses, Strength, frames, mean_about
 from tomoskin.learning.touch.session_alignment import SessionAlignment
 from tomoskin.learning.touch.stacking import (
@@ -208,7 +208,7 @@ class Locator:
         present = np.isfinite(given[:, self.features.rows]).mean(axis=1)
         wide = _bounded(
             present[:, None, None] ** -_MISSING * covariance
-            + doubt(strangeness)[:, None, None] ** 2 * np.eye(2)
+            + self.estimates.doubt(strangeness)[:, None, None] ** 2 * np.eye(2)
             + _label_spread(self.presses, self.region, answer)
         )
         return self.region.metres(answer), self.region.unit**2 * wide, strangeness

@@ -4,19 +4,16 @@ from tomoskin.model.robot.pose import Pose, pose_numbers, quaternion
 from tomoskin.model.robot.robot import (
     FRAME,
     SECTIONS,
-    JointPositions,
     Place,
     PlacedSkin,
     Robot,
     add_skin,
 )
-from tomoskin.model.robot.urdf import LinkSolid, Urdf
+from tomoskin.model.robot.urdf import Urdf
 
 __all__ = [
     "FRAME",
     "SECTIONS",
-    "JointPositions",
-    "LinkSolid",
     "Place",
     "PlacedSkin",
     "Pose",

@@ -1,7 +1,7 @@
 """Where results go while they are made: Foxglove, MQTT, LSL, ROS 2, and others by name."""
 
 from tomoskin.files.messages import Contact, Contacts, Item, Naming, Stream
-from tomoskin.run.sinks.joint_states import JointStates, joint_states
+from tomoskin.run.sinks.joint_states import joint_states
 from tomoskin.run.sinks.sink import (
     Sink,
     SinkConsumer,
@@ -16,7 +16,6 @@ __all__ = [
     "Contact",
     "Contacts",
     "Item",
-    "JointStates",
     "Naming",
     "Sink",
     "SinkConsumer",

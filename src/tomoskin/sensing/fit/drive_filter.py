@@ -75,12 +75,12 @@ class MovingTouch:
 
     @property
     def content(self) -> float:
-        """The content, m²."""
+        """The content of the touch, in m²."""
         return float(self.state[5])
 
     @property
     def spot(self) -> FloatArray:
-        """(4,) as the table takes it."""
+        """(4,) the spot as the table of responses takes it."""
         return np.asarray(self.state[_SPOT])
 
     def at(self, time: float) -> MovingTouch:

@@ -51,7 +51,7 @@ class DriveView:
 
     @property
     def key(self) -> NoiseKey:
-        """What the noise depends on."""
+        """What the noise of the drives depends on."""
         return *self.sight.newest, self.watch.excess, self.residual.doubts
 
     def noise(self) -> tuple[FloatArray, FloatArray]:

@@ -180,7 +180,7 @@ class SpotModel:
 
     @cached_property
     def sheet(self) -> SheetDomain:
-        """Where touches may be."""
+        """The sheet that touches may be on."""
         return SheetDomain(self.response.spots.mesh)
 
     def _solver_of(self, table: ResponseTable) -> Solver:
