@@ -310,8 +310,15 @@ static uint16_t on_ticks(void) {
                : (uint16_t)((UINT32_C(500000) / config.frequency - config.dead_time) / US_PER_TICK);
 }
 
-/* Memory for frames, or for drives. */
+/* What is not being sent is forgotten; what is goes on. */
+static void forget(void) {
+    filling = taken ? after(oldest()) : 0u;
+    waiting = taken;
+}
+
+/* Memory for frames, or for drives; nothing of the other kind waits in it. */
 static void share(void) {
+    forget();
     scan.singly = config_singly();
     n_slots = scan.singly ? DRIVES : FRAMES;
     uint16_t room = scan.singly ? ROOM(MOST_DRIVE_SAMPLES) : ROOM(MOST_FRAME);
@@ -351,10 +358,7 @@ void scan_order(uint8_t identity, const uint8_t *drives, uint8_t count) {
 void scan_stop(void) {
     halt();
     fault.code = 0u;
-    if (taken) { /* what is being sent goes on */
-        filling = after(oldest());
-    }
-    waiting = taken;
+    forget();
 }
 
 bool scan_running(void) {

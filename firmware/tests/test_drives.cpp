@@ -223,6 +223,25 @@ TEST_F(Singly, AfterDrivesAFrameIsWholeAgain) {
     expect_frames(frames);
 }
 
+TEST_F(Singly, FramesBehindAnyNumberOfDrivesStayInTheirMemory) {
+    drives.assign(26, {15, 14, 0xFFFF});  // long frames
+    oversampling = 1;
+    for (unsigned ms = 5; ms < 45; ms++) {
+        SCOPED_TRACE(ms);
+        machine.power_on();
+        scan_singly();
+        machine.run_us(ms * 1000);
+        EXPECT_EQ(ask({MSG_STOP}), RESULT_OK);
+        EXPECT_EQ(set_format(FORMAT_SIXTEEN), RESULT_OK);
+        machine.heard();
+        EXPECT_EQ(start(), RESULT_OK);
+        machine.run_us(120'000);
+        auto frames = of(MSG_FRAME, machine.heard());
+        ASSERT_GT(frames.size(), 2u);
+        expect_frames(frames);
+    }
+}
+
 TEST_F(Singly, ASlowLineBreaksTurnsAndCountsThem) {
     scan_singly();
     for (int k = 0; k < 10; k++) {

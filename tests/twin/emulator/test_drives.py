@@ -83,6 +83,22 @@ def test_the_megas_drives(
         check_orders(link, scan, expected)
 
 
+def test_drives_shorter_than_their_messages_make_the_host_ask_for_whole_scans(
+    programs: Programs, tmp_path: Path
+) -> None:
+    scan = Scan.of(Pattern.adjacent(8))
+    settings = replace(SINGLY, oversampling=1, settling=0.0)
+    with (
+        running(programs.emulator, tmp_path / "port", str(programs.elf)) as board,
+        Link(SerialTransport(board.path), scan, settings) as link,
+    ):
+        items = polled(link, Frame, 60)
+        frames = [item for item in items if isinstance(item, Frame)]
+        assert "whole-scans" in [item.kind for item in items if isinstance(item, Event)]
+        assert {tuple(frame.samples.tolist()) for frame in frames} == {tuple(star_counts(1, scan))}
+        assert not any(isinstance(item, DriveSamples) for item in polled(link, Frame, 20))
+
+
 @pytest.mark.parametrize(("electrodes", "most_ms"), [(8, 0.8), (16, 1.2)])
 def test_a_drive_of_the_mega_is_told_within_a_millisecond(
     programs: Programs, tmp_path: Path, electrodes: int, most_ms: float
