@@ -32,6 +32,7 @@
 #define LEAST_DEAD_CYCLES 16ull
 #define OFF 0xFFu
 #define SCANS_CYCLES (CLOCK / 5u) /* after the last drive it no longer scans */
+#define BREAK_CYCLES 1600u        /* between two drives; without any a host waits for an answer */
 #define BOOTLOADER_CYCLES CLOCK /* a second, as on a Mega 2560 */
 
 /* Places in data space. */
@@ -393,7 +394,8 @@ static void run(void) {
     if (stack >= 0x200u && stack < watch->lowest_stack) { /* not yet set up: 0 */
         watch->lowest_stack = stack;
     }
-    if (opened != 0 && heard != 0 && before - heard > watch->longest_deaf) {
+    bool scans = source != OFF || heard < opened + BREAK_CYCLES;
+    if (opened != 0 && heard != 0 && scans && before - heard > watch->longest_deaf) {
         watch->longest_deaf = before - heard;
     }
     if (listening || looks_at_line(at)) {

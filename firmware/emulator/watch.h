@@ -17,7 +17,7 @@ struct watch {
     uint64_t resets;       /* after power-on */
     uint64_t lowest_stack; /* address that the stack pointer has come down to */
     uint64_t said;         /* cycles from the end of a drive to that of the last message */
-    uint64_t longest_deaf; /* cycles without a look at the line, at most, after the first drive */
+    uint64_t longest_deaf; /* cycles without a look at the line, at most, while it scans */
     uint64_t spent[WATCH_WORDS]; /* cycles in the instruction at each word */
     int64_t net[WATCH_CHANNELS]; /* of pairs, by the lower channel: cycles from the other one to it, less
                                     those from it to the other */

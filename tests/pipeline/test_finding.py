@@ -86,9 +86,9 @@ def test_what_moves_in_a_scan_follows_the_pace_of_the_board(fitted):
         beside = FitConditions(fitted, reference, fitted=False, interval=interval).touch_fit()
         assert isinstance(finder, FitFinder)
         assert beside is not None
-        reach[interval] = finder._spots._reach
+        reach[interval] = finder.spots._reach
         other = inspect.getclosurevars(beside.detect).nonlocals["finder"]
-        assert other._spots._reach == pytest.approx(EXHAUSTIVE.speed / LIVE.speed * reach[interval])
+        assert other.spots._reach == pytest.approx(EXHAUSTIVE.speed / LIVE.speed * reach[interval])
     assert reach[1.4e-3] == pytest.approx(1.4e-3 * LIVE.speed)
     assert reach[0.2] == reach[np.nan] == pytest.approx(0.055 * LIVE.speed, rel=0.1)
 
@@ -100,5 +100,5 @@ def test_noise_that_is_not_known_is_the_read_outs(fitted):
         finder = finder_of(fitted, reference)
         assert isinstance(finder, FitFinder)
     louder = replace(fitted, readout=replace(fitted.readout, noise=3 * fitted.readout.noise))
-    quiet, loud = (finder_of(p, None)._spots._sight._noise for p in (fitted, louder))
+    quiet, loud = (finder_of(p, None).spots._sight._noise for p in (fitted, louder))
     assert np.linalg.norm(loud) == pytest.approx(9 * np.linalg.norm(quiet), rel=0.1)

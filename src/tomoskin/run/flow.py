@@ -152,10 +152,6 @@ class Flow:
                 out.say("replay-damaged", f"the replay ends here: {replay.damage}")
             out.wake()
 
-    def news(self, trouble: str | None) -> News:
-        """The newest result, and why no others come; ``trouble``: why there is no source."""
-        return self.newest, trouble or self.intake.standstill
-
     def contacts(self, news: News) -> Contacts:
         """A result as it leaves the program, not valid where no others come."""
         stream, (newest, trouble) = self.out.stream, news

@@ -237,7 +237,8 @@ class Runner:
     @property
     def news(self) -> News:
         """What :meth:`contacts_of` makes contacts of, at no cost: another pair is other news."""
-        return self._loop.flow.news(self._loop.trouble)
+        flow = self._loop.flow
+        return flow.newest, self._loop.trouble or flow.intake.standstill
 
     def contacts_of(self, news: News) -> Contacts:
         """The contacts of a result that :attr:`news` gave."""
