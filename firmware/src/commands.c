@@ -80,9 +80,7 @@ static void stop(void) {
 static struct verdict start(const uint8_t *payload) {
     struct verdict said = config_check_start(get_u16(payload + AT_START_CONFIGURATION));
     if (said.result == RESULT_OK) {
-        hal_lock();
         scan_start();
-        hal_unlock();
     }
     return said;
 }

@@ -338,12 +338,13 @@ void scan_start(void) {
     scan.on_ticks = on_ticks();
     order.identity = order.count = 0u;
     share();
-    hal_listen();
     demodulator_clear();
     hal_adc_prepare(config.prescaler, config_conversions());
+    hal_lock();
     begin_turn();
     begin_message();
     begin_drive();
+    hal_unlock();
 }
 
 void scan_order(uint8_t identity, const uint8_t *drives, uint8_t count) {

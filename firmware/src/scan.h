@@ -42,7 +42,7 @@ struct scan_fault {
 void scan_on_timer(void);
 void scan_on_sample(uint16_t sum);
 
-/* The configuration must be complete. Under lock. */
+/* The configuration must be complete, and no scan may run. Not under lock. */
 void scan_start(void);
 
 /* Which drives are scanned from the end of the present one on, checked; none: full turns. Under lock. */
