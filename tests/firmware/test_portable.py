@@ -67,8 +67,8 @@ MUTANTS = {
         "(uint8_t)(scan.upper >> (2u * (4u - scan.group)))",
         "scan.upper",
     ),
-    "drops not counted": ("scan.c", "(uint16_t)(scan.drops + 1u)", "scan.drops"),
-    "a frame overwritten while it is sent": ("scan.c", "        filling ^= 1u;\n", ""),
+    "drops not counted": ("scan.c", "        scan.drops++;\n", ""),
+    "a frame overwritten while it is sent": ("scan.c", "    filling = after(filling);\n", ""),
     "the first conversion lost": (
         "scan.c",
         "hal_adc_prepare(config.prescaler, config_conversions());",
@@ -148,13 +148,18 @@ def test_the_portable_part_passes_and_is_covered(googletest):
     assert googletest["branch_percent"] >= LEAST_BRANCHES
 
 
+@pytest.mark.parametrize("name", MUTANTS)
+def test_a_mutant_has_its_place(name):
+    file, old, _ = MUTANTS[name]
+    assert (FIRMWARE / "src" / file).read_text(encoding="utf-8").count(old) == 1
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", MUTANTS)
 def test_a_mutant_is_caught(name, googletest, tmp_path):
     assert googletest
     file, old, new = MUTANTS[name]
     text = (FIRMWARE / "src" / file).read_text(encoding="utf-8")
-    assert text.count(old) == 1, f"{name}: its place is gone or not the only one"
     mutant, program = tmp_path / file, tmp_path / "mutant"
     mutant.write_text(text.replace(old, new), encoding="utf-8")
     with_object = f"OBJECT={file[:-2]}.o"
