@@ -22,7 +22,7 @@ def at_one_moment(prepared, lost=()):
     return SimpleNamespace(
         prepared=prepared,
         newest=SimpleNamespace(result=result),
-        status=lambda: SimpleNamespace(choice=prepared.choice),
+        flow=SimpleNamespace(pipeline=SimpleNamespace(choice=prepared.choice)),
     )
 
 
