@@ -37,8 +37,13 @@ class Watched:
         self.page.set_default_timeout(PATIENCE)
         self.page.on("console", self._console)
         self.page.on("pageerror", lambda error: self.wrong.append(str(error)))
-        self.page.on("requestfailed", lambda request: self.wrong.append(request.url))
+        self.page.on("requestfailed", self._failed)
         self.page.on("response", self._response)
+
+    def _failed(self, request):
+        # another navigation may take the place of one that has begun
+        if not (request.is_navigation_request() and request.failure == "net::ERR_ABORTED"):
+            self.wrong.append(f"{request.url}: {request.failure}")
 
     def open(self):
         self.page.goto(self.site.policy.address)
