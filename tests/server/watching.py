@@ -41,8 +41,7 @@ class Watched:
         self.page.on("response", self._response)
 
     def _failed(self, request):
-        # another navigation may take the place of one that has begun
-        if not (request.is_navigation_request() and request.failure == "net::ERR_ABORTED"):
+        if request.failure != "net::ERR_ABORTED":  # a page that is left asks whether it is refused
             self.wrong.append(f"{request.url}: {request.failure}")
 
     def open(self):
