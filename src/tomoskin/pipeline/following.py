@@ -154,9 +154,7 @@ class Following:
 
     def push(self, measured: Voltages) -> FrameResult:
         """Take the voltages of one frame all the way to touches."""
-        for _ in range(self._steps):
-            self._tune()
-            self._refind()
+        self._prepare_anew()
         reach("voltages")
         conditioned = self.conditioning.condition(measured)
         if conditioned.differences is None:
@@ -249,6 +247,14 @@ class Following:
         if learnt.image and (reference := conditioning.reference) is not None:
             self._imaging.renew(conditioning.prepared, reference, conditioning.subspace())
         self._is_outdated |= learnt.image or learnt.touches
+
+    def _prepare_anew(self) -> None:
+        """As many steps as the time between two frames allows, while there is something to do."""
+        for _ in range(self._steps):
+            if self._tuning is None and self._renewal is None and not self._is_outdated:
+                return
+            self._tune()
+            self._refind()
 
     def _refind(self) -> None:
         """One step towards a finder of what is known now; what there is serves meanwhile."""
