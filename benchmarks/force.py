@@ -1,4 +1,5 @@
-"""Newtons: presses on the twin and a real fingertip, the bound, and what materials remember."""
+"""Newtons and millimetres: presses on the twin, a real fingertip and a hydrogel, the bounds, and
+what materials remember."""
 
 from __future__ import annotations
 
@@ -10,21 +11,36 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.optimize import minimize
+from scipy.spatial.distance import cdist
 
 from bench_rig import evenly, far_apart, gap
 from report import Floats, Report, available, rms, table
 from tomoskin.core import Detection
-from tomoskin.learning import ForceModel, ForceProcess, WeighedPresses, identify
-from tomoskin.twin import Press
+from tomoskin.learning import AmountModel, AmountProcess, LabelledPresses, identify
+from tomoskin.twin import Press, TwinSettings
 from touch_lab import TwinLab
 
+Tips = Sequence[float]
 SKIN = "textile-disc-16"
 SETS = ({11: 8e-3, 12: 10e-3, 13: 12e-3}, {21: 10e-3, 22: 12e-3, 23: 8e-3})
 """Radius of the tip of each seed, given to nobody. Tips of 6 to 15 mm in any order are refused as
 contradictory labels: twenty presses do not teach a size. The second set was never chosen by."""
 
-LIGHT, HEAVY = 2.0, 20.0
-LABELLED, WEIGHED = 20, (0.5, 1.0, 0.5)
+SPAN = {"force": (2.0, 20.0), "depth": (0.2e-3, 1.1e-3)}
+"""What presses are taught, and asked, with: N; m of the 1.2 that the foam can be squeezed."""
+
+DEPTHS: tuple[tuple[Mapping[int, Tips], int], ...] = (
+    ({41: (8e-3,), 42: (10e-3,), 43: (12e-3,)}, 20),
+    (dict.fromkeys((51, 52, 53), (0.008, 0.009, 0.01, 0.011, 0.012)), 20),
+    (dict.fromkeys((54, 55, 56), (0.008, 0.009, 0.01, 0.011, 0.012)), 60),
+)
+"""Radii of the tips of each seed, one of which makes each press; how many presses are labelled."""
+
+MOST = TwinSettings.preset("textile").contact.lock * 3e-3
+"""M by which the foam can be squeezed."""
+
+LABELLED, STAGES = 20, (0.5, 1.0, 0.5)
 HELD_OUT, PAIRS, LOOP = 20, 10, (0.2, 0.5, 0.8, 1.0, 0.8, 0.5, 0.2)
 FRAMES, BETWEEN, APART, NEAR = 5, 0.1, 0.06, 0.025
 
@@ -45,14 +61,22 @@ def run(data: Path | None) -> Iterator[Report]:
     )
     yield table(
         "force of held-out presses on the twin's textile, 16 electrodes",
-        (row for tips in SETS for row in _twin(tips)),
-        f"learnt: {LABELLED} presses of {LIGHT:.0f} to {HEAVY:.0f} N, each weighed half-way up, at "
-        "the top and half-way down",
+        (row for tips in SETS for row in _twin({k: (r,) for k, r in tips.items()}, "force")),
+        f"learnt: {LABELLED} presses of 2 to 20 N, each weighed half-way up, at the top and "
+        "half-way down",
         f"asked: {HELD_OUT} other presses and {PAIRS} pairs, seven forces each on the way up and "
-        f"down, from {LIGHT:.0f} N to a top of 4 to {HEAVY:.0f} N; means of {FRAMES} frames",
+        f"down, from 2 N to a top of 4 to 20 N; means of {FRAMES} frames",
         "tips of 8, 10 and 12 mm radius in the first seeds, 10, 12 and 8 in the others; the method "
         "knows neither, and was chosen on the first",
         "variation: of force over true force, over presses; cost: of a frame beyond the fit",
+    )
+    yield table(
+        "depth of held-out presses on the twin's textile, 16 electrodes",
+        (row for tips, labelled in DEPTHS for row in _twin(tips, "depth", labelled)),
+        "as the forces above, with depths of 0.2 to 1.1 mm and a top from 0.3 mm on; the foam is "
+        "3 mm thick and gives way by 1.2 at most",
+        "tips: radii, one of which makes each press, taught and asked; the method knows none, and "
+        "was chosen on seeds 11 to 13 and 31 to 33",
     )
     folder = available(data, "eskin_fingertip8", "strip_stretch")
     if folder is None:
@@ -60,9 +84,16 @@ def run(data: Path | None) -> Iterator[Report]:
     yield table(
         "a real fingertip",
         _fingertip(folder / "eskin_fingertip8" / "A2.npz"),
-        "ForceProcess, which only Python offers, on eskin_fingertip8/A2; newtons presumably; the "
+        "AmountProcess, which only Python offers, on eskin_fingertip8/A2; newtons presumably; the "
         "labels have steps of 0.01. The components that count were chosen by presses left out of "
         "the learning of fold 5",
+    )
+    yield table(
+        "depth classes of a real hydrogel skin",
+        _hydrogel(folder / "eskin_hydrogel_round"),
+        "AmountProcess on eskin_hydrogel_round, 16 electrodes: 10, 15 and 20 mm of robot travel; "
+        "the nearest class counts. Plain: a Gaussian process with one kernel on the changes, its "
+        "three numbers by their likelihood",
     )
     yield table(
         "what real materials remember",
@@ -76,46 +107,52 @@ def run(data: Path | None) -> Iterator[Report]:
 
 @dataclass(frozen=True)
 class Shown:
-    """One stage of a press: true force N, what was found of it if anything, the press, s."""
+    """One stage of a press: true amount, what was found of it if anything, the press, s."""
 
-    force: float
+    amount: float
     detection: Detection | None
     press: int
     time: float
 
 
 class Scale:
-    """A twin whose presses are weighed; each begins on a sheet that nothing has touched."""
+    """A twin whose presses are measured; each begins on a sheet that nothing has touched."""
 
-    def __init__(self, seed: int, radii: Sequence[float], skin: str = SKIN) -> None:
+    def __init__(self, seed: int, radii: Tips, of: str = "force", skin: str = SKIN) -> None:
         self.lab = TwinLab(skin, "textile", seed)
         self.random = np.random.default_rng(seed)
-        self.radii = radii
+        self.radii, self.of = radii, of
         self.finder = self.lab.by_fit()
 
     def pressed(
         self, tops: Floats, steps: Sequence[float], number: int
     ) -> Iterator[tuple[float, list[Shown]]]:
-        """Time s and what is shown of each of ``tops`` N, at every step of the way up and down."""
+        """Time s and what is shown of each of ``tops``, at every step of the way up and down."""
         lab = self.lab
         places = self._places(len(tops))
         radii = self.random.choice(self.radii, len(tops))
         lab.board.sheet.renew()
         self.finder.push(lab.shown(0 * lab.reference.mean))
         for step in steps:
-            forces = LIGHT + (tops - LIGHT) * step
+            amounts = SPAN[self.of][0] + (tops - SPAN[self.of][0]) * step
             lab.board.sheet.set_presses(tuple(
-                Press(float(x), float(y), float(f), float(r))
-                for (x, y), f, r in zip(places, forces, radii, strict=True)
+                self._press(float(x), float(y), float(amount), float(r))
+                for (x, y), amount, r in zip(places, amounts, radii, strict=True)
             ))  # fmt: skip
             found = self.finder.push(lab.shown(self._volts() - lab.reference.mean))
             yield (
                 lab.time,
                 [
-                    Shown(float(f), _nearest(found, place), number, lab.time)
-                    for f, place in zip(forces, places, strict=True)
+                    Shown(float(amount), _nearest(found, place), number, lab.time)
+                    for amount, place in zip(amounts, places, strict=True)
                 ],
             )
+
+    def _press(self, x: float, y: float, amount: float, radius: float) -> Press:
+        if self.of == "force":
+            return Press(x, y, amount, radius)
+        one = self.lab.board.sheet.depth_under(Press(x, y, 1.0, radius))
+        return Press(x, y, (amount / (MOST - amount)) / (one / (MOST - one)), radius)
 
     def _volts(self) -> Floats:
         lab, total = self.lab, 0.0
@@ -158,48 +195,51 @@ class Weighed:
         return float(np.nanstd(np.nanmean(self.ratio, axis=1)))
 
 
-def calibrated(scale: Scale) -> ForceModel:
+def calibrated(scale: Scale, labelled: int = LABELLED) -> AmountModel:
     """Learnt from labelled presses."""
-    tops = LIGHT + (HEAVY - LIGHT) * (np.arange(LABELLED) * 0.618 % 1)
+    least, most = SPAN[scale.of]
+    tops = least + (most - least) * (np.arange(labelled) * 0.618 % 1)
     shown = [
         one
         for number, top in enumerate(tops)
-        for _, stage in scale.pressed(np.array([top]), WEIGHED, number)
+        for _, stage in scale.pressed(np.array([top]), STAGES, number)
         for one in stage
         if one.detection is not None
     ]
-    presses = WeighedPresses.of(
+    presses = LabelledPresses.of(
         [one.detection for one in shown],
-        *(np.array([getattr(one, key) for one in shown]) for key in ("force", "press", "time")),
+        *(np.array([getattr(one, key) for one in shown]) for key in ("amount", "press", "time")),
+        scale.of,
     )
-    return ForceModel.fit(presses, scale.lab.prepared.skin)
+    return AmountModel.fit(presses, scale.lab.prepared.skin)
 
 
-def _weighed(scale: Scale, model: ForceModel, count: int, presses: int) -> Weighed:
+def _weighed(scale: Scale, model: AmountModel, count: int, presses: int) -> Weighed:
     ratio = np.full((presses, count, len(LOOP)), np.nan)
     held, taken = ratio.copy(), []
     for number in range(presses):
-        tops, state = scale.random.uniform(4.0, HEAVY, count), None
+        least, most = SPAN[scale.of]
+        tops, state = scale.random.uniform(least + (most - least) / 9, most, count), None
         for step, (now, stage) in enumerate(scale.pressed(tops, LOOP, number)):
             seen = [k for k, one in enumerate(stage) if one.detection is not None]
             began = time.process_time()
-            forces, state = model.read(state, [stage[k].detection for k in seen], now)
+            amounts, state = model.read(state, [stage[k].detection for k in seen], now)
             taken.append(1e3 * (time.process_time() - began))
-            for k, force in zip(seen, forces, strict=True):
-                ratio[number, k, step] = force.newtons / stage[k].force
-                held[number, k, step] = force.low <= stage[k].force <= force.high
+            for k, amount in zip(seen, amounts, strict=True):
+                ratio[number, k, step] = amount.value / stage[k].amount
+                held[number, k, step] = amount.low <= stage[k].amount <= amount.high
     missed = int(np.isnan(ratio).sum())
     return Weighed(
         ratio.reshape(-1, len(LOOP)), held.reshape(-1, len(LOOP)), missed, np.median(taken)
     )
 
 
-def _twin(tips: Mapping[int, float]) -> Iterator[dict[str, Any]]:
+def _twin(tips: Mapping[int, Tips], of: str, labelled: int = LABELLED) -> Iterator[dict[str, Any]]:
     by_count: dict[int, list[Weighed]] = {1: [], 2: []}
     left_out = []
-    for seed, radius in tips.items():
-        scale = Scale(seed, (radius,))
-        model = calibrated(scale)
+    for seed, radii in tips.items():
+        scale = Scale(seed, radii, of)
+        model = calibrated(scale, labelled)
         left_out.append(np.abs(model.errors).mean())
         for (count, some), presses in zip(by_count.items(), (HELD_OUT, PAIRS), strict=True):
             some.append(_weighed(scale, model, count, presses))
@@ -207,6 +247,12 @@ def _twin(tips: Mapping[int, float]) -> Iterator[dict[str, Any]]:
         yield {
             "contacts": contacts,
             "seeds": ", ".join(map(str, tips)),
+            "tips mm": ", ".join(
+                "/".join(f"{1e3 * r:.0f}" for r in radii) for radii in tips.values()
+            )
+            if of == "depth"
+            else "",
+            "labelled": labelled,
             "each": ", ".join(_percent(w.error) for w in some),
             "mean error": _percent(np.mean([w.error for w in some])),
             "in 90 % interval": _percent(np.mean([w.inside for w in some])),
@@ -237,7 +283,7 @@ def _fingertip(path: Path) -> Iterator[dict[str, Any]]:
     tests = {f"every tenth row, {fold} of 10": row % 10 == fold for fold in FOLDS}
     tests |= {name: (order >= low) & (order < high) for name, (low, high) in BLOCKS.items()}
     for name, test in tests.items():
-        model = ForceProcess.fit(before[~test], during[~test], force[~test])
+        model = AmountProcess.fit(before[~test], during[~test], force[~test])
         found, low, high = model.predict(before[test], during[test])
         true = force[test]
         yield {
@@ -248,6 +294,58 @@ def _fingertip(path: Path) -> Iterator[dict[str, Any]]:
             "in 90 % interval": _percent(((low <= true) & (true <= high)).mean()),
             "by presses left out": round(float(np.abs(model.left_out - force[~test]).mean()), 4),
         }
+
+
+def _hydrogel(folder: Path) -> Iterator[dict[str, Any]]:
+    for name in ("round16_single550", "round16_single500_ohmc"):
+        with np.load(folder / f"{name}.npz") as kept:
+            rest, pressed, depth = (kept[k].astype(float) for k in ("v_up", "v_down", "depth_mm"))
+        order = np.arange(len(depth)) / len(depth)
+        for rows, test in {
+            "the last tenth": order >= 0.9,
+            "every tenth": np.arange(len(depth)) % 10 == 5,
+        }.items():
+            model = AmountProcess.fit(rest[~test], pressed[~test], depth[~test])
+            ours = model.predict(rest[test], pressed[test])
+            change = pressed - rest
+            plain = _plain(change[~test], depth[~test], change[test])
+            row = {"recording, left out": f"{name}, {rows}", "presses": int(test.sum())}
+            for method, (found, low, high) in {"": ours, "plain: ": plain}.items():
+                levels = np.unique(depth)
+                nearest = levels[np.abs(found[:, None] - levels).argmin(axis=1)]
+                row |= {
+                    f"{method}class right": _percent((nearest == depth[test]).mean()),
+                    f"{method}error mm": round(float(np.abs(found - depth[test]).mean()), 2),
+                    f"{method}in 90 % interval": _percent(
+                        ((low <= depth[test]) & (depth[test] <= high)).mean()
+                    ),
+                }
+            yield row
+
+
+def _plain(data: Floats, labels: Floats, asked: Floats) -> tuple[Floats, Floats, Floats]:
+    """Mean, 5 % and 95 % point of a Gaussian process with one kernel."""
+    scale = data.std(axis=0)
+    own, cross = (cdist(one / scale, data / scale, "sqeuclidean") for one in (data, asked))
+    rest = labels - labels.mean()
+
+    def parts(logs: Floats) -> tuple[Floats, Floats]:
+        size, length, noise = np.exp(logs)
+        return size * np.exp(-own / (2 * length)) + noise * np.eye(len(own)), size * np.exp(
+            -cross / (2 * length)
+        )
+
+    def unlikely(logs: Floats) -> float:
+        lower = np.linalg.cholesky(parts(logs)[0])
+        return float(0.5 * (np.linalg.solve(lower, rest) ** 2).sum() + np.log(np.diag(lower)).sum())
+
+    first = np.log([rest.var(), np.median(own), rest.var() / 10])
+    logs = minimize(unlikely, first, method="Nelder-Mead", options={"maxiter": 200}).x
+    covariance, near = parts(logs)
+    weights = np.linalg.solve(covariance, near.T)
+    variance = np.exp(logs[0]) + np.exp(logs[2]) - (near * weights.T).sum(axis=1)
+    middle, half = labels.mean() + weights.T @ rest, 1.645 * np.sqrt(variance)
+    return middle, middle - half, middle + half
 
 
 def _materials(folder: Path) -> Iterator[dict[str, Any]]:

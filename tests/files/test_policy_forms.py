@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tomoskin.core import Force
+from tomoskin.core import Amount
 from tomoskin.files.messages import FIELDS, SLOTS, Contacts, PolicyForms, Slots, Stream
 from tomoskin.files.session import Session
 from tomoskin.model.skin import Skin
@@ -44,11 +44,11 @@ def touched(results):
     return next(r for r in reversed(results) if r.touches)
 
 
-def forced(result, newtons, *, calibrated=True):
-    """The result with a force of its touch."""
+def forced(result, newtons, depth=None):
+    """The result with a force of its touch, and perhaps a depth."""
     (touch,) = result.touches
-    force = Force(newtons, 0.9 * newtons, 1.1 * newtons, calibrated)
-    detection = replace(touch.detection, force=force)
+    force = Amount(newtons, 0.9 * newtons, 1.1 * newtons)
+    detection = replace(touch.detection, force=force, depth=depth)
     return replace(result, touches=(replace(touch, detection=detection),))
 
 
@@ -75,11 +75,14 @@ def test_points_are_touches_with_motion_and_force(session, results, touched):
     assert not view.points[1:].any()
 
 
-def test_a_force_that_is_not_calibrated_says_so(session, touched):
+def test_a_force_and_a_depth_that_are_not_calibrated_say_so(session, touched):
     forms = PolicyForms(session.prepared)
-    forms.push(forced(touched, 3.0, calibrated=False))
-    assert forms.at().point_mask[0].tolist() == [True, False]
+    forms.push(forced(touched, 3.0, Amount(5e-4, 4e-4, 7e-4)))
+    known = [column(forms.at().slots, name)[0] for name in ("depth_valid", "depth", "force_valid")]
+    assert known == [1, 5e-4, 1]
     forms.push(touched)
+    assert forms.at().point_mask[0].tolist() == [True, False]
+    assert column(forms.at().slots, "depth_valid")[0] == 0
     view = forms.at()
     assert (view.points[0, 8], view.map_valid) == (0, False)
     assert np.isfinite(view.map).all()

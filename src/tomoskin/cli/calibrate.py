@@ -17,7 +17,7 @@ import numpy as np
 import typer
 
 from tomoskin.cli.app import group
-from tomoskin.cli.calibrate_labels import ALONG_Y, bends, class_examples, forces, weighed
+from tomoskin.cli.calibrate_labels import ALONG_Y, amounts, bends, class_examples, labelled_presses
 from tomoskin.cli.calibrate_reports import (
     class_facts,
     class_lines,
@@ -30,7 +30,7 @@ from tomoskin.cli.named_files import SKIN, ForceFlag, Reads, Writes, with_option
 from tomoskin.cli.named_parts import Recorded, labelled_frames, reconstructed
 from tomoskin.cli.options import CalibrationOut, KnownSkinOption, ReferenceOption, SkinOption
 from tomoskin.cli.output import Bar, JsonFlag, remark, tell
-from tomoskin.core import DataError, FloatArray, write_text
+from tomoskin.core import MEASURANDS, DataError, FloatArray, write_text
 
 if TYPE_CHECKING:
     from tomoskin.core import IntArray
@@ -221,6 +221,15 @@ class Unit(StrEnum):
     KG = "kg"
 
 
+class Length(StrEnum):
+    """The unit in which labels of depth are given."""
+
+    UM = "um"
+    MM = "mm"
+    CM = "cm"
+    M = "m"
+
+
 @_kind("force", "Frames; some have a label with their force.")
 def force(
     labelled: Recorded,
@@ -235,30 +244,67 @@ def force(
     unit: Annotated[Unit, typer.Option(help="Unit of the forces.")] = Unit.N,
 ) -> LearningOutcome:
     """Learn the force of touches from presses with known weights, all by the same tip."""
-    from tomoskin.learning import FORCE, NEWTONS, ForceModel, ForceReport
+    return _amount(
+        labelled,
+        "force",
+        weight,
+        unit,
+        "forces are valid for the tip that pressed: a tip of another size changes the sheet "
+        "differently",
+    )
+
+
+@_kind("depth", "Frames; some have a label with the depth of their press.")
+def depth(
+    labelled: Recorded,
+    depth: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="DEPTH=A:B",
+            help="Label: in frames A to B-1 the tip stood so deep below the untouched sheet. Can "
+            "be repeated. Default: depth_m of the file.",
+        ),
+    ] = None,
+    unit: Annotated[
+        Length | None,
+        typer.Option(help="Unit of the depths. Default: mm of --depth, m of the file's."),
+    ] = None,
+) -> LearningOutcome:
+    """Learn the depth of touches from presses of known depth, by tips such as will press later."""
+    return _amount(
+        labelled,
+        "depth",
+        depth,
+        unit,
+        "depths are valid for tips like those that pressed: a small deep one looks like a large "
+        "shallow one, and intervals hold what the taught tips differ by",
+    )
+
+
+def _amount(
+    labelled: Recorded, name: str, given: list[str] | None, unit: str | None, advice: str
+) -> LearningOutcome:
+    from tomoskin.learning import KINDS, MEASURED, AmountModel, AmountReport
     from tomoskin.pipeline import prepare
 
-    skin, path = labelled.drawn, labelled.path
-    newtons = NEWTONS[unit.value] * forces(path, len(labelled.recording), weight)
+    skin, path, of = labelled.drawn, labelled.path, MEASURED[name]
+    amount = amounts(path, len(labelled.recording), given, unit, of)
     with Bar("preparing"):
         prepared = prepare(skin)
     with Bar("finding touches") as bar:
         result = reconstructed(labelled, prepared, None, bar)
-    presses = weighed(path, result, newtons, labelled.data.time)
+    presses = labelled_presses(path, result, amount, labelled.data.time, of)
     with Bar("learning"):
-        model = ForceModel.fit(presses, skin)
-    report = ForceReport.of(model)
-    facts = asdict(report)
+        model = AmountModel.fit(presses, skin)
+    report = AmountReport.of(model)
+    facts = asdict(report) | {"unit": MEASURANDS[name]}
     facts["held_by_90_percent_intervals"] = facts.pop("held")
-    lines = [
-        report.text,
-        "forces are valid for the tip that pressed: a tip of another size changes the sheet "
-        "differently",
-    ]
+    lines = [facts.pop("text"), advice]
     for doubtful in report.remarks:
         who = "" if doubtful.press is None else f"press {doubtful.press:>4}  uncertain: "
         lines.append(f"{who}{doubtful.reason}")
-    return LearningOutcome(FORCE.of(model, labelled.pattern, skin).write, facts, lines)
+    kind = next(kind for kind in KINDS if kind.name == name)
+    return LearningOutcome(kind.of(model, labelled.pattern, skin).write, facts, lines)
 
 
 @_kind("class", "Frames; some have a label with their class.", KnownSkinOption)

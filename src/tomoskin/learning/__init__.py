@@ -1,19 +1,20 @@
-"""What is learnt from examples: touch positions, forces, classes, bends, channel mapping."""
+"""What is learnt from examples: positions, forces and depths, classes, bends, mapping."""
 
 from pathlib import Path
 from typing import Any
 
 from tomoskin.core import DataError, StrPath, load_arrays
+from tomoskin.learning.amount.amount_model import AmountModel
+from tomoskin.learning.amount.amount_process import AmountProcess
+from tomoskin.learning.amount.amount_report import DEPTH, FORCE, AmountReport, least_known
+from tomoskin.learning.amount.identify import identify
+from tomoskin.learning.amount.labelled_presses import LabelledPresses
+from tomoskin.learning.amount.measurand import MEASURED, Measurand, Weight
 from tomoskin.learning.bend.bend_model import BendModel
 from tomoskin.learning.bend.bend_reader import BENDS, BendReader, BendReading
 from tomoskin.learning.bend.recorded_bends import BendExamples, JointReference
 from tomoskin.learning.classes.classifier import CLASSES, Answers, Classifier, ClassReading
 from tomoskin.learning.classes.examples import Codes, Examples, against_rest
-from tomoskin.learning.force.force_model import ForceModel
-from tomoskin.learning.force.force_report import FORCE, ForceReport, least_known
-from tomoskin.learning.force.identify import identify
-from tomoskin.learning.force.measured import ForceProcess
-from tomoskin.learning.force.weighed_presses import NEWTONS, WeighedPresses, Weight
 from tomoskin.learning.kind import (
     Calibration,
     Differences,
@@ -39,7 +40,7 @@ from tomoskin.learning.touch.session_alignment import SessionAlignment
 from tomoskin.learning.touch.several import Several
 from tomoskin.learning.touch.watch import Watch
 
-KINDS: tuple[Kind[Any], ...] = (TOUCH, FORCE, BENDS, CLASSES)
+KINDS: tuple[Kind[Any], ...] = (TOUCH, FORCE, DEPTH, BENDS, CLASSES)
 """Every kind whose calibrations are applied to frames, in the order in which they are applied."""
 
 
@@ -58,10 +59,14 @@ def load_calibration(path: StrPath, progress: Progress = silent) -> Calibration[
 __all__ = [
     "BENDS",
     "CLASSES",
+    "DEPTH",
     "FORCE",
     "KINDS",
-    "NEWTONS",
+    "MEASURED",
     "TOUCH",
+    "AmountModel",
+    "AmountProcess",
+    "AmountReport",
     "Answers",
     "BendExamples",
     "BendModel",
@@ -75,22 +80,20 @@ __all__ = [
     "Codes",
     "Differences",
     "Examples",
-    "ForceModel",
-    "ForceProcess",
-    "ForceReport",
     "FrameView",
     "JointReference",
     "Kind",
+    "LabelledPresses",
     "LeftOut",
     "Locator",
     "MappingAnswer",
+    "Measurand",
     "Presses",
     "Rubbing",
     "SessionAlignment",
     "Several",
     "TouchFit",
     "Watch",
-    "WeighedPresses",
     "Weight",
     "against_rest",
     "detection_at",

@@ -9,7 +9,14 @@ from typing import Any
 import numpy as np
 
 from tomoskin.core import DataError, Detection, FloatArray, Touch, WireError
-from tomoskin.learning import FORCE, ForceModel, ForceReport, WeighedPresses, Weight, least_known
+from tomoskin.learning import (
+    FORCE,
+    AmountModel,
+    AmountReport,
+    LabelledPresses,
+    Weight,
+    least_known,
+)
 from tomoskin.pipeline import FrameResult, Prepared
 from tomoskin.server.guided_flow import Estimate, GuidedFlow, counted
 from tomoskin.server.page_messages import Figures, Phase, Point, WeightNow
@@ -197,8 +204,8 @@ class WeighFlow(GuidedFlow):
         """Estimate the forces of touches from these weights."""
         if len(examples) < _FEWEST:
             return Estimate(f"{_placements(_FEWEST - len(examples))} more for a first answer")
-        model = ForceModel.fit(weighed_presses(examples), self.prepared.skin)
-        report = ForceReport.of(model)
+        model = AmountModel.fit(weighed_presses(examples), self.prepared.skin)
+        report = AmountReport.of(model)
         return Estimate(
             f"{report.text}. {_advice(report)}",
             least_known(model, self._dots.places),
@@ -225,10 +232,10 @@ class WeighFlow(GuidedFlow):
         }
 
 
-def weighed_presses(examples: tuple[Weighed, ...]) -> WeighedPresses:
+def weighed_presses(examples: tuple[Weighed, ...]) -> LabelledPresses:
     """What is learnt from: of each placement the way there, labelled where it lies still.
 
-    Raises DataError as :meth:`WeighedPresses.of` does.
+    Raises DataError as :meth:`LabelledPresses.of` does.
     """
     detections = [d for one in examples for d in one.placement.detections]
     length = [len(one.placement.detections) for one in examples]
@@ -237,10 +244,10 @@ def weighed_presses(examples: tuple[Weighed, ...]) -> WeighedPresses:
     force[still] = [one.weight.newtons for one in examples]
     press = np.repeat(np.arange(len(examples)), length)
     time = np.concatenate([one.placement.time for one in examples])
-    return WeighedPresses.of(detections, force, press, time)
+    return LabelledPresses.of(detections, force, press, time)
 
 
-def _advice(report: ForceReport) -> str:
+def _advice(report: AmountReport) -> str:
     n = report.presses
     if n < _ENOUGH:
         return f"Ten placements are a start: {_placements(_ENOUGH - n)} more."

@@ -14,7 +14,7 @@ from tomoskin.model.mesh import Outline, Plane, Surface, laid_on, triangulate
 from tomoskin.model.skin import Skin
 from tomoskin.twin import material
 from tomoskin.twin.bend import Pose, depth_of, strain_of
-from tomoskin.twin.dent import indent
+from tomoskin.twin.dent import depth_under, indent
 from tomoskin.twin.material import MaterialState
 from tomoskin.twin.presets import TwinSettings
 from tomoskin.twin.probe import Probe, check_on_skin
@@ -57,6 +57,11 @@ class _Loading:
         if presses != self.now[0][0]:
             taken = tuple(presses)
             self.now = (taken, indent(taken, *self._ground)), self.now[1]
+
+    def depth_under(self, probe: Probe) -> float:
+        """M by which the sheet gives way under it."""
+        contact, _, blur = self._ground
+        return depth_under(probe, contact, blur)
 
     def bend(self, pose: Pose) -> None:
         """Bend and stretch; GeometryError when the sheet cannot take that shape."""
@@ -167,6 +172,10 @@ class TwinSkin:
     def pose(self) -> Pose:
         """How the sheet is bent and stretched now."""
         return self._loading.now[1][0]
+
+    def depth_under(self, probe: Probe) -> float:
+        """M by which the sheet gives way under a ``probe`` that presses alone."""
+        return self._loading.depth_under(probe)
 
     @property
     def load(self) -> FloatArray:

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from files.session.runs import TOUCH
 from run.sinks.conftest import EPOCH, EVENT, MESH, VALUES, contacts_at, result_at, touch_of
-from tomoskin.core import Event, Force
+from tomoskin.core import Amount, Event
 from tomoskin.files.messages import (
     TOPICS,
     TYPES,
@@ -210,7 +210,7 @@ def test_contacts_say_where_and_which_way(stream):
 
 
 def pushing(touch, newtons):
-    force = Force(newtons, 0.5 * newtons, 2 * newtons)
+    force = Amount(newtons, 0.5 * newtons, 2 * newtons)
     return replace(touch, detection=replace(touch.detection, force=force))
 
 

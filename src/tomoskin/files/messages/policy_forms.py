@@ -25,6 +25,7 @@ SLOTS = 5
 FIELDS = (
     *("valid", "present", "id", "x", "y", "z", "dx", "dy", "dz", "nx", "ny", "nz"),
     *("sd_x", "sd_y", "sd_z", "force_valid", "force", "strength"),
+    *("depth_valid", "depth"),
 )
 """Columns of a slot; :meth:`Slots.table` says what they mean."""
 
@@ -55,7 +56,7 @@ class Slots:
         something touches, and ``present`` 1 where something does. ``x`` to ``nz`` are position,
         its change since the touch began, both along the surface, and normal in the frame of the
         contacts, m; ``force`` is in N against the normal, and ``force_valid`` 1 where it is
-        calibrated; ``strength`` is in the image's unit.
+        calibrated; ``strength`` is in the image's unit; ``depth``, m, is as ``force``.
     """
 
     ids: tuple[int, ...] = (0,) * SLOTS
@@ -91,11 +92,13 @@ def _kept(ids: tuple[int, ...], touches: tuple[Touch, ...]) -> tuple[int, ...]:
 def _row(contact: Contact, onset: FloatArray) -> list[float]:
     touch, position, spread = contact.touch, np.array(contact.position), contact.covariance
     deviation = [UNKNOWN_SD] * 3 if spread is None else np.sqrt(np.maximum(np.diag(spread), 0))
-    force = touch.detection.force
-    newtons = (0.0, 0.0) if force is None else (float(force.calibrated), force.newtons)
+    force, depth = (
+        (0.0, 0.0) if amount is None else (1.0, amount.value)
+        for amount in (touch.detection.force, touch.detection.depth)
+    )
     moved = position - onset
-    return [1.0, touch.id, *position, *moved, *contact.normal, *deviation, *newtons,
-            touch.detection.peak]  # fmt: skip
+    return [1.0, touch.id, *position, *moved, *contact.normal, *deviation, *force,
+            touch.detection.peak, *depth]  # fmt: skip
 
 
 def last_before(times: FloatArray, moments: FloatArray, count: int) -> IntArray:
@@ -128,7 +131,7 @@ class PolicyView:
     points, point_mask
         (SLOTS, 9) position m, displacement m and force N in x, y, z; and (SLOTS, 2) whether there
         is a touch and whether its force is calibrated. Displacement is along the surface, since
-        the touch began: the depth of an indentation is not measured.
+        the touch began; the depth of an indentation is in ``slots``.
     map, map_mask, map_valid
         (size, size) N/cm², or change of conductance in the image's unit, the top row first; where
         the sheet is; and whether it shows all that touches: the forces of all touches are known.
@@ -303,5 +306,5 @@ class _Grid:
             apart = (self.x - spot.x) ** 2 + (self.y[:, None] - spot.y) ** 2
             apart = np.where(self.mask, apart, np.inf)
             under = apart <= max(spot.area / np.pi, float(apart.min()))
-            drawn[under] += spot.force.newtons / (cell * np.count_nonzero(under))
+            drawn[under] += spot.force.value / (cell * np.count_nonzero(under))
         return drawn

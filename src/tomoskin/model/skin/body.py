@@ -94,6 +94,11 @@ class SurfaceSection(Section, section="surface"):
     unit: str = key(
         Choice(("mm", "cm", "m")), "Unit of the file's coordinates.", default="mm", shape="file"
     )
+    layer: float | None = key(
+        Quantity("length", "mm", 0.05, 1000),
+        "Thickness of the soft layer under the sheet, which no press can exceed.",
+        default=None,
+    )
 
 
 class ElectrodesSection(Section, section="electrodes"):
