@@ -1,5 +1,4 @@
-"""Newtons and millimetres: presses on the twin, a real fingertip and a hydrogel, the bounds, and
-what materials remember."""
+"""Newtons and millimetres: presses on the twin, a real fingertip and a hydrogel, and the bound."""
 
 from __future__ import annotations
 
@@ -15,9 +14,9 @@ from scipy.optimize import minimize
 from scipy.spatial.distance import cdist
 
 from bench_rig import evenly, far_apart, gap
-from report import Floats, Report, available, rms, table
+from report import Floats, Report, available, table
 from tomoskin.core import Detection
-from tomoskin.learning import AmountModel, AmountProcess, LabelledPresses, identify
+from tomoskin.learning import AmountModel, AmountProcess, LabelledPresses
 from tomoskin.twin import Press, TwinSettings
 from touch_lab import TwinLab
 
@@ -46,8 +45,6 @@ FRAMES, BETWEEN, APART, NEAR = 5, 0.1, 0.06, 0.025
 
 FOLDS = (2, 5)
 BLOCKS = {"a block in the middle, 45 to 57 %": (0.45, 0.57), "the last 12 %": (0.88, 1.0)}
-TIMES = (3.0, 10.0, 30.0, 100.0, 300.0)
-STRAIN_WIDTHS = (0.02, 0.05, 0.1)
 
 
 def run(data: Path | None) -> Iterator[Report]:
@@ -78,7 +75,7 @@ def run(data: Path | None) -> Iterator[Report]:
         "tips: radii, one of which makes each press, taught and asked; the method knows none, and "
         "was chosen on seeds 11 to 13 and 31 to 33",
     )
-    folder = available(data, "eskin_fingertip8", "strip_stretch")
+    folder = available(data, "eskin_fingertip8", "eskin_hydrogel_round")
     if folder is None:
         return
     yield table(
@@ -94,14 +91,6 @@ def run(data: Path | None) -> Iterator[Report]:
         "AmountProcess on eskin_hydrogel_round, 16 electrodes: 10, 15 and 20 mm of robot travel; "
         "the nearest class counts. Plain: a Gaussian process with one kernel on the changes, its "
         "three numbers by their likelihood",
-    )
-    yield table(
-        "what real materials remember",
-        _materials(folder),
-        "root mean square of what the model leaves, % of the span",
-        "strip: log of the resistance between the inner contacts against strain; the kinds of "
-        "memory were chosen with this recording in view, their numbers on the part named",
-        "fingertip: force against indentation, each run by itself",
     )
 
 
@@ -346,49 +335,6 @@ def _plain(data: Floats, labels: Floats, asked: Floats) -> tuple[Floats, Floats,
     variance = np.exp(logs[0]) + np.exp(logs[2]) - (near * weights.T).sum(axis=1)
     middle, half = labels.mean() + weights.T @ rest, 1.645 * np.sqrt(variance)
     return middle, middle - half, middle + half
-
-
-def _materials(folder: Path) -> Iterator[dict[str, Any]]:
-    strip = _strip(folder / "strip_stretch" / "1_10_E4pin_20mm_v4_0p3Strain.npz")
-    ends = {"stretch alone": 440.0, "until 10 s after release": 472.0, "all": np.inf}
-    for what, until in ends.items():
-        yield _identified(f"strip, {what}", strip, strip[0] < until, STRAIN_WIDTHS)
-    for name in ("A1", "A2", "F1"):
-        with np.load(folder / "eskin_fingertip8" / f"straight_{name}.npz") as kept:
-            series = tuple(kept[key].astype(float) for key in ("times", "positions", "forces"))
-        up = np.arange(len(series[0])) <= np.argmax(series[1]) + 15
-        yield _identified(f"fingertip {name}, in and 30 s out", series, up, (1.0, 2.0, 4.0, 8.0))
-
-
-def _strip(path: Path) -> tuple[Floats, Floats, Floats]:
-    """Time s, strain and log resistance: two polarities and ten readings make a value."""
-    with np.load(path) as kept:
-        columns = kept["columns"].astype(float)
-    ten = len(columns) // 20
-    pairs = columns[: 20 * ten].reshape(ten, 20, -1)
-    t, answer = pairs[:, :, 2].mean(axis=1), np.log(pairs[:, :, 1].mean(axis=1))
-    stands = np.diff(columns[:, 3], prepend=columns[0, 3]) < 11.0  # one reading fell to 0
-    load = -np.interp(t, columns[stands, 4], columns[stands, 3]) / 40.0
-    return t, load, answer - answer[t < 140].mean()
-
-
-def _identified(
-    name: str, series: tuple[Floats, ...], fitted: Floats, widths: Sequence[float]
-) -> dict[str, Any]:
-    t, load, answer = series
-    memory = {"widths": widths, "times": TIMES}
-    models: dict[str, dict[str, Any]] = {
-        "no memory": {},
-        "creep and play": memory,
-        "with breakdown": memory | {"breakdown_times": TIMES},
-    }
-    row: dict[str, Any] = {"recording, fitted on": name}
-    for model, options in models.items():
-        fit = identify(t[fitted], load[fitted], answer[fitted], **options)
-        off = (fit.predicted(t, load) - answer) / np.ptp(answer)
-        rest = _percent(rms(off[~fitted])) if (~fitted).any() else "–"
-        row |= {f"{model}: fitted": _percent(rms(off[fitted])), f"{model}: held out": rest}
-    return row
 
 
 def _percent(part: float) -> str:

@@ -13,9 +13,8 @@ from tomoskin.learning import (
     AmountModel,
     AmountProcess,
     LabelledPresses,
-    identify,
 )
-from tomoskin.model.skin import MaterialMemory, MemoryState, Skin, advanced, responses
+from tomoskin.model.skin import MaterialMemory, MemoryState, Skin, advanced
 from tomoskin.model.skin.hysteresis import response
 
 SHEET, UNIT = 0.1, 0.1
@@ -284,43 +283,6 @@ def test_one_press_alone_cannot_be_checked():
         AmountModel.learn(
             LabelledPresses.of(touches, forces, np.zeros(len(forces), int), time), SHEET, UNIT
         )
-
-
-# What a material remembers, from a recording.
-
-STRIP = MaterialMemory(
-    play=(0.4,), play_widths=(0.1,), creep=(0.2,), creep_times=(30.0,),
-    breakdown=(0.8,), breakdown_times=(3.0,),
-)  # fmt: skip
-
-
-def recording(memory=STRIP):
-    time = np.arange(0.0, 400.0, 1.0)
-    load = 0.3 * np.clip(np.interp(time, [0, 50, 60, 200, 210, 400], [0, 0, 1, 1, 0, 0]), 0, 1)
-    return time, load, responses(memory, time, load, gauge=2.0)
-
-
-def test_a_memory_is_identified_from_what_it_did():
-    time, load, answer = recording()
-    grids = {"widths": (0.05, 0.1, 0.2), "times": (10.0, 30.0, 100.0)}
-    found = identify(time, load, answer, breakdown_times=(1.0, 3.0, 10.0), **grids)
-    assert found.residual < 0.01 * np.ptp(answer)
-    assert found.predicted(time, load) == pytest.approx(answer, abs=0.03 * np.ptp(answer))
-    assert identify(time, load, answer).residual > 10 * found.residual
-
-
-def test_what_teaches_nothing_is_refused():
-    time, load, answer = recording()
-    with pytest.raises(DataError, match="load never changes"):
-        identify(time, 0 * load, answer)
-    with pytest.raises(DataError, match="does not rise with the load"):
-        identify(time, load, -answer)
-    with pytest.raises(DataError, match="time decreases at value 200"):
-        identify(np.where(np.arange(400) == 200, 0.0, time), load, answer)
-    with pytest.raises(DataError, match="of the same length"):
-        identify(time, load[1:], answer)
-    with pytest.raises(DataError, match="response is not finite at value 3"):
-        identify(time, load, np.where(np.arange(400) == 3, np.nan, answer))
 
 
 # Newtons from measurements.

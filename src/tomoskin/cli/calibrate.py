@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
@@ -30,7 +30,7 @@ from tomoskin.cli.named_files import SKIN, ForceFlag, Reads, Writes, with_option
 from tomoskin.cli.named_parts import Recorded, labelled_frames, reconstructed
 from tomoskin.cli.options import CalibrationOut, KnownSkinOption, ReferenceOption, SkinOption
 from tomoskin.cli.output import Bar, JsonFlag, remark, tell
-from tomoskin.core import MEASURANDS, DataError, FloatArray, write_text
+from tomoskin.core import DataError, FloatArray, write_text
 
 if TYPE_CHECKING:
     from tomoskin.core import IntArray
@@ -213,21 +213,11 @@ def rub(labelled: Recorded) -> LearningOutcome:
     )
 
 
-class Unit(StrEnum):
-    """The unit in which labels of force are given."""
+Unit = StrEnum("Unit", {"N": "N", "G": "g", "KG": "kg"})
+"""Units in which labels of force are given."""
 
-    N = "N"
-    G = "g"
-    KG = "kg"
-
-
-class Length(StrEnum):
-    """The unit in which labels of depth are given."""
-
-    UM = "um"
-    MM = "mm"
-    CM = "cm"
-    M = "m"
+Length = StrEnum("Length", {"UM": "um", "MM": "mm", "CM": "cm", "M": "m"})
+"""Units in which labels of depth are given."""
 
 
 @_kind("force", "Frames; some have a label with their force.")
@@ -284,7 +274,7 @@ def depth(
 def _amount(
     labelled: Recorded, name: str, given: list[str] | None, unit: str | None, advice: str
 ) -> LearningOutcome:
-    from tomoskin.learning import KINDS, MEASURED, AmountModel, AmountReport
+    from tomoskin.learning import KINDS, MEASURED, AmountModel, report_of
     from tomoskin.pipeline import prepare
 
     skin, path, of = labelled.drawn, labelled.path, MEASURED[name]
@@ -296,11 +286,9 @@ def _amount(
     presses = labelled_presses(path, result, amount, labelled.data.time, of)
     with Bar("learning"):
         model = AmountModel.fit(presses, skin)
-    report = AmountReport.of(model)
-    facts = asdict(report) | {"unit": MEASURANDS[name]}
-    facts["held_by_90_percent_intervals"] = facts.pop("held")
+    facts = report_of(model)
     lines = [facts.pop("text"), advice]
-    for doubtful in report.remarks:
+    for doubtful in model.remarks:
         who = "" if doubtful.press is None else f"press {doubtful.press:>4}  uncertain: "
         lines.append(f"{who}{doubtful.reason}")
     kind = next(kind for kind in KINDS if kind.name == name)

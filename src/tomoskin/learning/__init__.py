@@ -6,8 +6,7 @@ from typing import Any
 from tomoskin.core import DataError, StrPath, load_arrays
 from tomoskin.learning.amount.amount_model import AmountModel
 from tomoskin.learning.amount.amount_process import AmountProcess
-from tomoskin.learning.amount.amount_report import DEPTH, FORCE, AmountReport, least_known
-from tomoskin.learning.amount.identify import identify
+from tomoskin.learning.amount.amount_report import DEPTH, FORCE, least_known, report_of
 from tomoskin.learning.amount.labelled_presses import LabelledPresses
 from tomoskin.learning.amount.measurand import MEASURED, Measurand, Weight
 from tomoskin.learning.bend.bend_model import BendModel
@@ -66,7 +65,6 @@ __all__ = [
     "TOUCH",
     "AmountModel",
     "AmountProcess",
-    "AmountReport",
     "Answers",
     "BendExamples",
     "BendModel",
@@ -98,10 +96,10 @@ __all__ = [
     "against_rest",
     "detection_at",
     "growth_of_errors",
-    "identify",
     "least_known",
     "load_calibration",
     "quiet_electrodes",
+    "report_of",
     "ring_of",
     "solve_channel_mapping",
     "worse",

@@ -12,10 +12,10 @@ from tomoskin.core import DataError, Detection, FloatArray, Touch, WireError
 from tomoskin.learning import (
     FORCE,
     AmountModel,
-    AmountReport,
     LabelledPresses,
     Weight,
     least_known,
+    report_of,
 )
 from tomoskin.pipeline import FrameResult, Prepared
 from tomoskin.server.guided_flow import Estimate, GuidedFlow, counted
@@ -205,15 +205,14 @@ class WeighFlow(GuidedFlow):
         if len(examples) < _FEWEST:
             return Estimate(f"{_placements(_FEWEST - len(examples))} more for a first answer")
         model = AmountModel.fit(weighed_presses(examples), self.prepared.skin)
-        report = AmountReport.of(model)
         return Estimate(
-            f"{report.text}. {_advice(report)}",
+            f"{report_of(model)['text']}. {_advice(model)}",
             least_known(model, self._dots.places),
             ready=True,
             figures=Figures(
                 errors=model.errors.tolist(),
-                doubtful=[r.press for r in report.remarks if r.press is not None],
-                remarks=[_of_press(r.press) + r.reason for r in report.remarks],
+                doubtful=[r.press for r in model.remarks if r.press is not None],
+                remarks=[_of_press(r.press) + r.reason for r in model.remarks],
             ),
             answer=model,
         )
@@ -247,11 +246,11 @@ def weighed_presses(examples: tuple[Weighed, ...]) -> LabelledPresses:
     return LabelledPresses.of(detections, force, press, time)
 
 
-def _advice(report: AmountReport) -> str:
-    n = report.presses
+def _advice(model: AmountModel) -> str:
+    n = len(np.unique(model.presses.press[model.presses.labelled]))
     if n < _ENOUGH:
         return f"Ten placements are a start: {_placements(_ENOUGH - n)} more."
-    if report.remarks:
+    if model.remarks:
         return "These would be enough without the problems below."
     if n < _GOOD:
         return "Ten are enough to begin with, twenty are good."

@@ -199,7 +199,7 @@ def make_shard(plan: SetPlan, shard: int) -> Arrays:
         "drive": table.drive,
         "measure": table.measure,
         "identity": np.array(f"{plan.identity} {shard} {len(voltages)}"),
-    } | _labels(presses, plan.population.count[1], lab.depth_under)
+    } | _labels(presses, plan.population.count[1], lab.sheet.depth_under)
 
 
 class _Lab:
@@ -209,20 +209,17 @@ class _Lab:
         self.skin = Skin.from_toml(plan.skin, source="skin of the set")
         self._scans = Scans(self.skin, TwinSettings.preset(plan.preset, plan.seed))
         self._readout = Readout.of(self._scans.scan, self.skin.readout)
+        self.sheet = self._scans.electronics.sheet
         idle = np.random.SeedSequence(plan.seed, spawn_key=(0,))
         self.reference: FloatArray = self.read(
             [()] * REFERENCE_FRAMES, plan.population.hold, idle
         ).mean(axis=0)
 
-    def depth_under(self, probe: Probe) -> float:
-        """M by which the sheet gives way under it."""
-        return self._scans.electronics.sheet.depth_under(probe)
-
     def read(
         self, presses: list[tuple[Probe, ...]], hold: float, noise: np.random.SeedSequence
     ) -> FloatArray:
         """(n, n_meas) V: each frame of a sheet that nothing pressed before, after ``hold`` s."""
-        sheet, frame = self._scans.electronics.sheet, self._scans.frame
+        sheet, frame = self.sheet, self._scans.frame
         self._scans.renew(noise)
         frame(0, 0.0)
         measured = []

@@ -44,7 +44,7 @@ class _Loading:
         self, points: FloatArray, blur: float, outline: Outline, rest: Surface, given: TwinSettings
     ) -> None:
         self._points, self._outline = points, outline
-        self._ground = given.contact, points, blur
+        self.ground = given.contact, points, blur
         self._shape = points, rest, given.bend.height
         nothing = np.zeros((4, len(points)))
         self.at_rest: _Under = ((), nothing), ((), nothing[:3])
@@ -56,12 +56,7 @@ class _Loading:
         check_on_skin(presses, self._outline)
         if presses != self.now[0][0]:
             taken = tuple(presses)
-            self.now = (taken, indent(taken, *self._ground)), self.now[1]
-
-    def depth_under(self, probe: Probe) -> float:
-        """M by which the sheet gives way under it."""
-        contact, _, blur = self._ground
-        return depth_under(probe, contact, blur)
+            self.now = (taken, indent(taken, *self.ground)), self.now[1]
 
     def bend(self, pose: Pose) -> None:
         """Bend and stretch; GeometryError when the sheet cannot take that shape."""
@@ -175,7 +170,8 @@ class TwinSkin:
 
     def depth_under(self, probe: Probe) -> float:
         """M by which the sheet gives way under a ``probe`` that presses alone."""
-        return self._loading.depth_under(probe)
+        contact, _, blur = self._loading.ground
+        return depth_under(probe, contact, blur)
 
     @property
     def load(self) -> FloatArray:

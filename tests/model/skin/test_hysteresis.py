@@ -15,7 +15,6 @@ from tomoskin.model.skin import (
     advanced,
     followed,
     load_of,
-    responses,
 )
 from tomoskin.model.skin.hysteresis import SCALAR, response
 
@@ -92,10 +91,9 @@ def test_without_memory_the_response_is_the_load():
 
 def test_motion_either_way_breaks_contacts_that_form_again():
     brittle = MaterialMemory(breakdown=(0.5,), breakdown_times=(10.0,))
-    time, load = np.array([0.0, 0.0, 20.0, 20.0]), np.array([0.0, 1.0, 1.0, 0.0])
-    seen = responses(brittle, time, load, gauge=2.0)
-    left = math.exp(-2)
-    assert seen == pytest.approx([0.0, 2 * 1.5, 2 * (1 + 0.5 * left), 2 * 0.5 * (left + 1)])
+    left, steps = math.exp(-2), [(1.0, 0.0), (1.0, 20.0), (0.0, 0.0)]
+    seen = [response(after(steps[:n], brittle), brittle)[0] for n in (1, 2, 3)]
+    assert seen == pytest.approx([1.5, 1 + 0.5 * left, 0.5 * (left + 1)])
 
 
 def test_a_rise_that_may_be_a_release_has_no_load():

@@ -18,7 +18,11 @@ from tomoskin.learning.amount.curve import (
     basis,
     without_memory,
 )
-from tomoskin.learning.amount.labelled_presses import LabelledPresses, check_rising
+from tomoskin.learning.amount.labelled_presses import (
+    LabelledPresses,
+    check_rising,
+    columns_of,
+)
 from tomoskin.learning.touch.gaussian_process import nine_in_ten
 from tomoskin.model.skin import MaterialMemory, MemoryState, Skin, advanced, load_of
 from tomoskin.sensing.segment import Region
@@ -171,7 +175,7 @@ class AmountModel:
         if not detections:
             released = self._released(spots, np.arange(len(spots)), dt)
             return [], PressedSpots(spots.xy, time, released)
-        xy, area, peak, snr = _columns(detections)
+        xy, area, peak, snr = columns_of(detections)
         least = SHALLOW * self.depth
         depth = np.maximum(depth_of(peak, area, self.conductivity, self.radius), least)
         under, rest = _goes_on(spots.xy, xy, 0.5 * self.radius)
@@ -323,14 +327,6 @@ def _goes_on(spots: FloatArray, xy: FloatArray, within: float) -> tuple[list[int
         under.append(nearest if nearest >= 0 and apart[nearest] <= within else -1)
         free.pop(under[-1], None)
     return under, list(free)
-
-
-def _columns(
-    detections: Sequence[Detection],
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Positions (n, 2), areas, peaks and snr (n,)."""
-    rows = np.array([(d.x, d.y, d.area, d.peak, d.snr) for d in detections])
-    return rows[:, :2], rows[:, 2], rows[:, 3], rows[:, 4]
 
 
 def _radius(area: FloatArray) -> FloatArray:

@@ -3,73 +3,43 @@ what their model says of itself."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
 
-from tomoskin.core import DataError, Detection, FloatArray, IntArray
-from tomoskin.learning.amount.amount_model import AmountModel, LabelRemark, PressedSpots
+from tomoskin.core import MEASURANDS, DataError, Detection, FloatArray, IntArray
+from tomoskin.learning.amount.amount_model import AmountModel, PressedSpots
 from tomoskin.learning.amount.curve import basis
 from tomoskin.learning.amount.measurand import MEASURED
 from tomoskin.learning.kind import Applied, Calibration, Conditions, FrameView, Kind
 from tomoskin.model.skin import Skin
 
 
-@dataclass(frozen=True)
-class AmountReport:
-    """How well labelled touches are measured, each with its press left out.
+def report_of(model: AmountModel) -> dict[str, Any]:
+    """How well labelled touches are measured, each with its press left out, by name.
 
-    Attributes
-    ----------
-    touches, presses
-        How many were labelled.
-    smallest, largest
-        Of their amounts, SI.
-    mean_error, median_error
-        Relative errors of the amounts.
-    held
-        Part of the amounts that lie in their own 90 % intervals.
-    memory
-        Whether the sheet was found to remember.
-    remarks
-        What is wrong with labels.
-    text
-        The report as one sentence for people.
+    ``mean_error`` and ``median_error`` are relative, ``held_by_90_percent_intervals`` is a part,
+    ``memory`` is whether the sheet was found to remember, ``text`` is for people.
     """
-
-    touches: int
-    presses: int
-    smallest: float
-    largest: float
-    mean_error: float
-    median_error: float
-    held: float
-    memory: bool
-    remarks: tuple[LabelRemark, ...]
-    text: str
-
-    @classmethod
-    def of(cls, model: AmountModel) -> AmountReport:
-        """The report of a model that has learnt."""
-        rows, of = model.presses.labelled, model.presses.of_what
-        errors, amount = np.abs(model.errors), model.presses.amount[rows]
-        presses = len(np.unique(model.presses.press[rows]))
-        mean, median = float(errors.mean()), float(np.median(errors))
-        return cls(
-            touches=len(rows),
-            presses=presses,
-            smallest=float(amount.min()),
-            largest=float(amount.max()),
-            mean_error=mean,
-            median_error=median,
-            held=model.held,
-            memory=bool(model.memory.play),
-            remarks=model.remarks,
-            text=f"{len(rows)} touches of {presses} presses, {of.span(amount)}; left out of the "
-            f"learning their {of.plural} are missed by {100 * mean:.0f} % (median "
-            f"{100 * median:.0f} %), and their 90 % intervals hold {100 * model.held:.0f} %",
-        )
+    presses, of = model.presses, model.presses.of_what
+    errors, amount = np.abs(model.errors), presses.amount[presses.labelled]
+    number, unit = len(np.unique(presses.press[presses.labelled])), MEASURANDS[of.name].lower()
+    mean, median = float(errors.mean()), float(np.median(errors))
+    return {
+        "touches": len(errors),
+        "presses": number,
+        f"from_{unit}": float(amount.min()),
+        f"to_{unit}": float(amount.max()),
+        "mean_error": mean,
+        "median_error": median,
+        "held_by_90_percent_intervals": model.held,
+        "memory": bool(model.memory.play),
+        "remarks": [asdict(remark) for remark in model.remarks],
+        "text": f"{len(errors)} touches of {number} presses, {of.span(amount)}; left out of the "
+        f"learning their {of.plural} are missed by {100 * mean:.0f} % (median {100 * median:.0f} "
+        f"%), and their 90 % intervals hold {100 * model.held:.0f} %",
+    }
 
 
 def least_known(model: AmountModel, xy: FloatArray) -> FloatArray:

@@ -53,6 +53,27 @@ class LabelledPresses:
     time: FloatArray
     measurand: str = "force"
 
+    def __post_init__(self) -> None:
+        """Check all columns; raises as :meth:`of` does."""
+        if self.measurand not in MEASURED:
+            names = " or ".join(MEASURED)
+            raise DataError(f'expected labels of {names}, got "{self.measurand}"')
+        of, n, labels = self.of_what, len(self.xy), (self.amount, self.press, self.time)
+        if any(column.shape != (n,) for column in labels):
+            raise DataError(
+                f"expected a {of.name}, a press and a time for each of {n} touches, got shapes "
+                f"{', '.join(str(column.shape) for column in labels)}",
+                where=of.where,
+            )
+        about = (self.xy, self.area, self.peak)
+        shapes = [column.shape for column in (*about, self.snr)]
+        if shapes != [(n, 2), (n,), (n,), (n,)]:
+            raise DataError(f"expected xy, area, peak and snr of each touch, got shapes {shapes}")
+        if not all(np.isfinite(column).all() for column in about):
+            raise DataError("expected finite xy, area and peak of every touch, got others")
+        _check_order(of, *labels)
+        _check_amounts(of, self.amount[np.isfinite(self.amount)])
+
     @classmethod
     def of(
         cls,
@@ -70,47 +91,9 @@ class LabelledPresses:
             For labels that do not belong together or to a press, times that go back within one,
             fewer than five amounts, amounts in another unit, or labels that contradict.
         """
-        n = len(detections)
-        rows = np.array([(d.x, d.y, d.area, d.peak, d.snr) for d in detections]).reshape(n, 5)
-        area, peak, snr = rows[:, 2:].T
         values, times = (np.asarray(column, dtype=np.float64) for column in (amount, time))
-        number = np.asarray(press)
-        columns = {"xy": rows[:, :2], "area": area, "peak": peak, "snr": snr, "time": times}
-        return cls.checked(**columns, amount=values, press=number, measurand=measurand)
-
-    @classmethod
-    def checked(
-        cls,
-        *,
-        xy: FloatArray,
-        area: FloatArray,
-        peak: FloatArray,
-        snr: FloatArray,
-        amount: FloatArray,
-        press: IntArray,
-        time: FloatArray,
-        measurand: str = "force",
-    ) -> Self:
-        """The same of the columns; raises as :meth:`of` does."""
-        of = MEASURED.get(measurand)
-        if of is None:
-            raise DataError(f'expected labels of {" or ".join(MEASURED)}, got "{measurand}"')
-        n = len(xy)
-        if not amount.shape == press.shape == time.shape == (n,):
-            raise DataError(
-                f"expected a {of.name}, a press and a time for each of {n} touches, got shapes "
-                f"{amount.shape}, {press.shape}, {time.shape}",
-                where=of.where,
-            )
-        about = (xy, area, peak)
-        if xy.shape != (n, 2) or not area.shape == peak.shape == snr.shape == (n,):
-            shapes = ", ".join(str(column.shape) for column in (*about, snr))
-            raise DataError(f"expected xy, area, peak and snr of each touch, got shapes {shapes}")
-        if not all(np.isfinite(column).all() for column in about):
-            raise DataError("expected finite xy, area and peak of every touch, got others")
-        _check_order(of, amount, press, time)
-        _check_amounts(of, amount[np.isfinite(amount)])
-        return cls(xy, area, peak, snr, amount, press.astype(int), time, measurand)
+        number = np.asarray(press).astype(int)
+        return cls(*columns_of(detections), values, number, times, measurand)
 
     def __len__(self) -> int:
         """The number of touches with a label."""
@@ -137,6 +120,14 @@ class LabelledPresses:
     def labelled(self) -> IntArray:
         """Touches whose amount is known."""
         return np.flatnonzero(np.isfinite(self.amount))
+
+
+def columns_of(
+    detections: Sequence[Detection],
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Positions (n, 2), areas, peaks and snr (n,)."""
+    rows = np.array([(d.x, d.y, d.area, d.peak, d.snr) for d in detections]).reshape(-1, 5)
+    return rows[:, :2], rows[:, 2], rows[:, 3], rows[:, 4]
 
 
 def _check_order(of: Measurand, amount: FloatArray, press: IntArray, time: FloatArray) -> None:

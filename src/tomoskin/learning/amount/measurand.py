@@ -61,7 +61,7 @@ class Measurand:
 
     def span(self, values: FloatArray) -> str:
         """From the smallest to the largest of ``values``, SI."""
-        return f"{values.min() / self.units[self.shown]:.3g} to {self.text(float(values.max()))}"
+        return f"{values.min() / self.units[self.shown]:.2g} to {self.text(values.max(), 2)}"
 
     @cached_property
     def key(self) -> str:

@@ -12,7 +12,6 @@ from tomoskin.model.skin.hysteresis import (
     check_step,
     followed,
     load_of,
-    responses,
 )
 from tomoskin.model.skin.lay import lay
 from tomoskin.model.skin.processing import (
@@ -39,5 +38,4 @@ __all__ = [
     "load_of",
     "read_text",
     "regions_doubt",
-    "responses",
 ]

@@ -304,28 +304,6 @@ def _brittleness(memory: MaterialMemory, dt: float) -> float:
     return float(np.array(memory.breakdown) @ memory.kept(dt)[1])
 
 
-def responses(
-    memory: MaterialMemory, time: FloatArray, load: FloatArray, gauge: float = 1.0
-) -> FloatArray:
-    """(n,) response over a recording: ``gauge`` times that of ``load`` (n,) at ``time`` (n,) s.
-
-    Each load stands until the next one.
-
-    Raises
-    ------
-    ModelError
-        When the times go back.
-    """
-    state = MemoryState.fresh(memory)
-    out = np.empty(len(load))
-    for k, step in enumerate(np.diff(time, append=time[-1]).tolist()):
-        # What is seen at a time is the answer to the loads up to it, before it has stood.
-        state = advanced(state, memory, np.array([[load[k]]]), 0.0)
-        out[k] = response(state, memory)[0]
-        state = advanced(state, memory, np.array([[load[k]]]), step)
-    return gauge * out
-
-
 def _mixed(load: FloatArray, parts: FloatArray, weights: tuple[float, ...]) -> FloatArray:
     """(d, n): ``parts`` (n_parts, d, n) by their weights, and of ``load`` what these leave."""
     if not weights:
