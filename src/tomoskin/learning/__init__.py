@@ -1,9 +1,5 @@
 """What is learnt from examples: touch positions, forces, classes, bends, channel mapping."""
 
-from pathlib import Path
-from typing import Any
-
-from tomoskin.core import DataError, StrPath, load_arrays
 from tomoskin.learning.bend.bend_model import BendModel as BendModel
 from tomoskin.learning.bend.bend_reader import (
     BENDS as BENDS,
@@ -43,10 +39,9 @@ from tomoskin.learning.kind import (
     Differences as Differences,
     FrameView as FrameView,
     Kind as Kind,
-    Progress,
     TouchFit as TouchFit,
-    silent,
 )
+from tomoskin.learning.kinds import KINDS as KINDS, load_calibration as load_calibration
 from tomoskin.learning.mapping.mapping import ChannelMapping as ChannelMapping, ring_of as ring_of
 from tomoskin.learning.mapping.solve import (
     MappingAnswer as MappingAnswer,
@@ -65,18 +60,3 @@ from tomoskin.learning.touch.rubbing import Rubbing as Rubbing, quiet_electrodes
 from tomoskin.learning.touch.session_alignment import SessionAlignment as SessionAlignment
 from tomoskin.learning.touch.several import Several as Several
 from tomoskin.learning.touch.watch import Watch as Watch
-
-KINDS: tuple[Kind[Any], ...] = (TOUCH, FORCE, BENDS, CLASSES)
-"""Every kind whose calibrations are applied to frames, in the order in which they are applied."""
-
-
-def load_calibration(path: StrPath, progress: Progress = silent) -> Calibration[Any]:
-    """Read a file of any of the :data:`KINDS`. Raises DataError where it is of none."""
-    arrays = load_arrays(Path(path))
-    title = str(arrays.get("kind", ""))
-    kind = next((kind for kind in KINDS if kind.title == title), None)
-    if kind is None:
-        raise DataError(
-            "is not a calibration", where=str(path), hint="make one: tomoskin calibrate --help"
-        )
-    return kind.unpack(arrays, str(path), progress)
