@@ -22,10 +22,7 @@ from tomoskin.imaging.iterative.shapes import (
     Segmented as Segmented,
     ShapeImaging as ShapeImaging,
 )
-from tomoskin.imaging.iterative.sharp_difference import (
-    SharpDifference as SharpDifference,
-    SharpImage as SharpImage,
-)
+from tomoskin.imaging.iterative.sharp_difference import SharpDifference as SharpDifference
 from tomoskin.imaging.linear.linear_problem import (
     LinearProblem as LinearProblem,
     OneStep as OneStep,

@@ -6,13 +6,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from tomoskin.board.source import (
-    BOARDS,
-    DEFAULT_BOARD,
-    Transport,
-    list_ports,
-    open_source,
-)
+from tomoskin.board.source import BOARDS, DEFAULT_BOARD, Transport, list_ports, open_source
 from tomoskin.board.wire import SCHEMA, Info
 from tomoskin.core import SourceError
 from tomoskin.files.session import ReplayTransport, SessionReader, as_recorded, parse_replay

@@ -10,7 +10,6 @@ from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from tomoskin.board.source import Configuration, ScanSettings
 from tomoskin.board.wire import OLDER, SCHEMA
@@ -27,9 +26,7 @@ from tomoskin.files.session.session_reader import (
     touches_before,
 )
 from tomoskin.model.pattern import Scan
-
-if TYPE_CHECKING:
-    from tomoskin.model.skin import Skin
+from tomoskin.model.skin import Skin
 
 _SHORTEST = 1e-6
 """No wait is shorter, s: a piece is played so much earlier, or time would stand still."""

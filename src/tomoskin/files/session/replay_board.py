@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from tomoskin.board import wire
 from tomoskin.files.session.session_reader import stated_rate
+from tomoskin.model.skin import Skin
 from tomoskin.twin import Board, HeldScanning, Question, Setting
-
-if TYPE_CHECKING:
-    from tomoskin.model.skin import Skin
 
 _MOST = 2**16 - 1
 

@@ -7,13 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from tomoskin.core import DataError, FloatArray, IntArray, ModelError
-from tomoskin.imaging.choice.alpha_choice import (
-    AlphaChoice,
-    Curve,
-    Evidence,
-    Locate,
-    crossing,
-)
+from tomoskin.imaging.choice.alpha_choice import AlphaChoice, Curve, Evidence, Locate, crossing
 from tomoskin.imaging.choice.light_touch import light_touch
 from tomoskin.imaging.linear.spectrum import Spectrum
 from tomoskin.imaging.trained.merit import noise_figure
