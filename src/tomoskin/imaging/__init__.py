@@ -7,10 +7,10 @@ from tomoskin.imaging.choice.alpha_choice import (
 )
 from tomoskin.imaging.choice.criteria import (
     RULES as RULES,
+    LightTouch as LightTouch,
     choose as choose,
     for_recording as for_recording,
 )
-from tomoskin.imaging.choice.light_touch import LightTouch as LightTouch
 from tomoskin.imaging.iterative.absolute import (
     Absolute as Absolute,
     AbsoluteImaging as AbsoluteImaging,

@@ -4,9 +4,9 @@ from pathlib import Path
 from typing import Any
 
 from tomoskin.core import DataError, StrPath, load_arrays
-from tomoskin.learning.bend.bend_model import BendModel as BendModel
-from tomoskin.learning.bend.bend_reader import (
+from tomoskin.learning.bend.bend_model import (
     BENDS as BENDS,
+    BendModel as BendModel,
     BendReader as BendReader,
     BendReading as BendReading,
 )
