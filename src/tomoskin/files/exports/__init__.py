@@ -26,6 +26,8 @@ from tomoskin.files.exports.session_export import (
     omitted as omitted,
 )
 from tomoskin.files.exports.session_table import (
+    write_csv as write_csv,
+    write_hdf5 as write_hdf5,
     write_parquet as write_parquet,
     write_touches as write_touches,
 )

@@ -19,6 +19,7 @@ from tomoskin.model.prior.priors import (
     penalty_of as penalty_of,
 )
 from tomoskin.model.prior.smooth import (
+    GaussianHighPass as GaussianHighPass,
     Laplace as Laplace,
     Matern as Matern,
     Structural as Structural,
