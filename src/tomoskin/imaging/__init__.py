@@ -7,10 +7,10 @@ from tomoskin.imaging.choice.alpha_choice import (
 )
 from tomoskin.imaging.choice.criteria import (
     RULES as RULES,
+    LightTouch as LightTouch,
     choose as choose,
     for_recording as for_recording,
 )
-from tomoskin.imaging.choice.light_touch import LightTouch as LightTouch
 from tomoskin.imaging.iterative.absolute import (
     Absolute as Absolute,
     AbsoluteImaging as AbsoluteImaging,
@@ -22,10 +22,7 @@ from tomoskin.imaging.iterative.shapes import (
     Segmented as Segmented,
     ShapeImaging as ShapeImaging,
 )
-from tomoskin.imaging.iterative.sharp_difference import (
-    SharpDifference as SharpDifference,
-    SharpImage as SharpImage,
-)
+from tomoskin.imaging.iterative.sharp_difference import SharpDifference as SharpDifference
 from tomoskin.imaging.linear.linear_problem import (
     LinearProblem as LinearProblem,
     OneStep as OneStep,

@@ -1,8 +1,8 @@
 """What is learnt from examples: touch positions, forces, classes, bends, channel mapping."""
 
-from tomoskin.learning.bend.bend_model import BendModel as BendModel
-from tomoskin.learning.bend.bend_reader import (
+from tomoskin.learning.bend.bend_model import (
     BENDS as BENDS,
+    BendModel as BendModel,
     BendReader as BendReader,
     BendReading as BendReading,
 )

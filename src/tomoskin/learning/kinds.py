@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from tomoskin.core import DataError, StrPath, load_arrays
-from tomoskin.learning.bend.bend_reader import BENDS
+from tomoskin.learning.bend.bend_model import BENDS
 from tomoskin.learning.classes.classifier import CLASSES
 from tomoskin.learning.force.force_report import FORCE
 from tomoskin.learning.kind import Calibration, Kind, Progress, silent

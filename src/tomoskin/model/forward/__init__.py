@@ -4,7 +4,6 @@ from tomoskin.model.forward.differentiable import (
     jax_voltages as jax_voltages,
     torch_voltages as torch_voltages,
 )
-from tomoskin.model.forward.engine import Engine as Engine
 from tomoskin.model.forward.engine_choice import choose_engine as choose_engine
 from tomoskin.model.forward.model import (
     ForwardModel as ForwardModel,

@@ -20,9 +20,5 @@ from tomoskin.model.mesh.surface import (
     laid_on as laid_on,
 )
 from tomoskin.model.mesh.triangles import simplex_measure as simplex_measure
-from tomoskin.model.mesh.triangulate import (
-    Quality as Quality,
-    quality as quality,
-    triangulate as triangulate,
-)
+from tomoskin.model.mesh.triangulate import quality as quality, triangulate as triangulate
 from tomoskin.model.mesh.wrapped import Arm as Arm, Cylinder as Cylinder, Hinge as Hinge

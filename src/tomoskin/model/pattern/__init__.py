@@ -1,16 +1,10 @@
 """Drive and measurement tables: THE order of the rows, shared by firmware, decoder and Jacobian."""
 
-from tomoskin.model.pattern.match import (
-    RowMatch as RowMatch,
-    RowSums as RowSums,
-    match_rows as match_rows,
-    sum_rows as sum_rows,
-)
+from tomoskin.model.pattern.match import match_rows as match_rows, sum_rows as sum_rows
 from tomoskin.model.pattern.pattern import (
     NAMED as NAMED,
     Pattern as Pattern,
     check_drives as check_drives,
-    drive_table as drive_table,
     electrodes_of as electrodes_of,
     named as named,
     signed as signed,
