@@ -35,6 +35,9 @@ _FRAMES, _SECONDS = 2, 0.15
 """Frames, and seconds, within which a touch that has begun must show in frames, or it is withdrawn.
 The scan of the first one may have seen it come down, and quick ones tell little each."""
 
+_STEP = 5e-4
+"""Seconds of a drive that allow one step of what is made anew, where drives wait for it."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DriveResult:
@@ -75,11 +78,15 @@ class _Followed:
     lifted: float | None = None
     frames: int | None = None
 
-    def take(self, moving: MovingTouch, gone: float) -> None:
-        """Take a drive, and what it says of the odds."""
+    def take(self, moving: MovingTouch, gone: float, going: float) -> None:
+        """Take a drive, and what it says of the odds: it was lifted before, or while it was read.
+
+        What shows a part of a touch draws the touch after it, so that later drives speak of a weak
+        one elsewhere. So the odds begin with the drive in which it may have been lifted.
+        """
         self.moving = moving
         if self.lifted is None:
-            self.odds = max(self.odds + min(gone, _MOST), 0.0)
+            self.odds = max(self.odds + min(gone, _MOST), min(going, _MOST), 0.0)
             left = RESIDUAL.holds(abs(moving.content), abs(self.full)) and self.frames is None
             self.lifted = moving.time if left or self.odds > _LIFTED else None
 
@@ -113,6 +120,7 @@ class DriveWatch:
         self.view, self._follows = view, follows
         self._drives = pattern.drive_index
         self._length = interval / pattern.n_drive
+        self._steps = max(1, int(self._length / _STEP))
         self._key: NoiseKey | None = None
         self._blocked = True
         self._making: Generator[None, None, DriveEvidence] | None = None
@@ -163,18 +171,22 @@ class DriveWatch:
         return withdrawn
 
     def _ready(self) -> bool:
-        """Whether the noise is that of now; a piece of work where it is not."""
+        """Whether the noise is that of now, or less; some pieces of work where it is not."""
         key = self.view.key
-        if self._key is None or not _is_same(key, self._key):
+        is_newer = self._key is None or not _is_same(key, self._key)
+        says_less = self._key is None or _says_less(key, self._key)
+        if is_newer and (says_less or self._making is None):  # else it is made first
             begun = self._initiation is not None and self._initiation.begun
             if not begun:  # a frame into which a touch comes down looks like more noise
-                self._blocked |= self._key is None or _says_less(key, self._key)
+                self._blocked |= says_less
             self._key, model = key, self.view.model
             noise, stays = self.view.noise()
             self._making = DriveEvidence.making(model.candidates, noise, stays, self._drives)
             sign = self.view.skin.touch.sign
             self._filter = DriveFilter(model.solver, model.prior, sign, model.sheet, noise)
-        if self._making is not None:
+        for _ in range(self._steps if self._blocked else 1):
+            if self._making is None:
+                break
             try:
                 next(self._making)
             except StopIteration as end:
@@ -248,8 +260,9 @@ def _is_same(key: NoiseKey, before: NoiseKey) -> bool:
 def _says_less(key: NoiseKey, before: NoiseKey) -> bool:
     """Whether drives told less in the noise of a ``key`` than in that ``before``: then they must
     not be read by that."""
-    (*_, left), (*_, known) = key, before
-    return key[0] is not before[0] or key[3] is not before[3] or sum(left) > sum(known)
+    (nuisance, *_, excess, left), (*_, less, known) = key, before
+    louder = excess.level > less.level or bool((excess.variance > less.variance).any())
+    return nuisance is not before[0] or louder or sum(left) > sum(known)
 
 
 def _spread(detection: Detection) -> FloatArray:
