@@ -14,8 +14,7 @@ from tomoskin.learning import (
     AmountProcess,
     LabelledPresses,
 )
-from tomoskin.model.skin import MaterialMemory, MemoryState, Skin, advanced
-from tomoskin.model.skin.hysteresis import response
+from tomoskin.model.skin import MaterialMemory, MemoryState, Skin, advanced, followed
 
 SHEET, UNIT = 0.1, 0.1
 LAW = MaterialMemory(play=(0.25,), play_widths=(0.04,))
@@ -36,7 +35,7 @@ def press(rng, top, steps=LOOP, memory=LAW):
     for part in steps:
         force = top * part
         state = advanced(state, memory, np.array([[level * force / (force + 5.0)]]), 0.5)
-        touches.append(touch(x, y, response(state, memory)[0] * np.exp(0.03 * rng.normal())))
+        touches.append(touch(x, y, followed(state, memory)[0][0] * np.exp(0.03 * rng.normal())))
         forces.append(force)
     return touches, forces
 
@@ -104,7 +103,7 @@ def test_a_press_that_is_held_for_an_hour_keeps_its_force():
     for seconds in (0.5, 60.0, 600.0, 3000.0):
         state = advanced(state, law, np.array([[0.4 * 8.0 / 13.0]]), seconds)
         now += seconds
-        (force,), spots = model.read(spots, [touch(0.0, 0.0, response(state, law)[0])], now)
+        (force,), spots = model.read(spots, [touch(0.0, 0.0, followed(state, law)[0][0])], now)
         held.append(force.value)
     assert held == pytest.approx([held[0]] * 4, rel=0.1)
 
