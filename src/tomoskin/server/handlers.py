@@ -51,8 +51,8 @@ class CalibrationHandlers:
             self._used_on = prepared.mesh.identity
             self._files = dict.fromkeys(prepared.calibrations, "")
         files = {of: self._files.get(kind.name) for of, kind in _OFFERED.items()}
-        used = {name: prepared.calibrations.get(name) for name in (FORCE.name, DEPTH.name)}
-        most = {name: one.model.most for name, one in used.items() if one is not None}
+        used = prepared.calibrations
+        most = {name: used[name].model.most for name in (FORCE.name, DEPTH.name) if name in used}
         return (Calibrations(**files, most=most),)
 
     def note(self, kind: Kind[Any], name: str | None) -> None:

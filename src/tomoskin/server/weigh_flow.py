@@ -9,14 +9,7 @@ from typing import Any
 import numpy as np
 
 from tomoskin.core import DataError, Detection, FloatArray, Touch, WireError
-from tomoskin.learning import (
-    FORCE,
-    AmountModel,
-    LabelledPresses,
-    Weight,
-    least_known,
-    report_of,
-)
+from tomoskin.learning import FORCE, AmountModel, LabelledPresses, Weight, least_known, report_of
 from tomoskin.pipeline import FrameResult, Prepared
 from tomoskin.server.guided_flow import Estimate, GuidedFlow, counted
 from tomoskin.server.page_messages import Figures, Phase, Point, WeightNow

@@ -33,9 +33,9 @@ _ANY_TURN = math.pi**2 / 3
 """Variance of an angle of which nothing is known, rad²."""
 
 _UNCALIBRATED = {
-    key: value
+    f"{name}{part}": value
     for name in MEASURANDS
-    for key, value in ((name, None), (f"{name}_interval", None), (f"{name}_calibrated", False))
+    for part, value in (("", None), ("_interval", None), ("_calibrated", False))
 }
 """What a row says of a touch whose force and depth nothing tells."""
 

@@ -18,11 +18,7 @@ from tomoskin.learning.amount.curve import (
     basis,
     without_memory,
 )
-from tomoskin.learning.amount.labelled_presses import (
-    LabelledPresses,
-    check_rising,
-    columns_of,
-)
+from tomoskin.learning.amount.labelled_presses import LabelledPresses, check_rising, columns_of
 from tomoskin.learning.touch.gaussian_process import nine_in_ten
 from tomoskin.model.skin import MaterialMemory, MemoryState, Skin, advanced, load_of
 from tomoskin.sensing.segment import Region

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tomoskin.core import MEASURANDS, DataError, Detection, FloatArray, IntArray
+from tomoskin.core import MEASURANDS, DataError, Detection, FloatArray
 from tomoskin.learning.amount.amount_model import AmountModel, PressedSpots
 from tomoskin.learning.amount.curve import basis
 from tomoskin.learning.amount.measurand import MEASURED
@@ -89,11 +89,6 @@ def _check(calibration: Calibration[AmountModel], skin: Skin) -> None:
         raise calibration.mismatch("sheet", skin)
 
 
-def _exclude(model: AmountModel, _measurements: IntArray) -> AmountModel:
-    """Touches found without some measurements are touches all the same."""
-    return model
-
-
 def _apply(model: AmountModel, conditions: Conditions) -> Applied:
     """Regions of an image have other peaks and areas than fitted touches: they get no amount."""
     is_like = conditions.fitted == (model.method == "fit")
@@ -108,7 +103,7 @@ FORCE, DEPTH = (
         attachment=f"{of.name}.npz",
         learn=AmountModel.learn,
         check=_check,
-        exclude=_exclude,
+        exclude=lambda model, _measurements: model,  # touches found without some are touches too
         apply=_apply,
     )
     for of in MEASURED.values()

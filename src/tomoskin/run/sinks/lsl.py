@@ -7,15 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tomoskin.core import (
-    MEASURANDS,
-    Event,
-    FloatArray,
-    SinkError,
-    clock_ahead,
-    encode_json,
-    needed,
-)
+from tomoskin.core import MEASURANDS, Event, FloatArray, SinkError, clock_ahead, encode_json, needed
 from tomoskin.files.messages import Contacts, Item, Naming, Stream, row_labels, time_of
 from tomoskin.run.sinks.sink import Sink
 
@@ -111,7 +103,6 @@ def _touch_row(contacts: Contacts) -> FloatArray:
     for number, contact in enumerate(contacts.strongest(MOST_TOUCHES)):
         detection = contact.touch.detection
         row[number] = contact.touch.id, detection.x, detection.y, detection.peak
-        for of, name in enumerate(MEASURANDS):
-            if name in contact.touch.amounts:
-                amounts[of, number] = contact.touch.amounts[name].value
+        for name, amount in contact.touch.amounts.items():
+            amounts[[*MEASURANDS].index(name), number] = amount.value
     return np.concatenate((row.ravel(), amounts.ravel(), [float(contacts.valid)]))
