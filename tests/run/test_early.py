@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from functools import partial
+from itertools import pairwise
 from unittest.mock import Mock
 
 import numpy as np
@@ -93,7 +94,7 @@ def test_the_recording_holds_the_frames_alone(results):
 def test_no_touch_is_told_of_that_has_just_been_lifted_or_hidden_while_it_is_new(results):
     every, _ = results
     there = [bool(result.touches) for result in every]
-    assert sum(one != other for one, other in zip(there, there[1:], strict=False)) == 2
+    assert sum(one != other for one, other in pairwise(there)) == 2
 
 
 def test_a_drive_that_fails_is_counted_and_frames_go_on(skin, monkeypatch):

@@ -9,7 +9,6 @@ from tomoskin.sensing.fit.bounds import (
 )
 from tomoskin.sensing.fit.drive_evidence import DriveEvidence, Initiation, Onset
 from tomoskin.sensing.fit.drive_filter import DriveFilter, MovingTouch
-from tomoskin.sensing.fit.drive_order import drives_needed, telling_order, watch_order
 from tomoskin.sensing.fit.drive_view import DriveView, NoiseKey
 from tomoskin.sensing.fit.finder import SpotFinder
 from tomoskin.sensing.fit.noise import (
@@ -44,14 +43,11 @@ __all__ = [
     "Spots",
     "Whitener",
     "common_mode_variance",
-    "drives_needed",
     "idle_covariance",
     "measured_covariance",
     "position_bound",
     "resolution_bounds",
     "row_covariance",
     "spots_of",
-    "telling_order",
     "variants",
-    "watch_order",
 ]
