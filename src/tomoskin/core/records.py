@@ -354,6 +354,8 @@ class Touch:
     possible
         Identities that it may have, its own among them, where it has been too close to another
         for frames to tell who is who; else empty.
+    provisional
+        Whether single drives alone have told of it: no frame has confirmed it yet.
     """
 
     id: int
@@ -362,6 +364,7 @@ class Touch:
     detection: Detection = field(repr=False)
     merged: tuple[int, ...] = ()
     possible: tuple[int, ...] = ()
+    provisional: bool = False
 
     @property
     def said(self) -> str:
