@@ -347,6 +347,8 @@ class Touch:
     possible
         Identities that it may have, its own among them, where it has been too close to another
         for frames to tell who is who; else empty.
+    provisional
+        Whether single drives alone have told of it: no frame has confirmed it yet.
     """
 
     id: int
@@ -355,6 +357,7 @@ class Touch:
     detection: Detection = field(repr=False)
     merged: tuple[int, ...] = ()
     possible: tuple[int, ...] = ()
+    provisional: bool = False
 
     @property
     def amounts(self) -> dict[str, Amount]:

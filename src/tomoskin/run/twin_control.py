@@ -104,17 +104,17 @@ class TwinControl:
     @property
     def pressable(self) -> bool:
         """Whether the source can be pressed."""
-        return hasattr(self._source, "set_presses")
+        return self._can("set_presses")
 
     @property
     def breakable(self) -> bool:
         """Whether the source can be broken and mended."""
-        return hasattr(self._source, "set_faults") and hasattr(self._source, "set_noise")
+        return self._can("set_faults", "set_noise")
 
     @property
     def bendable(self) -> bool:
         """Whether the source has a sheet that can be bent and stretched."""
-        return hasattr(self._source, "set_pose")
+        return self._can("set_pose")
 
     def set_harm(self, harm: SetTwin) -> None:
         """Break and mend the source; ModelError for what it does not have."""
@@ -145,6 +145,9 @@ class TwinControl:
         asked = tuple(press for held in self._presses.values() for press in held)
         self.truth, self.refusals = _felt(self._source, asked)
         return True
+
+    def _can(self, *methods: str) -> bool:
+        return all(getattr(self._source, name, None) is not None for name in methods)
 
     def _break(self, harm: SetTwin) -> None:
         if self.breakable:

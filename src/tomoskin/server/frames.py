@@ -6,9 +6,10 @@ header, 40 bytes      ``TSK1``, sequence u32, host_time f64, n_cells u32, n_meas
 image                 f32 [n_cells], change of conductivity in the scene's unit
 voltages, reference   f32 [n_meas] each, V
 touches, 64 bytes     id u32, kind u8 (0 decrease, 1 increase), several u8 (0 no, 1 may be
-each                  several, n > 1: n that have merged), 2 pad, x, y, sd_x, sd_y (NaN
-                      unknown), area, peak, since (s ago), cov_xy (m²), force and its interval
-                      (N), depth and its interval (m; NaN uncalibrated) f32
+each                  several, n > 1: n that have merged), 1 pad, provisional u8 (1: no whole
+                      scan has confirmed it), x, y, sd_x, sd_y (NaN unknown), area, peak,
+                      since (s ago), cov_xy (m²), force and its interval (N), depth and its
+                      interval (m; NaN uncalibrated) f32
 truth, 16 bytes each  x, y (m), force (N), radius (m) f32: the presses on the twin
 bend, 16 bytes        with flag bit 3 only: angle, its deviation, axis (rad) f32, state u32 (a
                       place in :data:`BEND_STATES`)
@@ -71,7 +72,8 @@ RECORDS = {
             ("id", "<u4"),
             ("kind", "u1"),
             ("several", "u1"),
-            ("pad", "u2"),
+            ("pad", "u1"),
+            ("provisional", "u1"),
             *((name, "<f4") for name in _MEASURES),
         ]
     ),
@@ -140,6 +142,7 @@ def _touches(touches: Sequence[Touch], now: float) -> bytes:
             t.kind == "increase",
             min(len(t.merged), _MOST) or t.detection.close,
             0,
+            t.provisional,
             t.detection.x,
             t.detection.y,
             t.detection.sd_x,

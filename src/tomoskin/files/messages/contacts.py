@@ -178,6 +178,7 @@ class Contact:
         content = {
             **_UNCALIBRATED,
             **touch_row(self.touch),
+            "provisional": self.touch.provisional,
             "position": self.position,
             "normal": self.normal,
             "covariance": None if spread is None else spread.tolist(),

@@ -13,11 +13,6 @@ from tomoskin.sensing.fit.drive_evidence import (
     Onset as Onset,
 )
 from tomoskin.sensing.fit.drive_filter import DriveFilter as DriveFilter, MovingTouch as MovingTouch
-from tomoskin.sensing.fit.drive_order import (
-    drives_needed as drives_needed,
-    telling_order as telling_order,
-    watch_order as watch_order,
-)
 from tomoskin.sensing.fit.drive_view import DriveView as DriveView, NoiseKey as NoiseKey
 from tomoskin.sensing.fit.finder import SpotFinder as SpotFinder
 from tomoskin.sensing.fit.noise import (

@@ -42,6 +42,8 @@ class Tracker:
         Where touches were, of which something may still show.
     slides
         Moves touches that slide to the finger; what is held still is not moved.
+    responses
+        The touches of the newest frame where the sheet's response is, not moved.
     ledger
         Who is who.
     """
@@ -49,6 +51,7 @@ class Tracker:
     def __init__(self, settings: TrackSettings | None = None) -> None:
         self.settings = settings or TrackSettings()
         self.events: tuple[TouchEvent, ...] = ()
+        self.responses: tuple[Touch, ...] = ()
         self.traces: list[Trace] = []
         self.residuals = ResidualResponses()
         self.slides, self.ledger = SlideCorrection(0.0), IdentityLedger()
@@ -71,7 +74,7 @@ class Tracker:
         if detections or self.traces:
             self._follow(FrameOfTouches.of(detections, self._clock, self.settings))
         self.residuals.note(self._clock.now, quiet=not detections)
-        touches = self._touches() if self.traces else ()
+        touches = self.responses = self._touches() if self.traces else ()
         happened, self._happened = self._happened, []
         if not self.settings.still:
             self.slides = self.slides.after(touches, time)
