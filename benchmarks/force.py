@@ -29,6 +29,12 @@ contradictory labels: twenty presses do not teach a size. The second set was nev
 SPAN = {"force": (2.0, 20.0), "depth": (0.2e-3, 1.1e-3)}
 """What presses are taught, and asked, with: N; m of the 1.2 that the foam can be squeezed."""
 
+BOUNDS = {
+    "force": ((8e-3, 15e-3), (2.0, 5.0, 20.0)),
+    "depth": ((8e-3, 10e-3, 12e-3), (0.2e-3, 0.5e-3, 1e-3)),
+}
+"""Radii, m, and amounts for which the bounds are told."""
+
 DEPTHS: tuple[tuple[Mapping[int, Tips], int], ...] = (
     ({41: (8e-3,), 42: (10e-3,), 43: (12e-3,)}, 20),
     (dict.fromkeys((51, 52, 53), (0.008, 0.009, 0.01, 0.011, 0.012)), 20),
@@ -49,13 +55,14 @@ BLOCKS = {"a block in the middle, 45 to 57 %": (0.45, 0.57), "the last 12 %": (0
 
 def run(data: Path | None) -> Iterator[Report]:
     """The twin needs no recordings; the others are left out where there are none."""
-    yield table(
-        "bound of a force",
-        _bound(),
-        "least deviation that one frame of 16 electrodes allows: "
-        "Cramér–Rao of the twin without memory at the read-out's noise, from its own "
-        "derivatives; position unknown; above 100 % it says that nothing is known",
-    )
+    for of in SPAN:
+        yield table(
+            f"bound of a {of}",
+            _bound(of),
+            "least deviation that one frame of 16 electrodes allows: "
+            "Cramér–Rao of the twin without memory at the read-out's noise, from its own "
+            "derivatives; position unknown; above 100 % it says that nothing is known",
+        )
     yield table(
         "force of held-out presses on the twin's textile, 16 electrodes",
         (row for tips in SETS for row in _twin({k: (r,) for k, r in tips.items()}, "force")),
@@ -125,8 +132,8 @@ class Scale:
         for step in steps:
             amounts = SPAN[self.of][0] + (tops - SPAN[self.of][0]) * step
             lab.board.sheet.set_presses(tuple(
-                self._press(float(x), float(y), float(amount), float(r))
-                for (x, y), amount, r in zip(places, amounts, radii, strict=True)
+                _press(lab, self.of, place, float(amount), float(r))
+                for place, amount, r in zip(places, amounts, radii, strict=True)
             ))  # fmt: skip
             found = self.finder.push(lab.shown(self._volts() - lab.reference.mean))
             yield (
@@ -136,12 +143,6 @@ class Scale:
                     for amount, place in zip(amounts, places, strict=True)
                 ],
             )
-
-    def _press(self, x: float, y: float, amount: float, radius: float) -> Press:
-        if self.of == "force":
-            return Press(x, y, amount, radius)
-        one = self.lab.board.sheet.depth_under(Press(x, y, 1.0, radius))
-        return Press(x, y, (amount / (MOST - amount)) / (one / (MOST - one)), radius)
 
     def _volts(self) -> Floats:
         lab, total = self.lab, 0.0
@@ -154,6 +155,15 @@ class Scale:
         while not far_apart(places := evenly(self.random, count, 0.085), APART):
             continue
         return places
+
+
+def _press(lab: TwinLab, of: str, place: Sequence[float], amount: float, radius: float) -> Press:
+    """What presses with that force, or to that depth."""
+    x, y = map(float, place)
+    if of == "force":
+        return Press(x, y, amount, radius)
+    one = lab.board.sheet.depth_under(Press(x, y, 1.0, radius))
+    return Press(x, y, (amount / (MOST - amount)) / (one / (MOST - one)), radius)
 
 
 def _nearest(found: Sequence[Detection], place: Floats) -> Detection | None:
@@ -252,14 +262,25 @@ def _twin(tips: Mapping[int, Tips], of: str, labelled: int = LABELLED) -> Iterat
         }
 
 
-def _bound() -> Iterator[dict[str, Any]]:
-    """Relative deviations of a force, radius unknown and known."""
-    lab = TwinLab(SKIN, "ideal", min(SETS[0]))
-    for x, radius, force in product((0.02, 0.05, 0.075), (8e-3, 15e-3), (2.0, 5.0, 20.0)):
-        information = lab.information(Press(x, 0.0, force, radius))
-        some = {"tip unknown": information, "tip known": information[:3, :3]}
+def _bound(of: str) -> Iterator[dict[str, Any]]:
+    """Relative deviations of an amount: radius unknown, from 8 to 12 mm, and known."""
+    lab, (radii, amounts) = TwinLab(SKIN, "ideal", min(SETS[0])), BOUNDS[of]
+    for x, radius, amount in product((0.02, 0.05, 0.075), radii, amounts):
+        more, less = (
+            [_press(lab, of, (x, 0.0), amount * a, radius * b).force for a, b in ((e, 1), (1, e))]
+            for e in (1.05, 1 / 1.05)
+        )
+        turn = np.eye(4)  # of the force and radius that a step of the amount, or radius, takes
+        turn[2, 2:] = np.log(np.divide(more, less)) / np.log(1.05**2)
+        information = lab.information(_press(lab, of, (x, 0.0), amount, radius))
+        information = turn.T @ information @ turn
+        usual = information + np.diag([0, 0, 0, (0.05 / 0.117) ** 2])  # of log radius
+        some = {"tip unknown": information, "8 to 12 mm": usual, "tip known": information[:3, :3]}
+        if of == "force":
+            del some["8 to 12 mm"]
         parts = {k: 0.05 * float(np.sqrt(np.linalg.inv(v)[2, 2])) for k, v in some.items()}
-        case = {"from the middle mm": 1e3 * x, "tip radius mm": 1e3 * radius, "force N": force}
+        case = {"from the middle mm": 1e3 * x, "tip radius mm": 1e3 * radius}
+        case |= {"force N": amount} if of == "force" else {"depth mm": 1e3 * amount}
         yield case | {name: _percent(part) for name, part in parts.items()}
 
 
