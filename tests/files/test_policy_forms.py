@@ -88,6 +88,15 @@ def test_a_force_and_a_depth_that_are_not_calibrated_say_so(session, touched):
     assert np.isfinite(view.map).all()
 
 
+def test_messages_carry_a_depth_or_say_that_it_is_uncalibrated(session, touched):
+    names = ("depth", "depth_interval", "depth_calibrated")
+    deep = forced(touched, 3.0, Amount(5e-4, 4e-4, np.inf))
+    (touch,) = contacts_of(session, deep).content()["touches"]
+    assert [touch[name] for name in names] == [5e-4, (4e-4, np.inf), True]
+    (touch,) = contacts_of(session, touched).content()["touches"]
+    assert [touch[name] for name in names] == [None, None, False]
+
+
 @pytest.mark.parametrize("size", [32, 64])
 def test_the_map_of_pressure_holds_all_of_the_force(session, touched, size):
     forms = PolicyForms(session.prepared, size=size)
