@@ -247,10 +247,8 @@ def _twin(tips: Mapping[int, Tips], of: str, labelled: int = LABELLED) -> Iterat
             "contacts": contacts,
             "seeds": ", ".join(map(str, tips)),
             "tips mm": ", ".join(
-                "/".join(f"{1e3 * r:.0f}" for r in radii) for radii in tips.values()
-            )
-            if of == "depth"
-            else "",
+                f"{1e3 * min(r):.0f} to {1e3 * max(r):.0f}" for r in tips.values()
+            ),
             "labelled": labelled,
             "each": ", ".join(_percent(w.error) for w in some),
             "mean error": _percent(np.mean([w.error for w in some])),
