@@ -51,7 +51,7 @@ def unpack(make: Callable[..., T], arrays: Arrays, **given: Any) -> T:
     hints, values = get_type_hints(make), {}
     for name, parameter in signature(make).parameters.items():
         key = _KEYS.get(name, name)
-        key = key if key in arrays else _FORMER.get(name, key)
+        key = _FORMER[name] if _FORMER.get(name) in arrays else key
         if name in given:
             values[name] = given[name]
         elif is_dataclass(hints[name]):
