@@ -18,6 +18,7 @@ from tomoskin.cli.output import Bar, JsonFlag, remark, tell
 if TYPE_CHECKING:
     from tomoskin.core import Output
     from tomoskin.files.session import Lost, Repaired, SessionInfo
+    from tomoskin.model.robot import Robot
 
 app = group("session")
 
@@ -155,6 +156,14 @@ def export(
         ),
         Reads(),
     ] = None,
+    robot: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="robot.toml",
+            help="The robot that wore the skins: X.mcap and X.lerobot say where its links were.",
+        ),
+        Reads(),
+    ] = None,
     force: ForceFlag = False,
 ) -> None:
     """Convert a session to tables, images or the format of another program."""
@@ -166,10 +175,11 @@ def export(
         raise typer.BadParameter(
             f"expected it together with X.lerobot, got {out}", param_hint="--like"
         )
+    worn = None if robot is None else _worn(robot)
     names = (skin,) if skin or out.suffix.lower() != ".lerobot" else skins_in(file)
     with ExitStack() as stack, Bar(f"writing {out}") as bar:
         session, *others = [stack.enter_context(SessionReader(file, name)) for name in names]
-        job = Export(session, every, bar, overwrite=force, others=tuple(others), like=like)
+        job = Export(session, every, bar, force, tuple(others), like, worn)
         write(job, out)
         if touches is not None:
             export_touches(job, touches)
@@ -181,6 +191,23 @@ def export(
         if path is not None and path.is_file():
             but = f", without {without}" if without and path == out else ""
             typer.echo(f"{path}: {path.stat().st_size / 1e6:.1f} MB{but}")
+
+
+def _worn(file: Path) -> Robot:
+    """The robot of a recording, which stands as a recording of its joints says."""
+    from tomoskin.core import SkinError
+    from tomoskin.model.robot import Robot
+    from tomoskin.run.robot_run import with_joints
+
+    robot = Robot.load(file)
+    if robot.joints.startswith("ros2"):
+        raise SkinError(
+            f'expected a recording of joint states, got joints = "{robot.joints}", which says how '
+            "the robot stands now",
+            where=str(file),
+            hint='name a bag of the same time in a copy of the file, as in joints = "arm.mcap"',
+        )
+    return with_joints(robot)
 
 
 @app.command("import")

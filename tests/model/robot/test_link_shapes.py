@@ -87,7 +87,8 @@ COLLADA = """<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" versi
 <library_geometries><geometry id="g"><mesh>
  <source id="p"><float_array id="f" count="12">0 0 0 1 0 0 1 2 0 0 2 0</float_array>
   <technique_common><accessor source="#f" count="4" stride="3"><param name="X" type="float"/>
-  <param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common></source>
+  <param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common>
+ </source>
  <vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
  <polylist count="1"><input semantic="VERTEX" source="#v" offset="0"/>
   <vcount>4</vcount><p>0 1 2 3</p></polylist>

@@ -193,10 +193,10 @@ class SerialTransport:
             if sys.platform == "win32":
                 return port.read(1) + port.read(port.in_waiting)
             # as pyserial does, but in two calls of the system instead of five
-            ready, _, _ = select.select([port.fd, port.pipe_abort_read_r], [], [], _FETCH)
-            data = b""
+            own, data = port.fileno(), b""
+            ready, _, _ = select.select([own, port.pipe_abort_read_r or own], [], [], _FETCH)
             with suppress(BlockingIOError):
-                if port.fd in ready and not (data := os.read(port.fd, _CHUNK)):
+                if own in ready and not (data := os.read(own, _CHUNK)):
                     raise OSError("it has nothing more to give")
             return data
         except (OSError, TypeError) as error:  # TypeError: when closed meanwhile

@@ -19,11 +19,13 @@ from tomoskin.files.messages.foxglove_records import (
 )
 from tomoskin.files.messages.policy_forms import (
     FIELDS,
+    POSE,
     SLOTS,
     PolicyForms,
     PolicyView,
     Slots,
     last_before,
+    pose_row,
     still_holds,
 )
 from tomoskin.files.messages.reporter import Every, Item, Reporter
@@ -45,6 +47,7 @@ __all__ = [
     "NAMES",
     "NODE_TYPES",
     "NO_REFERENCE",
+    "POSE",
     "SLOTS",
     "TOPICS",
     "TYPES",
@@ -69,6 +72,7 @@ __all__ = [
     "grid_message",
     "last_before",
     "log_message",
+    "pose_row",
     "raster",
     "ros_messages",
     "row_labels",

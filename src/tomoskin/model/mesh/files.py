@@ -1,4 +1,4 @@
-"""What mesh files hold, by meshio and pycollada (extra ``mesh``): cells, points, groups of facets."""
+"""What mesh files hold, by meshio and pycollada (extra ``mesh``): cells, points and groups."""
 
 from __future__ import annotations
 
@@ -54,8 +54,9 @@ def parsed(file: Path) -> Any:
         # the reader itself: meshio.read ends the process where a file is damaged
         reader = import_module(name)
     except ImportError as error:
+        package = name.partition(".")[0]
         raise GeometryError(
-            f"{file.suffix} files need {name.partition('.')[0]}", where=str(file), hint=install_hint("mesh")
+            f"{file.suffix} files need {package}", where=str(file), hint=install_hint("mesh")
         ) from error
     _check_readable(file)
     try:

@@ -227,6 +227,21 @@ class Robot:
             joints = str(Path(folder) / joints)
         return cls(source, robot.name, skins, urdf, joints)
 
+    def place(self, name: str, path: StrPath) -> Place:
+        """That of the skin called so; of a recording ``path`` without names that of the only one.
+
+        Raises SkinError where it has none.
+        """
+        places = {skin.name: skin.place for skin in self.skins}
+        if name not in places and (name or len(places) > 1):
+            raise SkinError(
+                f"expected a recording of its skins ({', '.join(places)}), got "
+                f'"{name or "one skin without a name"}" in {path}',
+                where=self.source,
+                hint="name the recording of the robot, and one of its skins by --skin",
+            )
+        return places[name] if name else next(iter(places.values()))
+
     def moved_by(self, joints: JointPositions) -> Self:
         """The same, whose skins know by ``joints`` where their links are."""
         skins = (replace(s, place=replace(s.place, joints=joints)) for s in self.skins)
