@@ -207,6 +207,11 @@ def _worn(file: Path) -> Robot:
             where=str(file),
             hint='name a bag of the same time in a copy of the file, as in joints = "arm.mcap"',
         )
+    for skin in () if robot.joints else robot.skins:
+        try:
+            skin.place.in_root(None)
+        except SkinError as error:
+            remark(f"{skin.name}: {error}")
     return with_joints(robot)
 
 

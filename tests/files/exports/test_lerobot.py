@@ -254,6 +254,10 @@ def test_each_row_says_where_the_links_were_and_where_that_is_not_known(robot, t
     text = ROBOT.replace("palm", "left").replace("JOINTS", "ros2")
     file.write_text(text + '[[skin]]\nname = "right"\nskin = "textile-disc-8"\n')
     words = "session", "export", robot, folder, "--every", "0.05", "--robot", file
+    file.write_text(file.read_text().replace("joints =", "#"))
+    code, _, errors = tomoskin(*words[:3], robot.with_name("unknown.lerobot"), *words[4:])
+    assert (code, 'left: pose unknown: the joint "elbow" may move' in errors) == (0, True)
+    file.write_text(file.read_text().replace("#", "joints ="))
     code, _, errors = tomoskin(*words)
     assert (code, 'as in joints = "arm.mcap"' in errors) == (1, True)
     file.write_text(file.read_text().replace('"ros2"', '"arm.mcap"'))
