@@ -118,6 +118,13 @@ def test_a_touch_says_how_many_it_stands_for():
     assert [data[at + 52 * k + 5] for k in range(3)] == [0, 1, 3]
 
 
+def test_a_touch_says_whether_a_scan_has_confirmed_it():
+    early = replace(touch(1, [0]), provisional=True)
+    data = encode_result(make(5, (early, touch(2, [1]))), [], 0.0)
+    at = len(data) - 8 - 2 * 52
+    assert [data[at + 52 * k + 7] for k in range(2)] == [1, 0]
+
+
 def test_a_touch_carries_its_force():
     none, known, guessed = touch(1, [0]), touch(2, [1]), touch(3, [2])
     known = replace(known, detection=replace(known.detection, force=Force(4.0, 3.5, 4.75)))

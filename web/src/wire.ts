@@ -852,6 +852,7 @@ export const readTouch = (data: DataView, at: number) => ({
   kind: data.getUint8(at + 4),
   several: data.getUint8(at + 5),
   forceState: data.getUint8(at + 6),
+  provisional: data.getUint8(at + 7),
   x: data.getFloat32(at + 8, true),
   y: data.getFloat32(at + 12, true),
   sdX: data.getFloat32(at + 16, true),

@@ -305,7 +305,7 @@ class Detection:
     cells
         (n,) indices of the region's cells.
     cov_xy
-        Covariance of ``x`` and ``y``, m², beside ``sd_x``² and ``sd_y``².
+        Covariance of ``x`` and ``y``, m², beside the squares of ``sd_x`` and ``sd_y``.
     snr
         How many times its noise the detection stands out; NaN where the noise is not known.
     close
@@ -354,6 +354,8 @@ class Touch:
     possible
         Identities that it may have, its own among them, where it has been too close to another
         for frames to tell who is who; else empty.
+    provisional
+        Whether single drives alone have told of it: no frame has confirmed it yet.
     """
 
     id: int
@@ -362,6 +364,7 @@ class Touch:
     detection: Detection = field(repr=False)
     merged: tuple[int, ...] = ()
     possible: tuple[int, ...] = ()
+    provisional: bool = False
 
     @property
     def said(self) -> str:

@@ -7,8 +7,9 @@ image                 f32 [n_cells], change of conductivity in the scene's unit
 voltages, reference   f32 [n_meas] each, V
 touches, 52 bytes     id u32, kind u8 (0 decrease, 1 increase), several u8 (0 no, 1 may be
 each                  several, n > 1: n that have merged), force u8 (0 none, 1 calibrated,
-                      2 uncalibrated), 1 pad, x, y, sd_x, sd_y (NaN unknown), area, peak,
-                      since (s ago), cov_xy (m²), force and its interval (N, NaN none) f32
+                      2 uncalibrated), provisional u8 (1: no whole scan has confirmed it),
+                      x, y, sd_x, sd_y (NaN unknown), area, peak, since (s ago), cov_xy (m²),
+                      force and its interval (N, NaN none) f32
 truth, 16 bytes each  x, y (m), force (N), radius (m) f32: the presses on the twin
 bend, 16 bytes        with flag bit 3 only: angle, its deviation, axis (rad) f32, state u32 (a
                       place in :data:`BEND_STATES`)
@@ -69,7 +70,7 @@ RECORDS = {
             ("kind", "u1"),
             ("several", "u1"),
             ("force_state", "u1"),
-            ("pad", "u1"),
+            ("provisional", "u1"),
             *((name, "<f4") for name in _MEASURES),
         ]
     ),
@@ -138,7 +139,7 @@ def _touches(touches: Sequence[Touch], now: float) -> bytes:
             t.kind == "increase",
             min(len(t.merged), _MOST) or t.detection.close,
             _force_state(t.detection.force),
-            0,
+            t.provisional,
             t.detection.x,
             t.detection.y,
             t.detection.sd_x,

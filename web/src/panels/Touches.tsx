@@ -17,8 +17,9 @@ function uncertainty(touch: Touch): string {
   return axes ? millimetres(axes[0]) : "";
 }
 
-/** What cannot be separated, in words; nothing where there is one touch. */
-function tooClose(touch: Touch): string | undefined {
+/** What is not certain of a touch, in words; nothing where all is. */
+function doubt(touch: Touch): string | undefined {
+  if (touch.provisional) return "seen by single drives, not by a whole scan yet";
   if (touch.several > 1) return `${touch.several} touches, too close to separate`;
   return touch.several ? "may be several touches, too close to separate" : undefined;
 }
@@ -75,7 +76,7 @@ function Row({ touch, scale }: { touch: Touch; scale: Scale }) {
   return (
     <tr data-testid="touch-row" data-id={touch.id}>
       <th scope="row">
-        <span class="chip" title={tooClose(touch)}>
+        <span class="chip" title={doubt(touch)}>
           {touch.id}
           {touch.several > 0 && "+"}
         </span>
@@ -124,7 +125,7 @@ function Announcer() {
       const positions = touches.map(
         (touch) =>
           `touch ${touch.id} at ${millimetres(touch.x, 0)}, ${millimetres(touch.y, 0)} ` +
-          ["millimetres", touch.force && forceInWords(touch.force), tooClose(touch)]
+          ["millimetres", touch.force && forceInWords(touch.force), doubt(touch)]
             .filter(Boolean)
             .join(", "),
       );

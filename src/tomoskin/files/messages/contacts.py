@@ -174,6 +174,7 @@ class Contact:
         content = {
             **_NO_FORCE,
             **touch_row(self.touch),
+            "provisional": self.touch.provisional,
             "position": self.position,
             "normal": self.normal,
             "covariance": None if spread is None else spread.tolist(),
