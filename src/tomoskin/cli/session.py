@@ -18,7 +18,6 @@ from tomoskin.cli.output import Bar, JsonFlag, remark, tell
 if TYPE_CHECKING:
     from tomoskin.core import Output
     from tomoskin.files.session import Lost, Repaired, SessionInfo
-    from tomoskin.model.robot import Robot
 
 app = group("session")
 
@@ -169,13 +168,15 @@ def export(
     """Convert a session to tables, images or the format of another program."""
     from tomoskin.files.exports import WRITERS, Export, export_touches, omitted
     from tomoskin.files.session import SessionReader, skins_in
+    from tomoskin.model.robot import Robot
+    from tomoskin.run import with_joints
 
     write = WRITERS[out.suffix.lower()]
     if like is not None and out.suffix.lower() != ".lerobot":
         raise typer.BadParameter(
             f"expected it together with X.lerobot, got {out}", param_hint="--like"
         )
-    worn = None if robot is None else _worn(robot)
+    worn = None if robot is None else with_joints(Robot.load(robot))
     names = (skin,) if skin or out.suffix.lower() != ".lerobot" else skins_in(file)
     with ExitStack() as stack, Bar(f"writing {out}") as bar:
         session, *others = [stack.enter_context(SessionReader(file, name)) for name in names]
@@ -191,28 +192,6 @@ def export(
         if path is not None and path.is_file():
             but = f", without {without}" if without and path == out else ""
             typer.echo(f"{path}: {path.stat().st_size / 1e6:.1f} MB{but}")
-
-
-def _worn(file: Path) -> Robot:
-    """The robot of a recording, which stands as a recording of its joints says."""
-    from tomoskin.core import SkinError
-    from tomoskin.model.robot import Robot
-    from tomoskin.run.robot_run import with_joints
-
-    robot = Robot.load(file)
-    if robot.joints.startswith("ros2"):
-        raise SkinError(
-            f'expected a recording of joint states, got joints = "{robot.joints}", which says how '
-            "the robot stands now",
-            where=str(file),
-            hint='name a bag of the same time in a copy of the file, as in joints = "arm.mcap"',
-        )
-    for skin in () if robot.joints else robot.skins:
-        try:
-            skin.place.in_root(None)
-        except SkinError as error:
-            remark(f"{skin.name}: {error}")
-    return with_joints(robot)
 
 
 @app.command("import")

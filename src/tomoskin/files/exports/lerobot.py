@@ -132,6 +132,13 @@ class _Track:
                 poses.append(pose_row(contacts) if contacts.link else [])
         if not times:
             raise DataError("holds too few frames for a reference", where=str(job.session.path))
+        if (link := contacts.link) is not None and not np.any(poses):
+            raise DataError(
+                f"no frame says where its link was: {link.problem}",
+                where=str(job.session.path),
+                hint="name a bag with the joint states of that time in the robot file, as in "
+                'joints = "arm.mcap", or leave out --robot',
+            )
         name = f".{job.session.name}" if job.session.name else ""
         return cls(
             f"{PREFIX}{name}.",

@@ -233,14 +233,12 @@ class Robot:
         Raises SkinError where it has none.
         """
         places = {skin.name: skin.place for skin in self.skins}
-        if name not in places and (name or len(places) > 1):
-            raise SkinError(
-                f"expected a recording of its skins ({', '.join(places)}), got "
-                f'"{name or "one skin without a name"}" in {path}',
-                where=self.source,
-                hint="name the recording of the robot, and one of its skins by --skin",
-            )
-        return places[name] if name else next(iter(places.values()))
+        if not name and len(places) == 1:
+            return self.skins[0].place
+        if name not in places:
+            known, got = ", ".join(places), name or "one skin without a name"
+            raise SkinError(f'expected one of {known}, got "{got}" in {path}', where=self.source)
+        return places[name]
 
     def moved_by(self, joints: JointPositions) -> Self:
         """The same, whose skins know by ``joints`` where their links are."""
