@@ -19,7 +19,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 
@@ -232,10 +232,10 @@ def page(runner: Runner) -> Iterator[None]:
             reader.communicate()
 
 
-def elsewhere(words: list[str]) -> subprocess.Popen[str]:
+def elsewhere(words: list[str], out: IO[str] | int = subprocess.PIPE) -> subprocess.Popen[str]:
     """A process on the cores that this one does not use, where there are any."""
     others = set(range(os.cpu_count() or 1)) - os.sched_getaffinity(0)
-    process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
+    process = subprocess.Popen(words, stdout=out, text=True)
     if others:
         os.sched_setaffinity(process.pid, others)
     return process

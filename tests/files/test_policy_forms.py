@@ -7,9 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from run.sinks.test_joint_states import ROBOT, URDF
 from tomoskin.core import Amount
-from tomoskin.files.messages import FIELDS, SLOTS, Contacts, PolicyForms, Slots, Stream
+from tomoskin.files.messages import FIELDS, POSE, SLOTS, Contacts, PolicyForms, Slots, Stream
 from tomoskin.files.session import Session
+from tomoskin.model.robot import Robot
 from tomoskin.model.skin import Skin
 from tomoskin.run import simulate
 from tomoskin.twin import Script
@@ -73,6 +75,23 @@ def test_points_are_touches_with_motion_and_force(session, results, touched):
     )
     assert view.point_mask.tolist() == [[True, True]] + [[False, False]] * (SLOTS - 1)
     assert not view.points[1:].any()
+
+
+def test_on_a_robot_the_pose_of_the_link_is_known_or_zeros(session, touched, tmp_path):
+    (tmp_path / "arm.urdf").write_text(URDF)
+    (tmp_path / "robot.toml").write_text(ROBOT.replace("JOINTS", "ros2"))
+    place = Robot.load(tmp_path / "robot.toml").skins[0].place
+
+    def pose_by(joints):
+        forms = PolicyForms(session.prepared)
+        stream = Stream.of(session.prepared, "", 1000.0, replace(place, joints=joints))
+        forms.push(Contacts.of(stream, touched))
+        return forms.at().pose
+
+    half = np.sqrt(0.5)
+    turned = pose_by(lambda _: {"shoulder": np.pi / 2, "elbow": 0.1}.get)
+    assert turned == pytest.approx([1, 0, 0.4, 0.2, 0, 0, half, half])
+    assert pose_by(None).tolist() == [0.0] * len(POSE)
 
 
 def test_a_force_and_a_depth_that_are_not_calibrated_say_so(session, touched):

@@ -99,7 +99,7 @@ def guess(
 
 @app.command()
 def lay(
-    surface: Annotated[Path, typer.Argument(help="A .stl, .obj or .ply file."), Reads()],
+    surface: Annotated[Path, typer.Argument(help="A .stl, .obj, .ply or .dae file."), Reads()],
     electrodes: Annotated[
         Path,
         typer.Option(

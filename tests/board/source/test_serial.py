@@ -137,6 +137,19 @@ def test_where_no_board_answers_the_likeliest_cause_is_found_and_raised(words, s
     stranger.close()
 
 
+def test_a_read_asks_the_system_twice(bench, monkeypatch):
+    calls = []
+    for module, name in ((port.select, "select"), (port.os, "read")):
+        ask = getattr(module, name)
+        counted = lambda *given, ask=ask, name=name: calls.append(name) or ask(*given)  # noqa: E731
+        monkeypatch.setattr(module, name, counted)
+    transport = port.SerialTransport(bench.path)
+    monkeypatch.setattr(type(transport._serial), "read", None)
+    assert transport.read(5.0)
+    transport.close()
+    assert {"select", "read"} == set(calls)
+
+
 def test_reading_and_writing_after_close(bench):
     transport = port.SerialTransport(bench.path)
     transport.close()

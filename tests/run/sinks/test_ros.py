@@ -339,9 +339,10 @@ def test_what_is_sent_when(stream):
             result_at(0.3, events=(release,)), result_at(0.4, has_image=False), result_at(1.5),
         )
     ]  # fmt: skip
-    always = ["touches", "valid", "contacts", "wrench", "markers"]
+    first = ["touches", "valid", "contacts", "wrench"]
+    always = [*first, "markers"]
     seen, report = ["voltages", "image"], ["rows", "/diagnostics"]
-    assert sent[0] == ["touch", "track", "/tf", *always, *seen, *report]
+    assert sent[0] == [*first, "touch", "track", "/tf", "markers", *seen, *report]
     assert sent[1] == [*always, *seen]  # the last touch has ended
     assert sent[2] == seen
     assert sent[3] == ["events", *seen]

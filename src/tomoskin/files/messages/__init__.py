@@ -19,11 +19,13 @@ from tomoskin.files.messages.foxglove_records import (
 )
 from tomoskin.files.messages.policy_forms import (
     FIELDS as FIELDS,
+    POSE as POSE,
     SLOTS as SLOTS,
     PolicyForms as PolicyForms,
     PolicyView as PolicyView,
     Slots as Slots,
     last_before as last_before,
+    pose_row as pose_row,
     still_holds as still_holds,
 )
 from tomoskin.files.messages.reporter import Every as Every, Item as Item, Reporter as Reporter

@@ -29,6 +29,10 @@ FIELDS = (
 )
 """Columns of a slot; :meth:`Slots.table` says what they mean."""
 
+POSE = ("valid", "x", "y", "z", "qx", "qy", "qz", "qw")
+"""Where the link is that a skin lies on, in the root frame of the robot: 1 where that is known, m,
+and a quaternion; zeros where it is not."""
+
 UNKNOWN_SD = 1.0
 """Standard deviation of a position whose noise is not known, m: more than any sheet."""
 
@@ -84,6 +88,12 @@ class Slots:
         return Slots(tuple(ids), onsets, table)
 
 
+def pose_row(contacts: Contacts) -> list[float]:
+    """The values of :data:`POSE`."""
+    pose = contacts.link and contacts.link.pose
+    return [1.0, *pose.position, *pose.quaternion()] if pose else [0.0] * len(POSE)
+
+
 def _kept(ids: tuple[int, ...], touches: tuple[Touch, ...]) -> tuple[int, ...]:
     alive = {key for touch in touches for key in (touch.id, *touch.merged)}
     return tuple(key if key in alive else 0 for key in ids)
@@ -135,6 +145,8 @@ class PolicyView:
     map, map_mask, map_valid
         (size, size) N/cm², or change of conductance in the image's unit, the top row first; where
         the sheet is; and whether it shows all that touches: the forces of all touches are known.
+    pose
+        (len(POSE),) where the link of the robot is that the skin lies on, see :data:`POSE`.
     vector
         (n_meas,) change of the voltages in standard deviations of one frame's noise.
     window, ages
@@ -150,6 +162,7 @@ class PolicyView:
     map: FloatArray
     map_mask: _MASK
     map_valid: bool
+    pose: FloatArray
     vector: FloatArray
     window: FloatArray
     ages: FloatArray
@@ -227,7 +240,8 @@ class PolicyForms:
         time = float(times[-1]) if time is None else time
         chosen = last_before(times, np.array([time]), self._count)[0]
         newest, ages = samples[chosen[-1]], time - times[chosen]
-        valid = newest.contacts.valid and bool(still_holds(times, ages[-1:])[0])
+        holds = bool(still_holds(times, ages[-1:])[0])
+        valid = newest.contacts.valid and holds
         table = newest.slots.table * valid
         drawn, shows_all = self._drawn(newest.contacts if valid else None)
         return PolicyView(
@@ -239,6 +253,7 @@ class PolicyForms:
             map=drawn,
             map_mask=self._grid.mask,
             map_valid=shows_all,
+            pose=np.array(pose_row(newest.contacts)) * holds,
             vector=newest.change / _floored(newest.noise),
             window=np.array([samples[index].change for index in chosen]),
             ages=ages,

@@ -1,4 +1,4 @@
-"""What mesh files hold, by meshio (extra ``mesh``): cells, points and groups of facets;
+"""What mesh files hold, by meshio or pycollada (extra ``mesh``): cells, points, groups of facets;
 which of these are electrodes: by name, facets or a function."""
 
 from __future__ import annotations
@@ -23,8 +23,11 @@ from tomoskin.core import (
 )
 from tomoskin.model.mesh.triangles import boundary_facets
 
-READERS = {".msh": "gmsh", ".vtu": "vtu", ".stl": "stl", ".obj": "obj", ".ply": "ply"}
-"""meshio's reader for each ending."""
+READERS = {
+    ".msh": "meshio.gmsh", ".vtu": "meshio.vtu", ".stl": "meshio.stl", ".obj": "meshio.obj",
+    ".ply": "meshio.ply", ".dae": "collada",
+}  # fmt: skip
+"""The module that reads each ending."""
 
 TOO_LARGE = 10.0
 """A body that extends further than this, m, is taken for one in millimetres."""
@@ -45,7 +48,7 @@ def at_source(error: GeometryError, source: str) -> GeometryError:
 
 
 def parsed(file: Path) -> Any:
-    """What meshio makes of the file."""
+    """The file as meshio has it."""
     name = READERS.get(file.suffix.lower())
     if name is None:
         raise GeometryError(
@@ -53,15 +56,16 @@ def parsed(file: Path) -> Any:
         )
     try:
         # the reader itself: meshio.read ends the process where a file is damaged
-        reader = import_module(f"meshio.{name}")
+        reader = import_module(name)
     except ImportError as error:
+        package = name.partition(".")[0]
         raise GeometryError(
-            "mesh files need meshio", where=str(file), hint=install_hint("mesh")
+            f"{file.suffix} files need {package}", where=str(file), hint=install_hint("mesh")
         ) from error
     _check_readable(file)
     try:
         with np.errstate(over="ignore"):  # its test for binary STL multiplies text
-            return reader.read(file)
+            return _scene(reader, file) if name == "collada" else reader.read(file)
     except OSError as error:
         raise GeometryError(f"cannot be read: {error.strerror}", where=str(file)) from error
     except Exception as error:  # a parser meets damage in any way
@@ -69,6 +73,23 @@ def parsed(file: Path) -> Any:
         raise GeometryError(
             f"cannot be read as a {file.suffix} file{detail}", where=str(file)
         ) from error
+
+
+def _scene(collada: Any, file: Path) -> Any:
+    """All triangles of a scene, in m; its upward axis is not applied, as RViz has it."""
+    meshio, common = import_module("meshio"), collada.common
+    ignored = [common.DaeUnsupportedError, common.DaeBrokenRefError]  # textures, lights
+    document = collada.Collada(str(file), ignore=ignored)
+    points, cells, count = [np.zeros((0, 3))], [np.zeros((0, 3), np.int64)], 0
+    for shape in document.scene.objects("geometry"):
+        for part in shape.primitives():
+            drawn = part.triangleset() if hasattr(part, "triangleset") else part
+            if drawn.vertex_index.shape[1] == 3:  # no line
+                points.append(drawn.vertex)
+                cells.append(drawn.vertex_index + count)
+                count += len(drawn.vertex)
+    unit = document.assetInfo.unitmeter or 1.0
+    return meshio.Mesh(np.concatenate(points) * unit, [("triangle", np.concatenate(cells))])
 
 
 def _check_readable(file: Path) -> None:
@@ -123,8 +144,8 @@ def cells_of(raw: Any) -> IntArray:
     return np.concatenate(tables).astype(np.int64)
 
 
-def points_of(raw: Any, cells: IntArray, scale: float) -> FloatArray:
-    """(n, d) points in m; those of a flat mesh with two coordinates."""
+def points_of(raw: Any, cells: IntArray, scale: float) -> tuple[FloatArray, float]:
+    """(n, d) points in m; those of a flat mesh with two coordinates, and the third of all."""
     if not (math.isfinite(scale) and scale > 0):
         raise GeometryError(f"expected a scale above 0, got {scale:g}")
     points = np.asarray(raw.points, dtype=np.float64) * scale
@@ -142,7 +163,7 @@ def points_of(raw: Any, cells: IntArray, scale: float) -> FloatArray:
             hint='if the file is in millimetres, say so: unit "mm", or scale=1e-3',
         )
     flat = cells.shape[1] == 3 and points.shape[1] == 3 and extent[2] == 0
-    return points[:, :2] if flat else points
+    return (points[:, :2], float(points[cells[0, 0], 2])) if flat else (points, 0.0)
 
 
 def groups_of(raw: Any, corners: int) -> dict[str, IntArray]:

@@ -88,7 +88,7 @@ class SurfaceSection(Section, section="surface"):
     )
     file: str | None = key(
         Text(),
-        "A .stl, .obj or .ply file, beside the skin file unless the path is absolute.",
+        "A .stl, .obj, .ply or .dae file, beside the skin file unless the path is absolute.",
         shape="file",
     )
     unit: str = key(
