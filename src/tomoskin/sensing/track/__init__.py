@@ -1,6 +1,6 @@
 """Detections of successive frames → touches that keep their identity, and what happens to them."""
 
-from tomoskin.sensing.track.motion import SlideCorrection, TrackSettings
+from tomoskin.sensing.track.motion import SlideCorrection, TrackSettings, motion_step
 from tomoskin.sensing.track.policy import GATE, HELD, RESIDUAL
 from tomoskin.sensing.track.touch_table import (
     ELAPSED,
@@ -30,6 +30,7 @@ __all__ = [
     "columns_of",
     "force_values",
     "has_forces",
+    "motion_step",
     "touch_columns",
     "touch_rows",
     "touch_spans",
