@@ -22,7 +22,7 @@ from tomoskin.twin import Press, ScanClock, TwinSettings, make_electronics, samp
 from touch_lab import TwinLab
 from touch_noise import CASES, NEEDED, NoisyBoard, fitted
 
-SEEDS = (9401, 9402)
+SEEDS = (9501, 9502)
 """Everything was chosen on seeds 9100 and 9101."""
 
 PRESSES, COURSES, SPEEDS = 15, 4, (0.06, 0.12)
