@@ -29,7 +29,7 @@ from tomoskin.board.source import Configuration, ScanSettings, SerialTransport
 from tomoskin.board.wire import encode
 from tomoskin.core import FloatArray, Frame
 from tomoskin.files.session import SessionReader
-from tomoskin.files.session.replay_board import ReplayBoard
+from tomoskin.files.session.replay import ReplayBoard
 from tomoskin.model.pattern import Scan
 from tomoskin.model.robot import Place
 from tomoskin.model.skin import Skin

@@ -11,11 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tomoskin.cli.choices import (
-    quantity,
-    skin_for_file,
-    with_recorded_calibrations,
-)
+from tomoskin.cli.choices import quantity, skin_for_file, with_recorded_calibrations
 from tomoskin.cli.named_files import TABLE, ForceFlag, Writes
 from tomoskin.cli.named_parts import Recorded, first_time, reconstructed, say_notes, span_lines
 from tomoskin.cli.options import (

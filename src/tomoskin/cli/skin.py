@@ -119,8 +119,7 @@ def lay(
 ) -> None:
     """Write the skin file of a sheet on a scanned or drawn surface."""
     from tomoskin.core import DIMENSIONS, DataError, write_text
-    from tomoskin.model.skin import Skin
-    from tomoskin.model.skin import lay as laid
+    from tomoskin.model.skin import Skin, lay as laid
 
     if unit not in ("mm", "cm", "m"):
         raise DataError(f'expected mm, cm or m, got "{unit}"', where="--unit")

@@ -305,7 +305,7 @@ class Detection:
     cells
         (n,) indices of the region's cells.
     cov_xy
-        Covariance of ``x`` and ``y``, m², beside ``sd_x``² and ``sd_y``².
+        Covariance of ``x`` and ``y``, m², beside the squares of ``sd_x`` and ``sd_y``.
     snr
         How many times its noise the detection stands out; NaN where the noise is not known.
     close

@@ -11,7 +11,6 @@ import numpy as np
 from tomoskin.core import TomoskinError, WireError
 from tomoskin.learning import FORCE, TOUCH, Kind, load_calibration
 from tomoskin.run import SetPose, SetTwin, commands, way_to_bend
-from tomoskin.server.file_handlers import FileHandlers
 from tomoskin.server.folder import Folder
 from tomoskin.server.guide_handlers import GuideHandlers
 from tomoskin.server.hub import Hub
@@ -20,7 +19,7 @@ from tomoskin.server.page_messages import Calibrations
 from tomoskin.server.requests import UseCalibration
 from tomoskin.server.settings_handlers import SettingsHandlers
 from tomoskin.server.settings_messages import TwinBend, TwinRefused, TwinState, TwinStretch
-from tomoskin.server.source_handlers import SourceHandlers, SourceSwitch
+from tomoskin.server.source_handlers import FileHandlers, SourceHandlers, SourceSwitch
 
 _OFFERED: dict[str, Kind[Any]] = {"touch": TOUCH, "force": FORCE}
 

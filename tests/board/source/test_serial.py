@@ -11,8 +11,7 @@ import pytest
 from serial.tools.list_ports_common import ListPortInfo
 
 from board.source.boards import BOARD, SCAN, SETTINGS, Counting, frames, poll_until
-from tomoskin.board.source import Link, Timing
-from tomoskin.board.source import serial as port
+from tomoskin.board.source import Link, Timing, serial as port
 from tomoskin.board.source.serial import SIGN_ON
 from tomoskin.core import SourceError
 from tomoskin.twin.device import TwinDevice

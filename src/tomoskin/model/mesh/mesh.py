@@ -13,11 +13,12 @@ from numpy.typing import DTypeLike, NDArray
 
 from tomoskin.core import FloatArray, GeometryError, IntArray, PixelMap
 from tomoskin.model.mesh.check import check_mesh, checked_metric
-from tomoskin.model.mesh.choose import Electrodes, choose
 from tomoskin.model.mesh.files import (
+    Electrodes,
     at_source,
     cells_of,
     check_repeats,
+    choose,
     groups_of,
     parsed,
     points_of,

@@ -7,12 +7,7 @@ from dataclasses import replace
 
 from tomoskin.core import Detection, Touch
 from tomoskin.sensing.track import policy
-from tomoskin.sensing.track.association import (
-    FrameOfTouches,
-    ObservedDetection,
-    associate,
-    follow,
-)
+from tomoskin.sensing.track.association import FrameOfTouches, ObservedDetection, associate, follow
 from tomoskin.sensing.track.identity import IdentityLedger
 from tomoskin.sensing.track.merging import (
     divide,
