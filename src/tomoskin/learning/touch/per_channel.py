@@ -124,9 +124,9 @@ class ChannelMaps:
     twenty presses it learns the noise of a single row less well than the row alone does.
 
     ``mean``, ``size`` and ``ratio`` (k,) are each row's, the last that of noise over signal;
-    ``weights`` (k, m) of the functions of the ``basis`` and ``root`` (k or 1, m, m), whose square
-    is the covariance of the weights over the noise; ``evidence`` is the log marginal likelihood up
-    to a constant.
+    ``weights`` (k, m) are those of the functions of the ``basis``, whose covariance over the noise
+    has the ``axes`` (k or 1, m, m) with the inverse of ``spread`` (k, m); ``evidence`` is the log
+    marginal likelihood up to a constant.
     """
 
     envelope: Envelope
@@ -135,7 +135,8 @@ class ChannelMaps:
     size: FloatArray
     ratio: FloatArray
     weights: FloatArray
-    root: FloatArray
+    axes: FloatArray
+    spread: FloatArray
     evidence: float
 
     @classmethod
@@ -172,10 +173,9 @@ class ChannelMaps:
         logs = np.log(spread / ratios[:, :, None]).sum(axis=2) + n * np.log(ratios * size)
         best, rows = logs.argmin(axis=0), np.arange(len(mean))
         ratio, spread = np.broadcast_to(ratios, logs.shape)[best, rows], spread[best, rows]
-        root = axes / np.sqrt(spread)[:, None, :]
-        solved = (root @ (along / np.sqrt(spread))[:, :, None])[:, :, 0]
+        solved = (axes @ (along / spread)[:, :, None])[:, :, 0]
         evidence = -0.5 * float(logs[best, rows].sum())
-        return cls(envelope, basis, mean, size[best, rows], ratio, solved, root, evidence)
+        return cls(envelope, basis, mean, size[best, rows], ratio, solved, axes, spread, evidence)
 
     def again(self, positions: FloatArray, features: FloatArray) -> Self:
         """Maps of other presses with the same settings."""
@@ -185,11 +185,10 @@ class ChannelMaps:
     def at(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Mean and variance, both (g, k), of the features of a press at ``positions`` (g, 2)."""
         values, envelope = self.basis(positions), self.envelope(positions)
-        k, m = self.weights.shape
         mean = self.mean + envelope * (values @ self.weights.T)
-        white = (values @ self.root.transpose(1, 0, 2).reshape(m, -1)).reshape(-1, k, m)
+        known = ((values @ self.axes) ** 2 @ (1 / self.spread)[:, :, None])[:, :, 0].T
         unknown = self.basis.likeness.variance - (values**2).sum(axis=1, keepdims=True)
-        prior = np.maximum(unknown, 0.0) + self.ratio * np.einsum("gkm,gkm->gk", white, white)
+        prior = np.maximum(unknown, 0.0) + self.ratio * known
         return mean, self.size * np.maximum(envelope**2 * prior + self.ratio, _FLOOR)
 
 
