@@ -19,7 +19,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 
@@ -29,7 +29,7 @@ from tomoskin.board.source import Configuration, ScanSettings, SerialTransport
 from tomoskin.board.wire import encode
 from tomoskin.core import FloatArray, Frame
 from tomoskin.files.session import SessionReader
-from tomoskin.files.session.replay_board import ReplayBoard
+from tomoskin.files.session.replay import ReplayBoard
 from tomoskin.model.pattern import Scan
 from tomoskin.model.robot import Place
 from tomoskin.model.skin import Skin
@@ -232,10 +232,10 @@ def page(runner: Runner) -> Iterator[None]:
             reader.communicate()
 
 
-def elsewhere(words: list[str]) -> subprocess.Popen[str]:
+def elsewhere(words: list[str], out: IO[str] | int = subprocess.PIPE) -> subprocess.Popen[str]:
     """A process on the cores that this one does not use, where there are any."""
     others = set(range(os.cpu_count() or 1)) - os.sched_getaffinity(0)
-    process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
+    process = subprocess.Popen(words, stdout=out, text=True)
     if others:
         os.sched_setaffinity(process.pid, others)
     return process

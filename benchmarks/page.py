@@ -226,7 +226,7 @@ def _watched(browser: Any, prepared: Prepared, cells: int, most: int) -> Measure
         before, first = heap(page), page.evaluate(COUNT)
         page.wait_for_timeout(1e3 * WATCHED)
         grown, streamed = heap(page) - before, page.evaluate(COUNT) - first
-        painted = {s.name: s for s in stream.latency.stages()}["paint"]
+        painted = {s.name: s for s in stream.flow.latency.stages()}["paint"]
     yield f"scripting per frame, ms, {cells}", round(1e3 * (cost2 - cost) / shown, 2), f"≤ {most}"
     pair = f"{1e3 * painted.p50:.1f}, {1e3 * painted.p99:.1f}"
     yield f"arrival to drawn, ms, {cells}: median, p99", pair, ""

@@ -37,6 +37,9 @@ SINKS = {
 }
 """How each is asked for; where a subscriber finds it, in braces."""
 
+LOOP = "control loop"
+"""A thread of the same program, which waits for news."""
+
 PROMISED = 4.0, 15.0
 """ms from stamp to subscriber, median and 99 of 100."""
 
@@ -58,17 +61,17 @@ Messages = list[tuple[float, float, bool]]
 def run() -> Iterator[Report]:
     """From the stamp of a frame to who listens to a sink, in another process: two minutes."""
     prepared, rows = _prepared(), []
-    for kind in ("control loop", *SINKS):
+    for kind in (LOOP, *SINKS):
         progress(kind)
-        with _listened(prepared, () if kind == "control loop" else (kind,)) as (heard, _):
+        with _listened(prepared, (kind,)) as (heard, _):
             time.sleep(LEAD)
             before = time.time()
             time.sleep(SECONDS)
-            rows.append(_row(kind, heard[kind], before))
+            rows.append(_row(kind, heard()[kind], before))
     yield table(
         "from the middle of a scan to a subscriber",
         rows,
-        "one sink at a time, and its subscriber in a process of its own; "
+        "one sink at a time, and its subscriber in a process of its own, which reads touches; "
         f"the firmware with a Pico's timing on a pty, 404 frames/s; {SKIN}; presses that go round",
         f"promised: median {PROMISED[0]:g} ms, 99 of 100 within {PROMISED[1]:g} ms",
         f"load of the machine {os.getloadavg()[0]:.1f}",
@@ -80,12 +83,12 @@ def run_lost() -> Iterator[Report]:
     prepared, rows = _prepared(), []
     for number in range(LOSSES):
         progress(f"loss {number + 1} of {LOSSES}")
-        with _listened(prepared, (*SINKS, "page")) as (heard, kill):
+        with _listened(prepared, (LOOP, *SINKS, "page")) as (heard, kill):
             time.sleep(LEAD / 2)
             gone = time.time()
             kill()
             time.sleep(2 * LOST)
-            rows.append({name: _told(messages, gone) for name, messages in heard.items()})
+            rows.append({name: _told(messages, gone) for name, messages in heard().items()})
     yield table(
         f"ms until a board whose process was killed is told, {LOSSES} times",
         [
@@ -129,13 +132,16 @@ def _prepared() -> Prepared:
 @contextmanager
 def _listened(
     prepared: Prepared, kinds: Sequence[str]
-) -> Iterator[tuple[dict[str, Messages], Callable[[], None]]]:
-    """What a control loop and subscribers hear of a board that runs; what kills the board."""
+) -> Iterator[tuple[Callable[[], dict[str, Messages]], Callable[[], None]]]:
+    """What a control loop and subscribers have heard of a board that runs; what kills the board.
+
+    Subscribers write files: to read what they say at once would take the interpreter from the run.
+    """
     os.environ["CYCLONEDDS_URI"] = _LOOPBACK
-    heard: dict[str, Messages] = {name: [] for name in ("control loop", *kinds)}
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        ports = {kind: _free_port() for kind in kinds}
+        files = {kind: folder / kind for kind in kinds if kind != LOOP}
+        ports = {kind: _free_port() for kind in files}
         if "mqtt" in kinds:
             stack.enter_context(_broker(folder, ports["mqtt"]))
         tty, process = stack.enter_context(board(prepared.skin, folder))
@@ -143,36 +149,50 @@ def _listened(
         runner = Runner(prepared, lambda: SerialTransport(tty), sinks=sinks)
         runner.start()
         stack.callback(runner.stop)
-        for kind in kinds:
+        for kind, file in files.items():
             address = str(ports[kind])
             if kind == "page":
                 policy = stack.enter_context(served(runner))
                 address = f"ws://127.0.0.1:{policy.port}/ws?token={policy.token}"
-            client = elsewhere([sys.executable, str(_CLIENT), kind, address])
+            written = stack.enter_context(file.open("w"))
+            client = elsewhere([sys.executable, str(_CLIENT), kind, address], written)
             stack.callback(client.wait)
             stack.callback(client.kill)
-            threading.Thread(target=_note, args=(client, heard[kind]), daemon=True).start()
-        ended = threading.Event()
-        stack.callback(ended.set)
-        loop = threading.Thread(target=_loop, args=(runner, heard["control loop"], ended))
-        loop.start()
-        while not all(any(valid for *_, valid in messages) for messages in heard.values()):
-            time.sleep(0.1)
+        own: Messages = []
+        if LOOP in kinds:
+            stack.enter_context(_loop(runner, own))
+
+        def heard() -> dict[str, Messages]:
+            return {kind: _read(files[kind]) if kind in files else own for kind in kinds}
+
+        while not all(any(valid for *_, valid in messages) for messages in heard().values()):
+            time.sleep(1.0)
         yield heard, process.kill
 
 
-def _note(client: subprocess.Popen[str], messages: Messages) -> None:
-    for line in client.stdout or ():
-        came, stamp, valid = line.split()
-        messages.append((float(came), float(stamp), valid == "1"))
+def _read(file: Path) -> Messages:
+    """The whole lines of a subscriber."""
+    lines = (line.split() for line in file.read_text().rpartition("\n")[0].splitlines())
+    return [(float(came), float(stamp), valid == "1") for came, stamp, valid in lines]
 
 
-def _loop(runner: Runner, messages: Messages, ended: threading.Event) -> None:
-    skin = LiveSkin(runner)
-    while not ended.is_set():
-        contacts = skin.wait(0.1)
-        now = time.time()
-        messages.append((now, now - contacts.age_s, contacts.valid))
+@contextmanager
+def _loop(runner: Runner, messages: Messages) -> Iterator[None]:
+    skin, ended = LiveSkin(runner), threading.Event()
+
+    def follow() -> None:
+        while not ended.is_set():
+            contacts = skin.wait(0.1)
+            now = time.time()
+            messages.append((now, now - contacts.age_s, contacts.valid))
+
+    thread = threading.Thread(target=follow)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
 
 
 def _free_port() -> int:

@@ -76,8 +76,8 @@ class Claim:
         ]
 
     def _holds(self, key: str, value: float, now: float) -> bool:
-        if any(f"→ {column}," in key for column in self.timed):
-            return value / _SLOWER <= now <= value * _SLOWER
+        if any(f"→ {column}," in f"{key}," for column in self.timed):
+            return value * now >= 0 and abs(value) / _SLOWER <= abs(now) <= abs(value) * _SLOWER
         return abs(now - value) <= self.within * abs(value)
 
 

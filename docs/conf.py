@@ -1,11 +1,22 @@
 """How Sphinx makes the documentation: `make docs`."""
 
+import importlib
+import typing
 from importlib.metadata import version as version_of
 
 from docutils.nodes import SkipNode
 from docutils.utils.math import MathError
 from docutils.utils.math.latex2mathml import tex2mathml
 from sphinx.errors import ExtensionError
+
+from tomoskin import core
+
+# Some names of core are loaded on demand; the reference has them all.
+for later in core._LATER:
+    importlib.import_module(f"tomoskin.core.{later}")
+typing.TYPE_CHECKING = True
+importlib.reload(core)
+typing.TYPE_CHECKING = False
 
 project = "tomoskin"
 author = "the tomoskin developers"
@@ -36,6 +47,7 @@ suppress_warnings = ["ref.python"]
 def setup(app):
     """Absolute values in docstrings are no substitutions; formulae need no script, no network."""
     app.connect("autodoc-process-docstring", _escape_bars)
+    app.connect("autodoc-skip-member", _skip_foreign)
     app.add_html_math_renderer("mathml", (_inline, None), (_display, None))
 
 
@@ -58,3 +70,8 @@ def _write(writer, node, *, display):
 
 def _escape_bars(app, what, name, obj, options, lines):  # noqa: ARG001, PLR0917 - Sphinx calls it so
     lines[:] = [line.replace("|", r"\|") for line in lines]
+
+
+def _skip_foreign(app, what, name, obj, skip, options):  # noqa: ARG001, PLR0917 - Sphinx calls it so
+    """A package's own imports are no part of what it offers."""
+    return skip or not str(getattr(obj, "__module__", "tomoskin")).startswith("tomoskin")

@@ -31,8 +31,7 @@ from matplotlib.figure import Figure
 
 import figures
 from bodies import options_of
-from lab import FRAMES as SOURCE_FRAMES
-from lab import Changes, report
+from lab import FRAMES as SOURCE_FRAMES, Changes, report
 from layered import Inclusion, Layered, Plate
 from tomoskin.board.source import ScanSettings
 from tomoskin.core import Detection, FloatArray, Frame, Image

@@ -27,7 +27,7 @@ import figures
 from bodies import options_of
 from lab import report
 from tomoskin.core import FloatArray
-from tomoskin.learning import FORCE, ForceModel, WeighedPresses
+from tomoskin.learning import FORCE, AmountModel, LabelledPresses
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, prepare
 from tomoskin.twin import Circle, Press, Probe, SteppedSkin, TwinSettings
@@ -55,7 +55,7 @@ def main(arguments: Sequence[str] | None = None) -> dict[str, float]:
     return found
 
 
-def calibrated(prepared: Prepared, settings: TwinSettings) -> ForceModel:
+def calibrated(prepared: Prepared, settings: TwinSettings) -> AmountModel:
     """Forces learnt from presses with known weights."""
     twin, random = SteppedSkin(prepared, settings), np.random.default_rng(settings.seed)
     detections, force, press, time = [], [], [], []
@@ -78,7 +78,7 @@ def calibrated(prepared: Prepared, settings: TwinSettings) -> ForceModel:
         for _ in range(round(PAUSE / twin.period)):
             twin.step(())
             now += twin.period
-    return ForceModel.fit(WeighedPresses.of(detections, force, press, time), prepared.skin)
+    return AmountModel.fit(LabelledPresses.of(detections, force, press, time), prepared.skin)
 
 
 def pressed(twin: SteppedSkin) -> FloatArray:
@@ -89,7 +89,7 @@ def pressed(twin: SteppedSkin) -> FloatArray:
             time = twin.period * (len(rows) + 1)
             touches = twin.step((Press(*SPOT, force, RADIUS),)).touches
             weighed = touches[0].detection.force if len(touches) == 1 else None
-            estimate = (weighed.newtons, weighed.low, weighed.high) if weighed else (np.nan,) * 3
+            estimate = (weighed.value, weighed.low, weighed.high) if weighed else (np.nan,) * 3
             rows.append((time, force, *estimate))
     return np.array(rows)
 

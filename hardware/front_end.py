@@ -7,8 +7,7 @@ import tomllib
 
 import bill
 from circuit import Circuit
-from results import FILE as MEGA
-from results import Figures
+from results import FILE as MEGA, Figures
 from spice import run
 
 PICO = tomllib.loads(MEGA.read_text(encoding="utf-8"))["pico"]

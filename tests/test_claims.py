@@ -86,6 +86,15 @@ def test_a_table_on_a_page_is_held_against_a_run_number_by_number(
     ]
 
 
+def test_a_time_holds_within_a_factor_of_three_whatever_its_sign() -> None:
+    today = datetime.date(2026, 1, 2)
+    keys = {"A > b (1) → off, 1": -10.0, "A > b → ms": 2.0}
+    timed = Claim("tables", "one", "tomoskin bench one", today, "abc", keys, timed=("off", "ms"))
+    assert timed.broken({"A > b (1) → off, 1": -10.0, "A > b → ms": 5.0}) == []
+    wrong = timed.broken({"A > b (1) → off, 1": 10.0, "A > b → ms": 7.0})
+    assert [one.split(":")[0] for one in wrong] == [f"one, {key}" for key in keys]
+
+
 def test_a_figure_on_a_page_is_replaced_where_its_words_stand(claim: Claim) -> None:
     text = "of 3 rows\n1,019 are in, and 2.4 mm; of 3"
     template = f"of 3 rows {{{KEY}|0}} are in, and {{b|1}} mm"

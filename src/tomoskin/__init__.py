@@ -6,15 +6,15 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from tomoskin.files.exports import plot
-    from tomoskin.files.session import Session
-    from tomoskin.imaging import OneStep
-    from tomoskin.learning import Locator
-    from tomoskin.model.forward import ForwardModel
-    from tomoskin.model.mesh import Mesh
-    from tomoskin.model.pattern import Pattern
-    from tomoskin.model.skin import Skin
-    from tomoskin.run import open_robot, open_skin
+    from tomoskin.files.exports import plot as plot
+    from tomoskin.files.session import Session as Session
+    from tomoskin.imaging import OneStep as OneStep
+    from tomoskin.learning import Locator as Locator
+    from tomoskin.model.forward import ForwardModel as ForwardModel
+    from tomoskin.model.mesh import Mesh as Mesh
+    from tomoskin.model.pattern import Pattern as Pattern
+    from tomoskin.model.skin import Skin as Skin
+    from tomoskin.run import open_robot as open_robot, open_skin as open_skin
 
 __version__ = "0.1.0"
 
@@ -32,19 +32,7 @@ _HOME = {
 }
 """Where each public name lives; it is imported when it is first asked for."""
 
-__all__ = [
-    "ForwardModel",
-    "Locator",
-    "Mesh",
-    "OneStep",
-    "Pattern",
-    "Session",
-    "Skin",
-    "__version__",
-    "open_robot",
-    "open_skin",
-    "plot",
-]
+__all__ = ["__version__", *_HOME]  # noqa: PLE0604
 
 
 def __getattr__(name: str) -> Any:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -32,15 +31,6 @@ def test_a_map_and_a_comparison(tomoskin: Run, tmp_path: Path) -> None:
     assert "textile-disc-8: a press of radius 15 mm" in out
     assert "the same sheet with another design" in out
     assert "8 electrodes, skip:3: " in out
-    assert re.search(r"[1-8] of 8 drives of an untouched skin notice it everywhere: \d", out)
-
-
-def test_a_press_too_faint_for_any_drives_is_said_so(tomoskin: Run) -> None:
-    asked = ("design", "--electrodes", "", "--depth", "0.02", "--radius", "10 mm")
-    assert "all 8 drives of an untouched skin do not notice it" in tomoskin(*asked)[1]
-    watch = json.loads(tomoskin(*asked, "--json")[1])["watch"]
-    assert sorted(watch["drives"]) == list(range(8))
-    assert watch["needed"] is None
 
 
 def test_designs_that_saturate_are_marked_in_the_table_and_explained_once(tomoskin: Run) -> None:

@@ -7,8 +7,7 @@ import sys
 import pytest
 
 from tomoskin import __version__
-from tomoskin.cli import app as commands
-from tomoskin.cli import main
+from tomoskin.cli import app as commands, main
 from tomoskin.core import SinkError
 from tomoskin.server import check_page
 

@@ -66,7 +66,42 @@ def test_weights_in_grams_become_newtons_in_the_table(tomoskin, tmp_path, files)
     assert {row["force_state"] for row in rows} == {"calibrated"}
     code, said, _ = tomoskin("image", path, "--skin", skin, "--calibration", out, "--json")
     touch = json.loads(said)["touches"][-1]
-    assert touch["force_n"]["low"] < touch["force_n"]["newtons"] < touch["force_n"]["high"]
+    assert touch["force_n"]["low"] < touch["force_n"]["value"] < touch["force_n"]["high"]
+
+
+def test_depths_in_millimetres_become_columns_of_the_table(tomoskin, tmp_path, files):
+    path, skin = files
+    out, table = tmp_path / "depth.npz", tmp_path / "touches.csv"
+    command = ("calibrate", "depth", path, "--skin", skin, "--out", out)
+    code, _, err = tomoskin(*command)
+    assert code == 1
+    assert "holds no depths: expected depth_m" in err
+    spans = [
+        word
+        for number, weight in enumerate(WEIGHTS)
+        for word in ("--depth", f"{weight / 1000}={4 + 5 * number}:{7 + 5 * number}")
+    ]
+    code, said, err = tomoskin(*command, *spans)
+    assert (code, err) == (0, "")
+    assert "10 presses, 0.1 to 1.5 mm" in said
+    code, _, err = tomoskin(*command, *spans, "--unit", "m", "--force")
+    assert code == 1
+    assert "these values are probably millimetres" in err
+    code, _, err = tomoskin(
+        "image", path, "--skin", skin, "--calibration", out, "--touches", table
+    )  # fmt: skip
+    assert (code, err) == (0, "")
+    with table.open(newline="") as file:
+        rows = [row for row in csv.DictReader(file) if row["depth_m"]]
+    ratio = [float(row["depth_m"]) / (1e-6 * pressed(int(row["frame"]))) for row in rows]
+    assert np.abs(np.array(ratio) - 1).mean() < 0.3
+    assert {row["depth_state"] for row in rows} == {"calibrated"}
+    assert all(float(row["depth_low_m"]) < float(row["depth_high_m"]) for row in rows)
+
+
+def pressed(frame):
+    """The weight in that frame, g, or the depth, µm."""
+    return WEIGHTS[min((frame - 4) // 5, len(WEIGHTS) - 1)]
 
 
 def test_simulated_presses_teach_forces(tomoskin, tmp_path):
@@ -80,6 +115,8 @@ def test_simulated_presses_teach_forces(tomoskin, tmp_path):
     with made.open("rb") as file, np.load(file) as kept:
         arrays = dict(kept)
     assert arrays["force_n"] == pytest.approx(arrays["press_force_n"][:, 0])
+    assert arrays["depth_m"] == pytest.approx(arrays["press_depth_m"][:, 0])
+    assert ((arrays["depth_m"] > 0) & (arrays["depth_m"] < 1.2e-3)).all()  # where the foam locks
     older = tmp_path / "older.npz"  # sets of before had a column for the only press
     np.savez(older, **arrays | {"force_n": arrays["press_force_n"]})
     assert tomoskin(*calibrate, older)[0] == 0

@@ -19,8 +19,7 @@ from rosbags.typesys import Stores, get_typestore
 from run.board import Board, samples_of
 from run.scripted import fault
 from run.test_replay import Recorded, late
-from run.test_robot_run import Watch as RobotWatch
-from run.test_robot_run import grown, member, running
+from run.test_robot_run import Watch as RobotWatch, grown, member, running
 from run.test_runner import Watch
 from tomoskin.core import Touch
 from tomoskin.files.session import (

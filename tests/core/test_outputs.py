@@ -6,8 +6,7 @@ import os
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from tomoskin.core import RECORDING, Output, OutputError, check_outputs
 from tomoskin.core.outputs import MAGIC, is_same_file

@@ -7,9 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tomoskin.core import Force
-from tomoskin.files.messages import FIELDS, SLOTS, Contacts, PolicyForms, Slots, Stream
+from run.sinks.test_joint_states import ROBOT, URDF
+from tomoskin.core import Amount
+from tomoskin.files.messages import FIELDS, POSE, SLOTS, Contacts, PolicyForms, Slots, Stream
 from tomoskin.files.session import Session
+from tomoskin.model.robot import Robot
 from tomoskin.model.skin import Skin
 from tomoskin.run import simulate
 from tomoskin.twin import Script
@@ -44,11 +46,11 @@ def touched(results):
     return next(r for r in reversed(results) if r.touches)
 
 
-def forced(result, newtons, *, calibrated=True):
-    """The result with a force of its touch."""
+def forced(result, newtons, depth=None):
+    """The result with a force of its touch, and perhaps a depth."""
     (touch,) = result.touches
-    force = Force(newtons, 0.9 * newtons, 1.1 * newtons, calibrated)
-    detection = replace(touch.detection, force=force)
+    force = Amount(newtons, 0.9 * newtons, 1.1 * newtons)
+    detection = replace(touch.detection, force=force, depth=depth)
     return replace(result, touches=(replace(touch, detection=detection),))
 
 
@@ -75,14 +77,43 @@ def test_points_are_touches_with_motion_and_force(session, results, touched):
     assert not view.points[1:].any()
 
 
-def test_a_force_that_is_not_calibrated_says_so(session, touched):
+def test_on_a_robot_the_pose_of_the_link_is_known_or_zeros(session, touched, tmp_path):
+    (tmp_path / "arm.urdf").write_text(URDF)
+    (tmp_path / "robot.toml").write_text(ROBOT.replace("JOINTS", "ros2"))
+    place = Robot.load(tmp_path / "robot.toml").skins[0].place
+
+    def pose_by(joints):
+        forms = PolicyForms(session.prepared)
+        stream = Stream.of(session.prepared, "", 1000.0, replace(place, joints=joints))
+        forms.push(Contacts.of(stream, touched))
+        return forms.at().pose
+
+    half = np.sqrt(0.5)
+    turned = pose_by(lambda _: {"shoulder": np.pi / 2, "elbow": 0.1}.get)
+    assert turned == pytest.approx([1, 0, 0.4, 0.2, 0, 0, half, half])
+    assert pose_by(None).tolist() == [0.0] * len(POSE)
+
+
+def test_a_force_and_a_depth_that_are_not_calibrated_say_so(session, touched):
     forms = PolicyForms(session.prepared)
-    forms.push(forced(touched, 3.0, calibrated=False))
-    assert forms.at().point_mask[0].tolist() == [True, False]
+    forms.push(forced(touched, 3.0, Amount(5e-4, 4e-4, 7e-4)))
+    known = [column(forms.at().slots, name)[0] for name in ("depth_valid", "depth", "force_valid")]
+    assert known == [1, 5e-4, 1]
     forms.push(touched)
+    assert forms.at().point_mask[0].tolist() == [True, False]
+    assert column(forms.at().slots, "depth_valid")[0] == 0
     view = forms.at()
     assert (view.points[0, 8], view.map_valid) == (0, False)
     assert np.isfinite(view.map).all()
+
+
+def test_messages_carry_a_depth_or_say_that_it_is_uncalibrated(session, touched):
+    names = ("depth", "depth_interval", "depth_calibrated")
+    deep = forced(touched, 3.0, Amount(5e-4, 4e-4, np.inf))
+    (touch,) = contacts_of(session, deep).content()["touches"]
+    assert [touch[name] for name in names] == [5e-4, (4e-4, np.inf), True]
+    (touch,) = contacts_of(session, touched).content()["touches"]
+    assert [touch[name] for name in names] == [None, None, False]
 
 
 @pytest.mark.parametrize("size", [32, 64])

@@ -5,12 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
+from hypothesis import HealthCheck, given, settings, strategies as st
 
 from firmware.boards import PATIENCE, SCAN, SETTINGS, Talk, running, star_counts
-from tomoskin.board.source import Link
-from tomoskin.board.source import serial as port
+from tomoskin.board.source import Link, serial as port
 from tomoskin.board.wire import (
     Ack,
     BoardLimits,

@@ -11,8 +11,7 @@ import pytest
 from run.board import pressed, samples_of
 from run.test_replay import Recorded, recorded_touches, same, touches_of
 from run.test_runner import Watch
-from tomoskin import run as room
-from tomoskin import server
+from tomoskin import run as room, server
 from tomoskin.cli import main
 from tomoskin.core import Frame, Mark
 from tomoskin.files.session import SessionReader, as_recorded, replayed, session_info

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tomoskin.core import FloatArray, Voltages
-from tomoskin.learning import FORCE, TOUCH, ForceModel, Locator, WeighedPresses
+from tomoskin.learning import FORCE, TOUCH, AmountModel, LabelledPresses, Locator
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Pipeline, Prepared, prepare
 from tomoskin.pipeline.frame_result import FrameResult
@@ -109,8 +109,8 @@ def test_on_a_rig_that_the_model_does_not_know_it_stands_alone_and_says_so(
 def test_forces_are_told_beside_it_but_not_of_regions_of_an_image(calibrated: Prepared) -> None:
     detections = [shown(FITTED, s * PLACES[0])[-1].touches[0].detection for s in (1.0, 0.8, 0.6)]
     many = [replace(d, peak=f * d.peak) for d in detections for f in (0.5, 1.0, 1.5)]
-    weighed = WeighedPresses.of(many, np.tile([1.0, 2.0, 3.0], 3), np.arange(9), np.arange(9.0))
-    model = ForceModel.fit(weighed, FITTED.skin)
+    weighed = LabelledPresses.of(many, np.tile([1.0, 2.0, 3.0], 3), np.arange(9), np.arange(9.0))
+    model = AmountModel.fit(weighed, FITTED.skin)
     both = calibrated.calibrated(FORCE.of(model, FITTED.pattern, FITTED.skin))
     assert all(t.detection.force is not None for t in shown(both, *PLACES)[-1].touches)
     alone = shown(both, *PLACES[:1], size=40.0)[-1]

@@ -69,14 +69,16 @@ def test_a_touch_is_told_by_drives_and_then_by_the_frame(turns, idle, touched):
     assert not any(told[:3])
     assert all(told[5:])
     (first,) = next(touches for touches in told if touches)
-    assert turns.drives[-1].provisional in ((), (first.id,))
+    assert first.provisional
+    frame = turns.frames[-1]
+    assert [t.id for t in turns.pipeline.early(frame).touches] == [first.id]
     for _ in range(3):
         turns.turn(touched)
     (touch,) = turns.frames[-1].touches
     assert touch.id == first.id
     (last,) = turns.told[-1]
     assert last.id == touch.id
-    assert turns.drives[-1].provisional == ()
+    assert not last.provisional
     assert np.hypot(last.detection.x - 0.03, last.detection.y - 0.02) < 0.006
 
 
@@ -86,10 +88,26 @@ def test_a_touch_that_is_lifted_is_told_before_the_frame_ends(turns, idle, touch
     turns.turn(touched, idle, since=2)
     assert turns.told[0]
     assert not turns.told[-1]
+    assert turns.pipeline.early(turns.frames[-1]).touches == ()
+    turns.drives.clear()
     for _ in range(6):
         turns.turn(idle)
-    assert not any(turns.told)
+    assert not any(result.touches for result in turns.drives if result)
     assert turns.frames[-1].touches == ()
+
+
+def test_a_touch_is_lifted_though_the_drive_that_is_read_meanwhile_still_shows_a_part(
+    turns, idle, touched
+):
+    own = np.flatnonzero(turns.drive == 3)
+    part = idle.copy()
+    part[own[: len(own) // 2]] = touched[own[: len(own) // 2]]
+    for _ in range(6):
+        turns.turn(touched)
+    turns.turn(np.where(turns.drive < 3, touched, part))
+    told = turns.told
+    assert all(told[:3])
+    assert not any(told[5:])
 
 
 def test_what_no_frame_confirms_is_withdrawn_and_its_number_is_not_given_again(
@@ -99,12 +117,14 @@ def test_what_no_frame_confirms_is_withdrawn_and_its_number_is_not_given_again(
     drives = turns.drive
     glitch = np.where((drives == 2) | (drives == 3), touched, idle)
     turns.turn(glitch)
-    begun = [touches for touches in turns.told if touches]
-    for _ in range(4):
+    begun = {touch.id for touches in turns.told for touch in touches}
+    turns.drives.clear()
+    for _ in range(6):
         turns.turn(idle)
     assert not any(turns.told)
-    if begun:
-        assert turns.pipeline.numbered > number
+    withdrawn = {touch.id for result in turns.drives if result for touch in result.withdrawn}
+    assert begun == withdrawn == {number + 1}
+    assert turns.pipeline.numbered > number
 
 
 def test_frames_are_to_the_bit_what_they_are_without_drives(turns, prepared, idle, touched):

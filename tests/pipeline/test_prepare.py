@@ -9,7 +9,7 @@ import pytest
 
 from tomoskin.core import DataError, Detection, ModelError, SkinError
 from tomoskin.imaging import Evidence, Greit, OneStep
-from tomoskin.learning import FORCE, ForceModel, WeighedPresses
+from tomoskin.learning import FORCE, AmountModel, LabelledPresses
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.pattern import Pattern
@@ -60,11 +60,11 @@ def test_a_rule_cannot_choose_the_alpha_of_a_method_without_one() -> None:
 
 
 def test_a_calibration_that_cannot_serve_with_new_settings_is_refused() -> None:
-    weighed = WeighedPresses.of(
+    weighed = LabelledPresses.of(
         [Detection(0.01 * n, 0.0, 1e-3, 1e-3, 4e-4, -0.01 * n, np.empty(0)) for n in range(1, 7)],
         np.arange(1.0, 7.0), np.arange(6), np.arange(6.0),
     )  # fmt: skip
-    forces = FORCE.of(ForceModel.fit(weighed, PREPARED.skin), PREPARED.pattern, PREPARED.skin)
+    forces = FORCE.of(AmountModel.fit(weighed, PREPARED.skin), PREPARED.pattern, PREPARED.skin)
     weighing = PREPARED.calibrated(forces)
     assert prepare(PREPARED.skin.altered({"inverse": {"alpha": 0.2}}), weighing).calibrations
     with pytest.raises(DataError, match="touches found by"):

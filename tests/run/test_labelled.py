@@ -13,8 +13,13 @@ import pytest
 import tomoskin.twin.labelled
 from tomoskin.core import ScriptError, SourceError
 from tomoskin.model.skin import Skin
-from tomoskin.run import in_processes, in_this_process, make_set, on_cluster
-from tomoskin.run import labelled_frames as labelled
+from tomoskin.run import (
+    in_processes,
+    in_this_process,
+    labelled_frames as labelled,
+    make_set,
+    on_cluster,
+)
 from tomoskin.twin import COMMON_PRESSES, Population, SetPlan
 
 SKIN = Skin.load("textile-disc-8").altered({"mesh": {"cells": 300}}).to_toml()

@@ -105,6 +105,7 @@ def touches_of(result):
             r.peak,
             r.close,
             r.force,
+            r.depth,
         )
         for t in result.touches
         for r in [t.detection]

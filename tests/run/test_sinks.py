@@ -17,8 +17,7 @@ from tomoskin.model.skin import Skin
 from tomoskin.pipeline import prepare
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
 from tomoskin.run import Runner
-from tomoskin.run.sinks import Contacts
-from tomoskin.run.sinks import Sink as Base
+from tomoskin.run.sinks import Contacts, Sink as Base
 
 FRAMES = 3 * REFERENCE_FRAMES
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tomoskin.core import Detection, Force, Image, Touch
+from tomoskin.core import Amount, Detection, Image, Touch
 from tomoskin.learning import BENDS, BendReading
 from tomoskin.pipeline import FrameResult
 from tomoskin.server.frames import encode_result
@@ -53,12 +53,12 @@ def decode(data):
     head["image"] = floats(head["n_cells"])
     head["voltages"] = floats(head["n_meas"])
     head["reference"] = floats(head["n_meas"])
-    head["touches"], head["forces"] = [], []
+    head["touches"], head["amounts"] = [], []
     for _ in range(head["n_touches"]):
         number, kind = struct.unpack_from("<IB", data, at)
         head["touches"].append((number, kind, *struct.unpack_from("<8f", data, at + 8)))
-        head["forces"].append((data[at + 6], *struct.unpack_from("<3f", data, at + 40)))
-        at += 52
+        head["amounts"].append(struct.unpack_from("<6f", data, at + 40))
+        at += 64
     head["truth"] = [floats(4) for _ in range(head["n_truth"])]
     if head["flags"] & 8:
         head["bend"] = struct.unpack_from("<3fI", data, at)
@@ -114,19 +114,26 @@ def test_a_touch_says_how_many_it_stands_for():
     several = replace(several, detection=replace(several.detection, close=True))
     merged = replace(touch(3, [2]), merged=(3, 5, 8))
     data = encode_result(make(5, (alone, several, merged)), [], 0.0)
-    at = len(data) - 8 - 3 * 52
-    assert [data[at + 52 * k + 5] for k in range(3)] == [0, 1, 3]
+    at = len(data) - 8 - 3 * 64
+    assert [data[at + 64 * k + 5] for k in range(3)] == [0, 1, 3]
 
 
-def test_a_touch_carries_its_force():
-    none, known, guessed = touch(1, [0]), touch(2, [1]), touch(3, [2])
-    known = replace(known, detection=replace(known.detection, force=Force(4.0, 3.5, 4.75)))
-    by_material = Force(8.0, 2.0, 20.0, calibrated=False)
-    guessed = replace(guessed, detection=replace(guessed.detection, force=by_material))
-    found = decode(encode_result(make(5, (none, known, guessed)), [], 0.0))["forces"]
-    assert found[0][0] == 0
-    assert all(map(math.isnan, found[0][1:]))
-    assert found[1:] == [(1, 4.0, 3.5, 4.75), (2, 8.0, 2.0, 20.0)]
+def test_a_touch_says_whether_a_scan_has_confirmed_it():
+    early = replace(touch(1, [0]), provisional=True)
+    data = encode_result(make(5, (early, touch(2, [1]))), [], 0.0)
+    at = len(data) - 8 - 2 * 64
+    assert [data[at + 64 * k + 7] for k in range(2)] == [1, 0]
+
+
+def test_a_touch_carries_its_force_and_its_depth():
+    none, forced, deep = touch(1, [0]), touch(2, [1]), touch(3, [2])
+    forced = replace(forced, detection=replace(forced.detection, force=Amount(4.0, 3.5, 4.75)))
+    deep = replace(deep, detection=replace(deep.detection, depth=Amount(0.5, 0.25, math.inf)))
+    found = decode(encode_result(make(5, (none, forced, deep)), [], 0.0))["amounts"]
+    assert all(map(math.isnan, found[0]))
+    assert found[1][:3] == (4.0, 3.5, 4.75)
+    assert found[2][3:] == (0.5, 0.25, math.inf)
+    assert all(map(math.isnan, (*found[1][3:], *found[2][:3])))
 
 
 def test_a_touch_carries_its_whole_covariance():

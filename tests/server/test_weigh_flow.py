@@ -126,8 +126,8 @@ def test_ten_weights_are_learnt_from_saved_and_used(flow, tmp_path):
     FORCE.of(estimate.answer, flow.prepared.pattern, skin).write(path)
     again = FORCE.read(path).model
     (force,), _ = again.read(None, [touch(1, 4.0, *PLACES[1]).detection], 0.0)
-    assert force.newtons == pytest.approx(4.0, rel=0.25)
-    assert force.low < force.newtons < force.high
+    assert force.value == pytest.approx(4.0, rel=0.25)
+    assert force.low < force.value < force.high
     flow.estimate = estimate
     fields = flow.now()
     assert fields.weights[3] == "8 N"

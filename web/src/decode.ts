@@ -2,36 +2,30 @@
 
 import * as wire from "./wire";
 
-/** Median, and an interval that nine in ten lie in, N; `high` is infinite beyond what was taught. */
-export interface Force {
-  readonly newtons: number;
+/** Median, and an interval that nine in ten lie in, N or m; `high` is infinite beyond what was taught. */
+export interface Amount {
+  readonly value: number;
   readonly low: number;
   readonly high: number;
-  /** False: it rests on the skin file's material alone. */
-  readonly calibrated: boolean;
 }
 
-const UNCALIBRATED = 2;
+/** What calibrations tell of a touch. */
+export type Measurand = "force" | "depth";
+
+const amount = (value: number, low: number, high: number): Amount | null =>
+  Number.isNaN(value) ? null : { value, low, high };
+
 const KINDS = ["decrease", "increase"] as const;
 
 function touchAt(data: DataView, at: number) {
-  const { kind, forceState, force, low, high, ...rest } = wire.readTouch(data, at);
-  const known: Force = { newtons: force, low, high, calibrated: forceState !== UNCALIBRATED };
-  return { ...rest, kind: KINDS[kind], force: forceState ? known : null };
+  const { kind, force, forceLow, forceHigh, depth, depthLow, depthHigh, ...rest } = wire.readTouch(data, at);
+  const amounts = { force: amount(force, forceLow, forceHigh), depth: amount(depth, depthLow, depthHigh) };
+  return { ...rest, ...amounts, kind: KINDS[kind] };
 }
 
-/** Lengths m, deviations NaN where unknown; `force` null where no calibration gives it; `several`:
+/** Lengths m, deviations NaN where unknown; `force`, `depth` null where no calibration gives them; `several`:
  * how many it stands for: 0 one, 1 perhaps several, n > 1 that have come too close. */
 export type Touch = Readonly<ReturnType<typeof touchAt>>;
-
-export type ForceState = "none" | "calibrated" | "uncalibrated";
-
-/** What the forces of touches rest on: on a calibration only where every one does. */
-export function forceStateOf(touches: readonly Touch[]): ForceState {
-  const forces = touches.map(({ force }) => force).filter((force) => force !== null);
-  if (!forces.length) return "none";
-  return forces.every(({ calibrated }) => calibrated) ? "calibrated" : "uncalibrated";
-}
 
 export type Truth = Readonly<ReturnType<typeof wire.readTruth>>;
 

@@ -1,6 +1,6 @@
-/** Strength, force and way of each touch over the last seconds: a few fixed slots, one touch in each. */
+/** Strength, force, depth and way of each touch over the last seconds: a few fixed slots, one touch in each. */
 
-import type { Touch } from "./decode";
+import type { Measurand, Touch } from "./decode";
 
 type Column = (number | null)[];
 
@@ -16,6 +16,7 @@ interface Slot {
 }
 
 const emptyColumns = (): Column[] => Array.from({ length: SLOTS }, () => []);
+const emptyAmounts = () => ({ values: emptyColumns(), lows: emptyColumns(), highs: emptyColumns() });
 
 export class History {
   readonly times: number[] = [];
@@ -23,10 +24,8 @@ export class History {
   /** x and y of each slot's touch, m. */
   readonly xs = emptyColumns();
   readonly ys = emptyColumns();
-  /** Its force and the ends of the interval, N. */
-  readonly forces = emptyColumns();
-  readonly lows = emptyColumns();
-  readonly highs = emptyColumns();
+  /** What calibrations tell of it, and the ends of the intervals, SI. */
+  readonly amounts = { force: emptyAmounts(), depth: emptyAmounts() };
   private readonly slots: Slot[] = Array.from({ length: SLOTS }, () => ({ id: null, seen: 0 }));
 
   /** Add one frame's touches at a time in seconds; time running backwards starts afresh. */
@@ -43,9 +42,12 @@ export class History {
       this.columns[slot][at] = Math.abs(touch.peak);
       this.xs[slot][at] = touch.x;
       this.ys[slot][at] = touch.y;
-      this.forces[slot][at] = touch.force?.newtons ?? null;
-      this.lows[slot][at] = touch.force?.low ?? null;
-      this.highs[slot][at] = touch.force?.high ?? null;
+      for (const [name, { values, lows, highs }] of Object.entries(this.amounts)) {
+        const amount = touch[name as Measurand];
+        values[slot][at] = amount?.value ?? null;
+        lows[slot][at] = amount?.low ?? null;
+        highs[slot][at] = amount?.high ?? null;
+      }
     }
   }
 
@@ -69,7 +71,8 @@ export class History {
   }
 
   private all(): Column[] {
-    return [this.columns, this.xs, this.ys, this.forces, this.lows, this.highs].flat();
+    const amounts = Object.values(this.amounts).flatMap(({ values, lows, highs }) => [values, lows, highs]);
+    return [this.columns, this.xs, this.ys, ...amounts].flat();
   }
 
   /** Drop what is older than the span; call now and then, not per frame. */

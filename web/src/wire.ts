@@ -270,7 +270,8 @@ export interface Calibrations {
   readonly type: "calibrations";
   readonly touch: string | null;
   readonly force: string | null;
-  readonly force_most_n: number | null;
+  readonly depth: string | null;
+  readonly most: Readonly<Record<string, number>>;
 }
 
 /** The guided flow; ``kind`` null: none goes on. */
@@ -736,11 +737,11 @@ export interface KeepFlow {
   readonly name: string;
 }
 
-/** Use a calibration of the folder; null: none of those ``of`` touch, or of force. */
+/** Use a calibration of the folder; null: none of those ``of`` touch, force or depth. */
 export interface UseCalibration {
   readonly type: "calibration";
   readonly name: string | null;
-  readonly of?: "force" | "touch";
+  readonly of?: "depth" | "force" | "touch";
 }
 
 /** The newest touches on each skin of a robot; sent as JSON in bytes, the newest only. */
@@ -845,13 +846,13 @@ export const readHeader = (data: DataView, at: number) => ({
   latencyUs: data.getUint32(at + 32, true),
 });
 
-export const TOUCH_BYTES = 52;
+export const TOUCH_BYTES = 64;
 
 export const readTouch = (data: DataView, at: number) => ({
   id: data.getUint32(at, true),
   kind: data.getUint8(at + 4),
   several: data.getUint8(at + 5),
-  forceState: data.getUint8(at + 6),
+  provisional: data.getUint8(at + 7),
   x: data.getFloat32(at + 8, true),
   y: data.getFloat32(at + 12, true),
   sdX: data.getFloat32(at + 16, true),
@@ -861,8 +862,11 @@ export const readTouch = (data: DataView, at: number) => ({
   since: data.getFloat32(at + 32, true),
   covXy: data.getFloat32(at + 36, true),
   force: data.getFloat32(at + 40, true),
-  low: data.getFloat32(at + 44, true),
-  high: data.getFloat32(at + 48, true),
+  forceLow: data.getFloat32(at + 44, true),
+  forceHigh: data.getFloat32(at + 48, true),
+  depth: data.getFloat32(at + 52, true),
+  depthLow: data.getFloat32(at + 56, true),
+  depthHigh: data.getFloat32(at + 60, true),
 });
 
 export const TRUTH_BYTES = 16;

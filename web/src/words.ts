@@ -1,5 +1,6 @@
 /** The state as a word, what someone must act on, and the figures of the top line. */
 
+import type { Amount, Measurand } from "./decode";
 import { duration, fixed } from "./format";
 
 import type { LinkState } from "./socket";
@@ -166,4 +167,18 @@ export function alphaInFull(status: RunState): string {
 export function classInWords({ name, probability, unknown }: ClassReading): string {
   if (unknown) return `Class unknown (nearest: ${name})`;
   return `Class: ${name}, ${fixed(100 * probability, 0)} %`;
+}
+
+/** How each is shown: in a unit, so many to one of SI, with its decimals; and what its axis ends with,
+ * SI, where the calibration does not say what it reaches. */
+export const MEASURANDS = {
+  force: { title: "Force", felt: "felt, N", unit: "N", words: "newtons", perUnit: 1, decimals: 1, usual: 10 },
+  depth: { title: "Depth", felt: "deep, mm", unit: "mm", words: "millimetres deep", perUnit: 1e3, decimals: 2, usual: 5e-3 },
+} as const;
+/** An amount with its interval, in words. */
+export function amountInWords({ value, low, high }: Amount, name: Measurand): string {
+  const { perUnit, decimals, words } = MEASURANDS[name];
+  const told = (one: number) => fixed(perUnit * one, decimals);
+  if (high === Infinity) return `more than ${told(low)} ${words}, beyond what was taught`;
+  return `${told(value)} ${words}, ${told(low)} to ${told(high)}`;
 }

@@ -3,7 +3,7 @@ import { decodeFrame } from "../src/decode";
 
 /** Five cells, three rows, one touch, one press: built as the server builds it. */
 function sample(): ArrayBuffer {
-  const bytes = new ArrayBuffer(40 + 4 * (5 + 6) + 52 + 16 + 8);
+  const bytes = new ArrayBuffer(40 + 4 * (5 + 6) + 64 + 16 + 8);
   const data = new DataView(bytes);
   new Uint8Array(bytes).set([0x54, 0x53, 0x4b, 0x31]); // "TSK1"
   data.setUint32(4, 77, true);
@@ -19,13 +19,12 @@ function sample(): ArrayBuffer {
   data.setUint32(touch, 9, true);
   data.setUint8(touch + 4, 1);
   data.setUint8(touch + 5, 2);
-  data.setUint8(touch + 6, 2);
-  [4, 3.5, 4.75].forEach((v, k) => data.setFloat32(touch + 40 + 4 * k, v, true));
+  [4, 3.5, 4.75, Number.NaN, Number.NaN, Number.NaN].forEach((v, k) => data.setFloat32(touch + 40 + 4 * k, v, true));
   [0.01, -0.02, Number.NaN, Number.NaN, 3e-4, 0.5, 1.5].forEach((v, k) =>
     data.setFloat32(touch + 8 + 4 * k, v, true),
   );
-  [0.01, -0.02, 4, 0.008].forEach((v, k) => data.setFloat32(136 + 4 * k, v, true));
-  new Uint8Array(bytes, 152).set([0, 1, 1, 0, 0]);
+  [0.01, -0.02, 4, 0.008].forEach((v, k) => data.setFloat32(148 + 4 * k, v, true));
+  new Uint8Array(bytes, 164).set([0, 1, 1, 0, 0]);
   return bytes;
 }
 
@@ -41,7 +40,8 @@ describe("decodeFrame", () => {
     expect(frame.touches[0]).toMatchObject({ id: 9, kind: "increase", peak: 0.5, since: 1.5, several: 2 });
     expect(frame.touches[0].x).toBeCloseTo(0.01);
     expect(frame.touches[0].sdX).toBeNaN();
-    expect(frame.touches[0].force).toEqual({ newtons: 4, low: 3.5, high: 4.75, calibrated: false });
+    expect(frame.touches[0].force).toEqual({ value: 4, low: 3.5, high: 4.75 });
+    expect(frame.touches[0].depth).toBeNull();
     expect(frame.truths[0].radius).toBeCloseTo(0.008);
     expect(frame.bend).toBeNull();
   });
@@ -49,12 +49,12 @@ describe("decodeFrame", () => {
   it("reads how the sheet is bent before the labels", () => {
     const plain = new Uint8Array(sample());
     const bytes = new Uint8Array(plain.length + 16);
-    bytes.set(plain.subarray(0, 152));
-    bytes.set(plain.subarray(152), 168);
+    bytes.set(plain.subarray(0, 164));
+    bytes.set(plain.subarray(164), 180);
     const data = new DataView(bytes.buffer);
     data.setUint32(28, 9, true);
-    [0.5, 0.01, 1.25].forEach((v, k) => data.setFloat32(152 + 4 * k, v, true));
-    data.setUint32(164, 3, true);
+    [0.5, 0.01, 1.25].forEach((v, k) => data.setFloat32(164 + 4 * k, v, true));
+    data.setUint32(176, 3, true);
     const frame = decodeFrame(bytes.buffer);
     expect(frame.bend).toMatchObject({ angle: 0.5, axis: 1.25, state: "bend and touch" });
     expect([...frame.labels]).toEqual([0, 1, 1, 0, 0]);

@@ -1,7 +1,8 @@
 import { describe, expect, it } from "vitest";
-import { forceStateOf, type Touch } from "../src/decode";
+import type { Touch } from "../src/decode";
 import { History, SLOTS } from "../src/history";
 import { groupByDrive, spread } from "../src/panels/rows";
+import { amountInWords } from "../src/words";
 
 describe("rows by drive", () => {
   const grouping = groupByDrive({
@@ -25,14 +26,10 @@ describe("rows by drive", () => {
   });
 });
 
-describe("what strengths are shown in", () => {
-  const touch = (force: Touch["force"]) => ({ force }) as Touch;
-  const force = (calibrated: boolean) => ({ newtons: 1, low: 0.5, high: 2, calibrated });
-
-  it("is calibrated only where every force is", () => {
-    expect(forceStateOf([touch(null)])).toBe("none");
-    expect(forceStateOf([touch(force(true)), touch(force(true))])).toBe("calibrated");
-    expect(forceStateOf([touch(force(true)), touch(force(false))])).toBe("uncalibrated");
+describe("what strengths are shown as", () => {
+  it("is told with its interval, and as more where the interval has no end", () => {
+    expect(amountInWords({ value: 8.5e-4, low: 7e-4, high: 1.04e-3 }, "depth")).toBe("0.85 millimetres deep, 0.70 to 1.04");
+    expect(amountInWords({ value: 9, low: 8, high: Infinity }, "force")).toBe("more than 8.0 newtons, beyond what was taught");
   });
 });
 
@@ -48,13 +45,16 @@ describe("history", () => {
     expect([history.idOf(0), history.idOf(1)]).toEqual([4, 9]);
   });
 
-  it("keeps forces with their intervals beside, and nothing where there is none", () => {
+  it("keeps forces and depths with their intervals beside, and nothing where there is none", () => {
     const history = new History();
-    const force = { newtons: 4, low: 3, high: 6, calibrated: true };
-    history.add(0, [{ ...touch(4, -2), force }, touch(5, 1)]);
+    const force = { value: 4, low: 3, high: 6 };
+    const depth = { value: 1e-3, low: 8e-4, high: Infinity };
+    history.add(0, [{ ...touch(4, -2), force, depth }, touch(5, 1)]);
     history.add(1, []);
-    expect([history.forces[0], history.lows[0], history.highs[0]]).toEqual([[4, null], [3, null], [6, null]]);
-    expect(history.forces[1]).toEqual([null, null]);
+    const { values, lows, highs } = history.amounts.force;
+    expect([values[0], lows[0], highs[0]]).toEqual([[4, null], [3, null], [6, null]]);
+    expect(history.amounts.depth.values[0]).toEqual([1e-3, null]);
+    expect(values[1]).toEqual([null, null]);
   });
 
   it("forgets what is older than the span, and reuses its slot", () => {

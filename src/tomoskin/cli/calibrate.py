@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
@@ -17,7 +17,7 @@ import numpy as np
 import typer
 
 from tomoskin.cli.app import group
-from tomoskin.cli.calibrate_labels import ALONG_Y, bends, class_examples, forces, weighed
+from tomoskin.cli.calibrate_labels import ALONG_Y, amounts, bends, class_examples, labelled_presses
 from tomoskin.cli.calibrate_reports import (
     class_facts,
     class_lines,
@@ -213,12 +213,11 @@ def rub(labelled: Recorded) -> LearningOutcome:
     )
 
 
-class Unit(StrEnum):
-    """The unit in which labels of force are given."""
+Unit = StrEnum("Unit", {"N": "N", "G": "g", "KG": "kg"})
+"""Units in which labels of force are given."""
 
-    N = "N"
-    G = "g"
-    KG = "kg"
+Length = StrEnum("Length", {"UM": "um", "MM": "mm", "CM": "cm", "M": "m"})
+"""Units in which labels of depth are given."""
 
 
 @_kind("force", "Frames; some have a label with their force.")
@@ -235,30 +234,65 @@ def force(
     unit: Annotated[Unit, typer.Option(help="Unit of the forces.")] = Unit.N,
 ) -> LearningOutcome:
     """Learn the force of touches from presses with known weights, all by the same tip."""
-    from tomoskin.learning import FORCE, NEWTONS, ForceModel, ForceReport
+    return _amount(
+        labelled,
+        "force",
+        weight,
+        unit,
+        "forces are valid for the tip that pressed: a tip of another size changes the sheet "
+        "differently",
+    )
+
+
+@_kind("depth", "Frames; some have a label with the depth of their press.")
+def depth(
+    labelled: Recorded,
+    depth: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="DEPTH=A:B",
+            help="Label: in frames A to B-1 the tip stood so deep below the untouched sheet. Can "
+            "be repeated. Default: depth_m of the file.",
+        ),
+    ] = None,
+    unit: Annotated[
+        Length | None,
+        typer.Option(help="Unit of the depths. Default: mm of --depth, m of the file's."),
+    ] = None,
+) -> LearningOutcome:
+    """Learn the depth of touches from presses of known depth, by tips such as will press later."""
+    return _amount(
+        labelled,
+        "depth",
+        depth,
+        unit,
+        "depths are valid for tips like those that pressed: a small deep one looks like a large "
+        "shallow one, and intervals hold what the taught tips differ by",
+    )
+
+
+def _amount(
+    labelled: Recorded, name: str, given: list[str] | None, unit: str | None, advice: str
+) -> LearningOutcome:
+    from tomoskin.learning import KINDS, MEASURED, AmountModel, report_of
     from tomoskin.pipeline import prepare
 
-    skin, path = labelled.drawn, labelled.path
-    newtons = NEWTONS[unit.value] * forces(path, len(labelled.recording), weight)
+    skin, path, of = labelled.drawn, labelled.path, MEASURED[name]
+    amount = amounts(path, len(labelled.recording), given, unit, of)
     with Bar("preparing"):
         prepared = prepare(skin)
     with Bar("finding touches") as bar:
         result = reconstructed(labelled, prepared, None, bar)
-    presses = weighed(path, result, newtons, labelled.data.time)
+    presses = labelled_presses(path, result, amount, labelled.data.time, of)
     with Bar("learning"):
-        model = ForceModel.fit(presses, skin)
-    report = ForceReport.of(model)
-    facts = asdict(report)
-    facts["held_by_90_percent_intervals"] = facts.pop("held")
-    lines = [
-        report.text,
-        "forces are valid for the tip that pressed: a tip of another size changes the sheet "
-        "differently",
-    ]
-    for doubtful in report.remarks:
+        model = AmountModel.fit(presses, skin)
+    facts = report_of(model)
+    lines = [facts.pop("text"), advice]
+    for doubtful in model.remarks:
         who = "" if doubtful.press is None else f"press {doubtful.press:>4}  uncertain: "
         lines.append(f"{who}{doubtful.reason}")
-    return LearningOutcome(FORCE.of(model, labelled.pattern, skin).write, facts, lines)
+    kind = next(kind for kind in KINDS if kind.name == name)
+    return LearningOutcome(kind.of(model, labelled.pattern, skin).write, facts, lines)
 
 
 @_kind("class", "Frames; some have a label with their class.", KnownSkinOption)

@@ -16,7 +16,7 @@ from tomoskin.core import DataError, FloatArray
 
 if TYPE_CHECKING:
     from tomoskin.core import Arrays, Detection, Touch
-    from tomoskin.learning import Codes, Examples, WeighedPresses
+    from tomoskin.learning import Codes, Examples, LabelledPresses, Measurand
     from tomoskin.pipeline import Reconstruction
     from tomoskin.sensing.signal import Recording
 
@@ -96,65 +96,79 @@ def class_examples(
     return Examples.checked(codes, dv, np.full((len(dv), len(codes.names)), np.nan))
 
 
-def forces(path: Path, n: int, given: list[str] | None) -> FloatArray:
-    """(n,) force in each frame, in the unit that it is given in; NaN without one."""
+def amounts(
+    path: Path, n: int, given: list[str] | None, unit: str | None, of: Measurand
+) -> FloatArray:
+    """(n,) amount in each frame, SI; NaN without one.
+
+    Without a ``unit`` it is that in which people are told, and SI in a file.
+    """
     from tomoskin.core import real_numbers
 
+    option = _OPTION[of.name]
     if given:
-        named = labels_of_frames(given, n, "--weight", "FORCE")
-        return np.array([_number(text) if text else np.nan for text in named])
+        named = labels_of_frames(given, n, option, of.name.upper())
+        values = [_number(text, of, option) if text else np.nan for text in named]
+        return of.units[unit or of.shown] * np.array(values)
     arrays = _arrays(path)
-    if "force_n" not in arrays:
+    if of.key not in arrays:
         raise DataError(
-            "holds no forces: expected force_n (n_frames,), NaN where no weight was applied",
+            f"holds no {of.plural}: expected {of.key} (n_frames,), NaN where none is known",
             where=str(path),
-            hint="add force_n, or --weight 4.9=40:60 --weight 9.8=80:100",
+            hint=f"add {of.key}, or {option} 4.9=40:60 {option} 9.8=80:100",
         )
-    labels = real_numbers(arrays, "force_n", str(path))
+    labels = real_numbers(arrays, of.key, str(path))
     if labels.shape not in ((n,), (n, 1)):  # older sets of single presses have a column
         raise DataError(
-            f"expected force_n of shape ({n},), one force for each frame, got {labels.shape}",
+            f"expected {of.key} of shape ({n},), one {of.name} for each frame, got {labels.shape}",
             where=str(path),
-            hint="give the force of frames with one press, and NaN of all others",
+            hint=f"give the {of.name} of frames with one press, and NaN of all others",
         )
-    return labels.ravel()
+    return labels.ravel() * (of.units[unit] if unit else 1.0)
 
 
-def _number(text: str) -> float:
+_OPTION = {"force": "--weight", "depth": "--depth"}
+"""Options that label frames, by what they label."""
+
+
+def _number(text: str, of: Measurand, option: str) -> float:
     try:
         number = float(text)
     except ValueError:
         number = np.nan
     if not np.isfinite(number):
-        raise typer.BadParameter(f'expected a number as FORCE, got "{text}"', param_hint="--weight")
+        raise typer.BadParameter(
+            f'expected a number as {of.name.upper()}, got "{text}"', param_hint=option
+        )
     return number
 
 
-def weighed(
-    path: Path, result: Reconstruction, newtons: FloatArray, time: FloatArray
-) -> WeighedPresses:
+def labelled_presses(
+    path: Path, result: Reconstruction, amount: FloatArray, time: FloatArray, of: Measurand
+) -> LabelledPresses:
     """Touches of frames with one touch; a press is what one does at one spot until it is lifted."""
-    from tomoskin.learning import WeighedPresses
+    from tomoskin.learning import LabelledPresses
 
     rows: list[tuple[Detection, float, int, float]] = []
     without, several, number = 0, 0, 0
     before: Touch | None = None
     for frame, touches in zip(result.frames.tolist(), result.touches, strict=True):
-        has_force = bool(np.isfinite(newtons[frame]))
-        without += has_force and not touches
-        several += has_force and len(touches) > 1
+        labelled = bool(np.isfinite(amount[frame]))
+        without += labelled and not touches
+        several += labelled and len(touches) > 1
         alone = touches[0] if len(touches) == 1 else None
         if alone is not None:
             number += before is None or not _goes_on(before, alone)
-            rows.append((alone.detection, float(newtons[frame]), number, float(time[frame])))
+            rows.append((alone.detection, float(amount[frame]), number, float(time[frame])))
         before = alone
     if without or several:
         remark(
-            f"{path}: of the frames with a force, {without} show no touch and {several} show "
+            f"{path}: of the frames with a {of.name}, {without} show no touch and {several} show "
             "several touches; these were left out"
         )
     detections, *labels = zip(*rows, strict=True) if rows else ((), (), (), ())
-    return WeighedPresses.of(detections, *(np.array(column) for column in labels))
+    labels_of, press, times = (np.array(column) for column in labels)
+    return LabelledPresses.of(detections, labels_of, press, times, of.name)
 
 
 def _goes_on(before: Touch, touch: Touch) -> bool:

@@ -116,7 +116,6 @@ def design(
         "false_alarm": press.false_alarm,
         "found": press.found,
         **own.figures(),
-        "watch": {"drives": list(own.watch), "needed": own.needed},
         "compared": rows,
     }
     tell(document, _lines(document), json=json)
@@ -169,15 +168,6 @@ def _compared(
     return rows
 
 
-def _watched(watch: dict[str, Any]) -> str:
-    """How few drives notice the press."""
-    order, needed = watch["drives"], watch["needed"]
-    if needed is None:
-        return f"all {len(order)} drives of an untouched skin do not notice it at every position"
-    first = ", ".join(str(drive + 1) for drive in order[:needed])
-    return f"{needed} of {len(order)} drives of an untouched skin notice it everywhere: {first}"
-
-
 def _lines(document: dict[str, Any]) -> Iterator[str | Table]:
     press = document["press"]
     yield (
@@ -196,7 +186,6 @@ def _lines(document: dict[str, Any]) -> Iterator[str | Table]:
         f"{100 * document['faintest_median']:.2g} % on in the median, "
         f"{100 * document['faintest_p95']:.2g} % at the 95th percentile"
     )
-    yield _watched(document["watch"])
     shown = [
         (
             *(row["pattern"], row["electrodes"], row["rows"], row["samples"]),

@@ -11,11 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tomoskin.cli.choices import (
-    quantity,
-    skin_for_file,
-    with_recorded_calibrations,
-)
+from tomoskin.cli.choices import quantity, skin_for_file, with_recorded_calibrations
 from tomoskin.cli.named_files import TABLE, ForceFlag, Writes
 from tomoskin.cli.named_parts import Recorded, first_time, reconstructed, say_notes, span_lines
 from tomoskin.cli.options import (
@@ -27,7 +23,7 @@ from tomoskin.cli.options import (
     TouchesOut,
 )
 from tomoskin.cli.output import Bar, JsonFlag, remark, tell
-from tomoskin.core import DataError, meant
+from tomoskin.core import MEASURANDS, DataError, meant
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -176,7 +172,6 @@ def image(
     """Write the images of a recording and the touches in them, or say what they are."""
     from tomoskin.files.exports import write_touches
     from tomoskin.files.imports import read_recording
-    from tomoskin.learning import FORCE
     from tomoskin.pipeline import ALONE, located_alone, prepare, sharpened, with_calibrations
     from tomoskin.sensing.track import touch_spans
 
@@ -199,7 +194,7 @@ def image(
     if tuned.sharp:
         with Bar("sharpening") as bar:
             result = sharpened(result, prepared, given.data, given.against, bar)
-    surface, forces = prepared.skin.surface, FORCE.name in prepared.calibrations
+    surface, measured = prepared.skin.surface, prepared.calibrations
     tables = {touches: result}
     if thorough is not None:
         with Bar("searching each frame") as bar:
@@ -207,7 +202,7 @@ def image(
     for path, part in tables.items():
         if path is not None:
             rows = zip(part.frames.tolist(), part.time.tolist(), part.touches, strict=True)
-            write_touches(path, rows, surface, forces=forces, overwrite=force)
+            write_touches(path, rows, surface, measured=measured, overwrite=force)
     if results.out is not None:
         write = WRITERS[results.out.suffix.lower()]
         write(results.out, prepared, result, display, overwrite=force)
@@ -343,7 +338,7 @@ def _document(
                 "x_m": t.detection.x,
                 "y_m": t.detection.y,
                 "peak": t.detection.peak,
-                **_newtons(t),
+                **_amounts(t),
             }
             for f, touches in zip(result.frames.tolist(), result.touches, strict=True)
             for t in touches
@@ -360,9 +355,12 @@ def _unknowable(skin: Skin) -> str:
     return f"no data can tell how this is turned or mirrored: {keys} of [electrodes] in the skin do"
 
 
-def _newtons(touch: Touch) -> dict[str, Any]:
-    """Its force, where a calibration tells it."""
-    return {} if touch.detection.force is None else {"force_n": asdict(touch.detection.force)}
+def _amounts(touch: Touch) -> dict[str, Any]:
+    """Its force and its depth, where calibrations tell them."""
+    return {
+        f"{name}_{MEASURANDS[name].lower()}": asdict(amount)
+        for name, amount in touch.amounts.items()
+    }
 
 
 def _listed(frames: Sequence[object]) -> str:

@@ -66,8 +66,8 @@ CalibrationsOption = Annotated[
     typer.Option(
         "--calibration",
         metavar="C.npz",
-        help="File from tomoskin calibrate, of any kind: positions, forces, bends or classes are "
-        "estimated in each frame. Once for each kind.",
+        help="File from tomoskin calibrate, of any kind: positions, forces, depths, bends or "
+        "classes are estimated in each frame. Once for each kind.",
     ),
     Reads(),
 ]

@@ -155,21 +155,32 @@ def export(
         ),
         Reads(),
     ] = None,
+    robot: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="robot.toml",
+            help="The robot that wore the skins: X.mcap and X.lerobot say where its links were.",
+        ),
+        Reads(),
+    ] = None,
     force: ForceFlag = False,
 ) -> None:
     """Convert a session to tables, images or the format of another program."""
     from tomoskin.files.exports import WRITERS, Export, export_touches, omitted
     from tomoskin.files.session import SessionReader, skins_in
+    from tomoskin.model.robot import Robot
+    from tomoskin.run import with_joints
 
     write = WRITERS[out.suffix.lower()]
     if like is not None and out.suffix.lower() != ".lerobot":
         raise typer.BadParameter(
             f"expected it together with X.lerobot, got {out}", param_hint="--like"
         )
+    worn = None if robot is None else with_joints(Robot.load(robot))
     names = (skin,) if skin or out.suffix.lower() != ".lerobot" else skins_in(file)
     with ExitStack() as stack, Bar(f"writing {out}") as bar:
         session, *others = [stack.enter_context(SessionReader(file, name)) for name in names]
-        job = Export(session, every, bar, overwrite=force, others=tuple(others), like=like)
+        job = Export(session, every, bar, force, tuple(others), like, worn)
         write(job, out)
         if touches is not None:
             export_touches(job, touches)

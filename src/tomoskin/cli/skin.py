@@ -99,7 +99,7 @@ def guess(
 
 @app.command()
 def lay(
-    surface: Annotated[Path, typer.Argument(help="A .stl, .obj or .ply file."), Reads()],
+    surface: Annotated[Path, typer.Argument(help="A .stl, .obj, .ply or .dae file."), Reads()],
     electrodes: Annotated[
         Path,
         typer.Option(
@@ -119,8 +119,7 @@ def lay(
 ) -> None:
     """Write the skin file of a sheet on a scanned or drawn surface."""
     from tomoskin.core import DIMENSIONS, DataError, write_text
-    from tomoskin.model.skin import Skin
-    from tomoskin.model.skin import lay as laid
+    from tomoskin.model.skin import Skin, lay as laid
 
     if unit not in ("mm", "cm", "m"):
         raise DataError(f'expected mm, cm or m, got "{unit}"', where="--unit")

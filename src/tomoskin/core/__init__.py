@@ -4,155 +4,100 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from tomoskin.core.errors import (
-    EMPTY,
-    DataError,
-    GeometryError,
-    ModelError,
-    OutputError,
-    PatternError,
-    ScriptError,
-    SinkError,
-    SkinError,
-    SourceError,
-    TomoskinError,
-    WireError,
-    meant,
+    EMPTY as EMPTY,
+    DataError as DataError,
+    GeometryError as GeometryError,
+    ModelError as ModelError,
+    OutputError as OutputError,
+    PatternError as PatternError,
+    ScriptError as ScriptError,
+    SinkError as SinkError,
+    SkinError as SkinError,
+    SourceError as SourceError,
+    TomoskinError as TomoskinError,
+    WireError as WireError,
+    meant as meant,
 )
-from tomoskin.core.inputs import check_fits, check_is_file, most_bytes, open_input
+from tomoskin.core.inputs import (
+    check_fits as check_fits,
+    check_is_file as check_is_file,
+    most_bytes as most_bytes,
+    open_input as open_input,
+)
 from tomoskin.core.outputs import (
-    MAGIC,
-    RECORDING,
-    Output,
-    StrPath,
-    check_outputs,
-    disk_refusals,
-    write_text,
-    written,
+    MAGIC as MAGIC,
+    RECORDING as RECORDING,
+    Output as Output,
+    StrPath as StrPath,
+    check_outputs as check_outputs,
+    disk_refusals as disk_refusals,
+    write_text as write_text,
+    written as written,
 )
-from tomoskin.core.stages import finished, reach, watch_stages
-from tomoskin.core.units import DIMENSIONS, parse_quantity
+from tomoskin.core.stages import finished as finished, reach as reach, watch_stages as watch_stages
+from tomoskin.core.units import DIMENSIONS as DIMENSIONS, parse_quantity as parse_quantity
 
 if TYPE_CHECKING:
     from tomoskin.core.archive import (
-        MOST_ELECTRODES,
-        Arrays,
-        cache_folder,
-        electrode_table,
-        kept,
-        load_arrays,
-        numbers,
-        pack_arrays,
-        real_numbers,
-        save_arrays,
-        unpack_arrays,
-        whole_number,
+        MOST_ELECTRODES as MOST_ELECTRODES,
+        Arrays as Arrays,
+        cache_folder as cache_folder,
+        electrode_table as electrode_table,
+        kept as kept,
+        load_arrays as load_arrays,
+        numbers as numbers,
+        pack_arrays as pack_arrays,
+        real_numbers as real_numbers,
+        save_arrays as save_arrays,
+        unpack_arrays as unpack_arrays,
+        whole_number as whole_number,
     )
-    from tomoskin.core.clocks import Clock, VirtualClock, WallClock, clock_ahead
-    from tomoskin.core.colours import AMOUNT, CHANGE, CHANGE_ON_DARK
-    from tomoskin.core.extras import install_hint, needed
-    from tomoskin.core.json_bytes import encode_json, plain_values
+    from tomoskin.core.clocks import (
+        Clock as Clock,
+        VirtualClock as VirtualClock,
+        WallClock as WallClock,
+        clock_ahead as clock_ahead,
+    )
+    from tomoskin.core.colours import (
+        AMOUNT as AMOUNT,
+        CHANGE as CHANGE,
+        CHANGE_ON_DARK as CHANGE_ON_DARK,
+    )
+    from tomoskin.core.extras import install_hint as install_hint, needed as needed
+    from tomoskin.core.json_bytes import encode_json as encode_json, plain_values as plain_values
     from tomoskin.core.records import (
-        ComplexArray,
-        DeferredImage,
-        Detection,
-        DriveSamples,
-        Event,
-        FloatArray,
-        Force,
-        Frame,
-        Image,
-        IntArray,
-        Mark,
-        MarkedFrame,
-        PixelMap,
-        Touch,
-        Voltages,
+        MEASURANDS as MEASURANDS,
+        Amount as Amount,
+        ComplexArray as ComplexArray,
+        DeferredImage as DeferredImage,
+        Detection as Detection,
+        DriveSamples as DriveSamples,
+        Event as Event,
+        FloatArray as FloatArray,
+        Frame as Frame,
+        Image as Image,
+        IntArray as IntArray,
+        Mark as Mark,
+        MarkedFrame as MarkedFrame,
+        PixelMap as PixelMap,
+        Touch as Touch,
+        Voltages as Voltages,
     )
-    from tomoskin.core.worker import Capacity, Consumer, Say, Worker, stop_workers
+    from tomoskin.core.worker import (
+        Capacity as Capacity,
+        Consumer as Consumer,
+        Say as Say,
+        Worker as Worker,
+        stop_workers as stop_workers,
+    )
 
 _LATER = ("records", "worker", "clocks", "json_bytes", "extras", "colours", "archive")
 """Modules that need more, numpy for one, and are loaded when one of their names is first asked for:
 the command line needs errors only until a command runs."""
 
-__all__ = [
-    "AMOUNT",
-    "CHANGE",
-    "CHANGE_ON_DARK",
-    "DIMENSIONS",
-    "EMPTY",
-    "MAGIC",
-    "MOST_ELECTRODES",
-    "RECORDING",
-    "Arrays",
-    "Capacity",
-    "Clock",
-    "ComplexArray",
-    "Consumer",
-    "DataError",
-    "DeferredImage",
-    "Detection",
-    "DriveSamples",
-    "Event",
-    "FloatArray",
-    "Force",
-    "Frame",
-    "GeometryError",
-    "Image",
-    "IntArray",
-    "Mark",
-    "MarkedFrame",
-    "ModelError",
-    "Output",
-    "OutputError",
-    "PatternError",
-    "PixelMap",
-    "Say",
-    "ScriptError",
-    "SinkError",
-    "SkinError",
-    "SourceError",
-    "StrPath",
-    "TomoskinError",
-    "Touch",
-    "VirtualClock",
-    "Voltages",
-    "WallClock",
-    "WireError",
-    "Worker",
-    "cache_folder",
-    "check_fits",
-    "check_is_file",
-    "check_outputs",
-    "clock_ahead",
-    "disk_refusals",
-    "electrode_table",
-    "encode_json",
-    "finished",
-    "install_hint",
-    "kept",
-    "load_arrays",
-    "meant",
-    "most_bytes",
-    "needed",
-    "numbers",
-    "open_input",
-    "pack_arrays",
-    "parse_quantity",
-    "plain_values",
-    "reach",
-    "real_numbers",
-    "save_arrays",
-    "stop_workers",
-    "unpack_arrays",
-    "watch_stages",
-    "whole_number",
-    "write_text",
-    "written",
-]
-
 
 def __getattr__(name: str) -> Any:
-    for module in _LATER if name in __all__ else ():
+    for module in () if name.startswith("_") else _LATER:
         later = import_module(f"tomoskin.core.{module}")
         if hasattr(later, name):
             return globals().setdefault(name, getattr(later, name))

@@ -6,9 +6,10 @@ SI units throughout; electrodes, measurements and cells are counted from 0.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import IntFlag
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -260,31 +261,21 @@ class DeferredImage(Image):
         return Image, (self.values, self.unit, self.mesh_id)
 
 
-@dataclass(frozen=True, slots=True)
-class Force:
-    """Force of a touch across the sheet, N: its median, and an interval that nine in ten lie in.
+MEASURANDS: Mapping[str, str] = MappingProxyType({"force": "N", "depth": "m"})
+"""What calibrations tell of a touch, by the name of its field in a :class:`Detection`: its unit."""
 
-    ``high`` is infinite where the force is beyond those that were taught.
-    ``calibrated`` is False where it rests on the skin file's material alone.
+
+@dataclass(frozen=True, slots=True)
+class Amount:
+    """The force of a touch across the sheet, N, or its depth, m: median, and an interval that nine
+    in ten lie in.
+
+    ``high`` is infinite where the amount is beyond those that were taught.
     """
 
-    newtons: float
+    value: float
     low: float
     high: float
-    calibrated: bool = True
-
-    @property
-    def state(self) -> str:
-        """``calibrated`` or ``uncalibrated``."""
-        return "calibrated" if self.calibrated else "uncalibrated"
-
-    @property
-    def text(self) -> str:
-        """The force with its interval, in words."""
-        state = "" if self.calibrated else ", uncalibrated"
-        if math.isinf(self.high):
-            return f"more than {self.low:.2g} N{state}"
-        return f"{self.newtons:.2g} N ({self.low:.2g} to {self.high:.2g}{state})"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -305,7 +296,7 @@ class Detection:
     cells
         (n,) indices of the region's cells.
     cov_xy
-        Covariance of ``x`` and ``y``, m², beside ``sd_x``² and ``sd_y``².
+        Covariance of ``x`` and ``y``, m², beside the squares of ``sd_x`` and ``sd_y``.
     snr
         How many times its noise the detection stands out; NaN where the noise is not known.
     close
@@ -315,8 +306,9 @@ class Detection:
     bias
         Standard deviation, along each axis, of what the position is off by without any noise, m;
         0 in a touch, whose ``sd_x`` and ``sd_y`` hold it.
-    force
-        N with its interval; None where no calibration tells it.
+    force, depth
+        N across the sheet, and m by which it gives way under the tip, with their intervals; None
+        where no calibration tells them: uncalibrated.
     """
 
     x: float
@@ -331,7 +323,8 @@ class Detection:
     close: bool = False
     weak: bool = False
     bias: float = 0.0
-    force: Force | None = None
+    force: Amount | None = None
+    depth: Amount | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -354,6 +347,8 @@ class Touch:
     possible
         Identities that it may have, its own among them, where it has been too close to another
         for frames to tell who is who; else empty.
+    provisional
+        Whether single drives alone have told of it: no frame has confirmed it yet.
     """
 
     id: int
@@ -362,6 +357,13 @@ class Touch:
     detection: Detection = field(repr=False)
     merged: tuple[int, ...] = ()
     possible: tuple[int, ...] = ()
+    provisional: bool = False
+
+    @property
+    def amounts(self) -> dict[str, Amount]:
+        """What calibrations tell of it, by the names of :data:`MEASURANDS`."""
+        values = {name: getattr(self.detection, name) for name in MEASURANDS}
+        return {name: amount for name, amount in values.items() if amount is not None}
 
     @property
     def said(self) -> str:

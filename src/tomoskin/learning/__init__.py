@@ -1,105 +1,63 @@
-"""What is learnt from examples: touch positions, forces, classes, bends, channel mapping."""
+"""What is learnt from examples: positions, forces and depths, classes, bends, mapping."""
 
-from pathlib import Path
-from typing import Any
-
-from tomoskin.core import DataError, StrPath, load_arrays
-from tomoskin.learning.bend.bend_model import BendModel
-from tomoskin.learning.bend.bend_reader import BENDS, BendReader, BendReading
-from tomoskin.learning.bend.recorded_bends import BendExamples, JointReference
-from tomoskin.learning.classes.classifier import CLASSES, Answers, Classifier, ClassReading
-from tomoskin.learning.classes.examples import Codes, Examples, against_rest
-from tomoskin.learning.force.force_model import ForceModel
-from tomoskin.learning.force.force_report import FORCE, ForceReport, least_known
-from tomoskin.learning.force.identify import identify
-from tomoskin.learning.force.measured import ForceProcess
-from tomoskin.learning.force.weighed_presses import NEWTONS, WeighedPresses, Weight
+from tomoskin.learning.amount.amount_model import AmountModel as AmountModel
+from tomoskin.learning.amount.amount_process import AmountProcess as AmountProcess
+from tomoskin.learning.amount.amount_report import (
+    DEPTH as DEPTH,
+    FORCE as FORCE,
+    least_known as least_known,
+    report_of as report_of,
+)
+from tomoskin.learning.amount.labelled_presses import LabelledPresses as LabelledPresses
+from tomoskin.learning.amount.measurand import (
+    MEASURED as MEASURED,
+    Measurand as Measurand,
+    Weight as Weight,
+)
+from tomoskin.learning.bend.bend_model import (
+    BENDS as BENDS,
+    BendModel as BendModel,
+    BendReader as BendReader,
+    BendReading as BendReading,
+)
+from tomoskin.learning.bend.recorded_bends import (
+    BendExamples as BendExamples,
+    JointReference as JointReference,
+)
+from tomoskin.learning.classes.classifier import (
+    CLASSES as CLASSES,
+    Answers as Answers,
+    Classifier as Classifier,
+    ClassReading as ClassReading,
+)
+from tomoskin.learning.classes.examples import (
+    Codes as Codes,
+    Examples as Examples,
+    against_rest as against_rest,
+)
 from tomoskin.learning.kind import (
-    Calibration,
-    Differences,
-    FrameView,
-    Kind,
-    Progress,
-    TouchFit,
-    silent,
+    Calibration as Calibration,
+    Differences as Differences,
+    FrameView as FrameView,
+    Kind as Kind,
+    TouchFit as TouchFit,
 )
-from tomoskin.learning.mapping.mapping import ChannelMapping, ring_of
-from tomoskin.learning.mapping.solve import MappingAnswer, solve_channel_mapping
+from tomoskin.learning.kinds import KINDS as KINDS, load_calibration as load_calibration
+from tomoskin.learning.mapping.mapping import ChannelMapping as ChannelMapping, ring_of as ring_of
+from tomoskin.learning.mapping.solve import (
+    MappingAnswer as MappingAnswer,
+    solve_channel_mapping as solve_channel_mapping,
+)
 from tomoskin.learning.touch.calibration_health import (
-    CalibrationHealth,
-    LeftOut,
-    growth_of_errors,
-    worse,
+    CalibrationHealth as CalibrationHealth,
+    LeftOut as LeftOut,
+    growth_of_errors as growth_of_errors,
+    worse as worse,
 )
-from tomoskin.learning.touch.located_touch import TOUCH
-from tomoskin.learning.touch.locator import Locator, detection_at
-from tomoskin.learning.touch.presses import Presses
-from tomoskin.learning.touch.rubbing import Rubbing, quiet_electrodes
-from tomoskin.learning.touch.session_alignment import SessionAlignment
-from tomoskin.learning.touch.several import Several
-from tomoskin.learning.touch.watch import Watch
-
-KINDS: tuple[Kind[Any], ...] = (TOUCH, FORCE, BENDS, CLASSES)
-"""Every kind whose calibrations are applied to frames, in the order in which they are applied."""
-
-
-def load_calibration(path: StrPath, progress: Progress = silent) -> Calibration[Any]:
-    """Read a file of any of the :data:`KINDS`. Raises DataError where it is of none."""
-    arrays = load_arrays(Path(path))
-    title = str(arrays.get("kind", ""))
-    kind = next((kind for kind in KINDS if kind.title == title), None)
-    if kind is None:
-        raise DataError(
-            "is not a calibration", where=str(path), hint="make one: tomoskin calibrate --help"
-        )
-    return kind.unpack(arrays, str(path), progress)
-
-
-__all__ = [
-    "BENDS",
-    "CLASSES",
-    "FORCE",
-    "KINDS",
-    "NEWTONS",
-    "TOUCH",
-    "Answers",
-    "BendExamples",
-    "BendModel",
-    "BendReader",
-    "BendReading",
-    "Calibration",
-    "CalibrationHealth",
-    "ChannelMapping",
-    "ClassReading",
-    "Classifier",
-    "Codes",
-    "Differences",
-    "Examples",
-    "ForceModel",
-    "ForceProcess",
-    "ForceReport",
-    "FrameView",
-    "JointReference",
-    "Kind",
-    "LeftOut",
-    "Locator",
-    "MappingAnswer",
-    "Presses",
-    "Rubbing",
-    "SessionAlignment",
-    "Several",
-    "TouchFit",
-    "Watch",
-    "WeighedPresses",
-    "Weight",
-    "against_rest",
-    "detection_at",
-    "growth_of_errors",
-    "identify",
-    "least_known",
-    "load_calibration",
-    "quiet_electrodes",
-    "ring_of",
-    "solve_channel_mapping",
-    "worse",
-]
+from tomoskin.learning.touch.located_touch import TOUCH as TOUCH
+from tomoskin.learning.touch.locator import Locator as Locator, detection_at as detection_at
+from tomoskin.learning.touch.presses import Presses as Presses
+from tomoskin.learning.touch.rubbing import Rubbing as Rubbing, quiet_electrodes as quiet_electrodes
+from tomoskin.learning.touch.session_alignment import SessionAlignment as SessionAlignment
+from tomoskin.learning.touch.several import Several as Several
+from tomoskin.learning.touch.watch import Watch as Watch

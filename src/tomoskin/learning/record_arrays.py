@@ -21,9 +21,12 @@ _KEYS = {
     **{name: f"{name}_m" for name in ("xy", "outline", "unit")},
     **{name: f"{name}_s" for name in ("time", "peak", "conductivity")},
     **{name: f"{name}_rad" for name in ("angle", "axis")},
-    **{"area": "area_m2", "spread": "spread_m2", "force": "force_n", "skin_id": "skin"},
+    **{"area": "area_m2", "spread": "spread_m2", "skin_id": "skin"},
 }
-"""Names in a file of fields that have another name there: m, s or S, rad, m², N."""
+"""Names in a file of fields that have another name there: m, s or S, rad, m²."""
+
+_FORMER = {"amount": "force_n"}
+"""Names in older files, which calibrations of force had when nothing else was measured."""
 
 T = TypeVar("T")
 
@@ -48,6 +51,7 @@ def unpack(make: Callable[..., T], arrays: Arrays, **given: Any) -> T:
     hints, values = get_type_hints(make), {}
     for name, parameter in signature(make).parameters.items():
         key = _KEYS.get(name, name)
+        key = _FORMER[name] if _FORMER.get(name) in arrays else key
         if name in given:
             values[name] = given[name]
         elif is_dataclass(hints[name]):

@@ -35,6 +35,9 @@ _FRAMES, _SECONDS = 2, 0.15
 """Frames, and seconds, within which a touch that has begun must show in frames, or it is withdrawn.
 The scan of the first one may have seen it come down, and quick ones tell little each."""
 
+_STEP = 5e-4
+"""Seconds of a drive that allow one step of what is made anew, where drives wait for it."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DriveResult:
@@ -48,14 +51,14 @@ class DriveResult:
         Host monotonic seconds at which its last byte was read.
     touches
         Where they are now.
-    provisional
-        Identities of those that no frame has confirmed.
+    withdrawn
+        Those that drives have told of, and no frame has confirmed in time.
     """
 
     drive: int
     host_time: float
     touches: tuple[Touch, ...]
-    provisional: tuple[int, ...] = ()
+    withdrawn: tuple[Touch, ...] = ()
 
 
 @dataclass(slots=True, eq=False)
@@ -75,21 +78,25 @@ class _Followed:
     lifted: float | None = None
     frames: int | None = None
 
-    def take(self, moving: MovingTouch, gone: float) -> None:
-        """Take a drive, and what it says of the odds."""
+    def take(self, moving: MovingTouch, gone: float, going: float) -> None:
+        """Take a drive, and what it says of the odds: it was lifted before, or while it was read.
+
+        What shows a part of a touch draws the touch after it, so that later drives speak of a weak
+        one elsewhere. So the odds begin with the drive in which it may have been lifted.
+        """
         self.moving = moving
         if self.lifted is None:
-            self.odds = max(self.odds + min(gone, _MOST), 0.0)
+            self.odds = max(self.odds + min(gone, _MOST), min(going, _MOST), 0.0)
             left = RESIDUAL.holds(abs(moving.content), abs(self.full)) and self.frames is None
             self.lifted = moving.time if left or self.odds > _LIFTED else None
 
-    def stands(self, touch: Touch, time: float) -> bool:
-        """Whether a frame whose scan began at ``time`` s has a ``touch`` that is not lifted: it was
-        in that frame, and is more than what is left of it."""
-        before, now = self.touch.detection, touch.detection
-        if self.lifted is None or time < self.lifted or now.snr == before.snr:
+    def stands(self, touch: Touch, content: float, time: float) -> bool:
+        """Whether a frame whose scan began at ``time`` s has a ``touch`` of a ``content`` m² that
+        is not lifted: it was in that frame, and is more than what is left of it."""
+        is_missing = touch.detection.snr == self.touch.detection.snr
+        if self.lifted is None or time < self.lifted or is_missing:
             return self.lifted is None
-        return not RESIDUAL.holds(now.snr, before.snr)
+        return not RESIDUAL.holds(abs(content), abs(self.full))
 
 
 class DriveWatch:
@@ -113,6 +120,7 @@ class DriveWatch:
         self.view, self._follows = view, follows
         self._drives = pattern.drive_index
         self._length = interval / pattern.n_drive
+        self._steps = max(1, int(self._length / _STEP))
         self._key: NoiseKey | None = None
         self._blocked = True
         self._making: Generator[None, None, DriveEvidence] | None = None
@@ -120,6 +128,7 @@ class DriveWatch:
         self._evidence: DriveEvidence | None = None
         self._filter: DriveFilter | None = None
         self._followed: dict[int, _Followed] = {}
+        self._withdrawn: tuple[Touch, ...] = ()
 
     def push(
         self, drive: int, dv: FloatArray, clock: tuple[float, float], numbered: int
@@ -139,10 +148,18 @@ class DriveWatch:
                 self._begin(onset, time, host_time, numbered + 1)
         else:
             self._follow(rows, data, time)
-        shown = {n: f for n, f in self._followed.items() if f.lifted is None}
-        touches = tuple([self._shown(each, time) for each in shown.values()])
-        new = tuple([number for number, each in shown.items() if each.frames is not None])
-        return DriveResult(drive, host_time, touches, new)
+        there = [each for each in self._followed.values() if each.lifted is None]
+        withdrawn, self._withdrawn = self._withdrawn, ()
+        touches = tuple([self._shown(each, time) for each in there])
+        return DriveResult(drive, host_time, touches, withdrawn)
+
+    def among(self, touches: Sequence[Touch]) -> tuple[Touch, ...]:
+        """The ``touches`` of the newest frame as the drives know better: without those that have
+        been lifted, and with provisional ones."""
+        followed = self._followed.values()
+        lifted = {each.touch.id for each in followed if each.lifted is not None}
+        new = [each.touch for each in followed if each.touch.provisional and each.lifted is None]
+        return *[touch for touch in touches if touch.id not in lifted], *new
 
     def confirm(self, touches: Sequence[Touch], time: float) -> int:
         """Take the ``touches`` of a frame whose scan began at ``time`` s of the board; how many
@@ -150,31 +167,34 @@ class DriveWatch:
         before = self._followed
         new = [number for number, each in before.items() if each.frames is not None]
         self._followed = {t.id: self._going_on(t, before, time) for t in touches}
-        withdrawn = 0
         for number in new if not touches else []:
             each = before[number]
             each.frames = (each.frames or 0) + 1
             if each.frames < _FRAMES or time - each.begun < _SECONDS:
                 self._followed[number] = each
             else:
-                withdrawn += 1
+                self._withdrawn += (each.touch,)
         if before and not self._followed and self._initiation is not None:
             self._initiation.forget()
-        return withdrawn
+        return len(new) - len(self._followed) if not touches else 0
 
     def _ready(self) -> bool:
-        """Whether the noise is that of now; a piece of work where it is not."""
+        """Whether the noise is that of now, or less; some pieces of work where it is not."""
         key = self.view.key
-        if self._key is None or not _is_same(key, self._key):
+        is_newer = self._key is None or not _is_same(key, self._key)
+        says_less = self._key is None or _says_less(key, self._key)
+        if is_newer and (says_less or self._making is None):  # else it is made first
             begun = self._initiation is not None and self._initiation.begun
             if not begun:  # a frame into which a touch comes down looks like more noise
-                self._blocked |= self._key is None or _says_less(key, self._key)
+                self._blocked |= says_less
             self._key, model = key, self.view.model
             noise, stays = self.view.noise()
             self._making = DriveEvidence.making(model.candidates, noise, stays, self._drives)
             sign = self.view.skin.touch.sign
             self._filter = DriveFilter(model.solver, model.prior, sign, model.sheet, noise)
-        if self._making is not None:
+        for _ in range(self._steps if self._blocked else 1):
+            if self._making is None:
+                break
             try:
                 next(self._making)
             except StopIteration as end:
@@ -193,7 +213,8 @@ class DriveWatch:
         moving = MovingTouch.of_onset(time + self._length / 2, onset, self.view.model.prior)
         detection = self.view.shown(moving.spot, onset.covariance, onset.ratio)
         kind = "decrease" if moving.content < 0 else "increase"
-        touch = Touch(number, kind, host_time - onset.drives * self._length, detection)
+        since = host_time - onset.drives * self._length
+        touch = Touch(number, kind, since, detection, provisional=True)
         self._followed[number] = _Followed(touch, moving, moving.content, time, frames=0)
 
     def _follow(self, rows: slice, data: FloatArray, time: float) -> None:
@@ -214,11 +235,12 @@ class DriveWatch:
         if known is None:
             known = next((each for each in before.values() if each.frames is not None), None)
         middle = time + self._length * self._drives[-1] / 2
-        if known is not None and not known.stands(touch, time):
-            return known
         moving = MovingTouch.begin(
             middle, self.view.spot(touch.detection), _spread(touch.detection), self.view.model.prior
         )
+        if known is not None and not known.stands(touch, moving.content, time):
+            known.touch, known.frames = touch, None
+            return known
         if known is not None and known.lifted is None:
             where, spread = known.moving.position()
             off = where - [touch.detection.x, touch.detection.y]
@@ -248,8 +270,9 @@ def _is_same(key: NoiseKey, before: NoiseKey) -> bool:
 def _says_less(key: NoiseKey, before: NoiseKey) -> bool:
     """Whether drives told less in the noise of a ``key`` than in that ``before``: then they must
     not be read by that."""
-    (*_, left), (*_, known) = key, before
-    return key[0] is not before[0] or key[3] is not before[3] or sum(left) > sum(known)
+    (nuisance, *_, excess, left), (*_, less, known) = key, before
+    louder = excess.level > less.level or bool((excess.variance > less.variance).any())
+    return nuisance is not before[0] or louder or sum(left) > sum(known)
 
 
 def _spread(detection: Detection) -> FloatArray:

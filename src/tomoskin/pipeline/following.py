@@ -167,7 +167,9 @@ class Following:
             return self._without_touches(measured, failed)
         reach("tracking")
         touches = self._tracker.update(detections, measured.time, measured.host_time)
-        self._confirm(touches, measured.time)
+        if self._drives is not None:  # no number is given twice
+            responses = self._tracker.responses
+            self._tracker.ledger.numbered += self._drives.confirm(responses, measured.time)
         if self._finder.learn(touched=bool(self._tracker.traces)):
             self._tracker.residuals.forget()
         readings = {}
@@ -206,13 +208,11 @@ class Following:
         finger = self._tracker.slides.of_finger
         return replace(result, touches=tuple(map(finger, result.touches)))
 
-    def _confirm(self, touches: tuple[Touch, ...], time: float) -> None:
-        """Let drives know what a frame shows."""
+    def early(self, result: FrameResult) -> FrameResult:
+        """The newest ``result`` for those who were told of drives before."""
         if self._drives is None:
-            return
-        finger = self._tracker.slides.of_finger
-        withdrawn = self._drives.confirm([_sheet_of(t, finger(t)) for t in touches], time)
-        self._tracker.ledger.numbered += withdrawn  # no number is given twice
+            return result
+        return replace(result, touches=self._drives.among(result.touches))
 
     def _detected(self, time: float, differences: Differences) -> tuple[FrameView, list[Detection]]:
         """What a frame shows, and the touches in it."""
@@ -312,13 +312,6 @@ class Following:
             scanned=measured.scanned,
             scan_time=measured.scan_time,
         )
-
-
-def _sheet_of(touch: Touch, ahead: Touch) -> Touch:
-    """A touch where the sheet's response is, of one at the finger, and of that as much ahead."""
-    finger, more = touch.detection, ahead.detection
-    sheet = replace(finger, x=2 * finger.x - more.x, y=2 * finger.y - more.y)
-    return replace(touch, detection=sheet)
 
 
 def _imaging(

@@ -161,6 +161,11 @@ class Pipeline:
         time = part.ticks / (self.tick_rate or given.readout.tick_rate)
         return state.push_drive(part.drive, values, (time, part.host_time))
 
+    def early(self, result: FrameResult) -> FrameResult:
+        """The newest ``result`` for those who were told of drives before: it neither shows touches
+        again that have been lifted, nor hides those that no frame has had time to confirm."""
+        return self._state.early(result) if isinstance(self._state, Following) else result
+
     def follow(self, measured: Voltages) -> FrameResult:
         """Take one frame whose voltages are known already: what :meth:`push` does with counts."""
         if isinstance(self._state, Following):

@@ -1,54 +1,37 @@
 """The running loop: a thread that owns the source, commands to it and messages from it."""
 
-from tomoskin.run import commands
-from tomoskin.run.board_check import CheckFinding, check_board
-from tomoskin.run.board_memory import BoardMemory
-from tomoskin.run.commands import MAX_FORCE, SetPose, SetPresses, SetTwin, StrictRequest
-from tomoskin.run.flow import Snapshot
-from tomoskin.run.labelled_frames import (
-    Workers,
-    in_processes,
-    in_this_process,
-    make_set,
-    on_cluster,
-    processors,
+from tomoskin.run import commands as commands
+from tomoskin.run.board_check import CheckFinding as CheckFinding, check_board as check_board
+from tomoskin.run.board_memory import BoardMemory as BoardMemory
+from tomoskin.run.commands import (
+    MAX_FORCE as MAX_FORCE,
+    SetPose as SetPose,
+    SetPresses as SetPresses,
+    SetTwin as SetTwin,
+    StrictRequest as StrictRequest,
 )
-from tomoskin.run.live_skin import LiveSkin, open_skin, prepared_for
-from tomoskin.run.recordings import FILE_NAME
-from tomoskin.run.robot_run import Member, RobotRun, open_robot, with_joints
-from tomoskin.run.runner import Runner
-from tomoskin.run.scripted import simulate
-from tomoskin.run.status import ReplayStatus, Status
-from tomoskin.run.twin_control import way_to_bend
-
-__all__ = [
-    "FILE_NAME",
-    "MAX_FORCE",
-    "BoardMemory",
-    "CheckFinding",
-    "LiveSkin",
-    "Member",
-    "ReplayStatus",
-    "RobotRun",
-    "Runner",
-    "SetPose",
-    "SetPresses",
-    "SetTwin",
-    "Snapshot",
-    "Status",
-    "StrictRequest",
-    "Workers",
-    "check_board",
-    "commands",
-    "in_processes",
-    "in_this_process",
-    "make_set",
-    "on_cluster",
-    "open_robot",
-    "open_skin",
-    "prepared_for",
-    "processors",
-    "simulate",
-    "way_to_bend",
-    "with_joints",
-]
+from tomoskin.run.flow import Snapshot as Snapshot
+from tomoskin.run.labelled_frames import (
+    Workers as Workers,
+    in_processes as in_processes,
+    in_this_process as in_this_process,
+    make_set as make_set,
+    on_cluster as on_cluster,
+    processors as processors,
+)
+from tomoskin.run.live_skin import (
+    LiveSkin as LiveSkin,
+    open_skin as open_skin,
+    prepared_for as prepared_for,
+)
+from tomoskin.run.recordings import FILE_NAME as FILE_NAME
+from tomoskin.run.robot_run import (
+    Member as Member,
+    RobotRun as RobotRun,
+    open_robot as open_robot,
+    with_joints as with_joints,
+)
+from tomoskin.run.runner import Runner as Runner
+from tomoskin.run.scripted import simulate as simulate
+from tomoskin.run.status import ReplayStatus as ReplayStatus, Status as Status
+from tomoskin.run.twin_control import way_to_bend as way_to_bend

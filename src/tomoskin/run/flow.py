@@ -13,6 +13,8 @@ from functools import partial
 from itertools import chain
 from typing import Any
 
+import numpy as np
+
 from tomoskin.board.source import Link, Received, ScanSettings, Transport
 from tomoskin.board.wire import Info
 from tomoskin.core import DriveSamples, Event, Frame, Mark, MarkedFrame, TomoskinError
@@ -250,18 +252,17 @@ class Flow:
             with self.costs.of(frame):
                 result = self.pipeline.push(frame, mark)
         except TomoskinError as error:  # of this frame: the source is well
-            intake.skipped += 1
-            refused = Event(frame.host_time, "refused", f"a frame was left out: {error}")
-            for event in intake.repeats.push(frame.host_time, [refused]):
-                self.out.put(event)
+            _leave_out(self, "frame", frame.host_time, error)
             return
         if result is None:
             return
         ready, decode = self._clock(), begun - read + intake.waited
         self.latency.add_result(decode, ready - begun)
-        self.newest = Snapshot(result, _truth(self, frame), decode + ready - begun, ready)
         self._recall.see(result, self)
-        self.out.put(result)
+        self.out.recordings.put(result)
+        result = self.pipeline.early(result)
+        self.newest = Snapshot(result, _truth(self, frame), decode + ready - begun, ready)
+        self.out.tell(result)
 
 
 def _tell_drive(flow: Flow, drive: DriveSamples) -> None:
@@ -269,8 +270,15 @@ def _tell_drive(flow: Flow, drive: DriveSamples) -> None:
     newest = flow.newest
     if newest is None or flow.marker.held:
         return
-    with flow.turns:
-        known = flow.pipeline.push_drive(drive)
+    try:
+        with flow.turns:
+            known = flow.pipeline.push_drive(drive)
+    except (TomoskinError, np.linalg.LinAlgError) as error:  # frames go on
+        _leave_out(flow, "drive", drive.host_time, error)
+        return
+    for touch in () if known is None else known.withdrawn:
+        text = f"touch {touch.id} is withdrawn: no whole scan has confirmed it"
+        flow.out.tell(Event(drive.host_time, "touch-withdrawn", text))
     if known is None or not (known.touches or newest.result.touches):
         return
     result = replace(
@@ -281,6 +289,13 @@ def _tell_drive(flow: Flow, drive: DriveSamples) -> None:
     latency = ready - drive.host_time + flow.intake.waited
     flow.newest = Snapshot(result, flow.twin.truth, latency, ready)
     flow.out.tell(result)
+
+
+def _leave_out(flow: Flow, what: str, host_time: float, error: Exception) -> None:
+    flow.intake.skipped += 1
+    refused = Event(host_time, "refused", f"a {what} was left out: {error}")
+    for event in flow.intake.repeats.push(host_time, [refused]):
+        flow.out.put(event)
 
 
 def _dropped(flow: Flow) -> int:

@@ -3,7 +3,6 @@ took its time for; and all of it for a person and for a program."""
 
 from __future__ import annotations
 
-import heapq
 import math
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -77,14 +76,10 @@ class CostMeter:
     """
 
     def __init__(self, clock: Callable[[], float]) -> None:
-        """Begin to measure with ``clock``, which gives seconds."""
+        """Begin to measure with ``clock``, which gives seconds; ``slowest``: of the newest frames,
+        the slowest first."""
         self._clock, self._count = clock, 0
-        self._kept: list[tuple[float, int, FrameCost]] = []  # a heap by s and number, negative
-
-    @property
-    def slowest(self) -> tuple[FrameCost, ...]:
-        """The slowest of the newest frames, the slowest first."""
-        return tuple(cost for _, _, cost in sorted(self._kept, reverse=True))
+        self.slowest: tuple[FrameCost, ...] = ()
 
     @contextmanager
     def of(self, frame: Frame) -> Iterator[None]:
@@ -98,19 +93,14 @@ class CostMeter:
             self._keep(frame, marks)
 
     def _keep(self, frame: Frame, marks: list[tuple[str, float]]) -> None:
-        number, self._count = self._count, self._count + 1
-        if number % _OFTEN == 0:
-            first = number - _SLOW_AMONG
-            self._kept = [one for one in self._kept if -one[1] > first]
-            heapq.heapify(self._kept)
+        number, self._count, slowest = self._count, self._count + 1, self.slowest
         seconds = marks[-1][1] - marks[0][1]
-        if len(self._kept) >= _KEPT and seconds <= self._kept[0][0]:
+        full = len(slowest) == _KEPT and number % _OFTEN
+        if full and seconds <= slowest[-1].seconds:
             return
         cost = FrameCost(number, frame.sequence, frame.host_time, _stages(marks))
-        if len(self._kept) < _KEPT:
-            heapq.heappush(self._kept, (seconds, -number, cost))
-        else:
-            heapq.heapreplace(self._kept, (seconds, -number, cost))
+        newest = [one for one in (*slowest, cost) if one.number > number - _SLOW_AMONG]
+        self.slowest = tuple(sorted(newest, key=lambda one: -one.seconds)[:_KEPT])
 
 
 def _stages(marks: list[tuple[str, float]]) -> tuple[tuple[str, float, int], ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import threading
 from dataclasses import dataclass, field
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 from tomoskin.core import TomoskinError, WireError
 from tomoskin.model.mesh import Arm, Hinge, Plane, Surface
@@ -63,35 +63,11 @@ def _surface(bend: BendRequest, rest: Surface) -> Surface:
     )
 
 
-@runtime_checkable
-class Pressable(Protocol):
-    """A source that can be pressed, as the twin can."""
-
-    def set_presses(self, presses: tuple[Probe, ...]) -> None:
-        """Set all presses from now on."""
-
-
-@runtime_checkable
-class Breakable(Protocol):
-    """A source that can be broken and mended, as the twin can."""
-
-    def set_faults(self, faults: Faults) -> None:
-        """All that is broken from now on."""
-
-    def set_noise(self, noise: float | None) -> None:
-        """Standard deviation of one conversion, LSB; None: the source's own."""
-
-
-@runtime_checkable
-class Bendable(Protocol):
-    """A source whose sheet can be bent and stretched, as the twin's can."""
-
-    def set_pose(self, pose: Pose) -> None:
-        """Set the pose of the sheet from now on."""
-
-
 class TwinControl:
     """Does to the source of the moment what was asked, and to the next one the same.
+
+    A source can be pressed, broken and bent as far as it has the twin's methods: ``set_presses``,
+    ``set_faults`` with ``set_noise``, ``set_pose``.
 
     Presses are for one thread, faults and poses may come from any: a pose takes long.
 
@@ -115,34 +91,30 @@ class TwinControl:
         self.harm = SetTwin((), None)
         self._presses: dict[object, tuple[Probe, ...]] = {}
         self._is_due = True
-        self._pressable: Pressable | None = None
-        self._breakable: Breakable | None = None
-        self._bendable: Bendable | None = None
+        self._source: Any = None
         self._lock = threading.Lock()
 
     def attach(self, source: object) -> None:
         """A source that has just been opened is to be as the one before was."""
         with self._lock:
-            self._pressable = source if isinstance(source, Pressable) else None
-            self._breakable = source if isinstance(source, Breakable) else None
-            self._bendable = source if isinstance(source, Bendable) else None
+            self._source = source
             self._break(self.harm)
             self._bend(self.pose)
 
     @property
     def pressable(self) -> bool:
         """Whether the source can be pressed."""
-        return self._pressable is not None
+        return self._can("set_presses")
 
     @property
     def breakable(self) -> bool:
         """Whether the source can be broken and mended."""
-        return self._breakable is not None
+        return self._can("set_faults", "set_noise")
 
     @property
     def bendable(self) -> bool:
         """Whether the source has a sheet that can be bent and stretched."""
-        return self._bendable is not None
+        return self._can("set_pose")
 
     def set_harm(self, harm: SetTwin) -> None:
         """Break and mend the source; ModelError for what it does not have."""
@@ -167,29 +139,30 @@ class TwinControl:
 
     def press(self) -> bool:
         """Let the source feel what is pressed now; whether the truth has changed."""
-        if not self._is_due or self._pressable is None:
+        if not (self._is_due and self.pressable):
             return False
         self._is_due = False
         asked = tuple(press for held in self._presses.values() for press in held)
-        self.truth, self.refusals = _felt(self._pressable, asked)
+        self.truth, self.refusals = _felt(self._source, asked)
         return True
 
+    def _can(self, *methods: str) -> bool:
+        return all(getattr(self._source, name, None) is not None for name in methods)
+
     def _break(self, harm: SetTwin) -> None:
-        if self._breakable is not None:
-            self._breakable.set_faults(Faults(cut=frozenset(harm.cut)))
-            self._breakable.set_noise(harm.noise)
+        if self.breakable:
+            self._source.set_faults(Faults(cut=frozenset(harm.cut)))
+            self._source.set_noise(harm.noise)
             self.harm = harm
 
     def _bend(self, pose: SheetPose) -> None:
-        if self._bendable is not None:
-            self._bendable.set_pose(pose.pose)
+        if self.bendable:
+            self._source.set_pose(pose.pose)
             self.pose = pose
         self._is_due = True
 
 
-def _felt(
-    source: Pressable, presses: tuple[Probe, ...]
-) -> tuple[tuple[Probe, ...], tuple[str, ...]]:
+def _felt(source: Any, presses: tuple[Probe, ...]) -> tuple[tuple[Probe, ...], tuple[str, ...]]:
     """Those of ``presses`` that ``source`` takes, and why it does not take the others."""
     with contextlib.suppress(Exception):  # which of them it was is found below
         source.set_presses(presses)

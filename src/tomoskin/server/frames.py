@@ -5,10 +5,11 @@ header, 40 bytes      ``TSK1``, sequence u32, host_time f64, n_cells u32, n_meas
                       n_touches u16, n_truth u16, flags u32, latency_us u32, reserved u32
 image                 f32 [n_cells], change of conductivity in the scene's unit
 voltages, reference   f32 [n_meas] each, V
-touches, 52 bytes     id u32, kind u8 (0 decrease, 1 increase), several u8 (0 no, 1 may be
-each                  several, n > 1: n that have merged), force u8 (0 none, 1 calibrated,
-                      2 uncalibrated), 1 pad, x, y, sd_x, sd_y (NaN unknown), area, peak,
-                      since (s ago), cov_xy (m²), force and its interval (N, NaN none) f32
+touches, 64 bytes     id u32, kind u8 (0 decrease, 1 increase), several u8 (0 no, 1 may be
+each                  several, n > 1: n that have merged), 1 pad, provisional u8 (1: no whole
+                      scan has confirmed it), x, y, sd_x, sd_y (NaN unknown), area, peak,
+                      since (s ago), cov_xy (m²), force and its interval (N), depth and its
+                      interval (m; NaN uncalibrated) f32
 truth, 16 bytes each  x, y (m), force (N), radius (m) f32: the presses on the twin
 bend, 16 bytes        with flag bit 3 only: angle, its deviation, axis (rad) f32, state u32 (a
                       place in :data:`BEND_STATES`)
@@ -26,10 +27,10 @@ from enum import IntFlag
 
 import numpy as np
 
-from tomoskin.core import Force, Touch
+from tomoskin.core import Touch
 from tomoskin.learning import BendReading
 from tomoskin.pipeline import FrameResult
-from tomoskin.sensing.track import force_values
+from tomoskin.sensing.track import amount_values
 from tomoskin.twin import Probe
 
 MAGIC = b"TSK1"
@@ -47,7 +48,10 @@ class Flag(IntFlag):
 BEND_STATES = ("idle", "bend", "touch", "bend and touch", "unknown")
 """States of a :class:`~tomoskin.learning.BendReading`, as they are numbered here."""
 
-_MEASURES = ("x", "y", "sd_x", "sd_y", "area", "peak", "since", "cov_xy", "force", "low", "high")
+_MEASURES = (
+    *("x", "y", "sd_x", "sd_y", "area", "peak", "since", "cov_xy"),
+    *("force", "force_low", "force_high", "depth", "depth_low", "depth_high"),
+)
 RECORDS = {
     "Header": np.dtype(
         [
@@ -68,8 +72,8 @@ RECORDS = {
             ("id", "<u4"),
             ("kind", "u1"),
             ("several", "u1"),
-            ("force_state", "u1"),
             ("pad", "u1"),
+            ("provisional", "u1"),
             *((name, "<f4") for name in _MEASURES),
         ]
     ),
@@ -137,8 +141,8 @@ def _touches(touches: Sequence[Touch], now: float) -> bytes:
             t.id % 2**32,
             t.kind == "increase",
             min(len(t.merged), _MOST) or t.detection.close,
-            _force_state(t.detection.force),
             0,
+            t.provisional,
             t.detection.x,
             t.detection.y,
             t.detection.sd_x,
@@ -147,15 +151,12 @@ def _touches(touches: Sequence[Touch], now: float) -> bytes:
             t.detection.peak,
             now - t.since,
             t.detection.cov_xy,
-            *force_values(t.detection.force)[:3],
+            *amount_values(t.detection.force)[:3],
+            *amount_values(t.detection.depth)[:3],
         )
         for t in touches
     ]
     return _record("Touch", rows)
-
-
-def _force_state(force: Force | None) -> int:
-    return 0 if force is None else 1 if force.calibrated else 2
 
 
 def _bend(bend: BendReading | None) -> bytes:

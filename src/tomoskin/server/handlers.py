@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 
 from tomoskin.core import TomoskinError, WireError
-from tomoskin.learning import FORCE, TOUCH, Kind, load_calibration
+from tomoskin.learning import DEPTH, FORCE, TOUCH, Kind, load_calibration
 from tomoskin.run import SetPose, SetTwin, commands, way_to_bend
-from tomoskin.server.file_handlers import FileHandlers
 from tomoskin.server.folder import Folder
 from tomoskin.server.guide_handlers import GuideHandlers
 from tomoskin.server.hub import Hub
@@ -20,9 +19,9 @@ from tomoskin.server.page_messages import Calibrations
 from tomoskin.server.requests import UseCalibration
 from tomoskin.server.settings_handlers import SettingsHandlers
 from tomoskin.server.settings_messages import TwinBend, TwinRefused, TwinState, TwinStretch
-from tomoskin.server.source_handlers import SourceHandlers, SourceSwitch
+from tomoskin.server.source_handlers import FileHandlers, SourceHandlers, SourceSwitch
 
-_OFFERED: dict[str, Kind[Any]] = {"touch": TOUCH, "force": FORCE}
+_OFFERED: dict[str, Kind[Any]] = {"touch": TOUCH, "force": FORCE, "depth": DEPTH}
 
 
 def serve_requests(hub: Hub, source: str) -> None:
@@ -52,9 +51,9 @@ class CalibrationHandlers:
             self._used_on = prepared.mesh.identity
             self._files = dict.fromkeys(prepared.calibrations, "")
         files = {of: self._files.get(kind.name) for of, kind in _OFFERED.items()}
-        forces = prepared.calibrations.get(FORCE.name)
-        most = None if forces is None else forces.model.most
-        return (Calibrations(**files, force_most_n=most),)
+        used = prepared.calibrations
+        most = {name: used[name].model.most for name in (FORCE.name, DEPTH.name) if name in used}
+        return (Calibrations(**files, most=most),)
 
     def note(self, kind: Kind[Any], name: str | None) -> None:
         """The run goes on with the calibration in file ``name``, or None with none of ``kind``."""

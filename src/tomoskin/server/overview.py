@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from tomoskin import __version__
-from tomoskin.core import FloatArray, Force, SkinError, WireError, encode_json
+from tomoskin.core import Amount, FloatArray, SkinError, WireError, encode_json
 from tomoskin.files.messages import Contacts, Stream
 from tomoskin.model.robot import PlacedSkin, Pose, Robot
 from tomoskin.run import FILE_NAME, RobotRun, StrictRequest, commands
@@ -216,7 +216,7 @@ def states(run: RobotRun) -> RobotState:
     return RobotState(skins=skins, recording=recording)
 
 
-def _more_than(force: Force | None) -> float | None:
+def _more_than(force: Amount | None) -> float | None:
     return force.low if force is not None and math.isinf(force.high) else None
 
 

@@ -292,12 +292,13 @@ class Sources(Message, frozen=True, tag="sources"):
 class Calibrations(Message, frozen=True, tag="calibrations"):
     """Files of the calibrations in use; "" where the name is not known; null: none.
 
-    ``force_most_n``: the largest force that was learnt from, N.
+    ``most``: the largest amounts that were learnt from: "force", N, and "depth", m.
     """
 
     touch: str | None
     force: str | None
-    force_most_n: float | None
+    depth: str | None
+    most: dict[str, float]
 
 
 # Guided flows.

@@ -22,14 +22,7 @@ from tomoskin.learning import (
 from tomoskin.pipeline import FrameResult, Prepared, prepare
 from tomoskin.run import Runner, commands
 from tomoskin.server.folder import Folder
-from tomoskin.server.guided_flow import (
-    EFFORTS,
-    Effort,
-    Estimate,
-    GuidedFlow,
-    GuidedPress,
-    counted,
-)
+from tomoskin.server.guided_flow import EFFORTS, Effort, Estimate, GuidedFlow, GuidedPress, counted
 from tomoskin.server.page_messages import Figures, Point
 from tomoskin.server.press_taker import PressTaker
 

@@ -39,7 +39,7 @@ FlowKind = Literal["touch", "mapping", "force", "rub"]
 
 Unit = Literal["N", "g", "kg"]
 
-Calibrated = Literal["touch", "force"]
+Calibrated = Literal["touch", "force", "depth"]
 """What a calibration that a page can choose is of."""
 
 Plain = str | int | float
@@ -212,7 +212,7 @@ class KeepFlow(StrictRequest, frozen=True, tag="flow_keep"):
 
 
 class UseCalibration(StrictRequest, frozen=True, tag="calibration"):
-    """Use a calibration of the folder; null: none of those ``of`` touch, or of force."""
+    """Use a calibration of the folder; null: none of those ``of`` touch, force or depth."""
 
     name: FileName | None
     of: Calibrated = "touch"

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tomoskin.core import DataError, Detection, FloatArray, Touch, WireError
-from tomoskin.learning import FORCE, ForceModel, ForceReport, WeighedPresses, Weight, least_known
+from tomoskin.learning import FORCE, AmountModel, LabelledPresses, Weight, least_known, report_of
 from tomoskin.pipeline import FrameResult, Prepared
 from tomoskin.server.guided_flow import Estimate, GuidedFlow, counted
 from tomoskin.server.page_messages import Figures, Phase, Point, WeightNow
@@ -197,16 +197,15 @@ class WeighFlow(GuidedFlow):
         """Estimate the forces of touches from these weights."""
         if len(examples) < _FEWEST:
             return Estimate(f"{_placements(_FEWEST - len(examples))} more for a first answer")
-        model = ForceModel.fit(weighed_presses(examples), self.prepared.skin)
-        report = ForceReport.of(model)
+        model = AmountModel.fit(weighed_presses(examples), self.prepared.skin)
         return Estimate(
-            f"{report.text}. {_advice(report)}",
+            f"{report_of(model)['text']}. {_advice(model)}",
             least_known(model, self._dots.places),
             ready=True,
             figures=Figures(
                 errors=model.errors.tolist(),
-                doubtful=[r.press for r in report.remarks if r.press is not None],
-                remarks=[_of_press(r.press) + r.reason for r in report.remarks],
+                doubtful=[r.press for r in model.remarks if r.press is not None],
+                remarks=[_of_press(r.press) + r.reason for r in model.remarks],
             ),
             answer=model,
         )
@@ -225,10 +224,10 @@ class WeighFlow(GuidedFlow):
         }
 
 
-def weighed_presses(examples: tuple[Weighed, ...]) -> WeighedPresses:
+def weighed_presses(examples: tuple[Weighed, ...]) -> LabelledPresses:
     """What is learnt from: of each placement the way there, labelled where it lies still.
 
-    Raises DataError as :meth:`WeighedPresses.of` does.
+    Raises DataError as :meth:`LabelledPresses.of` does.
     """
     detections = [d for one in examples for d in one.placement.detections]
     length = [len(one.placement.detections) for one in examples]
@@ -237,14 +236,14 @@ def weighed_presses(examples: tuple[Weighed, ...]) -> WeighedPresses:
     force[still] = [one.weight.newtons for one in examples]
     press = np.repeat(np.arange(len(examples)), length)
     time = np.concatenate([one.placement.time for one in examples])
-    return WeighedPresses.of(detections, force, press, time)
+    return LabelledPresses.of(detections, force, press, time)
 
 
-def _advice(report: ForceReport) -> str:
-    n = report.presses
+def _advice(model: AmountModel) -> str:
+    n = len(np.unique(model.presses.press[model.presses.labelled]))
     if n < _ENOUGH:
         return f"Ten placements are a start: {_placements(_ENOUGH - n)} more."
-    if report.remarks:
+    if model.remarks:
         return "These would be enough without the problems below."
     if n < _GOOD:
         return "Ten are enough to begin with, twenty are good."

@@ -101,6 +101,16 @@ def indent(
     return felt
 
 
+def depth_under(probe: Probe, settings: ContactSettings, blur: float = 0.0) -> float:
+    """M by which the sheet gives way under the ``probe``, wherever its face is lowest."""
+    total = 0.0
+    for solved_at, weight in _rungs(probe.shape, probe.force):
+        dent = solved_dent(probe.shape, settings, solved_at, blur)
+        travel = dent.travel * probe.force / solved_at
+        total += weight * travel * settings.locked(travel)
+    return total
+
+
 def turned(strain: FloatArray, angle: float) -> FloatArray:
     """(n, 3) xx, yy, xy of tensors given in axes that are turned by ``angle`` rad."""
     return np.asarray(strain @ _turn(angle).T)

@@ -6,13 +6,13 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, IntArray
 from tomoskin.model.forward import choose_engine
+from tomoskin.model.skin import ReadoutSettings
 from tomoskin.twin.bend import Pose
 from tomoskin.twin.circuit import Electrodes, ElectronicsSettings, Lines, line_potentials, settling
 from tomoskin.twin.faults import Faults, check_electrodes
@@ -20,9 +20,6 @@ from tomoskin.twin.parameters import wandered
 from tomoskin.twin.probe import Probe
 from tomoskin.twin.scanning import SampleTable
 from tomoskin.twin.sheet import TwinSkin
-
-if TYPE_CHECKING:
-    from tomoskin.model.skin import ReadoutSettings
 
 Course = Callable[[float], tuple[Probe, ...]]
 """What presses so many seconds after the start of a scan."""

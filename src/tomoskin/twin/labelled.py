@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any, Self
@@ -119,7 +120,7 @@ COMMON_PRESSES = Population(
 SHARD_FRAMES = 500
 """Frames of a shard: what is drawn from one seed, and written as one file."""
 
-_LABELS = 2
+_LABELS = 3
 """Version of the labels: sets of different ones are not continued."""
 
 Arrays = dict[str, NDArray[Any]]
@@ -175,10 +176,10 @@ def make_shard(plan: SetPlan, shard: int) -> Arrays:
     """The frames of one shard as arrays of an interchange file, labels beside them.
 
     ``voltages`` (n, n_meas) and ``reference`` (n_meas,) V, ``drive``, ``measure``; ``xy_m``
-    (n, 2) and ``force_n`` (n,) where there is exactly one press, else NaN, as calibrations read
-    them. Of each press, NaN or "" where a frame has fewer: ``press_xy_m`` (n, most, 2),
-    ``press_force_n``, ``radius_m`` (of the circle with the area of the face), ``angle_rad`` and
-    ``shape`` (n, most).
+    (n, 2), ``force_n`` and ``depth_m`` (n,) where there is exactly one press, else NaN, as
+    calibrations read them. Of each press, NaN or "" where a frame has fewer: ``press_xy_m``
+    (n, most, 2), ``press_force_n``, ``press_depth_m``, ``radius_m`` (of the circle with the area
+    of the face), ``angle_rad`` and ``shape`` (n, most).
 
     Raises
     ------
@@ -198,7 +199,7 @@ def make_shard(plan: SetPlan, shard: int) -> Arrays:
         "drive": table.drive,
         "measure": table.measure,
         "identity": np.array(f"{plan.identity} {shard} {len(voltages)}"),
-    } | _labels(presses, plan.population.count[1])
+    } | _labels(presses, plan.population.count[1], lab.sheet.depth_under)
 
 
 class _Lab:
@@ -208,6 +209,7 @@ class _Lab:
         self.skin = Skin.from_toml(plan.skin, source="skin of the set")
         self._scans = Scans(self.skin, TwinSettings.preset(plan.preset, plan.seed))
         self._readout = Readout.of(self._scans.scan, self.skin.readout)
+        self.sheet = self._scans.electronics.sheet
         idle = np.random.SeedSequence(plan.seed, spawn_key=(0,))
         self.reference: FloatArray = self.read(
             [()] * REFERENCE_FRAMES, plan.population.hold, idle
@@ -217,7 +219,7 @@ class _Lab:
         self, presses: list[tuple[Probe, ...]], hold: float, noise: np.random.SeedSequence
     ) -> FloatArray:
         """(n, n_meas) V: each frame of a sheet that nothing pressed before, after ``hold`` s."""
-        sheet, frame = self._scans.electronics.sheet, self._scans.frame
+        sheet, frame = self.sheet, self._scans.frame
         self._scans.renew(noise)
         frame(0, 0.0)
         measured = []
@@ -233,23 +235,27 @@ def _lab(plan: SetPlan) -> _Lab:
     return _Lab(plan)
 
 
-def _labels(presses: list[tuple[Probe, ...]], most: int) -> Arrays:
+def _labels(
+    presses: list[tuple[Probe, ...]], most: int, depth_under: Callable[[Probe], float]
+) -> Arrays:
     shape = (len(presses), max(most, 1))
     positions = np.full((*shape, 2), np.nan)
-    force, radius, angle = (np.full(shape, np.nan) for _ in range(3))
+    force, depth, radius, angle = (np.full(shape, np.nan) for _ in range(4))
     name = np.full(shape, "", dtype="<U12")
     for row, probes in enumerate(presses):
         for column, probe in enumerate(probes):
             positions[row, column] = probe.x, probe.y
             force[row, column], radius[row, column] = probe.force, probe.radius
-            angle[row, column] = probe.angle
+            angle[row, column], depth[row, column] = probe.angle, depth_under(probe)
             name[row, column] = type(probe.shape).__name__.lower()
     single = np.array([len(probes) == 1 for probes in presses])
     return {
         "xy_m": np.where(single[:, None], positions[:, 0], np.nan),
         "force_n": np.where(single, force[:, 0], np.nan),
+        "depth_m": np.where(single, depth[:, 0], np.nan),
         "press_xy_m": positions,
         "press_force_n": force,
+        "press_depth_m": depth,
         "radius_m": radius,
         "angle_rad": angle,
         "shape": name,

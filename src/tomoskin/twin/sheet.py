@@ -14,7 +14,7 @@ from tomoskin.model.mesh import Outline, Plane, Surface, laid_on, triangulate
 from tomoskin.model.skin import Skin
 from tomoskin.twin import material
 from tomoskin.twin.bend import Pose, depth_of, strain_of
-from tomoskin.twin.dent import indent
+from tomoskin.twin.dent import depth_under, indent
 from tomoskin.twin.material import MaterialState
 from tomoskin.twin.presets import TwinSettings
 from tomoskin.twin.probe import Probe, check_on_skin
@@ -44,7 +44,7 @@ class _Loading:
         self, points: FloatArray, blur: float, outline: Outline, rest: Surface, given: TwinSettings
     ) -> None:
         self._points, self._outline = points, outline
-        self._ground = given.contact, points, blur
+        self.ground = given.contact, points, blur
         self._shape = points, rest, given.bend.height
         nothing = np.zeros((4, len(points)))
         self.at_rest: _Under = ((), nothing), ((), nothing[:3])
@@ -56,7 +56,7 @@ class _Loading:
         check_on_skin(presses, self._outline)
         if presses != self.now[0][0]:
             taken = tuple(presses)
-            self.now = (taken, indent(taken, *self._ground)), self.now[1]
+            self.now = (taken, indent(taken, *self.ground)), self.now[1]
 
     def bend(self, pose: Pose) -> None:
         """Bend and stretch; GeometryError when the sheet cannot take that shape."""
@@ -167,6 +167,11 @@ class TwinSkin:
     def pose(self) -> Pose:
         """How the sheet is bent and stretched now."""
         return self._loading.now[1][0]
+
+    def depth_under(self, probe: Probe) -> float:
+        """M by which the sheet gives way under a ``probe`` that presses alone."""
+        contact, _, blur = self._loading.ground
+        return depth_under(probe, contact, blur)
 
     @property
     def load(self) -> FloatArray:

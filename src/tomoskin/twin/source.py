@@ -5,13 +5,13 @@ from __future__ import annotations
 import threading
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tomoskin.board.source import BOARDS, BoardRecord, ScanSettings, read_options
 from tomoskin.core import Clock, Frame, SourceError, WallClock, meant
 from tomoskin.model.pattern import Scan
+from tomoskin.model.skin import ReadoutSettings, Skin
 from tomoskin.twin.bend import Pose
 from tomoskin.twin.device import TwinDevice
 from tomoskin.twin.electronics import TwinElectronics
@@ -21,9 +21,6 @@ from tomoskin.twin.presets import PRESETS, TwinSettings
 from tomoskin.twin.probe import Probe
 from tomoskin.twin.scanning import table_of
 from tomoskin.twin.sheet import TwinSkin
-
-if TYPE_CHECKING:
-    from tomoskin.model.skin import ReadoutSettings, Skin
 
 _CHANNELS = (8, 16, 32)
 """Sizes of the simulated board."""

@@ -4,8 +4,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from board.source.boards import (
     BOARD,
@@ -20,7 +19,6 @@ from board.source.boards import (
     frames,
     linked,
     poll_until,
-    twin_transport,
 )
 from tomoskin.board.source.assembler import Assembler
 from tomoskin.board.source.command_queue import SequenceFilter
@@ -31,10 +29,9 @@ from tomoskin.board.wire import (
     Format,
     Result,
     SetFormat,
-    SetOrder,
     type_byte,
 )
-from tomoskin.core import DriveSamples, Frame, WireError
+from tomoskin.core import DriveSamples, Frame
 from tomoskin.twin import TwinTransport
 from tomoskin.twin.device import TwinDevice
 
@@ -47,11 +44,9 @@ def sample(turn, place, drive):
     return (np.arange(6) + 6 * (drive + N * place) + 6 * N * N * turn).astype(np.uint16)
 
 
-def drive_of(turn, place, order=(), /, **changes):
-    drive = order[place] if order else place
+def drive_of(turn, place, /, **changes):
     head = turn, 1000 * turn + 10 * place, 0.5, CONFIGURATION.identity, 0, 0
-    made = DriveSamples(*head, len(order), place, drive, sample(turn, place, drive))
-    return replace(made, **changes)
+    return replace(DriveSamples(*head, 0, place, place, sample(turn, place, place)), **changes)
 
 
 def frame_at(turn):
@@ -82,14 +77,6 @@ def drives(items):
     return [item for item in items if isinstance(item, DriveSamples)]
 
 
-def turns(kinds):
-    """What a board sends in turns: full ones, in an order, or a full one that is cut short."""
-    for turn, kind in enumerate(kinds):
-        order = (5, 2, 5) if kind == "order" else ()
-        length = {"full": N, "order": 3, "cut": 3}[kind]
-        yield from (drive_of(turn, place, order) for place in range(length))
-
-
 def test_each_drive_passes_at_once_and_the_last_brings_the_frame():
     line = Line()
     for place in range(N - 1):
@@ -100,12 +87,12 @@ def test_each_drive_passes_at_once_and_the_last_brings_the_frame():
     assert line.filter.counters.passed == 1
 
 
-KINDS = st.lists(st.sampled_from(["full", "order", "cut"]), min_size=1, max_size=6)
+TURNS = st.integers(1, 6)
 
 
-@given(kinds=KINDS, data=st.data())
-def test_no_loss_doubling_or_swap_ever_mixes_a_frame(kinds, data):
-    sent = list(turns(kinds))
+@given(turns=TURNS, data=st.data())
+def test_no_loss_doubling_or_swap_ever_mixes_a_frame(turns, data):
+    sent = [drive_of(turn, place) for turn in range(turns) for place in range(N)]
     indices = st.integers(0, len(sent) - 1)
     dropped = data.draw(st.sets(indices, max_size=4))
     received = [drive for k, drive in enumerate(sent) if k not in dropped]
@@ -114,7 +101,6 @@ def test_no_loss_doubling_or_swap_ever_mixes_a_frame(kinds, data):
     line = Line()
     got = line.take(*received)
     for frame in frames(got):
-        assert kinds[frame.sequence] == "full"
         assert same(frame, frame_at(frame.sequence))
     numbers = [frame.sequence for frame in frames(got)]
     assert numbers == sorted(set(numbers))
@@ -124,19 +110,15 @@ def test_no_loss_doubling_or_swap_ever_mixes_a_frame(kinds, data):
     assert len(drives(got)) + counters.stale + counters.foreign == len(received)
 
 
-@given(kinds=KINDS, data=st.data())
-def test_what_is_lost_is_counted_by_turns(kinds, data):
-    kinds = ["full", *kinds, "full"]
-    sent = list(turns(kinds))
-    whole = {turn for turn, kind in enumerate(kinds) if kind == "full"}
-    # a cut turn is only known to be cut where an order comes right behind it
-    cut = {turn for turn in range(len(kinds) - 1) if kinds[turn : turn + 2] == ["cut", "order"]}
-    full_loss = data.draw(st.sampled_from([None, *sorted(whole - {len(kinds) - 1})]))
+@given(turns=TURNS, data=st.data())
+def test_what_is_lost_is_counted_by_turns(turns, data):
+    lost = data.draw(st.sets(st.integers(0, turns - 1), max_size=turns - 1))
+    last = max(set(range(turns)) - lost)  # behind it nothing says that more are missing
     line = Line()
-    got = line.take(*(d for d in sent if (d.sequence, d.place) != (full_loss, 1)))
-    assert {frame.sequence for frame in frames(got)} == whole - {full_loss}
-    orders = {turn for turn, kind in enumerate(kinds) if kind == "order"}
-    assert line.filter.counters.lost == len(kinds) - len(whole - {full_loss}) - len(cut | orders)
+    places = [(turn, place) for turn in range(last + 1) for place in range(N)]
+    got = line.take(*(drive_of(*each) for each in places if each not in {(k, 1) for k in lost}))
+    assert {frame.sequence for frame in frames(got)} == set(range(last + 1)) - lost
+    assert line.filter.counters.lost == sum(turn < last for turn in lost)
 
 
 @pytest.mark.parametrize(
@@ -145,7 +127,8 @@ def test_what_is_lost_is_counted_by_turns(kinds, data):
         {"configuration": CONFIGURATION.identity ^ 1},
         {"samples": np.zeros(5, np.uint16)},
         {"drive": N},
-        {"drive": 3},  # a full turn has each drive in its place
+        {"drive": 3},  # each drive has its place
+        {"order": 1},  # nobody has asked for another order
         {"place": 3},
     ],
 )
@@ -173,17 +156,6 @@ def test_nothing_passes_before_start_is_answered():
     line.filter.close()
     assert line.take(drive_of(0, 0)) == []
     assert line.filter.counters.stale == 1
-
-
-def test_a_lost_drive_of_an_order_is_a_lost_scan():
-    line = Line()
-    got = line.take(drive_of(0, 0, (5, 2, 5)), drive_of(0, 2, (5, 2, 5)), drive_of(2, 1, (4, 4)))
-    assert [event.text for event in events(got)] == [
-        "1 drive lost in scan 0",
-        "1 frame lost before frame 2",
-        "1 drive lost in scan 2",
-    ]
-    assert line.filter.counters.lost == 3
 
 
 class Moving:
@@ -217,54 +189,6 @@ def test_frames_of_drives_are_the_frames_of_whole_scans(changes):
         assert one.samples.dtype == other.samples.dtype
 
 
-def test_an_order_is_scanned_from_the_next_drive_on_and_full_turns_after_it():
-    clock = ManualClock()
-    with singly(twin_transport(clock), clock) as link:
-        assert link.ask_order([1]) == 0  # nothing is scanned yet
-        poll_until(link, lambda items: len(frames(items)) >= 2)
-        identity = link.ask_order([6, 1])
-        assert identity == 1
-        got = drives(poll_until(link, lambda items: len(drives(items)) >= 12))
-        first = next(k for k, drive in enumerate(got) if drive.order)
-        assert first <= 2
-        assert [drive.drive for drive in got[first:]] == ([6, 1] * 10)[: len(got) - first]
-        assert all(np.diff([drive.ticks for drive in got]) > 0)
-        link.ask_order([])
-        got = poll_until(link, lambda items: len(frames(items)) >= 2)
-        assert {len(frame.samples) for frame in frames(got)} == {SCAN.n_samples}
-        assert link.frames.lost == 0
-        assert link.frames.stale == link.frames.foreign == 0
-
-
-def test_of_several_orders_the_newest_counts():
-    clock = ManualClock()
-    board = Asked(clock)
-    with singly(board, clock) as link:
-        link.connect()
-        board.commands.clear()
-        assert [link.ask_order([k]) for k in range(4)] == [1, 2, 3, 4]
-        poll_until(link, lambda _: board.names.count("SetOrder") >= 2)
-        link.poll(0.05)
-    orders = [bytes(c.drives) for c in board.commands if isinstance(c, SetOrder)]
-    assert orders == [b"\0", b"\3"]
-
-
-def test_an_order_that_does_not_fit_is_refused_here():
-    clock = ManualClock()
-    with singly(twin_transport(clock), clock) as link:
-        link.connect()
-        with pytest.raises(WireError, match="SET_ORDER"):
-            link.ask_order([0] * 56)
-        link.ask_order([N])
-        (event,) = events(poll_until(link, events))
-        assert event.text == (
-            f"the board refused an order: drives of {bytes([N])} is out of range "
-            "(numbers of the drives, from 0; any of them may come several times; "
-            "at most 55 fit into a message)"
-        )
-        assert frames(poll_until(link, frames))
-
-
 class Asked(ScriptedBoard):
     """A board that agrees to everything, and remembers it."""
 
@@ -292,12 +216,10 @@ def test_an_older_board_sends_whole_scans_and_that_is_said_once():
     board = OldBoard(clock, hello=replace(HELLO, minor=2, schema_hash=OLDER[1, 2]))
     with singly(board, clock) as link:
         link.connect()
-        assert link.ask_order([1]) == 0
         board.say(frame_of(link, 0), frame_of(link, 1))
         got = poll_until(link, lambda items: len(frames(items)) == 2)
     assert [event.kind for event in events(got)] == ["whole-scans"]
     assert [c.format for c in board.commands if isinstance(c, SetFormat)] == [Format.SIXTEEN]
-    assert "SetOrder" not in board.names
 
 
 def test_a_board_that_refuses_is_set_up_again_for_whole_scans():

@@ -11,8 +11,7 @@ import pytest
 from serial.tools.list_ports_common import ListPortInfo
 
 from board.source.boards import BOARD, SCAN, SETTINGS, Counting, frames, poll_until
-from tomoskin.board.source import Link, Timing
-from tomoskin.board.source import serial as port
+from tomoskin.board.source import Link, Timing, serial as port
 from tomoskin.board.source.serial import SIGN_ON
 from tomoskin.core import SourceError
 from tomoskin.twin.device import TwinDevice
@@ -136,6 +135,19 @@ def test_where_no_board_answers_the_likeliest_cause_is_found_and_raised(words, s
     assert link.transport.rate == port.BAUD
     link.close()
     stranger.close()
+
+
+def test_a_read_asks_the_system_twice(bench, monkeypatch):
+    calls = []
+    for module, name in ((port.select, "select"), (port.os, "read")):
+        ask = getattr(module, name)
+        counted = lambda *given, ask=ask, name=name: calls.append(name) or ask(*given)  # noqa: E731
+        monkeypatch.setattr(module, name, counted)
+    transport = port.SerialTransport(bench.path)
+    monkeypatch.setattr(type(transport._serial), "read", None)
+    assert transport.read(5.0)
+    transport.close()
+    assert {"select", "read"} == set(calls)
 
 
 def test_reading_and_writing_after_close(bench):

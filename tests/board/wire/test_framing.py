@@ -1,7 +1,6 @@
 """COBS, CRC and the line format."""
 
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from tomoskin.board.wire import crc16
 from tomoskin.board.wire.framing import cobs_decode, cobs_encode, enclose

@@ -11,6 +11,7 @@ import pytest
 
 from cli.conftest import tomoskin
 from prose import ROOT
+from run.sinks.test_joint_states import ROBOT, URDF, write_bag
 from tomoskin.core import DataError
 from tomoskin.files.exports import Export
 from tomoskin.files.exports.lerobot import TIME, write_lerobot
@@ -245,6 +246,37 @@ def test_several_skins_in_one_dataset(robot, session, tomoskin):
     both = (table[f"{PREFIX}left.ages"] == table[f"{PREFIX}right.ages"]).all(axis=1)
     assert both.sum() > 10
     assert (table[f"{PREFIX}left.touches"][both] == table[f"{PREFIX}right.touches"][both]).all()
+
+
+def test_each_row_says_where_the_links_were_and_where_that_is_not_known(robot, tomoskin):
+    file, folder = robot.with_name("worn.toml"), robot.with_name("worn.lerobot")
+    robot.with_name("arm.urdf").write_text(URDF)
+    text = ROBOT.replace("palm", "left").replace("JOINTS", "ros2")
+    file.write_text(text + '[[skin]]\nname = "right"\nskin = "textile-disc-8"\n')
+    words = "session", "export", robot, folder, "--every", "0.05", "--robot", file
+    file.write_text(file.read_text().replace("joints =", "#"))
+    code, _, errors = tomoskin(*words)
+    assert (code, 'pose unknown: the joint "elbow" may move' in errors) == (1, True)
+    file.write_text(file.read_text().replace('# "ros2"', 'joints = "arm.mcap"'))
+    with SessionReader(robot, "left") as reader:
+        begin, end = reader.epoch, list(reader.frames())[-1].frame.host_time
+    middle = end / 2  # the robot says no more from here on
+    write_bag(robot.with_name("arm.mcap"), np.arange(0, middle, 0.02), lambda t: t, begun=begin)
+    assert tomoskin(*words)[0] == 0
+    table = table_of(folder)
+    pose, when = table[f"{PREFIX}left.link"], table["time"] - begin
+    known, late = pose[:, 0] == 1, when > middle + 0.6
+    assert known[when < middle].all()
+    assert late.any()
+    assert not pose[late].any()
+    yaw = 2 * np.arctan2(pose[known, 6], pose[known, 7])
+    scan = float(np.median(np.diff(np.unique(when))))
+    assert np.abs(yaw - np.minimum(when[known], middle)).max() < 2 * scan
+    assert pose[known, 1:3] == pytest.approx(0.4 * np.column_stack((np.cos(yaw), np.sin(yaw))))
+    assert f"{PREFIX}right.link" not in table
+    file.write_text(text.replace("ros2", "arm.mcap"))  # it has no skin called right
+    code, _, errors = tomoskin(*words[:3], folder.with_name("other.lerobot"), *words[4:])
+    assert 'expected one of left, got "right"' in errors
 
 
 @pytest.mark.parametrize("ending", [".csv", ".lerobot"])

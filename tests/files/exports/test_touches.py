@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import csv
+import math
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tomoskin.core import Detection, Force, Touch
+from tomoskin.core import Amount, Detection, Touch
 from tomoskin.files.exports import write_touches
 from tomoskin.files.session import SessionReader, SessionWriter, session_info
 from tomoskin.model.mesh import Cylinder, Plane
@@ -21,7 +22,7 @@ READING = Detection(
 TOUCHES = (
     Touch(1, "decrease", 0.5, replace(READING, close=False), (1, 3)),
     Touch(2, "decrease", 0.5, READING),
-    Touch(4, "increase", 0.5, replace(READING, close=False, force=Force(4.0, 3.5, 4.75))),
+    Touch(4, "increase", 0.5, replace(READING, close=False, force=Amount(4.0, 3.5, 4.75))),
 )
 
 
@@ -76,18 +77,19 @@ def test_on_a_surface_the_table_says_where_in_space(tmp_path: Path) -> None:
 
 def test_forces_stand_in_columns_of_their_own(tmp_path: Path) -> None:
     path = tmp_path / "x.csv"
-    weighed = replace(READING, force=Force(4.0, 3.5, 4.6))
-    guessed = replace(READING, force=Force(4.0, 1.0, 16.0, calibrated=False))
-    touches = tuple(Touch(k, "decrease", 0.5, d) for k, d in enumerate((weighed, guessed, READING)))
-    write_touches(path, [(3, 0.5, touches)], forces=True)
+    weighed = replace(READING, force=Amount(4.0, 3.5, 4.6))
+    deep = replace(READING, depth=Amount(0.5e-3, 0.25e-3, math.inf))
+    touches = tuple(Touch(k, "decrease", 0.5, d) for k, d in enumerate((weighed, deep, READING)))
+    write_touches(path, [(3, 0.5, touches)], measured=("force", "depth"))
     with path.open(newline="") as file:
         rows = [
-            [row[key] for key in row if key.startswith("force")] for row in csv.DictReader(file)
+            [row[key] for key in row if key.startswith(("force", "depth"))]
+            for row in csv.DictReader(file)
         ]
     assert rows == [
-        ["4", "3.5", "4.6", "calibrated"],
-        ["4", "1", "16", "uncalibrated"],
-        ["", "", "", ""],
+        ["4", "3.5", "4.6", "calibrated", "", "", "", ""],
+        ["", "", "", "", "0.0005", "0.00025", "inf", "calibrated"],
+        [""] * 8,
     ]
     write_touches(path, [(3, 0.5, touches)], overwrite=True)
     assert "force" not in path.read_text()

@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from tomoskin.core import DataError, Frame, Mark
 from tomoskin.files.session.layout import decode_frame, encode_frame

@@ -12,8 +12,18 @@ import pytest
 from mcap.reader import make_reader
 from mcap.stream_reader import StreamReader
 
-from files.session.runs import INFO, PRESS, SCAN, SKIN, TOUCH, frame_of, put, same_frame, write_all
-from files.session.runs import write_frames as write
+from files.session.runs import (
+    INFO,
+    PRESS,
+    SCAN,
+    SKIN,
+    TOUCH,
+    frame_of,
+    put,
+    same_frame,
+    write_all,
+    write_frames as write,
+)
 from tomoskin.board.wire import encode
 from tomoskin.core import DataError, Mark
 from tomoskin.files.imports import read_recording

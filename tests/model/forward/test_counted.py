@@ -62,7 +62,8 @@ def model() -> ForwardModel:
     """A model of eight electrodes whose engine counts."""
     skin = Skin.load("textile-disc-8")
     made = ForwardModel(skin.mesh(), skin.pattern(), 1e-2)
-    made.engine = Counting(made.engine)
+    counting: Any = Counting(made.engine)
+    made.engine = counting
     return made
 
 

@@ -15,8 +15,7 @@ import pytest
 from convergence import check_order_from_below, check_order_with_log
 from golden import mismatch
 from oracles import disc_resistance, inclusion, tube
-from shapes import folded, mapped, patched, rings, strip
-from shapes import tube as tube_mesh
+from shapes import folded, mapped, patched, rings, strip, tube as tube_mesh
 from tomoskin.core import FloatArray
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Mesh

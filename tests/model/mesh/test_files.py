@@ -13,8 +13,7 @@ import pytest
 
 from shapes import box, cylinder, disc
 from tomoskin.core import FloatArray, GeometryError, IntArray
-from tomoskin.model.mesh import Mesh, MeshFile
-from tomoskin.model.mesh import simplex_measure as measure
+from tomoskin.model.mesh import Mesh, MeshFile, simplex_measure as measure
 
 KINDS = {2: ("line", "triangle"), 3: ("triangle", "tetra")}
 Save = Callable[[Mesh, str], Path]

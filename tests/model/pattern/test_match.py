@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from tomoskin.core import FloatArray, IntArray, PatternError
 from tomoskin.model.pattern import Pattern, match_rows, named, sum_rows

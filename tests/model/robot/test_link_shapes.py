@@ -82,6 +82,42 @@ def test_links_are_drawn_by_what_is_seen_else_by_what_may_collide(tmp_path):
     assert solids["c"].triangles == pytest.approx(np.array(expected))
 
 
+COLLADA = """<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+<asset><unit name="centimeter" meter="0.01"/><up_axis>Y_UP</up_axis></asset>
+<library_geometries><geometry id="g"><mesh>
+ <source id="p"><float_array id="f" count="12">0 0 0 1 0 0 1 2 0 0 2 0</float_array>
+  <technique_common><accessor source="#f" count="4" stride="3"><param name="X" type="float"/>
+  <param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common>
+ </source>
+ <vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+ <polylist count="1"><input semantic="VERTEX" source="#v" offset="0"/>
+  <vcount>4</vcount><p>0 1 2 3</p></polylist>
+ <triangles count="1"><input semantic="VERTEX" source="#v" offset="0"/><p>0 1 2</p></triangles>
+ <lines count="1"><input semantic="VERTEX" source="#v" offset="0"/><p>0 2</p></lines>
+</mesh></geometry></library_geometries>
+<library_visual_scenes><visual_scene id="s"><node><translate>0 0 5</translate>
+ <node><rotate>0 0 1 90</rotate><instance_geometry url="#g"/></node></node>
+</visual_scene></library_visual_scenes><scene><instance_visual_scene url="#s"/></scene></COLLADA>"""
+
+
+@pytest.mark.filterwarnings("ignore:the matrix subclass")  # of pycollada's
+def test_a_collada_file_is_drawn_where_its_scene_and_its_unit_put_it(tmp_path):
+    pytest.importorskip("collada")
+    file = tmp_path / "arm" / "meshes" / "c.dae"
+    file.parent.mkdir(parents=True)
+    file.write_text(COLLADA)
+    link = LINKS[LINKS.index('<link name="c"') :].replace(".stl", ".dae").replace("0.001", "1")
+    (solid,) = solids_of(tmp_path, link.replace("-0.002", "-2")).values()
+    assert not solid.problems
+    assert area(solid.triangles) == pytest.approx(2e-4 + 1e-4)
+    corners = np.unique(solid.triangles.reshape(-1, 3).round(6) + 0.0, axis=0)
+    expected = [[-0.02, 0, -0.1], [-0.02, 0.01, -0.1], [0, 0, -0.1], [0, 0.01, -0.1]]
+    assert corners == pytest.approx(np.array(expected))
+    file.write_text(COLLADA[:900])
+    (solid,) = solids_of(tmp_path, link).values()
+    assert solid.problems[0].startswith("package://arm/meshes/c.dae: cannot be read as a .dae file")
+
+
 def test_what_cannot_be_drawn_is_said_without_a_folder(tmp_path):
     (solid,) = solids_of(tmp_path, LINKS[LINKS.index('<link name="c"') :]).values()
     (problem,) = solid.problems

@@ -56,15 +56,15 @@ def state(when, **positions):
     return STORE.serialize_cdr(types[KIND](header, [*positions], values, none, none), KIND)
 
 
-def write_bag(path, times, angle, name="/joint_states", kind=KIND):
+def write_bag(path, times, angle, name="/joint_states", kind=KIND, *, begun=BEGUN):
     """A bag of ROS 2 by the library of the format: ``angle(t)`` of the shoulder."""
     with path.open("wb") as file:
         bag = Writer(file, compression=CompressionType.ZSTD)
         bag.start(profile="ros2")
         channel = bag.register_channel(name, "cdr", bag.register_schema(kind, "ros2msg", b""))
         for t in times:
-            data = bytes(state(BEGUN + t, shoulder=angle(t), elbow=0.1))
-            bag.add_message(channel, round(1e9 * (BEGUN + t)), data, 0)
+            data = bytes(state(begun + t, shoulder=angle(t), elbow=0.1))
+            bag.add_message(channel, round(1e9 * (begun + t)), data, 0)
         bag.finish()
 
 

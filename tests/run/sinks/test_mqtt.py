@@ -265,6 +265,14 @@ def test_it_trusts_a_broker_by_its_authority_alone(tmp_path, mosquitto, authorit
         make_sink(f"{broker.url}?tls={tmp_path}/none.pem")
 
 
+def test_a_message_does_not_wait_for_the_one_before_to_be_acknowledged(broker, stream):
+    sink = make_sink(broker.url)
+    sink.open(stream)
+    own = sink._client.socket()
+    assert own.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
+    sink.close()
+
+
 def test_a_wrong_password_is_said(broker, stream):
     sink = make_sink(broker.url.replace("secret", "guess"))
     with pytest.raises(SinkError, match="refused"):

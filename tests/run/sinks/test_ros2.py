@@ -20,7 +20,7 @@ from files.session.runs import TOUCH
 from run.board import Board
 from run.sinks.conftest import EPOCH, EVENT, MESH, PATIENCE, PATTERN, begin
 from tomoskin.core import SinkError
-from tomoskin.files.messages import TOPICS, dds_name, type_hash
+from tomoskin.files.messages import TOPICS, dds_name, ros_fields, type_hash
 from tomoskin.files.session import SessionReader
 from tomoskin.run import LiveSkin, Runner
 from tomoskin.run.sinks import make_sink
@@ -129,6 +129,12 @@ def test_a_subscriber_that_reads_no_more_delays_nobody(program, domain, sink):
     assert time.monotonic() - begun < PATIENCE  # none stands still for ever, and none raises
     peer.send(signal.SIGCONT)
     peer.hears(lambda n: publish(sink, 2000 + n))
+
+
+def test_what_nobody_reads_is_not_made(sink, monkeypatch):
+    for name in ("contacts", "wrench", "track", "markers", "voltages", "image", "points"):
+        monkeypatch.setattr(ros_fields, name, lambda *_: pytest.fail("made for nobody"))
+    publish(sink, 0)
 
 
 def test_the_report_of_a_run_says_how_its_board_is(program, domain, prepared, idle):

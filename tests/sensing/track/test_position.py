@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from sensing.track.detections import Run, detection
-from tomoskin.core import Force
+from tomoskin.core import Amount
 
 
 @pytest.mark.parametrize("rate", [10, 40])
@@ -75,7 +75,8 @@ def test_what_is_off_without_noise_is_told() -> None:
 
 def test_all_else_of_a_detection_is_kept() -> None:
     """Field by field, those of a later version too: a new one is missed here."""
-    given = detection(0.0, close=True, weak=False, force=Force(2.0, 1.0, 3.0), cov_xy=1e-7)
+    amounts = {"force": Amount(2.0, 1.0, 3.0), "depth": Amount(1e-3, 0.5e-3, 2e-3)}
+    given = detection(0.0, close=True, weak=False, cov_xy=1e-7, **amounts)
     shown = Run()([[given]] * 3).touches[-1][0].detection
     assert shown is not given
     for name in {f.name for f in fields(given)} - {"x", "y", "sd_x", "sd_y", "cov_xy", "bias"}:

@@ -48,26 +48,6 @@ def check_full_turns(link: Link, scan: Scan, expected: list[int]) -> None:
     assert link.counters.corrupt == 0
 
 
-def check_orders(link: Link, scan: Scan, expected: list[int]) -> None:
-    """An order takes over at the end of a drive, and gives way to full turns again."""
-    counts = np.array(expected)
-    for order in ([5, 2, 5], [7]):
-        identity = link.ask_order(order)
-        items = polled(link, DriveSamples, 60)
-        drives = [item for item in items if isinstance(item, DriveSamples)]
-        first = next(k for k, drive in enumerate(drives) if drive.order == identity)
-        for number, drive in enumerate(drives[first:]):
-            assert drive.order == identity
-            assert drive.drive == order[number % len(order)]
-            assert drive.place == number % len(order)
-            own = scan.sample_drive == drive.drive
-            assert drive.samples.tolist() == counts[own].tolist()
-    link.ask_order([])
-    frames = [item for item in polled(link, Frame, 3) if isinstance(item, Frame)]
-    assert all(frame.samples.tolist() == expected for frame in frames)
-    assert link.frames.lost == link.frames.stale == link.frames.foreign == 0
-
-
 @pytest.mark.parametrize(("electrodes", "oversampling"), [(8, 4), (8, 1), (16, 4)])
 def test_the_megas_drives(
     programs: Programs, tmp_path: Path, electrodes: int, oversampling: int
@@ -80,7 +60,6 @@ def test_the_megas_drives(
         Link(SerialTransport(board.path), scan, settings) as link,
     ):
         check_full_turns(link, scan, expected)
-        check_orders(link, scan, expected)
 
 
 def test_drives_shorter_than_their_messages_make_the_host_ask_for_whole_scans(
@@ -127,4 +106,3 @@ def test_the_picos_drives(pico: PicoPrograms, tmp_path: Path, electrodes: int) -
     with powered(pico, tmp_path, "-f") as board, board.link(scan, settings) as link:
         expected = star(scan, 4)
         check_full_turns(link, scan, expected)
-        check_orders(link, scan, expected)

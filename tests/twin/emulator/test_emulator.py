@@ -15,8 +15,7 @@ from tomoskin.cli.app import app
 from tomoskin.core import Frame, SourceError
 from tomoskin.model.skin import Skin
 from tomoskin.twin import Press, TwinSettings, TwinSkin
-from tomoskin.twin.emulator import EmulatorTransport, emulate_board
-from tomoskin.twin.emulator import program as building
+from tomoskin.twin.emulator import EmulatorTransport, emulate_board, program as building
 from tomoskin.twin.emulator.board_process import Front, SkinMemory
 from tomoskin.twin.emulator.program import Programs
 from tomoskin.twin.emulator.source import front_of, open_emulator

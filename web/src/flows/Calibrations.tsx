@@ -3,15 +3,17 @@
 import { send, status } from "../state";
 import { calibrations, files } from "./model";
 
-type Of = "touch" | "force";
+type Of = "touch" | "force" | "depth";
 
 const WITHOUT: Readonly<Record<Of, string>> = {
   touch: "Positions of touches come from the voltages and the model of the skin.",
   force: "No weights have been learnt: strengths are changes of conductivity.",
+  depth: "Depths are uncalibrated: tomoskin calibrate depth learns them from presses of known depth.",
 };
 const WITH: Readonly<Record<Of, string>> = {
   touch: "Positions of touches come from",
   force: "Forces of touches come from",
+  depth: "Depths of touches come from",
 };
 
 function Health() {

@@ -170,8 +170,9 @@ function Session({ file }: { file: FileEntry }) {
 }
 
 function Other({ file }: { file: FileEntry }) {
-  const { touch, force } = calibrations.value;
-  const gives = file.name === touch ? "positions" : file.name === force ? "forces" : null;
+  const { touch, force, depth } = calibrations.value;
+  const names = { positions: touch, forces: force, depths: depth };
+  const gives = Object.entries(names).find(([, name]) => name === file.name)?.[0];
   return (
     <li class={exported.value === file.name || gives ? "current" : ""}>
       <div>

@@ -263,6 +263,7 @@ function View() {
         ))}
       </div>
       {(shown === "touch" || shown === "force") && going !== shown && <InUse of={shown} />}
+      {shown === "force" && going !== shown && <InUse of="depth" />}
       {shown === "board" ? <Board /> : <Guided kinds={TEACHING[shown]} />}
     </div>
   );

@@ -31,7 +31,7 @@ const NO_FLOW: FlowNow = {
 export const files = signal<Files | null>(null);
 export const sources = signal<Sources | null>(null);
 export const flow = signal<FlowNow>(NO_FLOW);
-export const calibrations = signal<Calibrations>({ type: "calibrations", touch: null, force: null, force_most_n: null });
+export const calibrations = signal<Calibrations>({ type: "calibrations", touch: null, force: null, depth: null, most: {} });
 export const timeline = signal<PlayedTimeline | null>(null);
 /** Notes and gaps since the recording began or the replay was opened, and its touches. */
 /** A moment of a recording, from its first frame, and what happened. */

@@ -1,4 +1,4 @@
-/** The force of each touch over the last ten seconds with its interval, or its change of the sheet;
+/** Force or depth of each touch over the last ten seconds with its interval, or its change of the sheet;
  * each line named at its end. */
 
 import { computed } from "@preact/signals";
@@ -7,7 +7,8 @@ import { inScale, niceAbove, type Scale, scaleFor } from "../format";
 import { SLOTS, SPAN } from "../history";
 import { history, limit, link, newest, scene, shown } from "../state";
 import { theme } from "../theme";
-import { asChange, forceState, inNewtons, mostNewtons } from "./forces";
+import { MEASURANDS } from "../words";
+import { most, next, several, showNext, shownAs } from "./amounts";
 import { axis, Plot, type Plan } from "./Plot";
 
 /** Names of more times would run into one another, px. */
@@ -17,13 +18,16 @@ const NARROW = 320;
 const HEADROOM = 5;
 
 /** The end of the ordinate: it follows the colour scale or the calibration, and moves for nothing else. */
-const top = computed(() => (inNewtons.value ? mostNewtons.value : niceAbove(HEADROOM * limit.value)));
-const scale = computed<Scale>(() =>
-  inNewtons.value
-    ? { factor: 1, unit: "N", decimals: top.value < 5 ? 1 : 0 }
-    : scaleFor(top.value, scene.value?.unit ?? "S"),
-);
-const lines = computed(() => (inNewtons.value ? history.forces : history.columns));
+const top = computed(() => (shownAs.value === "change" ? niceAbove(HEADROOM * limit.value) : most.value));
+const scale = computed<Scale>(() => {
+  const name = shownAs.value;
+  if (name === "change") return scaleFor(top.value, scene.value?.unit ?? "S");
+  const { perUnit, unit } = MEASURANDS[name];
+  return { factor: perUnit, unit, decimals: perUnit * top.value < 5 ? 1 : 0 };
+});
+/** The columns of what is shown, with the ends of its intervals where it has some. */
+const amounts = computed(() => (shownAs.value === "change" ? null : history.amounts[shownAs.value]));
+const lines = computed(() => amounts.value?.values ?? history.columns);
 
 /** The touch's number where its line ends, with an arrow where it goes on above. */
 function nameLines(plot: uPlot): void {
@@ -80,7 +84,7 @@ function plan(): Plan | null {
         width: 2,
         points: { show: false },
       })),
-      ...Array.from({ length: inNewtons.value ? 2 * SLOTS : 0 }, () => ({
+      ...Array.from({ length: amounts.value ? 2 * SLOTS : 0 }, () => ({
         width: 0,
         points: { show: false },
       })),
@@ -90,9 +94,9 @@ function plan(): Plan | null {
   };
 }
 
-/** Between the ends of each force's interval, which stand behind all lines. */
+/** Between the ends of each interval, which stand behind all lines. */
 function intervals(colour: string): uPlot.Band[] {
-  if (!inNewtons.value) return [];
+  if (!amounts.value) return [];
   return Array.from({ length: SLOTS }, (_, slot) => {
     const low = 1 + SLOTS + slot;
     return { series: [low + SLOTS, low] as [number, number], fill: `${colour}40` };
@@ -102,35 +106,33 @@ function intervals(colour: string): uPlot.Band[] {
 function data(): uPlot.AlignedData {
   void shown.value;
   const end = newest.frame?.hostTime ?? 0;
-  const most = top.value;
-  const ends = inNewtons.value ? [...history.lows, ...history.highs] : [];
+  const highest = top.value;
+  const ends = amounts.value ? [...amounts.value.lows, ...amounts.value.highs] : [];
   // What exceeds the end runs along the upper edge rather than out of sight.
   const columns = [...lines.value, ...ends].map((column) =>
-    column.map((value) => (value === null ? null : Math.min(value, most))),
+    column.map((value) => (value === null ? null : Math.min(value, highest))),
   );
   return [history.times.map((time) => time - end), ...columns];
 }
 
 function Title() {
-  const { unit } = scale.value;
-  if (forceState.value === "none") return <>Strength, {unit}</>;
-  const state = forceState.value === "uncalibrated" ? ", uncalibrated" : "";
+  if (!several.value) return <>{what()}, {scale.value.unit}</>;
   return (
     <button
       type="button"
       class="quiet"
       data-testid="strength-unit"
-      aria-pressed={asChange.value}
-      title={asChange.value ? "Show newtons" : "Show the change of conductivity"}
-      onClick={() => (asChange.value = !asChange.value)}
+      title={next.value}
+      onClick={showNext}
     >
-      {asChange.value ? `Strength, ${unit}` : `Force, ${unit}${state}`}
+      {what()}, {scale.value.unit}
     </button>
   );
 }
 
+const what = () => (shownAs.value === "change" ? "Strength" : MEASURANDS[shownAs.value].title);
+
 export function Strength() {
-  const what = inNewtons.value ? "Force" : "Strength";
   return (
     <section
       class={`panel${link.value.phase === "lost" ? " stale" : ""}`}
@@ -139,7 +141,7 @@ export function Strength() {
       <h2 id="strength-title">
         <Title />
       </h2>
-      <Plot label={`${what} of each touch over the last ten seconds`} plan={plan} data={data} />
+      <Plot label={`${what()} of each touch over the last ten seconds`} plan={plan} data={data} />
     </section>
   );
 }

@@ -1,13 +1,13 @@
 /** The touches as a short list in large figures, and, quietly, as words for a screen reader. */
 
 import { useComputed, useSignal, useSignalEffect } from "@preact/signals";
-import type { Force, Touch } from "../decode";
+import type { Touch } from "../decode";
 import { fixed, inScale, millimetres, scaleFor, type Scale } from "../format";
 import { fingers } from "../screen";
 import { limit, link, scene, shown, status } from "../state";
 import { halfAxes } from "../sheet/overlay";
-import { classInWords } from "../words";
-import { asChange, forceState } from "./forces";
+import { amountInWords, classInWords, MEASURANDS } from "../words";
+import { next, several, showNext, shownAs } from "./amounts";
 
 const ROWS = 4;
 
@@ -17,29 +17,25 @@ function uncertainty(touch: Touch): string {
   return axes ? millimetres(axes[0]) : "";
 }
 
-/** What cannot be separated, in words; nothing where there is one touch. */
-function tooClose(touch: Touch): string | undefined {
+/** What is not certain of a touch, in words; nothing where all is. */
+function doubt(touch: Touch): string | undefined {
+  if (touch.provisional) return "seen by single drives, not by a whole scan yet";
   if (touch.several > 1) return `${touch.several} touches, too close to separate`;
   return touch.several ? "may be several touches, too close to separate" : undefined;
 }
 
-/** A force with its interval, in words. */
-function forceInWords({ newtons, low, high, calibrated }: Force): string {
-  const state = calibrated ? "" : ", uncalibrated";
-  if (high === Infinity) return `more than ${fixed(low, 1)} newtons, beyond what was taught${state}`;
-  return `${fixed(newtons, 1)} newtons, ${fixed(low, 1)} to ${fixed(high, 1)}${state}`;
-}
-
 function Strength({ touch, scale }: { touch: Touch; scale: Scale }) {
-  const { force } = touch;
-  if (force && !asChange.value) {
+  const name = shownAs.value;
+  const amount = name === "change" ? null : touch[name];
+  if (name !== "change" && amount) {
+    const { perUnit, decimals } = MEASURANDS[name];
+    const [value, low, high] = [amount.value, amount.low, amount.high].map((one) => perUnit * one);
     return (
-      <td class="large" title={`${forceInWords(force)} (nine in ten)`} data-testid="force">
-        {!force.calibrated && "~"}
-        {force.high === Infinity ? `> ${fixed(force.low, 1)}` : fixed(force.newtons, 1)}
-        {force.high < Infinity && (
+      <td class="large" title={`${amountInWords(amount, name)} (nine in ten)`} data-testid={name}>
+        {high === Infinity ? `> ${fixed(low, decimals)}` : fixed(value, decimals)}
+        {high < Infinity && (
           <span class="small interval">
-            {fixed(force.low, 0)}–{fixed(force.high, 0)}
+            {fixed(low, decimals - 1)}–{fixed(high, decimals - 1)}
           </span>
         )}
       </td>
@@ -55,18 +51,18 @@ function Strength({ touch, scale }: { touch: Touch; scale: Scale }) {
   );
 }
 
-function StrengthTitle({ forces, scale }: { forces: boolean; scale: Scale }) {
+function StrengthTitle({ scale }: { scale: Scale }) {
+  const name = shownAs.value;
   const change = `strength, ${scale.unit}`;
-  if (!forces) return <>{change}</>;
+  if (!several.value) return <span title="Force and depth are uncalibrated">{change}</span>;
   return (
     <button
       type="button"
       class="quiet"
-      aria-pressed={asChange.value}
-      title={asChange.value ? "Show newtons" : "Estimated from the touch, with the interval that nine in ten lie in for the tip that was taught; again for the change of conductivity"}
-      onClick={() => (asChange.value = !asChange.value)}
+      title={name === "change" ? next.value : `Estimated from the touch, with the interval that nine in ten lie in for tips as were taught. ${next.value}`}
+      onClick={showNext}
     >
-      {asChange.value ? change : forceState.value === "uncalibrated" ? "~felt, N" : "felt, N"}
+      {name === "change" ? change : MEASURANDS[name].felt}
     </button>
   );
 }
@@ -75,7 +71,7 @@ function Row({ touch, scale }: { touch: Touch; scale: Scale }) {
   return (
     <tr data-testid="touch-row" data-id={touch.id}>
       <th scope="row">
-        <span class="chip" title={tooClose(touch)}>
+        <span class="chip" title={doubt(touch)}>
           {touch.id}
           {touch.several > 0 && "+"}
         </span>
@@ -124,7 +120,7 @@ function Announcer() {
       const positions = touches.map(
         (touch) =>
           `touch ${touch.id} at ${millimetres(touch.x, 0)}, ${millimetres(touch.y, 0)} ` +
-          ["millimetres", touch.force && forceInWords(touch.force), tooClose(touch)]
+          ["millimetres", touch.force && amountInWords(touch.force, "force"), touch.depth && amountInWords(touch.depth, "depth"), doubt(touch)]
             .filter(Boolean)
             .join(", "),
       );
@@ -180,7 +176,7 @@ export function Touches() {
                   ± mm
                 </th>
                 <th scope="col">
-                  <StrengthTitle forces={touches.some(({ force }) => force)} scale={scale} />
+                  <StrengthTitle scale={scale} />
                 </th>
               </tr>
             </thead>

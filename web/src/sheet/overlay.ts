@@ -25,11 +25,19 @@ export interface Marks {
 type Pen = CanvasRenderingContext2D;
 
 /** A line that reads on any colour: a wide halo under it. */
-function haloed(pen: Pen, theme: Theme, path: Path2D, colour: string, width: number): void {
+function haloed(
+  pen: Pen,
+  theme: Theme,
+  path: Path2D,
+  colour: string,
+  width: number,
+  dashes: number[] = [],
+): void {
   pen.setLineDash([]);
   pen.strokeStyle = theme.halo;
   pen.lineWidth = width + 2.5;
   pen.stroke(path);
+  pen.setLineDash(dashes);
   pen.strokeStyle = colour;
   pen.lineWidth = width;
   pen.stroke(path);
@@ -145,7 +153,7 @@ function drawTouch(pen: Pen, theme: Theme, view: View, touch: Touch): void {
     ring.forEach(([px, py], k) => (k ? path.lineTo(px, py) : path.moveTo(px, py)));
     path.closePath();
   }
-  haloed(pen, theme, path, theme.accent, 2);
+  haloed(pen, theme, path, theme.accent, 2, touch.provisional ? [5, 4] : []);
 }
 
 /** The touch's number on a disc beside its cross. */

@@ -17,7 +17,7 @@ class Assembler:
     """Passes drives on at once, and behind the last of a full turn its frame.
 
     A drive that is late, doubled, or of another scan is left out and counted, as a frame is. A turn
-    that lacks a drive makes no frame and is counted as lost, unless a new order cut it short.
+    that lacks a drive makes no frame and is counted as lost.
 
     ``broken`` is how many full turns in a row have lacked a drive; ``unsaid`` whether drives are
     asked for, none has come yet, and nobody has been told so.
@@ -57,44 +57,25 @@ class Assembler:
             counters.stale += 1
             return []
         self._last = drive
-        return self._go_on(drive, last) if last and ahead == 0 else self._begin(drive, last, ahead)
-
-    def _begin(self, drive: DriveSamples, last: DriveSamples | None, ahead: int) -> list[Received]:
-        """The first drive of a turn that is so many ``ahead`` of that of ``last``."""
-        whole = self._turn is not None and len(self._turn) == self._n_drives
-        # a full turn that lacks its end alone, with a new order right behind it
-        cut = self._turn is not None and not whole and drive.order != 0 and ahead == 1
-        if last and last.order == 0 and not whole and not cut:
-            self.broken += 1
-        self._turn = None
-        items: list[Received] = [*self._frames.reach(drive, cut=cut)]
-        if drive.order:
-            return [*items, *self._missing(drive, drive.place), drive]
-        if drive.place:
-            return [*items, drive]
-        self._turn = []
+        items: list[Received] = []
+        if last is None or ahead:
+            items += self._begin(drive, last)
+        elif drive.place > last.place + 1:
+            self._turn = None
         return items + self._complete(drive)
 
-    def _go_on(self, drive: DriveSamples, last: DriveSamples) -> list[Received]:
-        """A further drive of the turn of ``last``."""
-        missing = drive.place - last.place - 1
-        if drive.order:
-            return [*self._missing(drive, missing), drive]
-        if missing:
-            self._turn = None
-        return [drive] if self._turn is None else self._complete(drive)
-
-    def _missing(self, drive: DriveSamples, count: int) -> list[Event]:
-        """Drives of another order than a full turn are missing before this one."""
-        if not count:
-            return []
-        self._frames.counters.lost += 1
-        text = f"{count} drive{'s' if count > 1 else ''} lost in scan {drive.sequence}"
-        return [Event(drive.host_time, "lost", text)]
+    def _begin(self, drive: DriveSamples, last: DriveSamples | None) -> list[Event]:
+        """A turn begins after that of ``last``, with its first drive or a later one."""
+        whole = self._turn is not None and len(self._turn) == self._n_drives
+        if last and not whole:
+            self.broken += 1
+        self._turn = None if drive.place else []
+        return self._frames.reach(drive)
 
     def _complete(self, drive: DriveSamples) -> list[Received]:
-        """The drive, which lacks none before it, and the frame if it is the last."""
-        assert self._turn is not None
+        """The drive, and the frame if it is the last one of a turn that lacks none."""
+        if self._turn is None:
+            return [drive]
         self._turn.append(drive)
         if drive.place < self._n_drives - 1:
             return [drive]
@@ -102,9 +83,9 @@ class Assembler:
         return [drive, *self._frames.take(_frame(self._turn))]
 
 
-def _head(drive: DriveSamples) -> tuple[int, int, int]:
+def _head(drive: DriveSamples) -> tuple[int, int]:
     """What all drives of a turn have in common."""
-    return drive.order, drive.flags, drive.drops
+    return drive.flags, drive.drops
 
 
 def _frame(turn: list[DriveSamples]) -> Frame:

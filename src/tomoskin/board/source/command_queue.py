@@ -65,17 +65,13 @@ class SequenceFilter:
         self.counters.passed += 1
         return [*self._go_on(frame, gap), frame]
 
-    def reach(self, drive: DriveSamples, *, cut: bool) -> list[Event]:
-        """A turn begins with ``drive``, after one that was ``cut`` short or not; what is missing.
-
-        A full turn is still to make its frame, any other makes none.
-        """
+    def reach(self, drive: DriveSamples) -> list[Event]:
+        """A turn begins with ``drive``, which is still to make its frame; what is missing."""
         gap = self._gap(drive)
         if gap >= _MODULUS // 2:
             return []
-        events = self._go_on(drive, gap - cut)
-        if drive.order == 0:
-            self._expected = drive.sequence
+        events = self._go_on(drive, gap)
+        self._expected = drive.sequence
         return events
 
     def refuse(self, item: Frame | DriveSamples) -> list[Event] | None:
@@ -114,7 +110,7 @@ class SequenceFilter:
         if isinstance(item, Frame):
             expected, what = scan.n_samples, f"frames with {n} samples"
         else:
-            possible = item.drive < len(scan.channels) and (item.order or item.drive == item.place)
+            possible = item.order == 0 and item.drive == item.place < len(scan.channels)
             expected = scan.channels[item.drive] if possible else -1
             what = f"messages of drive {item.drive} with {n} samples"
         text = f"{what} are left out: this scan has {scan.n_samples} samples"
@@ -165,13 +161,6 @@ class CommandQueue:
     def add(self, commands: Iterable[Command]) -> None:
         """Send these after those that wait."""
         self._waiting.extend(commands)
-
-    def ask(self, command: Command, now: float) -> None:
-        """Send this as soon as nothing is pending, in place of one of its kind that waits."""
-        others = (waiting for waiting in self._waiting if type(waiting) is not type(command))
-        self._waiting = deque([*others, command])
-        if self._pending is None:
-            self.send_next(now)
 
     def clear(self) -> None:
         """Await nothing and send nothing more."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import AbstractContextManager
 
 from tomoskin.board.source.agreement import Rated, RateFollower
@@ -14,7 +14,7 @@ from tomoskin.board.source.configuration import Configuration
 from tomoskin.board.source.protocol_session import ProtocolSession, Stage
 from tomoskin.board.source.settings import ScanSettings, Timing
 from tomoskin.board.source.transport import Diagnosable, Fetched, Played, Transport
-from tomoskin.board.wire import Ack, BoardLimits, Decoder, Info, SetOrder, Stop, encode
+from tomoskin.board.wire import Ack, BoardLimits, Decoder, Info, Stop
 from tomoskin.core import Frame, SourceError
 from tomoskin.model.pattern import Scan
 
@@ -64,7 +64,6 @@ class Link(AbstractContextManager["Link"]):
         self.counters, self.frames = self._decoder.counters, self._session.frames.counters
         self._watch = ClockWatch()
         self._closed = False
-        self._orders = 0
         self._heard = b""
         self.diagnosis: SourceError | None = None
 
@@ -120,28 +119,6 @@ class Link(AbstractContextManager["Link"]):
         patience = min(timeout, self._session.deadline() - now)
         items += self._listen(max(patience, 0.0))
         return items
-
-    def ask_order(self, drives: Sequence[int]) -> int:
-        """Have the ``drives`` of the scan scanned in this order, again and again; none: full turns.
-
-        Returns the identity that they come with, from the end of a drive on; 0: full turns, also
-        where the board sends whole scans or has not begun. A board that is set up again begins with
-        full turns. Of several orders between two answers the newest counts.
-
-        Raises
-        ------
-        WireError
-            For more drives than fit into a message, 55.
-        """
-        if not (self.running and self.configuration.singly):
-            return 0
-        self._orders = self._orders % 255 + 1 if drives else self._orders
-        identity = self._orders if drives else 0
-        order = SetOrder(0, self.configuration.identity, identity, bytes(drives))
-        encode(order)  # one that does not fit a message is refused here, not when it is sent
-        self._session.commands.ask(order, self._clock())
-        self._flush()
-        return identity
 
     def connect(self) -> Info:
         """Poll until the board scans; what it said of itself. Raises as :meth:`poll` does."""

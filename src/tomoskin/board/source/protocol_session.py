@@ -33,7 +33,6 @@ from tomoskin.board.wire import (
     Result,
     SetBaud,
     SetFormat,
-    SetOrder,
     Stop,
     type_byte,
 )
@@ -175,8 +174,7 @@ class ProtocolSession:
 
     def _answered(self, now: float) -> list[Received]:
         """The pending command has been answered: what follows."""
-        pending = self.commands.pending
-        if self.commands.send_next(now) or isinstance(pending, SetOrder):
+        if self.commands.send_next(now):
             return []
         self.stage, self._last_frame, self.is_silent = Stage.RUNNING, now, False
         self.frames.open()
@@ -280,9 +278,6 @@ class ProtocolSession:
 
     def _refused(self, ack: Ack, command: Command, now: float) -> list[Received]:
         """The board has refused the pending command: goes on without it where that is possible."""
-        if isinstance(command, SetOrder):
-            self.commands.send_next(now)
-            return [Event(now, "order", f"the board refused an order: {_reason(ack, command)}")]
         if isinstance(command, SetFormat) and self.drives.unsaid:
             return self._go_whole(now)
         raise SourceError(

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import errno
+import os
+import select
+import sys
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -184,13 +188,18 @@ class SerialTransport:
         return self._ahead.waited
 
     def _fetch(self) -> bytes:
+        port = self._serial
         try:
-            first: bytes = self._serial.read(1)
-            if not first:
-                return b""
-            waiting = min(self._serial.in_waiting, _CHUNK)
-            return first + self._serial.read(waiting) if waiting else first
-        except (OSError, TypeError) as error:  # TypeError: pyserial, when closed meanwhile
+            if sys.platform == "win32":
+                return port.read(1) + port.read(port.in_waiting)
+            # as pyserial does, but in two calls of the system instead of five
+            own, data = port.fileno(), b""
+            ready, _, _ = select.select([own, port.pipe_abort_read_r or own], [], [], _FETCH)
+            with suppress(BlockingIOError):
+                if own in ready and not (data := os.read(own, _CHUNK)):
+                    raise OSError("it has nothing more to give")
+            return data
+        except (OSError, TypeError) as error:  # TypeError: when closed meanwhile
             raise self._gone(error) from None
 
     def write(self, data: bytes) -> None:

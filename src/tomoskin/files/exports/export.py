@@ -19,6 +19,7 @@ from tomoskin.files.session import (
     no_report,
     replayed,
 )
+from tomoskin.model.robot import Robot
 from tomoskin.pipeline import FrameResult, Prepared
 
 
@@ -29,6 +30,7 @@ class Export:
     ``every`` s between two images; ``advance`` is called with how far it is. Files that are
     there are written over with ``overwrite`` only. ``others`` are the sessions of a robot's other
     skins, and ``like`` the dataset of a robot whose rows are wanted: for formats that take them.
+    ``robot`` is that which wore the skins, where it is known.
     """
 
     session: SessionReader
@@ -37,6 +39,7 @@ class Export:
     overwrite: bool = False
     others: tuple[SessionReader, ...] = ()
     like: Path | None = None
+    robot: Robot | None = None
 
     @cached_property
     def prepared(self) -> Prepared:
@@ -46,7 +49,9 @@ class Export:
     @cached_property
     def stream(self) -> Stream:
         """What the run of the recording would have published."""
-        stream = Stream.of(self.prepared, str(self.session.path), self.session.epoch)
+        session = self.session
+        place = None if self.robot is None else self.robot.place(session.name, session.path)
+        stream = Stream.of(self.prepared, str(session.path), session.epoch, place)
         return replace(stream, replayed=False)  # here events are those of the recording too
 
     def each(self) -> Iterator[Export]:

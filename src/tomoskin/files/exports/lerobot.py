@@ -33,10 +33,12 @@ from tomoskin.files.exports.episodes import Episode, Rows, rows_like, rows_of
 from tomoskin.files.exports.export import Export
 from tomoskin.files.messages import (
     FIELDS,
+    POSE,
     SLOTS,
     Contacts,
     Slots,
     last_before,
+    pose_row,
     row_labels,
     still_holds,
 )
@@ -44,6 +46,7 @@ from tomoskin.model.pattern import Pattern
 
 PREFIX = "observation.tactile"
 VOLTAGES, TOUCHES, VALID, WINDOW, AGES = "voltages", "touches", "valid", "window", "ages"
+LINK = "link"
 """Names of a skin's features, after the prefix and, of several skins, the skin's name."""
 
 TIME = "tactile.time_ns"
@@ -112,10 +115,12 @@ class _Track:
     valid: NDArray[np.bool_]
     change: FloatArray
     touches: FloatArray
+    poses: FloatArray
+    """(n, len(POSE)); no columns where the skin lies on no link."""
 
     @classmethod
     def of(cls, job: Export) -> Self:
-        times, valid, change, touches, slots = [], [], [], [], Slots()
+        times, valid, change, touches, poses, slots = [], [], [], [], [], Slots()
         for result in job.results():
             contacts = Contacts.of(job.stream, result)
             if contacts.change is not None:
@@ -124,14 +129,22 @@ class _Track:
                 valid.append(contacts.valid)
                 change.append(contacts.change.astype(np.float32))
                 touches.append(slots.table.ravel().astype(np.float32))
+                poses.append(pose_row(contacts) if contacts.link else [])
         if not times:
             raise DataError("holds too few frames for a reference", where=str(job.session.path))
+        if (link := contacts.link) is not None and not np.any(poses):
+            raise DataError(
+                f"no frame says where its link was: {link.problem}",
+                where=str(job.session.path),
+                hint="name a bag with the joint states of that time in the robot file, as in "
+                'joints = "arm.mcap", or leave out --robot',
+            )
         name = f".{job.session.name}" if job.session.name else ""
         return cls(
             f"{PREFIX}{name}.",
             job.session.skin.pattern(),
             np.maximum.accumulate(times),
-            *map(np.array, (valid, change, touches)),
+            *map(np.array, (valid, change, touches, poses)),
         )
 
     def columns(self, rows: Rows, count: int) -> Columns:
@@ -142,7 +155,8 @@ class _Track:
         moments = rows.moments
         chosen = last_before(self.times, moments, count)
         newest, ages = chosen[:, -1], moments[:, None] - self.times[chosen]
-        valid = self.valid[newest] & still_holds(self.times, ages[:, -1])
+        holds = still_holds(self.times, ages[:, -1])
+        valid = self.valid[newest] & holds
         window = np.where((ages >= 0)[:, :, None], self.change[chosen], 0).astype(np.float32)
         columns = {
             VOLTAGES: window[:, -1],
@@ -151,6 +165,8 @@ class _Track:
             WINDOW: window.reshape(len(window), -1),
             AGES: ages.astype(np.float32),
         }
+        if self.poses.size:
+            columns[LINK] = np.where(holds[:, None], self.poses[newest], 0).astype(np.float32)
         return {self.prefix + name: values for name, values in columns.items()}
 
     def frames_of_window(self, rows: Rows) -> int:
@@ -171,7 +187,7 @@ class _Track:
         slots = [f"touch_{n}.{name}" for n in range(SLOTS) for name in FIELDS]
         frames = [f"frame_{n - count + 1}" for n in range(count)]
         window = [f"{frame}.{label}" for frame in frames for label in labels]
-        named = {VOLTAGES: labels, TOUCHES: slots, WINDOW: window, AGES: frames}
+        named = {VOLTAGES: labels, TOUCHES: slots, WINDOW: window, AGES: frames, LINK: [*POSE]}
         return {self.prefix + name: words for name, words in named.items()}
 
 

@@ -6,7 +6,9 @@ from __future__ import annotations
 import shutil
 import subprocess
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -292,18 +294,12 @@ FILMS: dict[str, Callable[..., None]] = {".gif": write_gif, ".mp4": write_mp4}
 def _encoded(command: list[str], first: NDArray[np.uint8], rest: Pictures) -> str:
     """Feed a program; why it failed, or ""."""
     with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as process:
-        _feed(process, first, rest)
+        assert process.stdin is not None
+        with suppress(BrokenPipeError):  # it has ended, and says why
+            for picture in chain([first], rest):
+                process.stdin.write(picture.tobytes())
         _, errors = process.communicate()
     if not process.returncode:
         return ""
     text = errors.decode(errors="replace").strip().splitlines()
     return text[-1] if text else f"ffmpeg ended with the code {process.returncode}"
-
-
-def _feed(process: Any, first: NDArray[np.uint8], rest: Pictures) -> None:
-    try:
-        process.stdin.write(first.tobytes())
-        for figure in rest:
-            process.stdin.write(figure.tobytes())
-    except BrokenPipeError:
-        pass  # it has ended, and says why

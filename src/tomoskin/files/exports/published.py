@@ -10,7 +10,7 @@ from uuid import uuid4
 import numpy as np
 
 from tomoskin import __version__
-from tomoskin.core import CHANGE, Event, Image, SinkError, StrPath, needed, written
+from tomoskin.core import CHANGE, MEASURANDS, Event, Image, SinkError, StrPath, needed, written
 from tomoskin.files.exports.export import Export
 from tomoskin.files.messages import (
     TOPICS,
@@ -125,11 +125,11 @@ class RerunView:
         for contact in contacts.touches:
             touch = contact.touch
             self._series(f"peak/{touch.id}", touch.detection.peak)
-            if not np.isnan(contact.force):
-                self._series(f"force/{touch.id}", contact.force)
+            for name, amount in touch.amounts.items():
+                self._series(f"{name}/{touch.id}", amount.value)
         ids = {touch.id for touch in touches}
         for gone in self._ids - ids:  # or its line would go on for ever
-            for name in ("peak", "force"):
+            for name in ("peak", *MEASURANDS):
                 gap = self._rerun.Clear(recursive=False)
                 self._recording.log(self._path(f"{name}/{gone}"), gap)
         self._ids = ids

@@ -27,7 +27,7 @@ from tomoskin.files.session import (
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import colour_limit
-from tomoskin.sensing.track import has_forces
+from tomoskin.sensing.track import measured_in
 
 
 def _npz(job: Export, path: StrPath) -> None:
@@ -67,8 +67,8 @@ def _scale(job: Export) -> tuple[Mesh, str, float]:
 def export_touches(job: Export, path: StrPath) -> None:
     """Write a table of the touches; of a session without any, those that a replay finds."""
     rows, surface = list(session_touches(job.session)), job.session.skin.surface
-    forces, begun = has_forces(rows), first_scan(job.session)
-    write_touches(path, rows, surface, forces=forces, begun=begun, overwrite=job.overwrite)
+    measured, begun = measured_in(rows), first_scan(job.session)
+    write_touches(path, rows, surface, measured=measured, begun=begun, overwrite=job.overwrite)
 
 
 WRITERS: dict[str, Callable[[Export, Path], None]] = {

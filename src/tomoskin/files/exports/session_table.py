@@ -12,7 +12,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import StrPath, needed, written
+from tomoskin.core import MEASURANDS, StrPath, needed, written
 from tomoskin.files.exports.export import Export
 from tomoskin.files.imports import column_names
 from tomoskin.files.session import (
@@ -24,7 +24,14 @@ from tomoskin.files.session import (
     session_touches,
 )
 from tomoskin.model.mesh import Surface
-from tomoskin.sensing.track import ELAPSED, TouchedFrame, columns_of, force_values, touch_rows
+from tomoskin.sensing.track import (
+    ELAPSED,
+    Measurands,
+    TouchedFrame,
+    amount_values,
+    columns_of,
+    touch_rows,
+)
 
 Column = NDArray[Any]
 
@@ -109,7 +116,7 @@ def write_touches(
     frames: Iterable[TouchedFrame],
     surface: Surface | None = None,
     *,
-    forces: bool = False,
+    measured: Measurands = (),
     begun: float | None = None,
     overwrite: bool = False,
 ) -> int:
@@ -118,7 +125,7 @@ def write_touches(
     A frame is its index in the recording, from 0, and empty where that does not hold it; its time
     is the recording's own.
 
-    ``forces`` adds those of the touches, which are empty where a touch has none; ``begun``, the
+    ``measured`` adds columns of forces or depths, empty where a touch has none; ``begun``, the
     time of the recording's own first frame, adds the time since then.
 
     A standard deviation that is not known is an empty field; the kind is :attr:`Touch.said`. On
@@ -126,14 +133,14 @@ def write_touches(
 
     Raises as :func:`written` does.
     """
-    names, count = columns_of(surface, forces=forces, begun=begun), 0
+    names, count = columns_of(surface, measured=measured, begun=begun), 0
     with (
         written(path, overwrite=overwrite) as part,
         part.open("w", newline="", encoding="utf-8") as file,
     ):
         table = csv.writer(file, lineterminator="\n")
         table.writerow(names)
-        for row in touch_rows(frames, surface, forces=forces, begun=begun):
+        for row in touch_rows(frames, surface, measured=measured, begun=begun):
             table.writerow(_touch_text(name, value) for name, value in zip(names, row, strict=True))
             count += 1
     return count
@@ -151,7 +158,11 @@ _FRAMES = ("number", "time", "host_time", "sequence", "ticks", "mark", "samples"
 _TOUCH = np.dtype(
     [("frame", "i8"), ("time", "f8"), ("id", "i8"), ("kind", "S32"), ("since", "f8")]
     + [(name, "f8") for name in ("x", "y", "sd_x", "sd_y", "area", "peak")]
-    + [("force", "f8"), ("force_low", "f8"), ("force_high", "f8"), ("force_state", "S12")]
+    + [
+        (f"{name}{part}", "S12" if part == "_state" else "f8")
+        for name in MEASURANDS
+        for part in ("", "_low", "_high", "_state")
+    ]
 )
 
 
@@ -201,7 +212,8 @@ def _touches(session: SessionReader) -> Any:
     """By frame, as in every table; -1 where a touch's frame is not in the file."""
     table = [
         (-1 if frame is None else frame, time, t.id, t.said.encode(), t.since,
-         r.x, r.y, r.sd_x, r.sd_y, r.area, r.peak, *force_values(r.force))
+         r.x, r.y, r.sd_x, r.sd_y, r.area, r.peak,
+         *amount_values(r.force), *amount_values(r.depth))
         for frame, time, touches in session_touches(session)
         for t in touches
         for r in [t.detection]

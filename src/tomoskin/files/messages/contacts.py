@@ -14,7 +14,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from tomoskin.core import Detection, Event, FloatArray, Force, Image, SkinError, Touch
+from tomoskin.core import MEASURANDS, Detection, Event, FloatArray, Image, SkinError, Touch
 from tomoskin.files.messages.stream import Stream
 from tomoskin.model.mesh import Surface
 from tomoskin.model.robot import Place, Pose, quaternion
@@ -32,8 +32,12 @@ _DENT = 1e-4
 _ANY_TURN = math.pi**2 / 3
 """Variance of an angle of which nothing is known, rad²."""
 
-_NO_FORCE = {"force": None, "force_interval": None, "force_calibrated": False}
-"""What a row says of a touch whose force nothing tells."""
+_UNCALIBRATED = {
+    f"{name}{part}": value
+    for name in MEASURANDS
+    for part, value in (("", None), ("_interval", None), ("_calibrated", False))
+}
+"""What a row says of a touch whose force and depth nothing tells."""
 
 Vector = tuple[float, ...]
 
@@ -156,7 +160,7 @@ class Contact:
     def force(self) -> float:
         """N, against the normal; NaN where nothing tells it."""
         force = self.touch.detection.force
-        return math.nan if force is None else force.newtons
+        return math.nan if force is None else force.value
 
     @property
     def push(self) -> FloatArray:
@@ -172,8 +176,9 @@ class Contact:
         """As plain values by name: on the sheet, in space, and on a robot in its root frame."""
         spread = self.covariance
         content = {
-            **_NO_FORCE,
+            **_UNCALIBRATED,
             **touch_row(self.touch),
+            "provisional": self.touch.provisional,
             "position": self.position,
             "normal": self.normal,
             "covariance": None if spread is None else spread.tolist(),
@@ -378,9 +383,13 @@ def _when(scanned: float, host_time: float) -> float:
 
 
 def touch_row(touch: Touch) -> dict[str, Any]:
-    """One touch as plain values by name; its force, N, only where a calibration tells it."""
-    r, force = touch.detection, touch.detection.force
-    return ({} if force is None else _newtons(force)) | {
+    """One touch as plain values by name; force, N, and depth, m, only where calibrations do."""
+    r = touch.detection
+    amounts: dict[str, Any] = {}
+    for name, amount in touch.amounts.items():
+        interval = amount.low, amount.high
+        amounts |= {name: amount.value, f"{name}_interval": interval, f"{name}_calibrated": True}
+    return amounts | {
         "id": touch.id, "kind": touch.kind, "since": touch.since,
         "x": r.x, "y": r.y, "sd_x": r.sd_x, "sd_y": r.sd_y, "area": r.area, "peak": r.peak,
         "cov_xy": r.cov_xy, "close": r.close, "merged": touch.merged,
@@ -403,14 +412,6 @@ def event_content(stream: Stream, event: Event, *, of_frame: bool = False) -> di
         "utc_s": None if unknown else stream.utc(event.host_time),
         "skin": stream.skin,
         "frame_id": stream.naming.frame_id,
-    }
-
-
-def _newtons(force: Force) -> dict[str, Any]:
-    return {
-        "force": force.newtons,
-        "force_interval": (force.low, force.high),
-        "force_calibrated": force.calibrated,
     }
 
 

@@ -25,8 +25,13 @@ SLOTS = 5
 FIELDS = (
     *("valid", "present", "id", "x", "y", "z", "dx", "dy", "dz", "nx", "ny", "nz"),
     *("sd_x", "sd_y", "sd_z", "force_valid", "force", "strength"),
+    *("depth_valid", "depth"),
 )
 """Columns of a slot; :meth:`Slots.table` says what they mean."""
+
+POSE = ("valid", "x", "y", "z", "qx", "qy", "qz", "qw")
+"""Where the link is that a skin lies on, in the root frame of the robot: 1 where that is known, m,
+and a quaternion; zeros where it is not."""
 
 UNKNOWN_SD = 1.0
 """Standard deviation of a position whose noise is not known, m: more than any sheet."""
@@ -55,7 +60,7 @@ class Slots:
         something touches, and ``present`` 1 where something does. ``x`` to ``nz`` are position,
         its change since the touch began, both along the surface, and normal in the frame of the
         contacts, m; ``force`` is in N against the normal, and ``force_valid`` 1 where it is
-        calibrated; ``strength`` is in the image's unit.
+        calibrated; ``strength`` is in the image's unit; ``depth``, m, is as ``force``.
     """
 
     ids: tuple[int, ...] = (0,) * SLOTS
@@ -83,6 +88,12 @@ class Slots:
         return Slots(tuple(ids), onsets, table)
 
 
+def pose_row(contacts: Contacts) -> list[float]:
+    """The values of :data:`POSE`."""
+    pose = contacts.link and contacts.link.pose
+    return [1.0, *pose.position, *pose.quaternion()] if pose else [0.0] * len(POSE)
+
+
 def _kept(ids: tuple[int, ...], touches: tuple[Touch, ...]) -> tuple[int, ...]:
     alive = {key for touch in touches for key in (touch.id, *touch.merged)}
     return tuple(key if key in alive else 0 for key in ids)
@@ -91,11 +102,13 @@ def _kept(ids: tuple[int, ...], touches: tuple[Touch, ...]) -> tuple[int, ...]:
 def _row(contact: Contact, onset: FloatArray) -> list[float]:
     touch, position, spread = contact.touch, np.array(contact.position), contact.covariance
     deviation = [UNKNOWN_SD] * 3 if spread is None else np.sqrt(np.maximum(np.diag(spread), 0))
-    force = touch.detection.force
-    newtons = (0.0, 0.0) if force is None else (float(force.calibrated), force.newtons)
+    force, depth = (
+        (0.0, 0.0) if amount is None else (1.0, amount.value)
+        for amount in (touch.detection.force, touch.detection.depth)
+    )
     moved = position - onset
-    return [1.0, touch.id, *position, *moved, *contact.normal, *deviation, *newtons,
-            touch.detection.peak]  # fmt: skip
+    return [1.0, touch.id, *position, *moved, *contact.normal, *deviation, *force,
+            touch.detection.peak, *depth]  # fmt: skip
 
 
 def last_before(times: FloatArray, moments: FloatArray, count: int) -> IntArray:
@@ -128,10 +141,12 @@ class PolicyView:
     points, point_mask
         (SLOTS, 9) position m, displacement m and force N in x, y, z; and (SLOTS, 2) whether there
         is a touch and whether its force is calibrated. Displacement is along the surface, since
-        the touch began: the depth of an indentation is not measured.
+        the touch began; the depth of an indentation is in ``slots``.
     map, map_mask, map_valid
         (size, size) N/cm², or change of conductance in the image's unit, the top row first; where
         the sheet is; and whether it shows all that touches: the forces of all touches are known.
+    pose
+        (len(POSE),) where the link of the robot is that the skin lies on, see :data:`POSE`.
     vector
         (n_meas,) change of the voltages in standard deviations of one frame's noise.
     window, ages
@@ -147,6 +162,7 @@ class PolicyView:
     map: FloatArray
     map_mask: _MASK
     map_valid: bool
+    pose: FloatArray
     vector: FloatArray
     window: FloatArray
     ages: FloatArray
@@ -224,7 +240,8 @@ class PolicyForms:
         time = float(times[-1]) if time is None else time
         chosen = last_before(times, np.array([time]), self._count)[0]
         newest, ages = samples[chosen[-1]], time - times[chosen]
-        valid = newest.contacts.valid and bool(still_holds(times, ages[-1:])[0])
+        holds = bool(still_holds(times, ages[-1:])[0])
+        valid = newest.contacts.valid and holds
         table = newest.slots.table * valid
         drawn, shows_all = self._drawn(newest.contacts if valid else None)
         return PolicyView(
@@ -236,6 +253,7 @@ class PolicyForms:
             map=drawn,
             map_mask=self._grid.mask,
             map_valid=shows_all,
+            pose=np.array(pose_row(newest.contacts)) * holds,
             vector=newest.change / _floored(newest.noise),
             window=np.array([samples[index].change for index in chosen]),
             ages=ages,
@@ -303,5 +321,5 @@ class _Grid:
             apart = (self.x - spot.x) ** 2 + (self.y[:, None] - spot.y) ** 2
             apart = np.where(self.mask, apart, np.inf)
             under = apart <= max(spot.area / np.pi, float(apart.min()))
-            drawn[under] += spot.force.newtons / (cell * np.count_nonzero(under))
+            drawn[under] += spot.force.value / (cell * np.count_nonzero(under))
         return drawn

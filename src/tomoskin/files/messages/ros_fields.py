@@ -31,15 +31,16 @@ def header(stamp: int, frame: str) -> Value:
     return {"stamp": {"sec": sec, "nanosec": nanosec}, "frame_id": frame}
 
 
-def pose(contact: Contact) -> Value:
-    """``geometry_msgs/PoseWithCovariance``: on the surface, z along the normal."""
-    return {"pose": _pose(contact), "covariance": contact.pose_covariance.ravel()}
+def stamped_pose(head: Value, contact: Contact) -> Value:
+    """``geometry_msgs/PoseWithCovarianceStamped``: on the surface, z along the normal."""
+    pose = {"pose": _pose(contact), "covariance": contact.pose_covariance.ravel()}
+    return {"header": head, "pose": pose}
 
 
 def track(head: Value, contact: Contact) -> Value:
     """``nav_msgs/Odometry``: a pose with the touch's identity; velocities are not measured."""
-    name = _name(head, contact)
-    return {"header": head, "child_frame_id": name, "pose": pose(contact), "twist": _NOT_MEASURED}
+    name = {"child_frame_id": _name(head, contact), "twist": _NOT_MEASURED}
+    return stamped_pose(head, contact) | name
 
 
 def contacts(head: Value, frame: Contacts) -> Value:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from tomoskin.core import Event, Image, encode_json
@@ -43,11 +44,16 @@ KEPT = frozenset({"rows", "/tf_static"})
 
 @dataclass(frozen=True, slots=True)
 class RosMessage:
-    """A message for ``topic`` (of :data:`TOPICS`), its fields by name; ``stamp`` ns since 1970."""
+    """A message for ``topic`` (of :data:`TOPICS`); ``stamp`` ns since 1970."""
 
     topic: str
-    value: Value
+    make: Callable[[], Value]
     stamp: int
+
+    @property
+    def value(self) -> Value:
+        """Its fields by name, made now: who has no reader of the topic saves most of the cost."""
+        return self.make()
 
 
 def ros_messages(stream: Stream, item: Item) -> Iterator[RosMessage]:
@@ -55,55 +61,59 @@ def ros_messages(stream: Stream, item: Item) -> Iterator[RosMessage]:
     of_frame = not isinstance(item, Event)
     stamp = stream.log_time(time_of(item))
     for event in (item,) if isinstance(item, Event) else item.events:
-        content = event_content(stream, event, of_frame=of_frame)
-        yield RosMessage("events", _json(content), stamp)
+        content = partial(event_content, stream, event, of_frame=of_frame)
+        yield RosMessage("events", partial(_json, content), stamp)
     if isinstance(item, Event):
         return
     head = ros_fields.header(stamp, item.frame_id)
-    for topic, value in _of_frame(head, item, stamp):
-        yield RosMessage(topic, value, stamp)
+    for topic, make in _of_frame(head, item, stamp):
+        yield RosMessage(topic, make, stamp)
 
 
-def _of_frame(head: Value, contacts: Contacts, stamp: int) -> Iterator[tuple[str, Value]]:
+Made = Iterator[tuple[str, Callable[[], Value]]]
+
+
+def _of_frame(head: Value, contacts: Contacts, stamp: int) -> Made:
     stream = contacts.stream
     if contacts.is_due:
         yield from _touches(head, contacts)
     if contacts.voltages is not None:
-        yield "voltages", ros_fields.voltages(contacts)
+        yield "voltages", partial(ros_fields.voltages, contacts)
     if contacts.image is not None:
         yield from _images(head, stream, contacts.image)
     if contacts.reports:
         naming = stream.naming
-        yield "rows", _json({"measurements": row_labels(stream.pattern)})
-        yield "/diagnostics", ros_fields.diagnostics(head, contacts)
-        if naming.mount is not None:
-            yield "/tf_static", ros_fields.transform(stamp, naming.frame_id, naming.mount)
+        yield "rows", partial(_json, lambda: {"measurements": row_labels(stream.pattern)})
+        yield "/diagnostics", partial(ros_fields.diagnostics, head, contacts)
+        if (mount := naming.mount) is not None:
+            yield "/tf_static", partial(ros_fields.transform, stamp, naming.frame_id, mount)
 
 
-def _images(head: Value, stream: Stream, image: Image) -> Iterator[tuple[str, Value]]:
+def _images(head: Value, stream: Stream, image: Image) -> Made:
     if stream.pixels is not None:
-        yield "image", ros_fields.image(head, image, stream.pixels)
+        yield "image", partial(ros_fields.image, head, image, stream.pixels)
     if stream.points is not None:
-        yield "points", ros_fields.points(head, image, stream.points)
+        yield "points", partial(ros_fields.points, head, image, stream.points)
 
 
-def _touches(head: Value, contacts: Contacts) -> Iterator[tuple[str, Value]]:
-    """Each touch as a pose and as a track, which has its identity and a frame; then all of them.
+def _touches(head: Value, contacts: Contacts) -> Made:
+    """All touches, which a robot acts on; then each as a pose and as a track, which has its
+    identity and a frame.
 
     Where touches are not valid there are no contacts, not even none.
     """
-    for contact in contacts.touches:
-        yield "touch", {"header": head, "pose": ros_fields.pose(contact)}
-        yield "track", ros_fields.track(head, contact)
-    if contacts.touches:
-        yield "/tf", ros_fields.touch_frames(head, contacts)
-    yield "touches", _json(contacts.content())
-    yield "valid", {"data": contacts.valid}
+    yield "touches", partial(_json, contacts.content)
+    yield "valid", lambda: {"data": contacts.valid}
     if contacts.valid:
-        yield "contacts", ros_fields.contacts(head, contacts)
-    yield "wrench", ros_fields.wrench(head, contacts)
-    yield "markers", ros_fields.markers(head, contacts)
+        yield "contacts", partial(ros_fields.contacts, head, contacts)
+    yield "wrench", partial(ros_fields.wrench, head, contacts)
+    for contact in contacts.touches:
+        yield "touch", partial(ros_fields.stamped_pose, head, contact)
+        yield "track", partial(ros_fields.track, head, contact)
+    if contacts.touches:
+        yield "/tf", partial(ros_fields.touch_frames, head, contacts)
+    yield "markers", partial(ros_fields.markers, head, contacts)
 
 
-def _json(content: Mapping[str, Any]) -> Value:
-    return {"data": encode_json(content).decode()}
+def _json(content: Callable[[], Mapping[str, Any]]) -> Value:
+    return {"data": encode_json(content()).decode()}

@@ -12,7 +12,17 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import DataError, Detection, Event, Force, Frame, Mark, MarkedFrame, Touch
+from tomoskin.core import (
+    MEASURANDS,
+    Amount,
+    DataError,
+    Detection,
+    Event,
+    Frame,
+    Mark,
+    MarkedFrame,
+    Touch,
+)
 
 _CDR = b"\x00\x01\x00\x00"
 _FRAME = struct.Struct("<4sdQIHHBBxxI")
@@ -142,10 +152,11 @@ def _touch_of(item: dict[str, Any]) -> Touch:
     place = item["x"], item["y"], sd_x, sd_y, item["area"], item["peak"], _NO_CELLS
     cov_xy, close, merged = (item.get(k) for k in ("cov_xy", "close", "merged"))  # format 1.0: none
     possible = tuple(item.get("possible", ()))  # none in 0.1
-    force = None
-    if item.get("force") is not None:
-        low, high = item["force_interval"]
-        high = math.inf if high is None else high  # beyond what was taught
-        force = Force(item["force"], low, high, item["force_calibrated"])
-    reading = Detection(*place, cov_xy=cov_xy or 0.0, close=bool(close), force=force)
+    amounts: dict[str, Any] = {}
+    for name in MEASURANDS:
+        if item.get(name) is not None:
+            low, high = item[f"{name}_interval"]
+            high = math.inf if high is None else high  # beyond what was taught
+            amounts[name] = Amount(item[name], low, high)
+    reading = Detection(*place, cov_xy=cov_xy or 0.0, close=bool(close), **amounts)
     return Touch(item["id"], item["kind"], item["since"], reading, tuple(merged or ()), possible)

@@ -15,14 +15,7 @@ from typing import Any, NamedTuple, TypeVar
 from mcap.data_stream import ReadDataStream, RecordBuilder
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import (
-    AttachmentIndex,
-    Chunk,
-    Footer,
-    McapRecord,
-    Statistics,
-    SummaryOffset,
-)
+from mcap.records import AttachmentIndex, Chunk, Footer, McapRecord, Statistics, SummaryOffset
 
 PREFIX = struct.Struct("<BQ")
 """Opcode and length in front of every body."""

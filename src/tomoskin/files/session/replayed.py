@@ -43,7 +43,7 @@ from tomoskin.pipeline import (
     prepare,
 )
 from tomoskin.sensing.signal import Recording
-from tomoskin.sensing.track import TouchedFrame, has_forces, touch_columns
+from tomoskin.sensing.track import TouchedFrame, measured_in, touch_columns
 
 
 def as_recorded(session: SessionReader, previous: Prepared | None = None) -> Prepared:
@@ -254,4 +254,4 @@ class Session:
                 for frame, result in gathered(pipeline, reader, self.prepared.scan)
                 if result is not None
             ]
-        return touch_columns(frames, self.skin.surface, forces=has_forces(frames))
+        return touch_columns(frames, self.skin.surface, measured=measured_in(frames))

@@ -6,8 +6,9 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from tomoskin.board.wire import Info
 from tomoskin.core import (
     Event,
     Frame,
@@ -25,10 +26,7 @@ from tomoskin.files.session.channels import robot_channels
 from tomoskin.files.session.layout import encode_frame, encode_raw
 from tomoskin.files.session.message_log import MessageLog
 from tomoskin.model.mesh import Plane
-
-if TYPE_CHECKING:
-    from tomoskin.board.wire import Info
-    from tomoskin.model.skin import Skin
+from tomoskin.model.skin import Skin
 
 FORMAT = 1
 """Version of the channels and their layout."""

@@ -9,14 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import Detection, FloatArray, IntArray
-from tomoskin.learning.kind import (
-    Applied,
-    Calibration,
-    Conditions,
-    FrameView,
-    Kind,
-    Progress,
-)
+from tomoskin.learning.kind import Applied, Calibration, Conditions, FrameView, Kind, Progress
 from tomoskin.learning.touch.calibration_health import CalibrationHealth, FitCorrection
 from tomoskin.learning.touch.locator import Locator
 from tomoskin.learning.touch.presses import Presses

@@ -22,7 +22,6 @@ from tomoskin.model.forward.engine import (
     Patches,
     singular,
 )
-from tomoskin.model.forward.plain import Scipy
 from tomoskin.model.pattern import Pattern
 
 VARIABLE = "TOMOSKIN_ENGINE"
@@ -33,11 +32,9 @@ INTERFACE = 7
 
 
 @dataclass(frozen=True)
-class Native:
+class Native(Engine):
     """Cholesky, products and rows of ``core``, the module tomoskin_core."""
 
-    core: Any
-    reason: str
     name: str = "native"
 
     @property
@@ -129,7 +126,7 @@ def choose_engine() -> Engine:
     if choice not in ("", "scipy", "native"):
         raise ModelError(f"expected {VARIABLE} to be scipy or native, got {choice!r}")
     if choice == "scipy":
-        return Scipy(f"{VARIABLE} asks for it")
+        return Engine(f"{VARIABLE} asks for it")
     engine = _native()
     if choice == "native" and not isinstance(engine, Native):
         raise ModelError(
@@ -144,10 +141,10 @@ def _native() -> Engine:
     """Return the native engine after a trial, else scipy's with what went wrong as its reason."""
     try:
         core = importlib.import_module("tomoskin_core")
-        engine = Native(core, f"tomoskin_core {core.__version__} is installed")
+        engine = Native(f"tomoskin_core {core.__version__} is installed", core=core)
         engine.check()
     except ModuleNotFoundError:
-        return Scipy("tomoskin_core is not installed")
+        return Engine("tomoskin_core is not installed")
     except Exception as error:
-        return Scipy(f"tomoskin_core does not work here: {error}")
+        return Engine(f"tomoskin_core does not work here: {error}")
     return engine

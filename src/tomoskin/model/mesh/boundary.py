@@ -1,10 +1,12 @@
-"""The rim of a mesh: stretches of it under electrodes, and its nodes."""
+"""The rim of a mesh: stretches of it under electrodes, and its nodes; and how large a cell should
+be where: small at sources, growing with distance, capped."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +15,50 @@ from scipy.spatial import cKDTree
 from tomoskin.core import FloatArray, GeometryError, IntArray
 from tomoskin.model.mesh.outline import Outline
 from tomoskin.model.mesh.polygon import inside, off_segment
-from tomoskin.model.mesh.sizing import SizeField, running
+
+
+@dataclass(frozen=True, eq=False)
+class SizeField:
+    """Edge length wanted at a point: min(coarse, minᵢ(sizesᵢ + growth·|x − pointsᵢ|)).
+
+    Attributes
+    ----------
+    coarse
+        Edge length far from every source, m.
+    points
+        (n, 2) sources, m.
+    sizes
+        (n,) edge length wanted at each, m.
+    growth
+        Edge length gained per unit of distance from a source.
+    """
+
+    coarse: float
+    points: FloatArray
+    sizes: FloatArray
+    growth: float
+
+    def __call__(self, xy: FloatArray) -> FloatArray:
+        """(n,) edge length wanted at ``xy`` (n, 2), m; the nearest few sources decide."""
+        reach = (self.coarse - self.sizes.min()) / self.growth
+        if reach <= 0:
+            return np.full(len(xy), self.coarse)
+        k = min(8, len(self.sizes))
+        gap, index = self._tree.query(xy, k=k, distance_upper_bound=reach)
+        padded = np.append(self.sizes, np.inf)  # the tree says n for "no neighbour"
+        size = (padded[index] + self.growth * gap).reshape(len(xy), k).min(axis=1)
+        return np.asarray(np.minimum(size, self.coarse))
+
+    @cached_property
+    def _tree(self) -> cKDTree:
+        return cKDTree(self.points)
+
+
+def running(density: FloatArray, at: FloatArray) -> FloatArray:
+    """(n,) integral of a density (n,) from the first of the places ``at`` (n,) to each."""
+    steps = np.diff(at) * (density[1:] + density[:-1]) / 2
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
 
 MIN_GAP = 0.01
 """Two electrodes must stand at least this fraction of the narrower one apart."""

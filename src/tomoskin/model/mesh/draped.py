@@ -72,7 +72,7 @@ class Draped(Surface):
 
     @classmethod
     def read(cls, path: str | Path, *, scale: float = 1.0) -> Self:
-        """Read a .stl, .obj or .ply file; its coordinates times ``scale`` are m.
+        """Read a .stl, .obj, .ply or .dae file; its coordinates times ``scale`` are m.
 
         Raises
         ------
@@ -81,9 +81,8 @@ class Draped(Surface):
         """
         file = MeshFile.read(path, scale=scale)
         used, compact = np.unique(file.cells, return_inverse=True)
-        points = np.pad(file.points[used], ((0, 0), (0, 3 - file.points.shape[1])))
         try:
-            return cls.of(points, compact.reshape(file.cells.shape))
+            return cls.of(file.places[used], compact.reshape(file.cells.shape))
         except GeometryError as error:
             raise at_source(error, file.source) from error
 

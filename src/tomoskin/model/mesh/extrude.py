@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from tomoskin.core import FloatArray, GeometryError, IntArray
-from tomoskin.model.mesh.boundary import AT_ELECTRODE, MIN_FACETS
+from tomoskin.model.mesh.boundary import AT_ELECTRODE, MIN_FACETS, SizeField, running
 from tomoskin.model.mesh.mesh import Mesh
 from tomoskin.model.mesh.outline import Outline, check_size
 from tomoskin.model.mesh.patch import FacePatch, Patch, WallPatch, check_patches, footprint
-from tomoskin.model.mesh.sizing import SizeField, running
 from tomoskin.model.mesh.triangles import boundary_facets
 from tomoskin.model.mesh.triangulate import triangulate
 

@@ -1,14 +1,17 @@
-"""What mesh files hold, by meshio (extra ``mesh``): cells, points and groups of facets."""
+"""What mesh files hold, by meshio or pycollada (extra ``mesh``): cells, points, groups of facets;
+which of these are electrodes: by name, facets or a function."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from tomoskin.core import (
     DataError,
@@ -18,9 +21,13 @@ from tomoskin.core import (
     check_is_file,
     install_hint,
 )
+from tomoskin.model.mesh.triangles import boundary_facets
 
-READERS = {".msh": "gmsh", ".vtu": "vtu", ".stl": "stl", ".obj": "obj", ".ply": "ply"}
-"""meshio's reader for each ending."""
+READERS = {
+    ".msh": "meshio.gmsh", ".vtu": "meshio.vtu", ".stl": "meshio.stl", ".obj": "meshio.obj",
+    ".ply": "meshio.ply", ".dae": "collada",
+}  # fmt: skip
+"""The module that reads each ending."""
 
 TOO_LARGE = 10.0
 """A body that extends further than this, m, is taken for one in millimetres."""
@@ -41,7 +48,7 @@ def at_source(error: GeometryError, source: str) -> GeometryError:
 
 
 def parsed(file: Path) -> Any:
-    """What meshio makes of the file."""
+    """The file as meshio has it."""
     name = READERS.get(file.suffix.lower())
     if name is None:
         raise GeometryError(
@@ -49,15 +56,16 @@ def parsed(file: Path) -> Any:
         )
     try:
         # the reader itself: meshio.read ends the process where a file is damaged
-        reader = import_module(f"meshio.{name}")
+        reader = import_module(name)
     except ImportError as error:
+        package = name.partition(".")[0]
         raise GeometryError(
-            "mesh files need meshio", where=str(file), hint=install_hint("mesh")
+            f"{file.suffix} files need {package}", where=str(file), hint=install_hint("mesh")
         ) from error
     _check_readable(file)
     try:
         with np.errstate(over="ignore"):  # its test for binary STL multiplies text
-            return reader.read(file)
+            return _scene(reader, file) if name == "collada" else reader.read(file)
     except OSError as error:
         raise GeometryError(f"cannot be read: {error.strerror}", where=str(file)) from error
     except Exception as error:  # a parser meets damage in any way
@@ -65,6 +73,23 @@ def parsed(file: Path) -> Any:
         raise GeometryError(
             f"cannot be read as a {file.suffix} file{detail}", where=str(file)
         ) from error
+
+
+def _scene(collada: Any, file: Path) -> Any:
+    """All triangles of a scene, in m; its upward axis is not applied, as RViz has it."""
+    meshio, common = import_module("meshio"), collada.common
+    ignored = [common.DaeUnsupportedError, common.DaeBrokenRefError]  # textures, lights
+    document = collada.Collada(str(file), ignore=ignored)
+    points, cells, count = [np.zeros((0, 3))], [np.zeros((0, 3), np.int64)], 0
+    for shape in document.scene.objects("geometry"):
+        for part in shape.primitives():
+            drawn = part.triangleset() if hasattr(part, "triangleset") else part
+            if drawn.vertex_index.shape[1] == 3:  # no line
+                points.append(drawn.vertex)
+                cells.append(drawn.vertex_index + count)
+                count += len(drawn.vertex)
+    unit = document.assetInfo.unitmeter or 1.0
+    return meshio.Mesh(np.concatenate(points) * unit, [("triangle", np.concatenate(cells))])
 
 
 def _check_readable(file: Path) -> None:
@@ -119,8 +144,8 @@ def cells_of(raw: Any) -> IntArray:
     return np.concatenate(tables).astype(np.int64)
 
 
-def points_of(raw: Any, cells: IntArray, scale: float) -> FloatArray:
-    """(n, d) points in m; those of a flat mesh with two coordinates."""
+def points_of(raw: Any, cells: IntArray, scale: float) -> tuple[FloatArray, float]:
+    """(n, d) points in m; those of a flat mesh with two coordinates, and the third of all."""
     if not (math.isfinite(scale) and scale > 0):
         raise GeometryError(f"expected a scale above 0, got {scale:g}")
     points = np.asarray(raw.points, dtype=np.float64) * scale
@@ -138,7 +163,7 @@ def points_of(raw: Any, cells: IntArray, scale: float) -> FloatArray:
             hint='if the file is in millimetres, say so: unit "mm", or scale=1e-3',
         )
     flat = cells.shape[1] == 3 and points.shape[1] == 3 and extent[2] == 0
-    return points[:, :2] if flat else points
+    return (points[:, :2], float(points[cells[0, 0], 2])) if flat else (points, 0.0)
 
 
 def groups_of(raw: Any, corners: int) -> dict[str, IntArray]:
@@ -189,3 +214,74 @@ def _by_number(raw: Any, key: str, corners: int) -> Iterator[tuple[int, IntArray
 
 def _fits(block: Any, corners: int) -> bool:
     return len(block.data) > 0 and block.data.shape[1] == corners
+
+
+_NUMBERED = re.compile(r"(?:e|el|elec|electrode)[\s_-]*(\d+)", re.IGNORECASE)
+
+Chooser = Callable[[FloatArray], ArrayLike]
+"""(n, d) centroids of boundary facets → (n,) electrode of each, −1 for none."""
+
+
+Electrodes = Sequence[str] | Sequence[ArrayLike] | Chooser | None
+"""How electrodes are given: names of groups in the file, in their order; facet arrays in the
+file's own point numbers; a function of centroids; None for the groups named E1, E2, …"""
+
+
+def choose(
+    points: FloatArray, cells: IntArray, groups: Mapping[str, IntArray], electrodes: Electrodes
+) -> tuple[IntArray, ...]:
+    """Facets (n, k − 1) of each electrode.
+
+    Raises
+    ------
+    GeometryError
+        When a group does not exist, or an electrode has no facet.
+    """
+    match electrodes:
+        case None:
+            chosen = _named(groups, _numbered(groups))
+        case _ if callable(electrodes):
+            chosen = _numbers(points, cells, electrodes)
+        case _ if any(isinstance(e, str) for e in electrodes):
+            chosen = _named(groups, [str(e) for e in electrodes])
+        case _:
+            chosen = [np.asarray(e) for e in electrodes]
+    for number, facets in enumerate(chosen):
+        if not facets.size:
+            raise GeometryError("has no facet on the boundary", where=f"E{number + 1}")
+    return tuple(chosen)
+
+
+def _numbered(groups: Mapping[str, IntArray]) -> list[str]:
+    """Names of the groups that are called after an electrode, by its number."""
+    numbered = {name: m for name in groups if (m := _NUMBERED.fullmatch(name.strip()))}
+    if not numbered:
+        raise GeometryError(
+            f"no group is named as an electrode (E1, E2, …); {_listing(groups)}",
+            hint="say which facets are electrodes: electrodes=…",
+        )
+    return sorted(numbered, key=lambda name: int(numbered[name][1]))
+
+
+def _named(groups: Mapping[str, IntArray], names: Sequence[str]) -> list[IntArray]:
+    for name in names:
+        if name not in groups:
+            raise GeometryError(f'no group of facets is named "{name}"; {_listing(groups)}')
+    return [groups[name] for name in names]
+
+
+def _listing(groups: Mapping[str, IntArray]) -> str:
+    return f"groups: {', '.join(groups)}" if groups else "the file has no groups of facets"
+
+
+def _numbers(points: FloatArray, cells: IntArray, chooser: Chooser) -> list[IntArray]:
+    facets = boundary_facets(cells)
+    if not len(facets):
+        raise GeometryError("the surface is closed: it has no rim for electrodes")
+    number = np.asarray(chooser(points[facets].mean(axis=1)))
+    if number.shape != (len(facets),) or number.dtype.kind not in "iu":
+        raise GeometryError(
+            f"expected one whole number for each of {len(facets)} facets, "
+            f"got {number.dtype} of shape {number.shape}"
+        )
+    return [facets[number == n] for n in range(1 + int(number.max()))]

@@ -10,9 +10,8 @@ from scipy.sparse import coo_array
 from scipy.spatial import Delaunay, cKDTree
 
 from tomoskin.core import FloatArray, IntArray, reach
-from tomoskin.model.mesh.boundary import Boundary, keeps_clear, rim_distance
+from tomoskin.model.mesh.boundary import Boundary, SizeField, keeps_clear, rim_distance
 from tomoskin.model.mesh.polygon import inside
-from tomoskin.model.mesh.sizing import SizeField
 from tomoskin.model.mesh.triangles import simplex_measure
 
 _RIM = 0.6

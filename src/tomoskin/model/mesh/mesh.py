@@ -13,11 +13,12 @@ from numpy.typing import DTypeLike, NDArray
 
 from tomoskin.core import FloatArray, GeometryError, IntArray, PixelMap
 from tomoskin.model.mesh.check import check_mesh, checked_metric
-from tomoskin.model.mesh.choose import Electrodes, choose
 from tomoskin.model.mesh.files import (
+    Electrodes,
     at_source,
     cells_of,
     check_repeats,
+    choose,
     groups_of,
     parsed,
     points_of,
@@ -173,12 +174,15 @@ class MeshFile:
         named "electrode".
     source
         The path, for messages.
+    height
+        m, the coordinate that a flat mesh has lost.
     """
 
     points: FloatArray
     cells: IntArray
     groups: dict[str, IntArray]
     source: str
+    height: float = 0.0
 
     @classmethod
     def read(cls, path: str | Path, *, scale: float = 1.0) -> Self:
@@ -187,11 +191,17 @@ class MeshFile:
         raw = parsed(file)
         try:
             cells = cells_of(raw)
-            points = points_of(raw, cells, scale)
+            points, height = points_of(raw, cells, scale)
             groups = groups_of(raw, cells.shape[1] - 1)
         except GeometryError as error:
             raise at_source(error, str(file)) from error
-        return cls(points, cells, groups, str(file))
+        return cls(points, cells, groups, str(file), height)
+
+    @property
+    def places(self) -> FloatArray:
+        """(n, 3) m: the points in space, where the file has them."""
+        spare = np.full((len(self.points), 3 - self.points.shape[1]), self.height)
+        return np.hstack((self.points, spare))
 
     def mesh(self, electrodes: Electrodes = None) -> Mesh:
         """Return the mesh with those electrodes. Raises GeometryError."""

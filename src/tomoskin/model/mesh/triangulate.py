@@ -10,11 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tomoskin.core import FloatArray, GeometryError, IntArray, reach
-from tomoskin.model.mesh.boundary import Boundary, ElectrodeArc, check_arcs, discretise
+from tomoskin.model.mesh.boundary import Boundary, ElectrodeArc, SizeField, check_arcs, discretise
 from tomoskin.model.mesh.inner import inner_points, smoothed, triangles
 from tomoskin.model.mesh.mesh import Mesh
 from tomoskin.model.mesh.outline import Outline
-from tomoskin.model.mesh.sizing import SizeField
 
 TOLERANCE = 0.10
 """Accepted relative miss of the wanted number of cells."""

@@ -1,30 +1,13 @@
 """Drive and measurement tables: THE order of the rows, shared by firmware, decoder and Jacobian."""
 
-from tomoskin.model.pattern.match import RowMatch, RowSums, match_rows, sum_rows
+from tomoskin.model.pattern.match import match_rows as match_rows, sum_rows as sum_rows
 from tomoskin.model.pattern.pattern import (
-    NAMED,
-    Pattern,
-    check_drives,
-    drive_table,
-    electrodes_of,
-    named,
-    signed,
-    undirected,
+    NAMED as NAMED,
+    Pattern as Pattern,
+    check_drives as check_drives,
+    electrodes_of as electrodes_of,
+    named as named,
+    signed as signed,
+    undirected as undirected,
 )
-from tomoskin.model.pattern.scan import Scan
-
-__all__ = [
-    "NAMED",
-    "Pattern",
-    "RowMatch",
-    "RowSums",
-    "Scan",
-    "check_drives",
-    "drive_table",
-    "electrodes_of",
-    "match_rows",
-    "named",
-    "signed",
-    "sum_rows",
-    "undirected",
-]
+from tomoskin.model.pattern.scan import Scan as Scan

@@ -7,6 +7,7 @@ for images with edges, or with few changed cells: its cost is not quadratic.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -58,94 +59,79 @@ class Noser:
         return Diagonal(np.asarray(power**self.exponent))
 
 
-class SharpPrior(Protocol):
-    """A prior whose quadratic follows the image."""
+@dataclass(frozen=True)
+class SharpPrior(ABC):
+    """A cost 2 Σ wᵢ (√(tᵢ² + β²) − β) of an image, whose quadratic follows the image.
+
+    Attributes
+    ----------
+    smoothing
+        β, in the image's unit: what is below it costs little, as in a quadratic cost.
+    """
+
+    smoothing: float = 0.01
+
+    @abstractmethod
+    def terms(self, mesh: Mesh, image: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Weights w (n,), and what of ``image`` (n_cells,) they weigh, t (n,)."""
+
+    @abstractmethod
+    def of_weights(self, mesh: Mesh, weights: FloatArray) -> Penalty:
+        """The penalty Σ wᵢ tᵢ²."""
 
     def penalty(self, mesh: Mesh, jacobian: NDArray[Any]) -> Penalty:
         """The quadratic at an image of nothing, with which an iteration begins."""
+        return self.touching(mesh, np.zeros(jacobian.shape[1]))
 
     def touching(self, mesh: Mesh, image: FloatArray) -> Penalty:
         """The quadratic that touches the cost at ``image`` (n_cells,)."""
+        weights, sizes = self.terms(mesh, image)
+        return self.of_weights(mesh, weights / np.sqrt(sizes**2 + self._beta**2))
 
     def energy(self, mesh: Mesh, image: FloatArray) -> float:
         """The cost of ``image``, in the units of xᵀQx."""
-
-
-@dataclass(frozen=True)
-class TotalVariation:
-    """Cost 2 Σ sizeᵢⱼ √((xᵢ − xⱼ)² + β²): twice the jumps times the length of their edges.
-
-    Total variation of an image that is constant on the cells (Borsic et al. 2010), relative to
-    the root of the domain's content, so that alpha does not depend on the unit of length.
-
-    Attributes
-    ----------
-    smoothing
-        β, in the image's unit: differences below it are smoothed, larger ones are edges.
-    """
-
-    smoothing: float = 0.01
-
-    def penalty(self, mesh: Mesh, jacobian: NDArray[Any]) -> Penalty:
-        """The quadratic at an image of nothing."""
-        return self.touching(mesh, np.zeros(jacobian.shape[1]))
-
-    def touching(self, mesh: Mesh, image: FloatArray) -> Penalty:
-        """The weighted graph Laplacian near an image."""
-        step = self._jumps(mesh, image)
-        return sparse_penalty(
-            graph_laplacian(mesh, _edges(mesh) / np.sqrt(step**2 + self._beta**2))
-        )
-
-    def energy(self, mesh: Mesh, image: FloatArray) -> float:
-        """The cost of ``image``; zero for a constant."""
-        beta = self._beta
-        length = np.sqrt(self._jumps(mesh, image) ** 2 + beta**2) - beta
-        return float(2.0 * _edges(mesh) @ length)
+        weights, sizes = self.terms(mesh, image)
+        return float(2.0 * weights @ (np.sqrt(sizes**2 + self._beta**2) - self._beta))
 
     @property
     def _beta(self) -> float:
-        return _positive(self.smoothing)
-
-    def _jumps(self, mesh: Mesh, image: FloatArray) -> FloatArray:
-        first, second = mesh.neighbours.T
-        return np.asarray(image[first] - image[second])
+        if not (np.isfinite(self.smoothing) and self.smoothing > 0):
+            raise ModelError(f"expected a smoothing above 0, got {self.smoothing}")
+        return self.smoothing
 
 
-@dataclass(frozen=True)
-class Sparse:
-    """Cost 2 Σ wᵢ √(xᵢ² + β²), L1 of the image: few cells differ from the background.
+class TotalVariation(SharpPrior):
+    """Twice the jumps between cells times the length of their edges; zero for a constant.
 
-    wᵢ is the cell's share of the domain, so that a finer mesh holds the same image.
-
-    Attributes
-    ----------
-    smoothing
-        β, in the image's unit.
+    Total variation of an image that is constant on the cells (Borsic et al. 2010), relative to
+    the root of the domain's content, so that alpha does not depend on the unit of length.
+    Differences below ``smoothing`` are smoothed, larger ones are edges.
     """
 
-    smoothing: float = 0.01
+    def terms(self, mesh: Mesh, image: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The edges between neighbours, and the jumps across them."""
+        first, second = mesh.neighbours.T
+        return _edges(mesh), np.asarray(image[first] - image[second])
 
-    def penalty(self, mesh: Mesh, jacobian: NDArray[Any]) -> Penalty:
-        """The quadratic at an image of nothing."""
-        return self.touching(mesh, np.zeros(jacobian.shape[1]))
-
-    def touching(self, mesh: Mesh, image: FloatArray) -> Penalty:
-        """The diagonal matrix near an image."""
-        share = mesh.volumes / mesh.volumes.sum()
-        return Diagonal(share / np.sqrt(image**2 + _positive(self.smoothing) ** 2))
-
-    def energy(self, mesh: Mesh, image: FloatArray) -> float:
-        """The cost of ``image``; zero for nothing."""
-        beta = _positive(self.smoothing)
-        share = mesh.volumes / mesh.volumes.sum()
-        return float(2.0 * share @ (np.sqrt(image**2 + beta**2) - beta))
+    def of_weights(self, mesh: Mesh, weights: FloatArray) -> Penalty:
+        """The weighted graph Laplacian."""
+        return sparse_penalty(graph_laplacian(mesh, weights))
 
 
-def _positive(smoothing: float) -> float:
-    if not (np.isfinite(smoothing) and smoothing > 0):
-        raise ModelError(f"expected a smoothing above 0, got {smoothing}")
-    return smoothing
+class Sparse(SharpPrior):
+    """L1 of the image: few cells differ from the background.
+
+    The weight is the cell's share of the domain, so that a finer mesh holds the same image.
+    """
+
+    def terms(self, mesh: Mesh, image: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The shares of the cells, and their values."""
+        return mesh.volumes / mesh.volumes.sum(), image
+
+    def of_weights(self, mesh: Mesh, weights: FloatArray) -> Penalty:
+        """The diagonal matrix of the weights."""
+        del mesh
+        return Diagonal(weights)
 
 
 def _edges(mesh: Mesh) -> FloatArray:

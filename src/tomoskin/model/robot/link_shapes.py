@@ -84,8 +84,7 @@ def mesh_file(path: str, scale: FloatArray, urdf: Path) -> FloatArray:
         raise GeometryError(error.message, where=path, hint=error.hint) from error
     if file.cells.shape[1] != 3:
         raise GeometryError("expected triangles, got a volume", where=path)
-    points = np.pad(file.points, ((0, 0), (0, 3 - file.points.shape[1])))
-    return np.asarray((points * (scale / unit))[file.cells])
+    return np.asarray((file.places * (scale / unit))[file.cells])
 
 
 def _located(path: str, urdf: Path) -> Path:

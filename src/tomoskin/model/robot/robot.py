@@ -227,6 +227,19 @@ class Robot:
             joints = str(Path(folder) / joints)
         return cls(source, robot.name, skins, urdf, joints)
 
+    def place(self, name: str, path: StrPath) -> Place:
+        """That of the skin called so; of a recording ``path`` without names that of the only one.
+
+        Raises SkinError where it has none.
+        """
+        places = {skin.name: skin.place for skin in self.skins}
+        if not name and len(places) == 1:
+            return self.skins[0].place
+        if name not in places:
+            known, got = ", ".join(places), name or "one skin without a name"
+            raise SkinError(f'expected one of {known}, got "{got}" in {path}', where=self.source)
+        return places[name]
+
     def moved_by(self, joints: JointPositions) -> Self:
         """The same, whose skins know by ``joints`` where their links are."""
         skins = (replace(s, place=replace(s.place, joints=joints)) for s in self.skins)

@@ -88,11 +88,16 @@ class SurfaceSection(Section, section="surface"):
     )
     file: str | None = key(
         Text(),
-        "A .stl, .obj or .ply file, beside the skin file unless the path is absolute.",
+        "A .stl, .obj, .ply or .dae file, beside the skin file unless the path is absolute.",
         shape="file",
     )
     unit: str = key(
         Choice(("mm", "cm", "m")), "Unit of the file's coordinates.", default="mm", shape="file"
+    )
+    layer: float | None = key(
+        Quantity("length", "mm", 0.05, 1000),
+        "Thickness of the soft layer under the sheet, which no press can exceed.",
+        default=None,
     )
 
 

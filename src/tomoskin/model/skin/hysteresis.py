@@ -237,42 +237,24 @@ def broken_down(state: MemoryState, memory: MaterialMemory) -> FloatArray:
     return np.asarray(np.tensordot(np.array(memory.breakdown), state.broken, 1))
 
 
-def response(state: MemoryState, memory: MaterialMemory) -> FloatArray:
-    """(n,) response of a material whose loads are one number each, in the unit of the load."""
-    following = followed(state, memory)[0]
-    if memory.breakdown:
-        following = following + broken_down(state, memory)[0]
-    return np.asarray(following)
-
-
 def load_of(
     state: MemoryState, memory: MaterialMemory, answer: FloatArray, dt: float
 ) -> tuple[FloatArray, MemoryState]:
     """The load (n,) that makes the response ``answer`` (n,) after ``dt`` s, and the state then.
 
-    The inverse of :func:`advanced` and :func:`response`, exact: the response is a line in pieces
-    of the new load, with a bend where a play begins to be pulled and where the motion turns.
+    The inverse of :func:`advanced` and :func:`followed`, exact: the response is a line in pieces
+    of the new load, with a bend where a play begins to be pulled. The memory has no breakdown.
 
     Raises
     ------
     ModelError
-        When dt is negative or not finite, or when the material's breakdown outweighs what follows
-        its load: then two loads have the same response.
+        When dt is negative or not finite.
     """
-    least = (1 - sum(memory.play)) * _promptness(memory, dt) - _brittleness(memory, dt)
-    if not least > 0:
-        raise ModelError(
-            "this material's response rises both under load and on release, so no load can be "
-            "read from it. Its breakdown exceeds the part that follows the load by "
-            f"{-least:.3g} per unit of load",
-            where=_WHERE,
-            hint="leave the breakdown out of the model, and read the load after the breakdown has "
-            "ended",
-        )
     width, lagging = memory.half_widths, state.lagging[:, 0]
     bends = np.sort(np.concatenate([state.load, lagging - width, lagging + width]), axis=0)
     ends = np.concatenate([bends[:1] - 1.0, bends, bends[-1:] + 1.0])
-    values = _tried(state, memory, ends, dt)
+    each = Metric(((1.0,),) * len(ends))  # trials take the place of components
+    values = followed(advanced(state, memory, ends, dt, each), memory)
     piece = (values[1:-1] <= answer).sum(axis=0)
     column = np.arange(len(answer))
     low, high = values[piece, column], values[piece + 1, column]
@@ -280,50 +262,6 @@ def load_of(
     first = ends[piece, column]
     load = first + part * (ends[piece + 1, column] - first)
     return load, advanced(state, memory, load[None], dt)
-
-
-def _tried(state: MemoryState, memory: MaterialMemory, loads: FloatArray, dt: float) -> FloatArray:
-    """(m, n) responses to each of ``loads`` (m, n) by itself, after ``dt`` s."""
-    each = Metric(((1.0,),) * len(loads))  # trials take the place of components
-    tried = advanced(state, memory, loads, dt, each)
-    values = followed(tried, memory)
-    return values + broken_down(tried, memory) if memory.breakdown else values
-
-
-def _promptness(memory: MaterialMemory, dt: float) -> float:
-    """Response per prompt part after ``dt`` s of one load."""
-    if not memory.creep:
-        return 1.0
-    return 1.0 - float(np.array(memory.creep) @ memory.kept(dt)[0])
-
-
-def _brittleness(memory: MaterialMemory, dt: float) -> float:
-    """Response per motion, ``dt`` s after it."""
-    if not memory.breakdown:
-        return 0.0
-    return float(np.array(memory.breakdown) @ memory.kept(dt)[1])
-
-
-def responses(
-    memory: MaterialMemory, time: FloatArray, load: FloatArray, gauge: float = 1.0
-) -> FloatArray:
-    """(n,) response over a recording: ``gauge`` times that of ``load`` (n,) at ``time`` (n,) s.
-
-    Each load stands until the next one.
-
-    Raises
-    ------
-    ModelError
-        When the times go back.
-    """
-    state = MemoryState.fresh(memory)
-    out = np.empty(len(load))
-    for k, step in enumerate(np.diff(time, append=time[-1]).tolist()):
-        # What is seen at a time is the answer to the loads up to it, before it has stood.
-        state = advanced(state, memory, np.array([[load[k]]]), 0.0)
-        out[k] = response(state, memory)[0]
-        state = advanced(state, memory, np.array([[load[k]]]), step)
-    return gauge * out
 
 
 def _mixed(load: FloatArray, parts: FloatArray, weights: tuple[float, ...]) -> FloatArray:

@@ -31,7 +31,7 @@ def lay(
     like: Skin,
     source: str = "",
 ) -> Skin:
-    """Skin on the surface of a .stl, .obj or .ply file.
+    """Skin on the surface of a .stl, .obj, .ply or .dae file.
 
     Parameters
     ----------

@@ -146,6 +146,11 @@ class Skin:
         return len(self.arcs)
 
     @property
+    def layer(self) -> float | None:
+        """Thickness of the soft layer under the sheet, m, where the file says it."""
+        return self._sections.surface.layer
+
+    @property
     def polarity(self) -> float:
         """Sign of the measured voltages: −1 where they come reversed."""
         return -1.0 if self._sections.drive.polarity == "reversed" else 1.0

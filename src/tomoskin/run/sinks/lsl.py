@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tomoskin.core import Event, FloatArray, SinkError, clock_ahead, encode_json, needed
+from tomoskin.core import MEASURANDS, Event, FloatArray, SinkError, clock_ahead, encode_json, needed
 from tomoskin.files.messages import Contacts, Item, Naming, Stream, row_labels, time_of
 from tomoskin.run.sinks.sink import Sink
 
@@ -38,7 +38,8 @@ class LslSink(Sink):
             for number in range(1, MOST_TOUCHES + 1)
             for name, unit in _FIELDS
         ]
-        touches += [(f"force {number}", "N") for number in range(1, MOST_TOUCHES + 1)]
+        for name, unit in MEASURANDS.items():
+            touches += [(f"{name} {number}", unit) for number in range(1, MOST_TOUCHES + 1)]
         touches.append(("valid", ""))
         double, string = self._lsl.cf_double64, self._lsl.cf_string
         self._announce(stream, "voltages", "EIT", rows, double)
@@ -96,10 +97,12 @@ def open_lsl(argument: str) -> LslSink:
 
 
 def _touch_row(contacts: Contacts) -> FloatArray:
-    """Each touch, then the forces, then 1 where touches are valid and 0 where they are not."""
-    row, forces = np.full((MOST_TOUCHES, len(_FIELDS)), np.nan), np.full(MOST_TOUCHES, np.nan)
+    """Each touch, forces, depths, then 1 where touches are valid and 0 where they are not."""
+    row = np.full((MOST_TOUCHES, len(_FIELDS)), np.nan)
+    amounts = np.full((len(MEASURANDS), MOST_TOUCHES), np.nan)
     for number, contact in enumerate(contacts.strongest(MOST_TOUCHES)):
         detection = contact.touch.detection
         row[number] = contact.touch.id, detection.x, detection.y, detection.peak
-        forces[number] = contact.force
-    return np.concatenate((row.ravel(), forces, [float(contacts.valid)]))
+        for name, amount in contact.touch.amounts.items():
+            amounts[[*MEASURANDS].index(name), number] = amount.value
+    return np.concatenate((row.ravel(), amounts.ravel(), [float(contacts.valid)]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 import threading
 from collections import deque
 from dataclasses import replace
@@ -76,6 +77,8 @@ class MqttSink(Sink):
         answer = _Answer()
         client.on_connect = answer
         client.connect(self._url.hostname, self._port, keepalive=_KEEPALIVE)
+        # a second message of a frame must not wait until the first is acknowledged, 40 ms
+        client.socket().setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         client.loop_start()
         answer.check(self.name)
         self._say("online")

@@ -67,6 +67,7 @@ class Ros2Sink(Sink):
             for name in ("core", "domain", "pub", "sub", "topic", "idl")
         }
         self._writers: dict[str, Any] = {}
+        self._readers: dict[str, int] = {}
 
     def open(self, stream: Stream) -> None:
         """Join the domain; SinkError when there is no network for it."""
@@ -97,10 +98,10 @@ class Ros2Sink(Sink):
     def publish(self, item: Item) -> None:
         """Write the messages of ``item``; the source time is that of the measurement."""
         for message in ros_messages(self._stream, item):
-            writer = self._writers[message.topic]
-            if message.topic not in KEPT and not writer.get_matched_subscriptions():
-                continue  # bytes are the dear part, and nobody listens
-            writer.write(encoded_as(TOPICS[message.topic], message.value), message.stamp)
+            topic = message.topic
+            if topic in KEPT or self._readers.get(topic):
+                encoded = encoded_as(TOPICS[topic], message.value)
+                self._writers[topic].write(encoded, message.stamp)
 
     def close(self) -> None:
         """Leave: with the last reference to a writer its participant goes too."""
@@ -120,9 +121,13 @@ class Ros2Sink(Sink):
             policy.Userdata(f"typehash={type_hash(kind)};".encode()),
         )
         name = f"rt/{naming.topic(topic)}"
-        return self._dds["pub"].DataWriter(
-            participant, self._dds["topic"].Topic(participant, name, struct_of(kind)), qos=qos
-        )
+        entity = self._dds["topic"].Topic(participant, name, struct_of(kind))
+
+        def count(_: Any, status: Any) -> None:  # to be asked for each message would cost more
+            self._readers[topic] = status.current_count
+
+        listener = core.Listener(on_publication_matched=count)
+        return self._dds["pub"].DataWriter(participant, entity, qos=qos, listener=listener)
 
 
 def _services(stream: Stream, folder: Path | None) -> dict[str, Service]:

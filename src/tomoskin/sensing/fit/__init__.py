@@ -1,57 +1,28 @@
 """Touches fitted to voltages by their parameters, with the exact forward model."""
 
 from tomoskin.sensing.fit.bounds import (
-    Demand,
-    ResolutionBounds,
-    position_bound,
-    resolution_bounds,
-    variants,
+    Demand as Demand,
+    ResolutionBounds as ResolutionBounds,
+    position_bound as position_bound,
+    resolution_bounds as resolution_bounds,
+    variants as variants,
 )
-from tomoskin.sensing.fit.drive_evidence import DriveEvidence, Initiation, Onset
-from tomoskin.sensing.fit.drive_filter import DriveFilter, MovingTouch
-from tomoskin.sensing.fit.drive_order import drives_needed, telling_order, watch_order
-from tomoskin.sensing.fit.drive_view import DriveView, NoiseKey
-from tomoskin.sensing.fit.finder import SpotFinder
+from tomoskin.sensing.fit.drive_evidence import (
+    DriveEvidence as DriveEvidence,
+    Initiation as Initiation,
+    Onset as Onset,
+)
+from tomoskin.sensing.fit.drive_filter import DriveFilter as DriveFilter, MovingTouch as MovingTouch
+from tomoskin.sensing.fit.drive_view import DriveView as DriveView, NoiseKey as NoiseKey
+from tomoskin.sensing.fit.finder import SpotFinder as SpotFinder
 from tomoskin.sensing.fit.noise import (
-    Whitener,
-    common_mode_variance,
-    idle_covariance,
-    measured_covariance,
-    row_covariance,
+    Whitener as Whitener,
+    common_mode_variance as common_mode_variance,
+    idle_covariance as idle_covariance,
+    measured_covariance as measured_covariance,
+    row_covariance as row_covariance,
 )
-from tomoskin.sensing.fit.policy import EXHAUSTIVE, LIVE, Pace
-from tomoskin.sensing.fit.spot import Response, Spots, spots_of
-from tomoskin.sensing.fit.spot_fit import SpotPrior
-from tomoskin.sensing.fit.spot_model import SpotModel
-
-__all__ = [
-    "EXHAUSTIVE",
-    "LIVE",
-    "Demand",
-    "DriveEvidence",
-    "DriveFilter",
-    "DriveView",
-    "Initiation",
-    "MovingTouch",
-    "NoiseKey",
-    "Onset",
-    "Pace",
-    "ResolutionBounds",
-    "Response",
-    "SpotFinder",
-    "SpotModel",
-    "SpotPrior",
-    "Spots",
-    "Whitener",
-    "common_mode_variance",
-    "drives_needed",
-    "idle_covariance",
-    "measured_covariance",
-    "position_bound",
-    "resolution_bounds",
-    "row_covariance",
-    "spots_of",
-    "telling_order",
-    "variants",
-    "watch_order",
-]
+from tomoskin.sensing.fit.policy import EXHAUSTIVE as EXHAUSTIVE, LIVE as LIVE, Pace as Pace
+from tomoskin.sensing.fit.spot import Response as Response, Spots as Spots, spots_of as spots_of
+from tomoskin.sensing.fit.spot_fit import SpotPrior as SpotPrior
+from tomoskin.sensing.fit.spot_model import SpotModel as SpotModel

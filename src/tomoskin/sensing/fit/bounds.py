@@ -15,7 +15,6 @@ from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Mesh, triangulate
 from tomoskin.model.pattern import Scan
 from tomoskin.model.skin import Skin
-from tomoskin.sensing.fit.drive_order import drive_sizes, drives_needed, watch_order
 from tomoskin.sensing.fit.noise import Whitener, row_covariance
 from tomoskin.sensing.fit.spot import CONTENT, N_PARAMETERS, Response, spots_of
 from tomoskin.sensing.segment import Region
@@ -159,10 +158,6 @@ class ResolutionBounds:
         (n_cells,) whether a cell counts for the figures.
     headroom
         What the skin asks of the board; what saturates does not count.
-    watch
-        Drives in the order in which an untouched skin is watched best.
-    needed
-        How many of them notice the press at all the positions inside; None: not even all do.
     """
 
     mesh: Mesh
@@ -170,8 +165,6 @@ class ResolutionBounds:
     faintest: FloatArray
     inside: FloatArray
     headroom: Headroom
-    watch: tuple[int, ...]
-    needed: int | None
 
     @cached_property
     def rms(self) -> FloatArray:
@@ -228,14 +221,7 @@ def resolution_bounds(
     progress(len(spots), len(spots))
     faintest = -np.expm1(np.maximum(np.concatenate(least) / area, -700.0))
     inside = _inside(skin, coarse.centroids)
-    changes = response.changes([spot[None] for spot in spots[inside]])
-    drives = model.pattern.drive_index
-    sizes = drive_sizes(changes, covariance, drives, headroom.saturated)
-    watch = watch_order(sizes)
-    needed = drives_needed(sizes, watch, demand.ratio)
-    return ResolutionBounds(
-        coarse, np.concatenate(bounds), faintest, inside, headroom, tuple(watch), needed
-    )
+    return ResolutionBounds(coarse, np.concatenate(bounds), faintest, inside, headroom)
 
 
 def _covariance(skin: Skin) -> FloatArray:

@@ -149,23 +149,24 @@ class DriveFilter:
 
     def pushed(
         self, touch: MovingTouch, rows: slice, data: FloatArray
-    ) -> tuple[MovingTouch, float]:
-        """The touch after the ``data`` (m,) V of a drive at its time; and the logarithm of how much
-        likelier these are of a skin from which it has been lifted."""
+    ) -> tuple[MovingTouch, float, float]:
+        """The touch after the ``data`` (m,) V of a drive at its time; and the logarithms of how
+        much likelier these are if it has been lifted before the drive, and if while it was read."""
         before, spread = touch.state, touch.covariance
         own, state = self.noise[rows, rows], before
-        gone = 0.0
+        gone = going = 0.0
         for step in range(_STEPS):
             change, slopes = self._response(state, rows)
             both = slopes @ spread @ slopes.T + own + np.diag((_OTHERWISE * change) ** 2)
             off = data - change - slopes @ (before - state)
             if not step:
-                left = _LEFT * np.outer(change, change)
-                gone = _cost(off, both) - _cost(data, own + left)
+                stands, half = _cost(off, both), change / 2  # a measurement shows it, or none of it
+                gone = stands - _cost(data, own + _LEFT * np.outer(change, change))
+                going = stands - _cost(data - half, own + np.diag(half**2))
             gain = np.linalg.solve(both, slopes @ spread).T
             state = self._held(before + gain @ off)
         left = spread - gain @ both @ gain.T
-        return MovingTouch(touch.time, state, (left + left.T) / 2), gone
+        return MovingTouch(touch.time, state, (left + left.T) / 2), gone, going
 
     def _response(self, state: FloatArray, rows: slice) -> tuple[FloatArray, FloatArray]:
         """(m,) V of a state, and (m, 8) its slopes."""

@@ -1,11 +1,4 @@
 """Regions of an image."""
 
-from tomoskin.sensing.segment.region import Region, hexagonal_grid
-from tomoskin.sensing.segment.segment import ImageNoise, Segmenter
-
-__all__ = [
-    "ImageNoise",
-    "Region",
-    "Segmenter",
-    "hexagonal_grid",
-]
+from tomoskin.sensing.segment.region import Region as Region, hexagonal_grid as hexagonal_grid
+from tomoskin.sensing.segment.segment import ImageNoise as ImageNoise, Segmenter as Segmenter

@@ -11,12 +11,7 @@ from numpy.typing import NDArray
 from tomoskin.core import FloatArray, IntArray
 from tomoskin.model.pattern import Pattern, Scan
 from tomoskin.sensing.signal.baseline import Reference
-from tomoskin.sensing.signal.evidence import (
-    EqualReadings,
-    Groups,
-    Reciprocity,
-    sign_limit,
-)
+from tomoskin.sensing.signal.evidence import EqualReadings, Groups, Reciprocity, sign_limit
 from tomoskin.sensing.signal.health import ElectrodeHealth, Health, Mask, Roles
 
 ENTER = 2

@@ -1,36 +1,21 @@
 """Detections of successive frames → touches that keep their identity, and what happens to them."""
 
-from tomoskin.sensing.track.motion import SlideCorrection, TrackSettings
-from tomoskin.sensing.track.policy import GATE, HELD, RESIDUAL
-from tomoskin.sensing.track.touch_table import (
-    ELAPSED,
-    Span,
-    TouchedFrame,
-    columns_of,
-    force_values,
-    has_forces,
-    touch_columns,
-    touch_rows,
-    touch_spans,
+from tomoskin.sensing.track.motion import (
+    SlideCorrection as SlideCorrection,
+    TrackSettings as TrackSettings,
 )
-from tomoskin.sensing.track.trace import TouchEvent
-from tomoskin.sensing.track.tracker import Tracker
-
-__all__ = [
-    "ELAPSED",
-    "GATE",
-    "HELD",
-    "RESIDUAL",
-    "SlideCorrection",
-    "Span",
-    "TouchEvent",
-    "TouchedFrame",
-    "TrackSettings",
-    "Tracker",
-    "columns_of",
-    "force_values",
-    "has_forces",
-    "touch_columns",
-    "touch_rows",
-    "touch_spans",
-]
+from tomoskin.sensing.track.policy import GATE as GATE, HELD as HELD, RESIDUAL as RESIDUAL
+from tomoskin.sensing.track.touch_table import (
+    ELAPSED as ELAPSED,
+    Measurands as Measurands,
+    Span as Span,
+    TouchedFrame as TouchedFrame,
+    amount_values as amount_values,
+    columns_of as columns_of,
+    measured_in as measured_in,
+    touch_columns as touch_columns,
+    touch_rows as touch_rows,
+    touch_spans as touch_spans,
+)
+from tomoskin.sensing.track.trace import TouchEvent as TouchEvent
+from tomoskin.sensing.track.tracker import Tracker as Tracker

@@ -20,15 +20,7 @@ from tomoskin.sensing.track.motion import (
     predict,
     update,
 )
-from tomoskin.sensing.track.policy import (
-    APART,
-    EXCHANGED,
-    GATE,
-    JUMP,
-    STRENGTH,
-    confirmed,
-    missed,
-)
+from tomoskin.sensing.track.policy import APART, EXCHANGED, GATE, JUMP, STRENGTH, confirmed, missed
 from tomoskin.sensing.track.position import ELSEWHERE, NOISE, TouchStrength, log_content
 from tomoskin.sensing.track.trace import Alone, Trace, TrackClock, sign_of
 

@@ -178,6 +178,7 @@ class Position:
             weak=detection.weak,
             bias=0.0,
             force=detection.force,
+            depth=detection.depth,
         )
 
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import Force, Touch
+from tomoskin.core import MEASURANDS, Amount, Touch
 from tomoskin.model.mesh import Plane, Surface
 
 
@@ -62,9 +62,10 @@ COLUMNS = (
     *("area_m2", "peak", "kind"),
 )
 
-FORCE = ("force_n", "force_low_n", "force_high_n", "force_state")
-"""Further columns where a calibration measures forces: median, interval that nine in ten lie in,
-and "calibrated" or "uncalibrated"."""
+Measurands = Collection[str]
+"""Some of the names of :data:`~tomoskin.core.MEASURANDS`. Where a calibration measures one, its
+median, the interval that nine in ten lie in, and "calibrated" are further columns: ``force_n``,
+``force_low_n``, ``force_high_n``, ``force_state``."""
 
 IN_SPACE = ("space_x_m", "space_y_m", "space_z_m")
 """Further columns where the sheet lies on a surface; x_m and y_m are the sheet's own (u, v)."""
@@ -79,19 +80,25 @@ Value = int | float | str | None
 
 
 def columns_of(
-    surface: Surface | None = None, *, forces: bool = False, begun: float | None = None
+    surface: Surface | None = None, *, measured: Measurands = (), begun: float | None = None
 ) -> tuple[str, ...]:
-    """Names of the columns, with those of forces, of a ``surface`` that is not flat, and of the
-    time since the recording has ``begun``."""
+    """Names of the columns, with those of what is ``measured``, of a ``surface`` that is not flat,
+    and of the time since the recording has ``begun``."""
     in_space = IN_SPACE if _curved(surface) else ()
-    return COLUMNS + (FORCE if forces else ()) + in_space + (() if begun is None else (ELAPSED,))
+    amounts = [
+        f"{name}_{part}"
+        for name, unit in MEASURANDS.items()
+        if name in measured
+        for part in (unit.lower(), f"low_{unit.lower()}", f"high_{unit.lower()}", "state")
+    ]
+    return (*COLUMNS, *amounts, *in_space, *(() if begun is None else (ELAPSED,)))
 
 
 def touch_rows(
     frames: Iterable[TouchedFrame],
     surface: Surface | None = None,
     *,
-    forces: bool = False,
+    measured: Measurands = (),
     begun: float | None = None,
 ) -> Iterator[tuple[Value, ...]]:
     """One row a touch, in the order of :func:`columns_of`; NaN for what is not known."""
@@ -101,22 +108,23 @@ def touch_rows(
             d, number = touch.detection, -1 if frame is None else frame
             row: tuple[Value, ...] = (number, time, touch.id, d.x, d.y, d.sd_x, d.sd_y)
             row += (d.area, d.peak, touch.said)
-            if forces:
-                row += force_values(d.force)
+            for name in MEASURANDS:
+                if name in measured:
+                    row += amount_values(touch.amounts.get(name))
             if on is not None:
                 row += tuple(on.point([[d.x, d.y]])[0].tolist())
             yield row if begun is None else (*row, time - begun)
 
 
 def touch_columns(
-    frames: Iterable[TouchedFrame], surface: Surface | None = None, *, forces: bool = False
+    frames: Iterable[TouchedFrame], surface: Surface | None = None, *, measured: Measurands = ()
 ) -> dict[str, NDArray[np.generic]]:
     """Columns by their name, (n,) each, as ``pandas.DataFrame`` takes them.
 
     ``frame`` is −1 where the recording does not hold the frame; what is not known is NaN.
     """
-    names = columns_of(surface, forces=forces)
-    rows = list(touch_rows(frames, surface, forces=forces))
+    names = columns_of(surface, measured=measured)
+    rows = list(touch_rows(frames, surface, measured=measured))
     columns = dict(zip(names, zip(*rows, strict=True), strict=True)) if rows else {}
     return {name: np.array(columns.get(name, ()), _kind(name)) for name in names}
 
@@ -124,20 +132,20 @@ def touch_columns(
 def _kind(name: str) -> type:
     if name in ("frame", "id"):
         return np.int64
-    return np.str_ if name in ("kind", "force_state") else np.float64
+    return np.str_ if name == "kind" or name.endswith("_state") else np.float64
 
 
 def _curved(surface: Surface | None) -> Surface | None:
     return None if isinstance(surface, Plane) else surface
 
 
-def has_forces(frames: Iterable[TouchedFrame]) -> bool:
-    """Whether a touch of any frame has a force."""
-    return any(t.detection.force is not None for *_, touches in frames for t in touches)
+def measured_in(frames: Iterable[TouchedFrame]) -> Measurands:
+    """What calibrations tell of a touch of any frame."""
+    return {name for *_, touches in frames for touch in touches for name in touch.amounts}
 
 
-def force_values(force: Force | None) -> tuple[float, float, float, str]:
-    """As in the columns :data:`FORCE`; NaN and "" where nothing tells it."""
-    if force is None:
+def amount_values(amount: Amount | None) -> tuple[float, float, float, str]:
+    """As in the columns of one of :data:`Measurands`; NaN and "" where nothing tells it."""
+    if amount is None:
         return (math.nan, math.nan, math.nan, "")
-    return (force.newtons, force.low, force.high, force.state)
+    return (amount.value, amount.low, amount.high, "calibrated")

@@ -7,12 +7,7 @@ from dataclasses import replace
 
 from tomoskin.core import Detection, Touch
 from tomoskin.sensing.track import policy
-from tomoskin.sensing.track.association import (
-    FrameOfTouches,
-    ObservedDetection,
-    associate,
-    follow,
-)
+from tomoskin.sensing.track.association import FrameOfTouches, ObservedDetection, associate, follow
 from tomoskin.sensing.track.identity import IdentityLedger
 from tomoskin.sensing.track.merging import (
     divide,
@@ -47,6 +42,8 @@ class Tracker:
         Where touches were, of which something may still show.
     slides
         Moves touches that slide to the finger; what is held still is not moved.
+    responses
+        The touches of the newest frame where the sheet's response is, not moved.
     ledger
         Who is who.
     """
@@ -54,6 +51,7 @@ class Tracker:
     def __init__(self, settings: TrackSettings | None = None) -> None:
         self.settings = settings or TrackSettings()
         self.events: tuple[TouchEvent, ...] = ()
+        self.responses: tuple[Touch, ...] = ()
         self.traces: list[Trace] = []
         self.residuals = ResidualResponses()
         self.slides, self.ledger = SlideCorrection(0.0), IdentityLedger()
@@ -76,7 +74,7 @@ class Tracker:
         if detections or self.traces:
             self._follow(FrameOfTouches.of(detections, self._clock, self.settings))
         self.residuals.note(self._clock.now, quiet=not detections)
-        touches = self._touches() if self.traces else ()
+        touches = self.responses = self._touches() if self.traces else ()
         happened, self._happened = self._happened, []
         if not self.settings.still:
             self.slides = self.slides.after(touches, time)

@@ -1,30 +1,18 @@
 """The board's real firmware on a simulated processor, before the twin's sheet."""
 
 from tomoskin.twin.emulator.flash import (
-    check_current,
-    read_identity,
-    say_board,
-    say_identity,
-    sense_resistor,
-    write_firmware,
-    write_identity,
+    check_current as check_current,
+    read_identity as read_identity,
+    say_board as say_board,
+    say_identity as say_identity,
+    sense_resistor as sense_resistor,
+    write_firmware as write_firmware,
+    write_identity as write_identity,
 )
-from tomoskin.twin.emulator.program import build_firmware
-from tomoskin.twin.emulator.source import EmulatorTransport, emulate_board, emulate_load
-from tomoskin.twin.emulator.uf2 import settings_uf2, write_uf2
-
-__all__ = [
-    "EmulatorTransport",
-    "build_firmware",
-    "check_current",
-    "emulate_board",
-    "emulate_load",
-    "read_identity",
-    "say_board",
-    "say_identity",
-    "sense_resistor",
-    "settings_uf2",
-    "write_firmware",
-    "write_identity",
-    "write_uf2",
-]
+from tomoskin.twin.emulator.program import build_firmware as build_firmware
+from tomoskin.twin.emulator.source import (
+    EmulatorTransport as EmulatorTransport,
+    emulate_board as emulate_board,
+    emulate_load as emulate_load,
+)
+from tomoskin.twin.emulator.uf2 import settings_uf2 as settings_uf2, write_uf2 as write_uf2

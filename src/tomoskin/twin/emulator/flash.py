@@ -7,13 +7,7 @@ import subprocess
 import tempfile
 from pathlib import Path
 
-from tomoskin.board.source import (
-    BOARDS_SINCE,
-    BoardRecord,
-    Exchange,
-    SerialTransport,
-    Transport,
-)
+from tomoskin.board.source import BOARDS_SINCE, BoardRecord, Exchange, SerialTransport, Transport
 from tomoskin.board.wire import BoardLimits, GetBoard, GetInfo, Info
 from tomoskin.core import SourceError
 from tomoskin.twin.emulator.board_process import BoardIdentity

@@ -8,18 +8,12 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tomoskin.board.source import (
-    BOARDS,
-    DEFAULT_BOARD,
-    SerialTransport,
-    Transport,
-    read_options,
-)
+from tomoskin.board.source import BOARDS, DEFAULT_BOARD, SerialTransport, Transport, read_options
 from tomoskin.core import FloatArray, SourceError
+from tomoskin.model.skin import Skin
 from tomoskin.twin import (
     SheetTransport,
     ThermalVoltages,
@@ -37,9 +31,6 @@ from tomoskin.twin.emulator.board_process import (
     SkinMemory,
 )
 from tomoskin.twin.emulator.program import programs_of
-
-if TYPE_CHECKING:
-    from tomoskin.model.skin import Skin
 
 _STEP = 0.01
 """Between two looks at the sheet, s."""

@@ -1,4 +1,4 @@
-"""Touches under known forces → the force of a touch, with an interval, frame by frame."""
+"""Touches of known force, or depth → that of a touch, with an interval, frame by frame."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from typing import Self
 
 import numpy as np
 
-from tomoskin.core import DataError, Detection, FloatArray, Force, IntArray
-from tomoskin.learning.force.curve import (
+from tomoskin.core import Amount, DataError, Detection, FloatArray, IntArray
+from tomoskin.learning.amount.curve import (
     SHALLOW,
-    ForceCurve,
+    AmountCurve,
     averaged_memory,
     basis,
     without_memory,
 )
-from tomoskin.learning.force.weighed_presses import WeighedPresses, check_rising
+from tomoskin.learning.amount.labelled_presses import LabelledPresses, check_rising, columns_of
 from tomoskin.learning.touch.gaussian_process import nine_in_ten
 from tomoskin.model.skin import MaterialMemory, MemoryState, Skin, advanced, load_of
 from tomoskin.sensing.segment import Region
@@ -60,8 +60,8 @@ class PressedSpots:
 
 
 @dataclass(frozen=True, eq=False)
-class ForceModel:
-    """The force of touches on one skin, for the tip that pressed it; made by :meth:`fit`.
+class AmountModel:
+    """Force or depth of touches on one skin, for tips like those taught; made by :meth:`fit`.
 
     Attributes
     ----------
@@ -76,25 +76,25 @@ class ForceModel:
     memory
         What the sheet remembers, in the unit of a touch's depth.
     curve
-        Depth and force.
+        Depth and amount.
     scale
         By which intervals are widened, so that nine in ten of the labels lie in theirs when
         their press is left out.
     left_out
-        (n_labelled, 3) force, 5 % and 95 % point of each label, its press left out, N.
+        (n_labelled, 3) amount, 5 % and 95 % point of each label, its press left out, SI.
     remarks
         What is wrong with labels.
     skin_id, method
         Identity of the skin; how its touches were found.
     """
 
-    presses: WeighedPresses
+    presses: LabelledPresses
     conductivity: float
     unit: float
     radius: float
     depth: float
     memory: MaterialMemory
-    curve: ForceCurve
+    curve: AmountCurve
     scale: float
     left_out: FloatArray
     remarks: tuple[LabelRemark, ...]
@@ -102,15 +102,18 @@ class ForceModel:
     method: str = "fit"
 
     @classmethod
-    def fit(cls, presses: WeighedPresses, skin: Skin) -> Self:
-        """Learn from presses on ``skin``; see :meth:`learn`."""
+    def fit(cls, presses: LabelledPresses, skin: Skin) -> Self:
+        """Learn from presses on ``skin``; see :meth:`learn`. Raises DataError for a depth beyond
+        its layer too."""
+        if skin.layer is not None:
+            presses.check_within(skin.layer)
         unit = Region.of(skin).unit
         return cls.learn(presses, skin.conductivity, unit, skin.identity, skin.touch.method)
 
     @classmethod
     def learn(
         cls,
-        presses: WeighedPresses,
+        presses: LabelledPresses,
         conductivity: float,
         unit: float,
         skin_id: str = "",
@@ -123,32 +126,32 @@ class ForceModel:
         Raises
         ------
         DataError
-            When the weights contradict, or a labelled touch makes the sheet conduct better.
+            When labels contradict, or a labelled touch makes the sheet conduct better.
         """
         if not (conductivity > 0 and unit > 0):
             raise DataError(
                 f"expected a conductivity and a unit above 0, got {conductivity} and {unit}"
             )
-        rows = presses.labelled
+        rows, of = presses.labelled, presses.of_what
         radius = float(np.exp(np.log(_radius(presses.area[rows])).mean()))
         depth = depth_of(presses.peak, presses.area, conductivity, radius)
         if not (depth[rows] > 0).all():
             row = int(rows[np.argmin(depth[rows])])
             raise DataError(
-                f"touch {row}, with {presses.force[row]:.3g} N, increases the conductivity "
+                f"touch {row}, with {of.text(presses.amount[row])}, increases the conductivity "
                 "of the sheet",
-                where="force labels",
+                where=of.where,
                 hint="calibrate with frames in which the press is found as a touch",
             )
-        check_rising(depth[rows], presses.force[rows])
+        check_rising(of, depth[rows], presses.amount[rows])
         terms = basis(presses.xy, np.log(_radius(presses.area) / radius), unit)
         usual = float(np.median(depth[rows]))
         memory = averaged_memory(presses, depth, usual, terms)
         free = without_memory(memory, depth[:, None], presses.press, presses.time)[:, 0]
         free = np.maximum(free, SHALLOW * usual)
-        curve = ForceCurve.of(terms[rows], free[rows], presses.force[rows])
+        curve = AmountCurve.of(of, terms[rows], free[rows], presses.amount[rows])
         left_out = _left_out(presses, terms, free)
-        scale = _scale(left_out, presses.force[rows])
+        scale = _scale(left_out, presses.amount[rows])
         remarks = _remarks(presses, left_out, unit)
         return cls(
             presses, conductivity, unit, radius, usual, memory, curve, scale, left_out, remarks,
@@ -157,8 +160,8 @@ class ForceModel:
 
     def read(
         self, spots: PressedSpots | None, detections: Sequence[Detection], time: float
-    ) -> tuple[list[Force], PressedSpots]:
-        """Forces of a frame's detections, and what the spots remember then.
+    ) -> tuple[list[Amount], PressedSpots]:
+        """Amounts of a frame's detections, and what the spots remember then.
 
         ``spots`` is what they remembered after the frame before, None on a skin that nothing has
         touched; ``time`` is the frame's, s. A spot that is new has been pressed since that frame.
@@ -168,7 +171,7 @@ class ForceModel:
         if not detections:
             released = self._released(spots, np.arange(len(spots)), dt)
             return [], PressedSpots(spots.xy, time, released)
-        xy, area, peak, snr = _columns(detections)
+        xy, area, peak, snr = columns_of(detections)
         least = SHALLOW * self.depth
         depth = np.maximum(depth_of(peak, area, self.conductivity, self.radius), least)
         under, rest = _goes_on(spots.xy, xy, 0.5 * self.radius)
@@ -177,12 +180,12 @@ class ForceModel:
             before = before.joined(self._fresh).of_pieces(np.array(under))
         load, now = load_of(before, self.memory, depth, dt)
         terms = basis(xy, np.log(_radius(area) / self.radius), self.unit)
-        forces = self._forces(terms, np.maximum(load, least), self._beyond(snr))
+        amounts = self._amounts(terms, np.maximum(load, least), self._beyond(snr))
         if rest:
             others = np.array(rest[: max(_MOST_SPOTS - len(xy), 0)], dtype=np.intp)
             now = now.joined(self._released(spots, others, dt))
             xy = np.concatenate([xy, spots.xy[others]])
-        return forces, PressedSpots(xy, time, now)
+        return amounts, PressedSpots(xy, time, now)
 
     def _released(self, spots: PressedSpots, which: IntArray, dt: float) -> MemoryState:
         """What those of ``spots`` that nothing touches remember ``dt`` s later."""
@@ -200,20 +203,20 @@ class ForceModel:
     @property
     def errors(self) -> FloatArray:
         """(n_labelled,) relative errors of the labels, each press left out."""
-        force = self.presses.force[self.presses.labelled]
-        return np.asarray(self.left_out[:, 0] / force - 1)
+        amount = self.presses.amount[self.presses.labelled]
+        return np.asarray(self.left_out[:, 0] / amount - 1)
 
     @cached_property
     def most(self) -> float:
-        """The largest force that it was learnt from, N; of more it says only that it is more."""
-        return float(np.nanmax(self.presses.force))
+        """The largest amount that it was learnt from; of more it says only that it is more."""
+        return float(np.nanmax(self.presses.amount))
 
     @property
     def held(self) -> float:
         """Part of the labels within their own intervals, each press left out."""
-        force = self.presses.force[self.presses.labelled]
+        amount = self.presses.amount[self.presses.labelled]
         _, low, high = _widened(np.log(self.left_out), self.scale).T
-        return float(((low <= force) & (force <= high)).mean())
+        return float(((low <= amount) & (amount <= high)).mean())
 
     def _beyond(self, snr: FloatArray) -> FloatArray:
         """Relative deviation of depths by noise, beyond that of the labelled touches."""
@@ -226,12 +229,12 @@ class ForceModel:
         known = self.presses.snr[self.presses.labelled]
         return float(np.nanmedian(1 / known**2)) if np.isfinite(known).any() else 0.0
 
-    def _forces(self, terms: FloatArray, depth: FloatArray, sd: FloatArray) -> list[Force]:
-        points = _widened(self.curve.log_forces(terms, depth, sd), self.scale).tolist()
+    def _amounts(self, terms: FloatArray, depth: FloatArray, sd: FloatArray) -> list[Amount]:
+        points = _widened(self.curve.log_amounts(terms, depth, sd), self.scale).tolist()
         most = self.most
         return [
-            Force(newtons, min(low, most), math.inf if newtons > most else high)
-            for newtons, low, high in points
+            Amount(value, min(low, most), math.inf if value > most else high)
+            for value, low, high in points
         ]
 
 
@@ -241,53 +244,55 @@ def depth_of(peak: FloatArray, area: FloatArray, conductivity: float, radius: fl
     return np.asarray(-np.log1p(part) * np.asarray(area) / (np.pi * radius**2))
 
 
-def _left_out(presses: WeighedPresses, terms: FloatArray, free: FloatArray) -> FloatArray:
-    """(n_labelled, 3) force and interval of each label from the other presses."""
-    rows = presses.labelled
+def _left_out(presses: LabelledPresses, terms: FloatArray, free: FloatArray) -> FloatArray:
+    """(n_labelled, 3) amount and interval of each label from the other presses."""
+    rows, of = presses.labelled, presses.of_what
     out = np.empty((len(rows), 3))
     for number in np.unique(presses.press[rows]):
         mine = presses.press[rows] == number
         others, own = rows[~mine], rows[mine]
         if not len(others):
             raise DataError(
-                "expected labelled forces of at least two presses, got one press",
-                where="force labels",
+                f"expected labelled {of.plural} of at least two presses, got one press",
+                where=of.where,
                 hint="lift the tip between two presses, or give the presses their own numbers",
             )
-        curve = ForceCurve.of(terms[others], free[others], presses.force[others])
-        out[mine] = np.exp(curve.log_forces(terms[own], free[own], np.zeros(len(own))))
+        curve = AmountCurve.of(of, terms[others], free[others], presses.amount[others])
+        out[mine] = np.exp(curve.log_amounts(terms[own], free[own], np.zeros(len(own))))
     return out
 
 
-def _scale(left_out: FloatArray, force: FloatArray) -> float:
+def _scale(left_out: FloatArray, amount: FloatArray) -> float:
     """What nine in ten labels need of their intervals."""
-    return float(np.clip(nine_in_ten(_half_intervals(left_out, force)), *_SCALES))
+    return float(np.clip(nine_in_ten(_half_intervals(left_out, amount)), *_SCALES))
 
 
-def _half_intervals(left_out: FloatArray, force: FloatArray) -> FloatArray:
-    """(n,) by how many half intervals, on the side where it lies, each force is missed."""
+def _half_intervals(left_out: FloatArray, amount: FloatArray) -> FloatArray:
+    """(n,) by how many half intervals, on the side where it lies, each amount is missed."""
     middle, low, high = np.log(left_out).T
-    away = np.log(force) - middle
+    away = np.log(amount) - middle
     return np.asarray(np.abs(away) / np.where(away > 0, high - middle, middle - low))
 
 
-def _widened(log_forces: FloatArray, scale: float) -> FloatArray:
-    """(n, 3) N: forces whose intervals are ``scale`` times as wide as those of ``log_forces``."""
-    middle = log_forces[:, :1]
-    return np.asarray(np.exp(middle + scale * (log_forces - middle)))
+def _widened(logs: FloatArray, scale: float) -> FloatArray:
+    """(n, 3) amounts whose intervals are ``scale`` times as wide as those of ``logs``."""
+    middle = logs[:, :1]
+    return np.asarray(np.exp(middle + scale * (logs - middle)))
 
 
-def _remarks(presses: WeighedPresses, left_out: FloatArray, unit: float) -> tuple[LabelRemark, ...]:
-    rows = presses.labelled
-    force = presses.force[rows]
+def _remarks(
+    presses: LabelledPresses, left_out: FloatArray, unit: float
+) -> tuple[LabelRemark, ...]:
+    rows, of = presses.labelled, presses.of_what
+    amount = presses.amount[rows]
     remarks = [
         LabelRemark(
             int(presses.press[row]),
-            f"the label {presses.force[row]:.3g} N contradicts the other presses, which give "
-            f"{middle:.2g} N ({low:.2g} to {high:.2g})",
+            f"the label {of.text(presses.amount[row])} contradicts the other presses, which give "
+            f"{of.text(middle, 2)} ({of.text(low, 2)} to {of.text(high, 2)})",
         )
         for row, (middle, low, high), away in zip(
-            rows.tolist(), left_out.tolist(), _half_intervals(left_out, force), strict=True
+            rows.tolist(), left_out.tolist(), _half_intervals(left_out, amount), strict=True
         )
         if away > _FAR_OFF
     ]
@@ -296,14 +301,14 @@ def _remarks(presses: WeighedPresses, left_out: FloatArray, unit: float) -> tupl
     if apart < _LONELY * unit:
         remarks.append(LabelRemark(
             None,
-            f"all presses lie within {2e3 * apart:.0f} mm: elsewhere forces are less certain, "
+            f"all presses lie within {2e3 * apart:.0f} mm: elsewhere {of.plural} are less certain, "
             "and their intervals are wider; press at other positions too",
         ))  # fmt: skip
-    if np.ptp(np.log(force)) < np.log(1.5):
+    if np.ptp(np.log(amount)) < np.log(1.5):
         remarks.append(LabelRemark(
             None,
-            f"all forces lie from {force.min():.3g} to {force.max():.3g} N: other forces are "
-            "extrapolated; use a lighter and a heavier weight too",
+            f"all {of.plural} lie from {of.span(amount)}: others are extrapolated; press less and "
+            "more too",
         ))  # fmt: skip
     return tuple(remarks)
 
@@ -318,14 +323,6 @@ def _goes_on(spots: FloatArray, xy: FloatArray, within: float) -> tuple[list[int
         under.append(nearest if nearest >= 0 and apart[nearest] <= within else -1)
         free.pop(under[-1], None)
     return under, list(free)
-
-
-def _columns(
-    detections: Sequence[Detection],
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Positions (n, 2), areas, peaks and snr (n,)."""
-    rows = np.array([(d.x, d.y, d.area, d.peak, d.snr) for d in detections])
-    return rows[:, :2], rows[:, 2], rows[:, 3], rows[:, 4]
 
 
 def _radius(area: FloatArray) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Newtons from the measurements themselves, for skins without a model: a Gaussian process."""
+"""Amounts from the measurements themselves, for skins without a model: a Gaussian process."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _COMPONENTS = {"change": 60, "pressed": 60, "rest": 10}
 """Principal components of each block that count; chosen by left-out presses of one skin."""
 
 _FEWEST = 20
-_WHERE = "force labels"
+_WHERE = "labels of presses"
 _HALF = float(ndtri(0.95))
 _RECENT, _LEAST = 8, 30
 """The last eighth of the presses, or so many, tell whether the skin has changed."""
@@ -72,20 +72,20 @@ class FeatureBlock:
 
 
 @dataclass(frozen=True, eq=False)
-class ForceProcess:
-    """Forces of single presses, from what they change and from what the skin was like before.
+class AmountProcess:
+    """Forces or depths of single presses, from their change and what the skin was like before.
 
-    What a skin reads at rest holds what it remembers of earlier presses; so a force is learnt from
-    what a press changes, from the pressed frame and from the rest before it. The interval is the
-    process's own, widened so that nine in ten of the left-out presses lie in theirs; the last ones
-    count alone where they are missed farther.
+    What a skin reads at rest holds what it remembers of earlier presses; so an amount is learnt
+    from what a press changes, from the pressed frame and from the rest before it. The interval is
+    the process's own, widened so that nine in ten of the left-out presses lie in theirs; the last
+    ones count alone where they are missed farther.
 
     Attributes
     ----------
     blocks
         What is read of each of these, by name.
     process
-        What tells the force.
+        What tells the amount.
     scale
         By which the process's deviations are widened.
     """
@@ -95,33 +95,33 @@ class ForceProcess:
     scale: float
 
     @classmethod
-    def fit(cls, before: ArrayLike, during: ArrayLike, force: ArrayLike) -> Self:
+    def fit(cls, before: ArrayLike, during: ArrayLike, amount: ArrayLike) -> Self:
         """Learn from presses in the order of time.
 
         Parameters
         ----------
         before, during
             (n, n_meas) frames just before and during each press, in any one unit.
-        force
-            (n,) N.
+        amount
+            (n,) in any one unit.
 
         Raises
         ------
         DataError
-            For shapes that do not belong together, fewer than twenty presses, forces that are not
+            For shapes that do not belong together, fewer than twenty presses, amounts that are not
             finite or all alike, data that never change.
         """
         rest, pressed = frames(before), frames(during)
-        newtons = np.asarray(force, dtype=np.float64)
-        if rest.shape != pressed.shape or newtons.shape != (len(rest),) or len(rest) < _FEWEST:
+        labels = np.asarray(amount, dtype=np.float64)
+        if rest.shape != pressed.shape or labels.shape != (len(rest),) or len(rest) < _FEWEST:
             raise DataError(
-                f"expected before, during and force of at least {_FEWEST} presses, got shapes "
-                f"{rest.shape}, {pressed.shape}, {newtons.shape}",
+                f"expected before, during and amount of at least {_FEWEST} presses, got shapes "
+                f"{rest.shape}, {pressed.shape}, {labels.shape}",
                 where=_WHERE,
             )
-        if not np.isfinite(newtons).all() or np.ptp(newtons) == 0:
+        if not np.isfinite(labels).all() or np.ptp(labels) == 0:
             raise DataError(
-                f"expected finite forces that differ, got {newtons.min():g} to {newtons.max():g} N",
+                f"expected finite amounts that differ, got {labels.min():g} to {labels.max():g}",
                 where=_WHERE,
             )
         blocks = {
@@ -129,18 +129,18 @@ class ForceProcess:
             for name, data in _named(rest, pressed).items()
         }
         squares = {name: block.squares(block.inputs) for name, block in blocks.items()}
-        process = Process.of(_TERMS, squares, newtons[:, None])
+        process = Process.of(_TERMS, squares, labels[:, None])
         return cls(blocks, process, _scale(np.abs(process.missed[:, 0])))
 
     @property
     def left_out(self) -> FloatArray:
-        """(n,) N: force of each press as the others tell it."""
+        """(n,) amount of each press as the others tell it."""
         return self.process.left_out[:, 0]
 
     def predict(
         self, before: ArrayLike, during: ArrayLike
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Force, 5 % and 95 % point, (n,) N each, of presses as in :meth:`fit`.
+        """Amount, 5 % and 95 % point, (n,) each, of presses as in :meth:`fit`.
 
         Raises
         ------

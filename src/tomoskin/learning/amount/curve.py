@@ -1,14 +1,16 @@
-"""Newtons from how much a touch changes the sheet: a curve that flattens, how sure it is, and what
+"""Force or depth of a touch from how much it changes the sheet: a curve, how sure it is, and what
 the sheet remembers of its load.
 
 A touch of content c (how much conductivity it takes away in all) stands for a depth u = c/r̄², r̄ the
-usual radius. The soft layer under the sheet is squeezed solid in the end, so that
+usual radius. With F the force, or how far the tip has moved,
 
-    log u = φ(position, radius)·β + log F/(F + F₀) + noise.
+    log u = φ(position, radius)·β + p log F/(F + F₀) + noise.
 
-What position and radius do is linear in β with a normal prior; F₀ and the noise are averaged,
-each by its evidence (MacKay 2003, chapter 28). The force is then read from the curve with a prior
-on log F: where the curve is flat a touch says little of its force, and the interval says so.
+What position and radius do is linear in β with a normal prior; p, F₀ and the noise are averaged,
+each by its evidence (MacKay 2003, chapter 28). F is then read from the curve with a prior on
+log F: where the curve is flat a touch says little of its force, and the interval says so. A force
+has p = 1, since the soft layer under the sheet is squeezed solid in the end; a depth bends the
+curve by p alone (:class:`~.measurand.Measurand`).
 """
 
 from __future__ import annotations
@@ -22,11 +24,9 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.special import softmax
 
 from tomoskin.core import FloatArray, IntArray
-from tomoskin.learning.force.weighed_presses import WeighedPresses
+from tomoskin.learning.amount.labelled_presses import LabelledPresses
+from tomoskin.learning.amount.measurand import Measurand
 from tomoskin.model.skin import MaterialMemory, MemoryState, load_of
-
-_HALF = np.geomspace(0.02, 50.0, 41)
-"""F₀ over the median force of the labels."""
 
 _NOISE = np.geomspace(0.01, 0.6, 9)
 """Deviations of log u about the curve."""
@@ -40,7 +40,7 @@ _WIDER = 1.25
 
 _LEAST_WIDTH = 0.5
 _COUNTS = 3e-3
-_FORCES = 161
+_AMOUNTS = 161
 _BEYOND = 4.0
 _LEVELS = np.array([0.5, 0.05, 0.95])
 """The median, and what nine in ten lie between."""
@@ -63,36 +63,40 @@ _PRIOR = np.array([_LEVEL, _SLOPE, _SLOPE, _SLOPE, _RADIUS, _OUTWARD]) ** 2
 
 
 @dataclass(frozen=True, eq=False)
-class ForceCurve:
+class AmountCurve:
     """The curve as labelled touches tell it.
 
     Attributes
     ----------
-    half, noise
-        (g,) F₀ in N and deviation of log u, of each member of the average.
+    half, bend, noise
+        (g,) F₀ in SI, p and deviation of log u, of each member of the average.
     weight
         (g,) of each, 1 together.
     mean, covariance
         (g, 6), (g, 6, 6) of β.
     evidence
         Log marginal likelihood of the labelled touches.
-    log_force
+    log_amount
         Mean and deviation of the prior of log F.
     """
 
     half: FloatArray
+    bend: FloatArray
     noise: FloatArray
     weight: FloatArray
     mean: FloatArray
     covariance: FloatArray
     evidence: float
-    log_force: tuple[float, float]
+    log_amount: tuple[float, float]
 
     @classmethod
-    def of(cls, terms: FloatArray, depth: FloatArray, force: FloatArray) -> ForceCurve:
-        """Learn from ``terms`` (n, 6), ``depth`` u (n,) and ``force`` (n,) N, all above 0."""
-        half = _HALF * float(np.median(force))
-        level = np.log(depth)[:, None] - np.log(force[:, None] / (force[:, None] + half))
+    def of(
+        cls, of: Measurand, terms: FloatArray, depth: FloatArray, amount: FloatArray
+    ) -> AmountCurve:
+        """Learn from ``terms`` (n, 6), ``depth`` u (n,) and ``amount`` (n,) SI, all above 0."""
+        bend, half = np.array(list(product(of.bends, of.halves))).T
+        half = half * float(np.median(amount))
+        level = np.log(depth)[:, None] - bend * np.log(amount[:, None] / (amount[:, None] + half))
         members = [_members(terms, level, noise) for noise in _NOISE]
         mean = np.concatenate([member[0] for member in members])
         evidence = np.concatenate([member[2] for member in members])
@@ -100,16 +104,17 @@ class ForceCurve:
         total = float(evidence.max() + np.log(weight.mean()))
         weight /= weight.sum()
         counts = weight > _COUNTS * weight.max()
-        logs = np.log(force)
+        logs = np.log(amount)
         width = max(_WIDER * float(logs.std()), _LEAST_WIDTH)
         return cls(
             half=np.tile(half, len(_NOISE))[counts],
+            bend=np.tile(bend, len(_NOISE))[counts],
             noise=np.repeat(_NOISE, len(half))[counts],
             weight=weight[counts] / weight[counts].sum(),
             mean=mean[counts],
             covariance=np.repeat([member[1] for member in members], len(half), axis=0)[counts],
             evidence=total,
-            log_force=(float(logs.mean()), width),
+            log_amount=(float(logs.mean()), width),
         )
 
     def posterior(
@@ -136,15 +141,15 @@ class ForceCurve:
 
     @cached_property
     def _tabulated(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Grid (f,) of log F, its prior (f,), and log F/(F + F₀) of each member (g, f)."""
-        middle, width = self.log_force
-        steps = np.linspace(-_BEYOND, _BEYOND, _FORCES)
-        force = np.exp(middle + width * steps)
-        curves = np.log(force / (force + self.half[:, None]))
+        """Grid (f,) of log F, its prior (f,), and p log F/(F + F₀) of each member (g, f)."""
+        middle, width = self.log_amount
+        steps = np.linspace(-_BEYOND, _BEYOND, _AMOUNTS)
+        amount = np.exp(middle + width * steps)
+        curves = self.bend[:, None] * np.log(amount / (amount + self.half[:, None]))
         return middle + width * steps, np.exp(-0.5 * steps**2), curves
 
-    def log_forces(self, terms: FloatArray, depth: FloatArray, sd: FloatArray) -> FloatArray:
-        """(n, 3): median, 5 % and 95 % point of log F, F in N; see :meth:`posterior`."""
+    def log_amounts(self, terms: FloatArray, depth: FloatArray, sd: FloatArray) -> FloatArray:
+        """(n, 3): median, 5 % and 95 % point of log F, F in SI; see :meth:`posterior`."""
         grid, chance = self.posterior(terms, depth, sd)
         below = np.cumsum(chance, axis=1)
         below -= 0.5 * chance
@@ -199,7 +204,7 @@ def without_memory(
 
 
 def averaged_memory(
-    presses: WeighedPresses, depth: FloatArray, usual: float, terms: FloatArray
+    presses: LabelledPresses, depth: FloatArray, usual: float, terms: FloatArray
 ) -> MaterialMemory:
     """The mean of several memories, each with the evidence of the labels as its weight.
 
@@ -216,7 +221,7 @@ def averaged_memory(
         both = without_memory(memory, depth[:, None] * (1, 1 + _STEP), press, time)
         free, more = np.maximum(both, SHALLOW * usual).T
         slope = np.maximum(more - free, 1e-6 * free) / (_STEP * free)
-        curve = ForceCurve.of(terms[rows], free[rows], presses.force[rows])
+        curve = AmountCurve.of(presses.of_what, terms[rows], free[rows], presses.amount[rows])
         evidence.append(curve.evidence + float(np.log(slope[rows]).sum()))
     weight = softmax(evidence).reshape(len(plays), len(creeps))
     return _memory(weight.sum(axis=1) @ plays, widths, weight.sum(axis=0) @ creeps)

@@ -1,1 +1,0 @@
-"""Newtons from labelled presses, and what a material remembers of its load."""
