@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Self
+from functools import cache
+from typing import Protocol, Self, TypeVar
 
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve, eigh
@@ -57,6 +58,31 @@ def leading(data: FloatArray, count: int, rounding: float = _ROUNDING) -> FloatA
 def nearness(a: FloatArray, b: FloatArray, length: float) -> FloatArray:
     """(n, m) exp(−d²/2 ``length``²) of the distances d between rows of ``a`` and ``b``."""
     return np.asarray(np.exp(-0.5 * squared_distances(a, b) / length**2))
+
+
+class _Likely(Protocol):
+    """What has a log marginal likelihood."""
+
+    @property
+    def evidence(self) -> float:
+        """Log marginal likelihood, up to a constant."""
+        ...
+
+
+L = TypeVar("L", bound=_Likely)
+
+
+def climbed(maps: Callable[[float], L]) -> L:
+    """What ``maps`` makes of the length scale of the largest evidence, climbed to from the middle
+    one of :data:`LENGTHS`."""
+    of = cache(maps)
+    best = len(LENGTHS) // 2
+    while True:
+        near = range(max(best - 1, 0), min(best + 2, len(LENGTHS)))
+        higher = max(near, key=lambda number: of(LENGTHS[number]).evidence)
+        if higher == best:
+            return of(LENGTHS[best])
+        best = higher
 
 
 @dataclass(frozen=True)

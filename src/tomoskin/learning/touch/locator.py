@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits
 
 from tomoskin.core import Detection, FloatArray
 from tomoskin.learning.kind import Progress, silent
-from tomoskin.learning.touch.per_channel import Rotations
+from tomoskin.learning.touch.per_channel import Envelope, likeliest_envelope, rings
 from tomoskin.learning.touch.posterior import Estimates
 from tomoskin.learning.touch.presses import Features, Presses, Strength, frames, mean_about
 from tomoskin.learning.touch.session_alignment import SessionAlignment
@@ -20,7 +20,6 @@ from tomoskin.learning.touch.stacking import (
     CalibratedCovariance,
     Remark,
     Stacking,
-    disagreement_of,
     outliers,
     squared_lengths,
     twins,
@@ -33,6 +32,9 @@ _STEPS = 4
 
 _PLACES = 600
 """Positions in the grid; what is between them is their mean."""
+
+_SHARED = 256
+"""Measurements above which it is not asked where their electrodes are: so many tell enough."""
 
 _MISSING = 2.0
 """Power of the part of the rows that a frame has, by which its covariance is divided: filled in,
@@ -154,20 +156,20 @@ class Locator:
         features = Features.of(presses.dv)
         data = features(presses.dv)
         progress(0, _STEPS)
-        rotations = Rotations.of(origin[0]) if origin[0] else Rotations.none(presses.dv.shape[1])
+        envelope = Envelope()
+        if origin[0] is not None and len(features.rows) <= _SHARED:
+            around = rings(origin[0], region.scaled(region.outline))
+            of_rows = (ring.of_rows(features.rows) for ring in around)
+            envelope = likeliest_envelope(of_rows, positions, data)
         grid = region.lattice(_PLACES)
-        estimates = Estimates.of(data, positions, grid, rotations.of_rows(features.rows))
+        estimates = Estimates.of(data, positions, grid, envelope)
         progress(1, _STEPS)
         stacking = Stacking.of(data, estimates.left_out, positions)
         progress(2, _STEPS)
-        disagreement = disagreement_of(stacking.left_out_by_expert, stacking.left_out)
-        calibrated = CalibratedCovariance.of(
-            stacking.left_out - positions, estimates.left_out_spread, disagreement
-        )
-        covariance = calibrated(estimates.left_out_spread, disagreement)
-        held = float(
-            np.mean(squared_lengths(stacking.left_out - positions, covariance) < NINE_IN_TEN)
-        )
+        errors = stacking.left_out - positions
+        calibrated = CalibratedCovariance.of(errors, estimates.left_out_spread)
+        covariance = calibrated(estimates.left_out_spread)
+        held = float(np.mean(squared_lengths(errors, covariance) < NINE_IN_TEN))
         remarks = (
             *twins(data, positions, region.unit),
             *outliers(stacking.left_out, positions, covariance, region.unit),
@@ -202,9 +204,8 @@ class Locator:
         given = frames(dv, self.presses.dv.shape[1])
         data = self.features(given)
         guess, spread, strangeness = self.estimates(data)
-        by_expert = self.stacking.by_expert(data, guess)
-        answer = self.stacking.combined(by_expert)
-        covariance = self.calibrated(spread, disagreement_of(by_expert, answer))
+        answer = self.stacking(data, guess)
+        covariance = self.calibrated(spread)
         present = np.isfinite(given[:, self.features.rows]).mean(axis=1)
         wide = _bounded(
             present[:, None, None] ** -_MISSING * covariance

@@ -1,200 +1,111 @@
-"""Response maps of rows that are taken one by one: what few presses can tell of a row's noise, and
-what rows that the pattern's table turns into each other tell together."""
+"""Response maps of rows that are taken one by one, each strongest where its electrodes are."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, IntArray
-from tomoskin.learning.touch.gaussian_process import LENGTHS, Basis, Likeness
+from tomoskin.learning.touch.gaussian_process import (
+    LENGTHS,
+    Basis,
+    Likeness,
+    climbed,
+    squared_distances,
+)
 from tomoskin.model.pattern import Pattern
 
-_DECIMALS = 9
-"""Of an angle, so that equal ones are equal."""
+_TURNS = 32
+"""Positions of the first electrode that are tried, evenly along the rim, for both ways round."""
+
+_OUTSIDE = 1.1
+"""Where the electrodes stand, in parts of the way to the rim: a response is finite there."""
+
+_FALL = 0.5
+"""Power of the fields' product by which responses vary. This and the number before were chosen on
+noPattern, radial and cam09_05, 10, 25 and 60 presses."""
+
+_TRIED_ON, _NOISE = 30, 0.1
+"""Presses by which the ring is found, and noise over signal of a row there."""
+
+_SURE = float(np.log(2 * _TURNS))
+"""Log marginal likelihood by which a ring must explain the presses better than none does: so many
+are tried."""
 
 
 @dataclass(frozen=True, eq=False)
-class Rotations:
-    """Which rows are alike on a uniform round skin whose electrodes stand evenly around it.
+class Envelope:
+    """How strongly each row may answer over the sheet, in parts of its answer in the middle.
 
-    ``orbit`` (k,): rows of one number become each other when all electrodes move on by some;
-    ``angle`` (k,) rad by which a row is turned against the first of its orbit. Whether a real
-    skin is like that, and which way round its electrodes go, is for the presses to tell.
+    The field of two electrodes on an even sheet is largest near them: |a − b| / |x − a| |x − b|. A
+    row answers as the product of that of its drive and of its measurement, to a power.
+    ``electrodes`` (k, 4, 2) of the rows, in radii; None where they are not known.
     """
 
-    orbit: IntArray
-    angle: FloatArray
+    electrodes: FloatArray | None = None
 
-    @classmethod
-    def of(cls, pattern: Pattern) -> Self:
-        """By the electrodes' numbers alone."""
-        table = np.hstack([pattern.drive, pattern.measure])
-        row_of = {tuple(electrodes): row for row, electrodes in enumerate(table.tolist())}
-        n = pattern.n_electrodes
-        orbit, angle = np.arange(len(table)), np.zeros(len(table))
-        for steps in range(1, n):
-            first = [row_of.get(tuple(e), len(table)) for e in ((table - steps) % n).tolist()]
-            earlier = np.array(first) < orbit
-            orbit = np.where(earlier, first, orbit)
-            angle = np.where(earlier, 2 * np.pi * steps / n, angle)
-        return cls(orbit, np.round(angle, _DECIMALS))
-
-    @classmethod
-    def none(cls, n_rows: int) -> Self:
-        """Where the pattern is not known: one group, nothing turned."""
-        return cls(np.zeros(n_rows, dtype=np.int64), np.zeros(n_rows))
+    def __call__(self, positions: FloatArray) -> FloatArray:
+        """(n, k) at ``positions`` (n, 2); (n, 1) of ones where nothing is known."""
+        if self.electrodes is None:
+            return np.ones((len(positions), 1))
+        k = len(self.electrodes)
+        points = self.electrodes.reshape(-1, 2)
+        away = squared_distances(positions, points) / (points**2).sum(axis=1)
+        return np.asarray(
+            np.exp(-0.5 * _FALL * np.log(away).reshape(len(positions), k, 4).sum(axis=2))
+        )
 
     def of_rows(self, rows: IntArray) -> Self:
-        """The rotations of these measurements only."""
-        return type(self)(self.orbit[rows], self.angle[rows])
-
-    def reversed(self) -> Self:
-        """The same with the electrodes the other way round."""
-        return replace(self, angle=np.round(-self.angle % (2 * np.pi), _DECIMALS))
-
-    @property
-    def any(self) -> bool:
-        """Whether there is a turned row at all."""
-        return bool(self.angle.any())
+        """The same of some rows."""
+        return self if self.electrodes is None else type(self)(self.electrodes[rows])
 
 
-def turned(positions: FloatArray, angle: float) -> FloatArray:
-    """``positions`` (n, 2) as a row that is turned by ``angle`` sees them: turned back."""
-    c, s = np.cos(angle), np.sin(angle)
-    return np.asarray(positions @ np.array([[c, -s], [s, c]]))
+def rings(pattern: Pattern, rim: FloatArray) -> Iterator[Envelope]:
+    """Envelopes with the electrodes evenly along the ``rim`` (c, 2), from everywhere both ways.
+
+    Where the first electrode stands, and which way round the others go, is for the presses to tell.
+    """
+    table = np.hstack([pattern.drive, pattern.measure])
+    closed = np.vstack([rim, rim[:1]])
+    along = np.append(0.0, np.linalg.norm(np.diff(closed, axis=0), axis=1).cumsum())
+    for first in np.arange(_TURNS) / _TURNS:
+        for way in (1, -1):
+            at = (first + way * np.arange(pattern.n_electrodes) / pattern.n_electrodes) % 1.0
+            ring = [np.interp(at * along[-1], along, axis) for axis in closed.T]
+            yield Envelope(_OUTSIDE * np.column_stack(ring)[table])
+
+
+def likeliest_envelope(
+    envelopes: Iterator[Envelope], positions: FloatArray, features: FloatArray
+) -> Envelope:
+    """The envelope of the largest marginal likelihood; none, unless one explains much more."""
+    some = np.unique(np.linspace(0, len(positions) - 1, _TRIED_ON).astype(int))
+    near = Likeness(LENGTHS[len(LENGTHS) // 2])(positions[some], positions[some])
+    about = (features[some] - features[some].mean(axis=0)).T
+    none = Envelope()
+
+    def evidence(envelope: Envelope) -> float:
+        size = envelope(positions[some]).T
+        prior = size[:, :, None] * near * size[:, None, :] + _NOISE * np.eye(len(some))
+        root = np.linalg.cholesky(prior)
+        white = np.linalg.solve(root, about[:, :, None])[:, :, 0]
+        logs = np.log((white**2).mean(axis=1) + _FLOOR) * len(some)
+        determinant = 2 * np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1)
+        return -0.5 * float((logs + determinant).sum())
+
+    likely = {envelope: evidence(envelope) for envelope in (none, *envelopes)}
+    best = max(likely, key=lambda envelope: likely[envelope])
+    return best if likely[best] > likely[none] + _SURE else none
 
 
 _RATIOS = np.array([0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0])
 """Noise over signal of a row, as tried."""
 
 _FLOOR = 1e-9
-
-
-@dataclass(frozen=True, eq=False)
-class PerChannelFeatures:
-    """Features in the modes of the presses: ``rows`` (n, k) about their ``mean`` (k,), and the
-    ``size`` (k,) of each row's signal and its ``noise`` over that, likeliest for the row alone.
-    """
-
-    mean: FloatArray
-    rows: FloatArray
-    size: FloatArray
-    noise: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
-class LikenessModes:
-    """Presses at ``positions`` (n, 2) in the ``axes`` (n, n) of their likeness.
-
-    ``weights`` (n,) are those of the axes. ``common`` holds what a row and its turned copies share:
-    functions of the turned position, whose values at the presses are ``values`` for each angle.
-    """
-
-    likeness: Likeness
-    positions: FloatArray
-    weights: FloatArray
-    axes: FloatArray
-    common: Basis
-    values: dict[float, FloatArray]
-
-    @classmethod
-    def of(cls, likeness: Likeness, positions: FloatArray, angles: FloatArray) -> Self:
-        """For rows that are turned by one of ``angles``."""
-        weights, axes = np.linalg.eigh(likeness(positions, positions))
-        copies = {angle: turned(positions, angle) for angle in np.unique(angles).tolist()}
-        common = Basis.of(likeness, np.concatenate([*copies.values()]))
-        values = {angle: axes.T @ common(copy) for angle, copy in copies.items()}
-        return cls(likeness, positions, np.maximum(weights, 0.0), axes, common, values)
-
-    def alone(self, features: FloatArray) -> PerChannelFeatures:
-        """What each row of ``features`` (n, k) tells by itself (Rasmussen & Williams 2006, 5.8)."""
-        n, mean = features.shape[0], features.mean(axis=0)
-        rows = self.axes.T @ (features - mean)
-        spread = self.weights[:, None] + _RATIOS
-        size = (1 / spread).T @ rows**2 / n + _FLOOR
-        log = -0.5 * n * np.log(size) - 0.5 * np.log(spread).sum(axis=0)[:, None]
-        best = log.argmax(axis=0)
-        return PerChannelFeatures(mean, rows, size[best, np.arange(len(mean))], _RATIOS[best])
-
-    def at(self, positions: FloatArray) -> tuple[FloatArray, dict[float, FloatArray]]:
-        """(g, n) of the likeness and, for each angle, (g, m) of what is common."""
-        near = self.likeness(positions, self.positions) @ self.axes
-        return near, {angle: self.common(turned(positions, angle)) for angle in self.values}
-
-
-@dataclass(frozen=True, eq=False)
-class OrbitMaps:
-    """Maps of rows that are turned copies of each other: √size (√share g(turned x) + h(x) + noise).
-
-    g is the same for all, h is each row's own with the rest of the variance: two Gaussian processes
-    of one likeness. Without a ``share`` each row stands for itself. ``angles`` (r,) of the rows;
-    ``residual`` (n, r), ``spread`` (n, r): what g leaves over its variance, and that; ``pull``
-    (m,) and ``root`` (m, m): mean of g's coefficients and a root of their covariance.
-    """
-
-    modes: LikenessModes
-    angles: FloatArray
-    share: float
-    mean: FloatArray
-    size: FloatArray
-    noise: FloatArray
-    residual: FloatArray
-    spread: FloatArray
-    pull: FloatArray
-    root: FloatArray
-    evidence: float
-
-    @classmethod
-    def of(
-        cls, modes: LikenessModes, alone: PerChannelFeatures, angles: FloatArray, share: float
-    ) -> Self:
-        """From rows that have been looked at alone, turned by ``angles``."""
-        rows = alone.rows / np.sqrt(alone.size)
-        spread = (1 - share) * modes.weights[:, None] + alone.noise
-        functions = len(modes.common.root.T) if share else 0
-        values = np.stack([modes.values[angle][:, :functions] for angle in angles.tolist()])
-        weighed = (values / np.sqrt(spread.T)[:, :, None]).reshape(spread.size, functions)
-        precision = np.eye(functions) / (share or 1.0) + weighed.T @ weighed
-        root = np.linalg.inv(np.linalg.cholesky(precision))
-        weighted = root @ (weighed.T @ (rows / np.sqrt(spread)).T.ravel())
-        pull = root.T @ weighted
-        residual = (rows - (values @ pull).T) / spread
-        evidence = (
-            0.5 * float(weighted @ weighted)
-            + float(np.log(np.diag(root)).sum())
-            - 0.5 * functions * float(np.log(share or 1.0))
-            - 0.5 * float((rows**2 / spread + np.log(spread) + np.log(alone.size)).sum())
-        )
-        numbers = alone.mean, alone.size, alone.noise, residual, spread, pull, root, evidence
-        return cls(modes, angles, share, *numbers)
-
-    def at(
-        self, near: FloatArray, common: dict[float, FloatArray]
-    ) -> tuple[FloatArray, FloatArray]:
-        """Mean and variance, both (g, r); ``near`` and ``common`` of :meth:`LikenessModes.at`."""
-        own = 1 - self.share
-        mean = own * near @ self.residual
-        variance = own * self.modes.likeness.variance + self.noise
-        variance = variance - own**2 * near**2 @ (1 / self.spread)
-        for row, angle in enumerate(self.angles.tolist() if self.share else ()):
-            there, values = common[angle], self.modes.values[angle]
-            mean[:, row] += there @ self.pull
-            rest = there - own * near @ (values / self.spread[:, row, None])
-            variance[:, row] += ((rest @ self.root.T) ** 2).sum(axis=1)
-        return self.mean + np.sqrt(self.size) * mean, self.size * np.maximum(variance, _FLOOR)
-
-
-_SHARED = 256
-"""Rows above which turned copies share nothing: it takes long, and so many rows tell enough."""
-
-_SHARES = (0.3, 0.6, 0.85)
-"""Part of a row's variance that its turned copies have in common, as tried beside none with the
-length scale that is likeliest then."""
 
 _FREEDOM = 4.0
 """Degrees of freedom of one row's error: a press may be told wrong by a few rows."""
@@ -207,74 +118,78 @@ _SINGLE = np.float32
 
 @dataclass(frozen=True, eq=False)
 class ChannelMaps:
-    """A Gaussian process for each row, with a noise of its own and a share in its turned copies.
+    """A Gaussian process for each row, with a noise of its own: size · (envelope · map + noise).
 
     The matrix-variate process knows more, but must learn two covariances of all rows: from some
     twenty presses it learns the noise of a single row less well than the row alone does.
 
-    ``groups`` are the rows of each group, whose maps are ``orbits``.
+    ``mean``, ``size`` and ``ratio`` (k,) are each row's, the last that of noise over signal;
+    ``weights`` (k, m) are those of the functions of the ``basis``, whose covariance over the noise
+    has the ``axes`` (k or 1, m, m) with the inverse of ``spread`` (k, m); ``evidence`` is the log
+    marginal likelihood up to a constant.
     """
 
-    rotations: Rotations
-    groups: tuple[IntArray, ...]
-    orbits: tuple[OrbitMaps, ...]
+    envelope: Envelope
+    basis: Basis
+    mean: FloatArray
+    size: FloatArray
+    ratio: FloatArray
+    weights: FloatArray
+    axes: FloatArray
+    spread: FloatArray
+    evidence: float
 
     @classmethod
-    def of(cls, positions: FloatArray, features: FloatArray, rotations: Rotations) -> Self:
+    def of(cls, positions: FloatArray, features: FloatArray, envelope: Envelope) -> Self:
         """Maps for ``features`` (n, k) of presses at ``positions`` (n, 2).
 
-        Of each group of rows the length scale, then the share, and the way round of all, are those
-        of the largest marginal likelihood.
+        The length scale of all rows, and the noise of each, are those of the largest evidence.
         """
-        if features.shape[1] > _SHARED:
-            rotations = Rotations.none(features.shape[1])
-        ways = (rotations, rotations.reversed()) if rotations.any else (rotations,)
-        angles = np.concatenate([way.angle for way in ways])
-        modes = [LikenessModes.of(Likeness(length), positions, angles) for length in LENGTHS]
-        return max((cls._of(modes, features, way) for way in ways), key=lambda m: m.evidence)
+        return climbed(
+            lambda length: cls._of(Basis.of(Likeness(length), positions), positions, features,
+                                   envelope)
+        )  # fmt: skip
 
     @classmethod
     def _of(
-        cls, modes: Sequence[LikenessModes], features: FloatArray, rotations: Rotations
+        cls,
+        basis: Basis,
+        positions: FloatArray,
+        features: FloatArray,
+        envelope: Envelope,
+        ratio: FloatArray | None = None,
     ) -> Self:
-        groups = tuple(
-            np.flatnonzero(rotations.orbit == orbit) for orbit in np.unique(rotations.orbit)
-        )
-        orbits = []
-        for rows in groups:
-            angles, some = rotations.angle[rows], features[:, rows]
-            alone = [OrbitMaps.of(m, m.alone(some), angles, 0.0) for m in modes]
-            best = max(alone, key=lambda maps: maps.evidence)
-            for share in _SHARES if rotations.any else ():
-                shared = OrbitMaps.of(best.modes, best.modes.alone(some), angles, share)
-                best = max(best, shared, key=lambda maps: maps.evidence)
-            orbits.append(best)
-        return cls(rotations, groups, tuple(orbits))
+        n, mean = len(features), features.mean(axis=0)
+        about = (features - mean).T
+        design = envelope(positions).T[:, :, None] * basis(positions)
+        pull = (about[:, None] @ design)[:, 0]
+        weights, axes = np.linalg.eigh(design.transpose(0, 2, 1) @ design)
+        along, total = (pull[:, None] @ axes)[:, 0], (about**2).sum(axis=1)
+        weights = np.maximum(weights, 0.0)
+        ratios = _RATIOS[:, None] if ratio is None else ratio[None]
+        spread = np.broadcast_to(weights, along.shape) + ratios[:, :, None]
+        square = (total - (along**2 / spread).sum(axis=2)) / ratios
+        size = np.maximum(square, 0.0) / n + _FLOOR
+        logs = np.log(spread / ratios[:, :, None]).sum(axis=2) + n * np.log(ratios * size)
+        best, rows = logs.argmin(axis=0), np.arange(len(mean))
+        ratio, spread = np.broadcast_to(ratios, logs.shape)[best, rows], spread[best, rows]
+        solved = (axes @ (along / spread)[:, :, None])[:, :, 0]
+        evidence = -0.5 * float(logs[best, rows].sum())
+        return cls(envelope, basis, mean, size[best, rows], ratio, solved, axes, spread, evidence)
 
     def again(self, positions: FloatArray, features: FloatArray) -> Self:
         """Maps of other presses with the same settings."""
-        angle, lengths = self.rotations.angle, {maps.modes.likeness for maps in self.orbits}
-        modes = {likeness: LikenessModes.of(likeness, positions, angle) for likeness in lengths}
-        orbits = []
-        for rows, maps in zip(self.groups, self.orbits, strict=True):
-            theirs = modes[maps.modes.likeness]
-            alone = theirs.alone(features[:, rows])
-            orbits.append(OrbitMaps.of(theirs, alone, angle[rows], maps.share))
-        return replace(self, orbits=tuple(orbits))
-
-    @property
-    def evidence(self) -> float:
-        """Log marginal likelihood, up to a constant of the features."""
-        return sum(maps.evidence for maps in self.orbits)
+        basis = Basis.of(self.basis.likeness, positions)
+        return self._of(basis, positions, features, self.envelope, self.ratio)
 
     def at(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Mean and variance, both (g, k), of the features of a press at ``positions`` (g, 2)."""
-        mean, variance = np.empty((2, len(positions), len(self.rotations.angle)))
-        modes = {maps.modes.likeness: maps.modes for maps in self.orbits}
-        values = {likeness: m.at(positions) for likeness, m in modes.items()}
-        for rows, maps in zip(self.groups, self.orbits, strict=True):
-            mean[:, rows], variance[:, rows] = maps.at(*values[maps.modes.likeness])
-        return mean, variance
+        values, envelope = self.basis(positions), self.envelope(positions)
+        mean = self.mean + envelope * (values @ self.weights.T)
+        known = ((values @ self.axes) ** 2 @ (1 / self.spread)[:, :, None])[:, :, 0].T
+        unknown = self.basis.likeness.variance - (values**2).sum(axis=1, keepdims=True)
+        prior = np.maximum(unknown, 0.0) + self.ratio * known
+        return mean, self.size * np.maximum(envelope**2 * prior + self.ratio, _FLOOR)
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 from itertools import product
 from typing import Self
 
@@ -12,9 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, IntArray
-from tomoskin.learning.touch.gaussian_process import LENGTHS, Likeness, moments, squared_distances
+from tomoskin.learning.touch.gaussian_process import (
+    Likeness,
+    climbed,
+    moments,
+    squared_distances,
+)
 from tomoskin.learning.touch.maps import ResponseMaps, principal
-from tomoskin.learning.touch.per_channel import ChannelLikelihood, ChannelMaps, Rotations
+from tomoskin.learning.touch.per_channel import ChannelLikelihood, ChannelMaps, Envelope
 
 BoolArray = NDArray[np.bool_]
 
@@ -156,13 +161,16 @@ class Estimates:
         features: FloatArray,
         positions: FloatArray,
         grid: FloatArray,
-        rotations: Rotations,
+        envelope: Envelope,
     ) -> Self:
         """Learn the maps; length scales by evidence, powers by left-out presses."""
         n = len(positions)
-        maps = _likeliest(positions, features, principal(features))
+        directions = principal(features)
+        maps = climbed(
+            lambda length: ResponseMaps.of(Likeness(length), positions, features, directions)
+        )
         few = _some(n)
-        channels = ChannelMaps.of(positions[few], features[few], rotations)
+        channels = ChannelMaps.of(positions[few], features[few], envelope)
         misfit, alone, folds = np.empty((n, len(grid))), np.empty((n, len(grid))), []
         unlike = np.empty((n, 2))
         for out in _folds(positions):
@@ -212,22 +220,6 @@ class Estimates:
         ½ Σ log(1 + signal / noise) (MacKay 1992).
         """
         return np.asarray(self.grid[int(self.likelihood.volume.argmax())])
-
-
-def _likeliest(positions: FloatArray, features: FloatArray, directions: FloatArray) -> ResponseMaps:
-    """Maps of the length scale of the largest evidence, climbed to from the middle one."""
-
-    @cache
-    def of(number: int) -> ResponseMaps:
-        return ResponseMaps.of(Likeness(LENGTHS[number]), positions, features, directions)
-
-    best = len(LENGTHS) // 2
-    while True:
-        near = range(max(best - 1, 0), min(best + 2, len(LENGTHS)))
-        higher = max(near, key=lambda number: of(number).evidence)
-        if higher == best:
-            return of(best)
-        best = higher
 
 
 def _folds(positions: FloatArray) -> list[BoolArray]:

@@ -1,4 +1,4 @@
-"""Stacking: how much each estimate of a position counts, and how sure the answer is."""
+"""Stacking: how much each of two estimates of a position counts, and how sure the answer is."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
-from scipy.optimize import minimize, nnls
+from scipy.optimize import minimize
 from scipy.special import chdtri
 
 from tomoskin.core import FloatArray
@@ -44,17 +44,16 @@ radial, cam09_05 and the 8 electrodes of eskin_hydrogel_round, 25 to 200 presses
 
 @dataclass(frozen=True)
 class CalibratedCovariance:
-    """Covariance of an answer: parts of the posterior's own, of the experts' disagreement, and
-    the same for all, with a factor by which nine ellipses in ten hold their press.
+    """Covariance of an answer: a part of the posterior's own, and the same for all, with a factor
+    by which nine ellipses in ten hold their press.
     """
 
     posterior: float
-    disagreement: float
     everywhere: float
 
     @classmethod
-    def of(cls, errors: FloatArray, posterior: FloatArray, disagreement: FloatArray) -> Self:
-        """Learn from left-out ``errors`` (n, 2), and (n, 2, 2) of both kinds.
+    def of(cls, errors: FloatArray, posterior: FloatArray) -> Self:
+        """Learn from left-out ``errors`` (n, 2), and the ``posterior`` (n, 2, 2) of each.
 
         The parts are those at which the errors are likeliest (a Student density); the common
         factor is split-conformal (Vovk, Gammerman & Shafer 2005). The errors are in the order of
@@ -63,29 +62,23 @@ class CalibratedCovariance:
         size = float((errors**2).mean()) + _SPREAD**2
 
         def cost(logs: FloatArray) -> float:
-            cov = cls(*np.exp(logs))(posterior, disagreement)
+            cov = cls(*np.exp(logs))(posterior)
             far = squared_lengths(errors, cov)
             heavy = (_FREEDOM + 2) * np.log1p(far / _FREEDOM)
             return float((np.log(np.linalg.det(cov)) + heavy).sum()) + 0.05 * float(logs @ logs)
 
-        start = np.array([-1.0, -1.0, np.log(0.3 * size)])
+        start = np.array([-1.0, np.log(0.3 * size)])
         optimum = np.exp(minimize(cost, start, method="Nelder-Mead", options={"maxiter": 150}).x)
-        far = squared_lengths(errors, cls(*optimum)(posterior, disagreement))
+        far = squared_lengths(errors, cls(*optimum)(posterior))
         last = far[-max(len(far) // _RECENT, _FEWEST) :]
         factor = max(nine_in_ten(far), nine_in_ten(last) / _CHANCE) / NINE_IN_TEN
         spent = _FOLDED * (len(errors) + _SPENT) / max(len(errors) - _SPENT, 1)
         return cls(*(float(x) for x in factor * spent * optimum))
 
-    def __call__(self, posterior: FloatArray, disagreement: FloatArray) -> FloatArray:
+    def __call__(self, posterior: FloatArray) -> FloatArray:
         """The covariance (n, 2, 2) of each position, in m²."""
         common = (self.everywhere + _SPREAD**2) * np.eye(2)
-        return np.asarray(self.posterior * posterior + self.disagreement * disagreement + common)
-
-
-def disagreement_of(by_expert: FloatArray, answer: FloatArray) -> FloatArray:
-    """(n, 2, 2) scatter of what the experts say, (experts, n, 2), about the answer (n, 2)."""
-    away = by_expert - answer
-    return np.asarray(np.einsum("eni,enj->nij", away, away) / len(by_expert))
+        return np.asarray(self.posterior * posterior + common)
 
 
 def squared_lengths(errors: FloatArray, covariance: FloatArray) -> FloatArray:
@@ -94,34 +87,31 @@ def squared_lengths(errors: FloatArray, covariance: FloatArray) -> FloatArray:
     return np.asarray((errors * solved).sum(axis=1))
 
 
-_PLAIN = (("features",), ("features",))
-_BOTH = (("features", "estimate"), ("features",), ("estimate",))
+_TERMS = (("features", "estimate"), ("features",), ("estimate",))
 
 _NEAR = 0.5
 """Unit of the estimates' distances, in radii of the region."""
 
-_BEFORE, _WORTH = np.array([0.64, 0.18, 0.18]), 8
-"""Weights before any press, the maps first, and as many presses they count for: from few, weights
-are learnt badly."""
-
-_TOGETHER = 1e3
-"""Weight of the demand that the parts add up to one."""
+_BEFORE, _WORTH = 0.36, 8
+"""Part of the process before any press, and as many presses it counts for: from few, the part is
+learnt badly."""
 
 
 @dataclass(frozen=True, eq=False)
 class Stacking:
-    """The weighted mean of the maps' estimate and of processes on features and estimate.
+    """The weighted mean of the maps' estimate and of a process on features and estimate.
 
-    Stacked generalisation (Wolpert 1992; weights not negative as in Breiman 1996): the estimates
-    that the processes learn from, and the weights, come from presses that were left out.
+    Stacked generalisation (Wolpert 1992): the estimates that the process learns from, and its
+    ``part`` of the answer, come from presses that were left out. ``left_out`` (n, 2) is what each
+    press would be told without itself.
     """
 
     features: FloatArray
     estimates: FloatArray
     unit: float
-    experts: tuple[Process, ...]
-    weights: FloatArray
-    left_out_by_expert: FloatArray
+    process: Process
+    part: float
+    left_out: FloatArray
 
     @classmethod
     def of(
@@ -137,31 +127,22 @@ class Stacking:
             "features": between / unit,
             "estimate": squared_distances(estimates, estimates) / _NEAR**2,
         }
-        experts = (Process.of(_PLAIN, squares, xy), Process.of(_BOTH, squares, xy))
-        by_expert = np.stack([estimates, *(expert.left_out for expert in experts)])
-        weights = _weights(by_expert, xy)
-        return cls(features, estimates, unit, experts, weights, by_expert)
-
-    @property
-    def left_out(self) -> FloatArray:
-        """(n, 2) what each press would be told without itself."""
-        return self.combined(self.left_out_by_expert)
+        process = Process.of(_TERMS, squares, xy)
+        part = _part(estimates, process.left_out, xy)
+        left_out = estimates + part * (process.left_out - estimates)
+        return cls(features, estimates, unit, process, part, left_out)
 
     @cached_property
     def _norms(self) -> FloatArray:
         return squared_norms(self.features)
 
-    def by_expert(self, features: FloatArray, estimates: FloatArray) -> FloatArray:
-        """(experts, m, 2) what each says of frames, the maps first."""
+    def __call__(self, features: FloatArray, estimates: FloatArray) -> FloatArray:
+        """(m, 2) places of frames with ``features`` (m, k) of which the maps say ``estimates``."""
         squares = {
             "features": squared_distances(features, self.features, self._norms) / self.unit,
             "estimate": squared_distances(estimates, self.estimates) / _NEAR**2,
         }
-        return np.stack([estimates, *(expert(squares) for expert in self.experts)])
-
-    def combined(self, by_expert: FloatArray) -> FloatArray:
-        """(m, 2) places from what each says, (experts, m, 2)."""
-        return np.asarray(np.tensordot(self.weights, by_expert, 1))
+        return estimates + self.part * (self.process(squares) - estimates)
 
 
 def _usual(between: FloatArray) -> float:
@@ -169,15 +150,14 @@ def _usual(between: FloatArray) -> float:
     return float(np.median(between[between > 0])) if (between > 0).any() else 1.0
 
 
-def _weights(by_expert: FloatArray, xy: FloatArray) -> FloatArray:
-    """Parts that add up to one, of least squared error; far-off presses weigh less (Huber)."""
-    errors = np.linalg.norm(by_expert - xy, axis=2).min(axis=0)
-    weigh = np.sqrt(1 / np.maximum(errors, np.median(errors) + 1e-9))[:, None]
-    columns = (by_expert * weigh).reshape(len(by_expert), -1).T
-    design = np.vstack([columns, np.full((1, len(by_expert)), _TOGETHER)])
-    weights, _ = nnls(design, np.append((xy * weigh).ravel(), _TOGETHER))
+def _part(estimates: FloatArray, others: FloatArray, xy: FloatArray) -> float:
+    """Part of the ``others`` of least squared error; far-off presses weigh less (Huber)."""
+    errors = np.minimum(*(np.linalg.norm(said - xy, axis=1) for said in (estimates, others)))
+    weigh = 1 / np.maximum(errors, np.median(errors) + 1e-9)[:, None]
+    way = others - estimates
+    best = float((weigh * way * (xy - estimates)).sum() / ((weigh * way**2).sum() + _SPREAD**2))
     learnt = len(xy) / (len(xy) + _WORTH)
-    return np.asarray(learnt * weights / weights.sum() + (1 - learnt) * _BEFORE)
+    return learnt * min(max(best, 0.0), 1.0) + (1 - learnt) * _BEFORE
 
 
 _SAME = 1e-6
