@@ -69,6 +69,9 @@ CASES = {
     ("calibrate force", "out"): Case(
         "calibrate force {presses} --skin {skin} --out {out}", ".npz", ("--weight", "4=0:16")
     ),
+    ("calibrate depth", "out"): Case(
+        "calibrate depth {presses} --skin {skin} --out {out}", ".npz", ("--depth", "1=0:16")
+    ),
     ("calibrate bend", "out"): Case(
         "calibrate bend {bends} --skin {skin} --out {out}", ".npz", BENDS
     ),
