@@ -22,8 +22,8 @@ from tomoskin.twin import Press, ScanClock, TwinSettings, make_electronics, samp
 from touch_lab import TwinLab
 from touch_noise import CASES, NEEDED, NoisyBoard, fitted
 
-SEEDS = (9301, 9302)
-"""Everything was chosen on seed 9100."""
+SEEDS = (9501, 9502)
+"""Everything was chosen on seeds 9100 and 9101."""
 
 PRESSES, COURSES, SPEEDS = 15, 4, (0.06, 0.12)
 """Of each seed; m/s."""
@@ -251,11 +251,13 @@ def _moving(name: str, board: str) -> Iterator[dict[str, Any]]:
             for _ in range(COURSES):
                 _course(rig, random, speed, offs)
         for way, rows in offs.items():
-            off, behind, inside = np.array(rows).T
+            every = np.array(rows)
+            off, behind, inside = every[np.isfinite(every[:, 0])].T
             yield {
                 "skin": name,
                 "mm/s": f"{1e3 * speed:.0f}",
                 "by": way,
+                "told": percent(len(off) / len(every)),
                 "off, mm": mm(np.median(off), digits=1)[0],
                 "p90 mm": mm(np.percentile(off, 90), digits=1)[0],
                 "behind, mm": mm(np.nanmedian(behind), digits=1)[0],
@@ -293,8 +295,11 @@ def _course(
     heading = (end - begin) / length
     for way, shown in (("drives", seen.drives), ("frames", seen.frames)):
         for time, touches in shown:
+            if not onset + LATE < time < arrived:
+                continue
             touch = nearest(touches, at(time))
-            if touch is None or not onset + LATE < time < arrived:
+            if touch is None:
+                offs[way].append((np.nan, np.nan, False))
                 continue
             d, true = touch.detection, at(time)
             off = np.array([d.x, d.y]) - true
@@ -306,7 +311,7 @@ def _course(
 
 def _bound(name: str) -> dict[str, Any]:
     """How much wider the bound of a position gets where the best drives alone are read."""
-    ratios, wholes = [], []
+    ratios = []
     for seed in SEEDS:
         progress(f"standing on {name}, seed {seed}")
         lab, random = TwinLab(name, "textile", seed), np.random.default_rng(seed)
@@ -330,14 +335,11 @@ def _bound(name: str) -> dict[str, Any]:
             known = np.diag([*model.prior.weights**2, 1.0, 1.0])
             whole = _variance(known + drives.sum(axis=0))
             ratios.append(_variance(known + drives[chosen].sum(axis=1)).min() / whole)
-            wholes.append(whole)
-    rms = np.average(ratios, weights=wholes) ** 0.5
     return {
         "sheet": name,
         "drives": f"{int(PART * count)} of {count}",
-        "bound of all: rms mm": mm(np.sqrt(np.mean(wholes)))[0],
-        "ratio, best drives: rms": round(float(rms), 2),
-        "median": round(float(np.median(ratios)) ** 0.5, 2),
+        "least error against all: median": round(float(np.median(ratios)) ** 0.5, 2),
+        "mean": round(float(np.sqrt(ratios).mean()), 2),
     }
 
 

@@ -99,15 +99,15 @@ def test_a_touch_that_is_lifted_is_told_before_the_frame_ends(turns, idle, touch
 def test_a_touch_is_lifted_though_the_drive_that_is_read_meanwhile_still_shows_a_part(
     turns, idle, touched
 ):
-    own = np.flatnonzero(turns.drive == 3)
+    own = np.flatnonzero(turns.drive == 5)[:3]
     part = idle.copy()
-    part[own[: len(own) // 2]] = touched[own[: len(own) // 2]]
+    part[own] = touched[own]
     for _ in range(6):
         turns.turn(touched)
-    turns.turn(np.where(turns.drive < 3, touched, part))
+    turns.turn(np.where(turns.drive < 5, touched, part))
     told = turns.told
-    assert all(told[:3])
-    assert not any(told[5:])
+    assert all(told[:5])
+    assert not any(told[6:])
 
 
 def test_what_no_frame_confirms_is_withdrawn_and_its_number_is_not_given_again(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from contextlib import closing
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -15,7 +16,7 @@ from server.serving import Site
 from server.test_play import Page
 from server.watching import Watched
 from tomoskin.board.source import open_source
-from tomoskin.learning import FORCE, TOUCH
+from tomoskin.learning import DEPTH, FORCE, TOUCH, AmountModel
 from tomoskin.model.skin import Skin
 from tomoskin.run import Runner, commands
 from tomoskin.server import serve_requests
@@ -155,14 +156,30 @@ def test_weights_are_laid_on_and_forces_are_shown(opened, folder):
     looks_right(opened, "force")
     opened.test_id("flow-keep").click()
     opened.test_id("calibration").filter(has_text="force.npz").wait_for()
-    learnt = FORCE.read(folder / "force.npz").model.presses
-    assert learnt.force[learnt.labelled].tolist() == [2, 8, 4, 6, 3]
+    forces = FORCE.read(folder / "force.npz")
+    learnt = forces.model.presses
+    assert learnt.amount[learnt.labelled].tolist() == [2, 8, 4, 6, 3]
+    deep = replace(learnt, amount=1e-4 * learnt.amount, measurand="depth")
+    depths = AmountModel.learn(deep, forces.model.conductivity, forces.model.unit)
+    DEPTH.of(depths, forces.pattern).write(folder / "depth.npz")
     opened.press(0.03, 0.03)
     opened.test_id("force").wait_for()
     looks_right(opened, "forces")
     opened.test_id("strength-unit").filter(has_text="Force, N").press("Enter")
     opened.test_id("strength-unit").filter(has_text="Strength, S").wait_for()
     assert opened.test_id("force").count() == 0, "the list and the chart show the same"
+    opened.page.mouse.up()
+    opened.test_id("calibration-of-depth").filter(has_text="uncalibrated").wait_for()
+    opened.test_id("open-setup").click()
+    opened.test_id("open-setup").click()
+    opened.test_id("step-force").click()
+    opened.page.get_by_label("Depths from").select_option("depth.npz")
+    opened.test_id("calibration-of-depth").filter(has_text="depth.npz").wait_for()
+    opened.press(0.03, 0.03)
+    opened.test_id("strength-unit").press("Enter")
+    opened.test_id("strength-unit").press("Enter")
+    opened.test_id("strength-unit").filter(has_text="Depth, mm").wait_for()
+    opened.test_id("depth").wait_for()
     opened.page.mouse.up()
     opened.page.get_by_label("Calibration").select_option("")
     opened.test_id("calibration").filter(has_text="No weights").wait_for()

@@ -35,8 +35,9 @@ _FRAMES, _SECONDS = 2, 0.15
 """Frames, and seconds, within which a touch that has begun must show in frames, or it is withdrawn.
 The scan of the first one may have seen it come down, and quick ones tell little each."""
 
-_STEP = 5e-4
-"""Seconds of a drive that allow one step of what is made anew, where drives wait for it."""
+_STEP = 1e-4
+"""Seconds of a drive that allow one step of what is made anew, where drives wait for it: with 8
+electrodes a step takes so long, and with 16 three times as long."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,7 +68,7 @@ class _Followed:
     ``begun``: the device time, s, at which a provisional one has.
 
     ``odds``: their logarithm that it is lifted, and the device time, s, at which it was; ``frames``
-    of a provisional one: those without it.
+    of a provisional one: those without it; ``doubtful``: whether the newest drive is left out.
     """
 
     touch: Touch
@@ -75,16 +76,19 @@ class _Followed:
     full: float
     begun: float = 0.0
     odds: float = 0.0
+    doubtful: bool = False
     lifted: float | None = None
     frames: int | None = None
 
-    def take(self, moving: MovingTouch, gone: float, going: float) -> None:
-        """Take a drive, and what it says of the odds: it was lifted before, or while it was read.
+    def take(self, moved: MovingTouch, told: MovingTouch, gone: float, going: float) -> None:
+        """Take a drive: the touch as it has ``moved`` and as the drive has ``told``, and what that
+        says of the odds: it was lifted before, or while the drive was read.
 
-        What shows a part of a touch draws the touch after it, so that later drives speak of a weak
-        one elsewhere. So the odds begin with the drive in which it may have been lifted.
+        What shows a part of a touch would draw it elsewhere, and later drives would speak of what
+        is there. So such a drive is left out, and the odds begin with it. The next one counts.
         """
-        self.moving = moving
+        self.doubtful = going > _MOST and not self.doubtful
+        self.moving = moving = moved if self.doubtful else told
         if self.lifted is None:
             self.odds = max(self.odds + min(gone, _MOST), min(going, _MOST), 0.0)
             left = RESIDUAL.holds(abs(moving.content), abs(self.full)) and self.frames is None
@@ -226,7 +230,7 @@ class DriveWatch:
         every = np.sum(list(changes.values()), axis=0)
         for number, each in self._followed.items():
             own = data - every + changes[number]
-            each.take(*self._filter.pushed(moved[number], rows, own))
+            each.take(moved[number], *self._filter.pushed(moved[number], rows, own))
 
     def _going_on(self, touch: Touch, before: Mapping[int, _Followed], time: float) -> _Followed:
         """A touch of a frame whose scan began at ``time`` s: as the drives have it where they

@@ -33,7 +33,7 @@ export function InUse({ of }: { of: Of }) {
   const kept = (files.value?.files ?? []).filter(({ name }) => name.endsWith(".npz"));
   return (
     <>
-      <p data-testid="calibration">
+      <p data-testid={of === "depth" ? "calibration-of-depth" : "calibration"}>
         {known === null
           ? WITHOUT[of]
           : `${WITH[of]} ${known || "the calibration that tomoskin was started with"}.`}
@@ -41,7 +41,7 @@ export function InUse({ of }: { of: Of }) {
       {of === "touch" && known !== null && <Health />}
       {(kept.length > 0 || known !== null) && (
         <label class="row">
-          <span>Calibration</span>
+          <span>{of === "depth" ? "Depths from" : "Calibration"}</span>
           <select
             value={known ?? ""}
             onChange={({ currentTarget: { value } }) =>

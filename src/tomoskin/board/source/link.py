@@ -13,7 +13,7 @@ from tomoskin.board.source.clock import ClockWatch
 from tomoskin.board.source.configuration import Configuration
 from tomoskin.board.source.protocol_session import ProtocolSession, Stage
 from tomoskin.board.source.settings import ScanSettings, Timing
-from tomoskin.board.source.transport import Diagnosable, Fetched, Played, Transport
+from tomoskin.board.source.transport import Diagnosable, Played, Transport
 from tomoskin.board.wire import Ack, BoardLimits, Decoder, Info, Stop
 from tomoskin.core import Frame, SourceError
 from tomoskin.model.pattern import Scan
@@ -58,7 +58,6 @@ class Link(AbstractContextManager["Link"]):
         self._tap = tap
         self._timing = timing or Timing()
         self._decoder = Decoder()
-        self._fetched = transport if isinstance(transport, Fetched) else None
         self._rate = RateFollower(transport) if isinstance(transport, Rated) else None
         self._session = ProtocolSession(scan, settings, self._timing, self._clock(), transport.name)
         self.counters, self.frames = self._decoder.counters, self._session.frames.counters
@@ -90,7 +89,8 @@ class Link(AbstractContextManager["Link"]):
     @property
     def waited(self) -> float:
         """How long the first byte of the last read had waited on this host, s."""
-        return self._fetched.waited if self._fetched else 0.0
+        waited: float = getattr(self.transport, "waited", 0.0)
+        return waited
 
     def poll(self, timeout: float) -> list[Received]:
         """Frames, drives sent singly, and events, waiting at most ``timeout`` s for bytes.

@@ -27,7 +27,8 @@ GROUP = "tomoskin.sources"
 class Transport(Protocol):
     """A two-way stream of bytes to a board, real or not.
 
-    One thread reads and writes; ``close`` may come from another.
+    One thread reads and writes; ``close`` may come from another. Where bytes are fetched while
+    nobody reads, ``waited`` is how long the first byte of the last read had waited, s.
     """
 
     @property
@@ -56,15 +57,6 @@ class Diagnosable(Protocol):
 
     def diagnose(self, heard: bytes) -> SourceError:
         """The likeliest cause; ``heard``: the first bytes that came. Raises as ``read`` does."""
-
-
-@runtime_checkable
-class Fetched(Protocol):
-    """A transport whose bytes are fetched while nobody reads, so that they may have waited."""
-
-    @property
-    def waited(self) -> float:
-        """How long the first byte of the last read had waited, s."""
 
 
 @runtime_checkable

@@ -80,16 +80,13 @@ def _scene(collada: Any, file: Path) -> Any:
     meshio, common = import_module("meshio"), collada.common
     ignored = [common.DaeUnsupportedError, common.DaeBrokenRefError]  # textures, lights
     document = collada.Collada(str(file), ignore=ignored)
-    points, cells, count = [np.zeros((0, 3))], [np.zeros((0, 3), np.int64)], 0
-    for shape in document.scene.objects("geometry"):
-        for part in shape.primitives():
-            drawn = part.triangleset() if hasattr(part, "triangleset") else part
-            if drawn.vertex_index.shape[1] == 3:  # no line
-                points.append(drawn.vertex)
-                cells.append(drawn.vertex_index + count)
-                count += len(drawn.vertex)
-    unit = document.assetInfo.unitmeter or 1.0
-    return meshio.Mesh(np.concatenate(points) * unit, [("triangle", np.concatenate(cells))])
+    parts = (part for shape in document.scene.objects("geometry") for part in shape.primitives())
+    sets = (part.triangleset() if hasattr(part, "triangleset") else part for part in parts)
+    corners = [one.vertex[one.vertex_index] for one in sets if one.vertex_index.shape[1] == 3]
+    whole = np.concatenate([np.zeros((0, 3, 3)), *corners]).reshape(-1, 3)
+    points, cells = np.unique(whole, axis=0, return_inverse=True)
+    points *= document.assetInfo.unitmeter or 1.0
+    return meshio.Mesh(points, [("triangle", cells.reshape(-1, 3))])
 
 
 def _check_readable(file: Path) -> None:

@@ -7,7 +7,6 @@ measurements of one drive after the other. So a scan does not tear what moves wi
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -19,7 +18,7 @@ from tomoskin.sensing.fit.problem import Solver
 from tomoskin.sensing.fit.solver import SheetDomain
 from tomoskin.sensing.fit.spot import CONTENT, LOG_RADIUS, N_PARAMETERS, X, Y
 from tomoskin.sensing.fit.spot_fit import SpotPrior
-from tomoskin.sensing.track import RESIDUAL, TrackSettings
+from tomoskin.sensing.track import RESIDUAL, TrackSettings, motion_step
 
 _TRACK = TrackSettings()
 
@@ -109,15 +108,12 @@ def _cost(data: FloatArray, covariance: FloatArray) -> float:
 def _moving(seconds: float) -> tuple[FloatArray, FloatArray]:
     """(8, 8) by which a state goes on, and the noise of position and velocity meanwhile: those of
     the tracker."""
-    tau, power = _TRACK.turning, _TRACK.speed**2
-    u = seconds / tau
-    a = math.exp(-u)
+    leads, remains, there, cross, moving = motion_step(seconds, _TRACK)
     step, noise = np.eye(_SIZE), np.zeros((_SIZE, _SIZE))
     for place, speed in ((0, 2), (1, 3)):
-        step[place, speed], step[speed, speed] = tau * (1 - a), a
-        noise[place, place] = power * tau**2 * (2 * u - 3 + 4 * a - a * a)
-        noise[place, speed] = noise[speed, place] = power * tau * (1 - a) ** 2
-        noise[speed, speed] = power * (1 - a * a)
+        step[place, speed], step[speed, speed] = leads, remains
+        noise[place, place], noise[speed, speed] = there, moving
+        noise[place, speed] = noise[speed, place] = cross
     return step, noise
 
 

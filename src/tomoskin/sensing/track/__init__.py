@@ -3,6 +3,7 @@
 from tomoskin.sensing.track.motion import (
     SlideCorrection as SlideCorrection,
     TrackSettings as TrackSettings,
+    motion_step as motion_step,
 )
 from tomoskin.sensing.track.policy import GATE as GATE, HELD as HELD, RESIDUAL as RESIDUAL
 from tomoskin.sensing.track.touch_table import (

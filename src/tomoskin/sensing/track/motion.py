@@ -86,7 +86,7 @@ def predict(state: TrackState, seconds: float, settings: TrackSettings) -> Track
     """The state after some seconds without a detection."""
     if not seconds > 0:
         return state
-    b, a, there, cross, moving = _step(seconds, settings)
+    b, a, there, cross, moving = motion_step(seconds, settings)
     x, y, u, v, xx, xy, yy, xu, xv, yu, yv, uu, uv, vv = state
     bb, aa = b * b, a * a
     return TrackState(
@@ -163,7 +163,9 @@ def observe(detection: Detection, settings: TrackSettings) -> TrackObservation:
 
 
 @lru_cache(maxsize=8)
-def _step(seconds: float, settings: TrackSettings) -> tuple[float, float, float, float, float]:
+def motion_step(
+    seconds: float, settings: TrackSettings
+) -> tuple[float, float, float, float, float]:
     """Over some ``seconds``: how far a speed leads, and what is left of it; variance of the
     position along each axis, its covariance with the speed, and the speed's variance."""
     tau, power = settings.turning, settings.speed**2
