@@ -42,7 +42,7 @@ angles = ["180 deg", "0 deg", "0 deg"]
 """
 URDF = """<robot name="arm"><link name="base"/><link name="fore">
 <visual><geometry><sphere radius="0.04"/></geometry></visual>
-<visual><geometry><mesh filename="package://arm/fore.dae"/></geometry></visual>
+<visual><geometry><mesh filename="package://arm/fore.wrl"/></geometry></visual>
 </link><joint name="elbow"
 type="revolute"><parent link="base"/><child link="fore"/>
 <origin xyz="0.3 0 0.1"/></joint></robot>"""
@@ -148,7 +148,7 @@ def test_touches_are_told_in_the_frame_of_the_robot(site, pressed):
         assert corners.min(axis=0) == pytest.approx([-0.04, -0.04, -0.04], abs=1e-4)
         assert corners.max(axis=0) == pytest.approx([0.04, 0.04, 0.04], abs=1e-4)
         (undrawn,) = scene["undrawn"]
-        assert undrawn.startswith("fore: package://arm/fore.dae: expected a file ending in")
+        assert undrawn.startswith("fore: package://arm/fore.wrl: expected a file ending in")
         middle = np.array(scene["skins"][1]["corners"]).reshape(-1, 3).mean(axis=0)
         assert scene["skins"][1]["link"] == 1
         assert middle == pytest.approx([0, 0, -0.05], abs=0.005)
