@@ -89,7 +89,7 @@ class Slots:
 
 
 def pose_row(contacts: Contacts) -> list[float]:
-    """The values of :data:`POSE`."""
+    """The values of :data:`POSE`, in order."""
     pose = contacts.link and contacts.link.pose
     return [1.0, *pose.position, *pose.quaternion()] if pose else [0.0] * len(POSE)
 

@@ -60,7 +60,7 @@ class Envelope:
         )
 
     def of_rows(self, rows: IntArray) -> Self:
-        """The same of some rows."""
+        """The same record for some rows only."""
         return self if self.electrodes is None else type(self)(self.electrodes[rows])
 
 

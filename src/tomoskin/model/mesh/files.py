@@ -48,7 +48,7 @@ def at_source(error: GeometryError, source: str) -> GeometryError:
 
 
 def parsed(file: Path) -> Any:
-    """The file as meshio has it."""
+    """The file as meshio reads it."""
     name = READERS.get(file.suffix.lower())
     if name is None:
         raise GeometryError(

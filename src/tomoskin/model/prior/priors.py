@@ -77,7 +77,7 @@ class SharpPrior(ABC):
 
     @abstractmethod
     def of_weights(self, mesh: Mesh, weights: FloatArray) -> Penalty:
-        """The penalty Σ wᵢ tᵢ²."""
+        """The penalty Σ wᵢ tᵢ² of an image."""
 
     def penalty(self, mesh: Mesh, jacobian: NDArray[Any]) -> Penalty:
         """The quadratic at an image of nothing, with which an iteration begins."""

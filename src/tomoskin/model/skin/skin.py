@@ -55,6 +55,8 @@ class Skin:
         Rim of the sheet, and the stretch of it that each electrode covers.
     surface
         What the sheet lies on.
+    layer
+        Thickness of the soft layer under the sheet, m; None where the file does not say it.
     conductivity
         Sheet conductance of the unloaded sheet, S.
     contact_impedance
@@ -74,6 +76,7 @@ class Skin:
     outline: Outline
     arcs: tuple[ElectrodeArc, ...]
     surface: Surface
+    layer: float | None
     conductivity: float
     contact_impedance: FloatArray
     current: float
@@ -146,11 +149,6 @@ class Skin:
         return len(self.arcs)
 
     @property
-    def layer(self) -> float | None:
-        """Thickness of the soft layer under the sheet, m, where the file says it."""
-        return self._sections.surface.layer
-
-    @property
     def polarity(self) -> float:
         """Sign of the measured voltages: −1 where they come reversed."""
         return -1.0 if self._sections.drive.polarity == "reversed" else 1.0
@@ -212,6 +210,7 @@ class Skin:
             outline=body.outline,
             arcs=body.arcs,
             surface=body.surface,
+            layer=sections.surface.layer,
             conductivity=1.0 / sections.material.sheet_resistance,
             contact_impedance=body.contact_impedance,
             current=sections.drive.current,
