@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import socket
 import threading
 from collections import deque
@@ -106,7 +107,9 @@ class MqttSink(Sink):
         if client.is_connected():
             topic = self._stream.naming.topic("status")
             last = client.publish(topic, "offline", qos=1, retain=True)
-            last.wait_for_publish(_PATIENCE)
+            # a broker that went just now takes no last word: it says so itself, by the will
+            with contextlib.suppress(RuntimeError):
+                last.wait_for_publish(_PATIENCE)
             client.disconnect()
         client.loop_stop()
 
