@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +18,14 @@ from tomoskin.twin.probe import Probe
 _ROUNDS = 2000
 _TOLERANCE = 1e-8
 
-FOUNDATIONS = ("winkler", "half-space")
-"""Bodies under the sheet: springs side by side, or an elastic half-space (Hertz)."""
+FOUNDATIONS = ("winkler", "layer")
+"""Bodies under the sheet: springs side by side, or an elastic layer glued to a stiff base."""
+
+_DEEP = 300.0
+"""A layer of so many wave lengths over 2π is a half-space: hyperbolic functions end there."""
+
+_LONG = 1e-3
+"""Waves longer than the layer's thickness by this part are even pressure."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +34,10 @@ class ContactSettings:
 
     foundation: str = parameter("winkler", "", "Model of the body under the sheet.", "")
     modulus: float = parameter(
-        5e3, "Pa", "Compressive modulus of that body.", "soft polyurethane foam, assumed"
+        5e3,
+        "Pa",
+        "Compressive modulus of springs, Young's modulus of a layer.",
+        "soft polyurethane foam, assumed",
     )
     thickness: float = parameter(3e-3, "m", "Its thickness.", "thin foam, assumed")
     lock: float = parameter(
@@ -40,7 +50,13 @@ class ContactSettings:
     )
     sheet_poisson: float = parameter(0.3, "", "Poisson ratio of the sheet.", "assumed")
     bulge: float = parameter(
-        0.2, "", "Strain along the body's face per compression across it.", "assumed"
+        0.2,
+        "",
+        "Strain along the face of springs per compression across it; a layer has its own.",
+        "assumed",
+    )
+    grip: float = parameter(
+        1.0, "", "Part of the body's shear that the sheet feels: 0 where it slips.", "assumed"
     )
     friction: float = parameter(0.3, "", "Sliding friction of a probe.", "assumed")
     rolling_friction: float = parameter(0.02, "", "Rolling friction of a probe.", "assumed")
@@ -52,25 +68,36 @@ class ContactSettings:
         check_numbers(
             self,
             above="modulus thickness",
-            least="poisson tension stiffness sheet_poisson bulge friction rolling_friction",
+            least="poisson tension stiffness sheet_poisson bulge grip friction rolling_friction",
         )
         if not self.lock > 0:
             raise ModelError(f"expected lock above 0, got {self.lock}", where="ContactSettings")
-        if self.foundation == "half-space" and self.tension > 0:
+        if self.poisson > 0.5:
             raise ModelError(
-                f"expected no tension over a half-space, got {self.tension} N/m",
-                where="ContactSettings",
+                f"expected poisson of 0.5 or less, got {self.poisson}", where="ContactSettings"
             )
 
     @property
     def spring(self) -> float:
-        """Stiffness per area of a Winkler body, Pa/m: modulus over thickness."""
+        """Stiffness per area, Pa/m: modulus over thickness."""
         return self.modulus / self.thickness
 
     @property
+    def shear_modulus(self) -> float:
+        """Of the body, Pa."""
+        return self.modulus / (2 * (1 + self.poisson))
+
+    @property
     def shear_spring(self) -> float:
-        """Stiffness per area against shifting the sheet along the body, Pa/m."""
-        return self.modulus / (2 * (1 + self.poisson)) / self.thickness
+        """Stiffness per area against shifting the whole sheet along the body, Pa/m."""
+        return self.shear_modulus / self.thickness
+
+    @property
+    def lame(self) -> tuple[float, float]:
+        """λ and μ of the sheet's plane stress, N/m."""
+        nu = self.sheet_poisson
+        shear = self.stiffness / (2 * (1 + nu))
+        return self.stiffness * nu / (1 - nu**2), shear
 
     def locked(self, travel: float) -> float:
         """Part that is left of a ``travel`` m which a linear body would give way by.
@@ -82,8 +109,60 @@ class ContactSettings:
 
     @property
     def reach(self) -> float:
-        """How far a dent reaches beyond a probe, m: √(tension / spring)."""
-        return math.sqrt(self.tension / self.spring)
+        """How far a dent reaches beyond a probe, m: √(tension / spring), and into a layer."""
+        stiff = math.sqrt(self.tension / self.spring)
+        return stiff if self.foundation == "winkler" else math.hypot(stiff, self.thickness / 2)
+
+
+class Face(NamedTuple):
+    """What the face of a body does under waves of pressure and shear, wave by wave.
+
+    Attributes
+    ----------
+    give
+        m/Pa of depth, with the sheet on it.
+    spread
+        1/m: divergence of the face's own motion along itself, per m of depth.
+    along, across
+        Pa/m of shear, along the wave and across it.
+    """
+
+    give: FloatArray
+    spread: FloatArray | float
+    along: FloatArray | float
+    across: FloatArray | float
+
+    @classmethod
+    def of(cls, body: ContactSettings, squared: FloatArray) -> Face:
+        """Of waves with ``squared`` wave numbers, rad²/m².
+
+        Springs side by side; or a layer glued to a stiff base and to the sheet. In a half-space
+        a wave of pressure p gives way by (1 − ν)p/Gq and pulls the face together by (1 − 2ν)p/2Gq
+        (Johnson 1985, section 2.8); the plane-strain solution of a layer is the same but for
+        functions of qt (Barthel & Perriot 2007, J. Phys. D 40, 1059). Across the wave it is sheared
+        as a plate, Gq/tanh qt. The sheet holds the face back, and spans the dent by its tension.
+        """
+        if body.foundation == "winkler":
+            give = 1.0 / (body.spring + body.tension * squared)
+            shear = body.grip * body.shear_spring
+            return cls(give, 2 * body.bulge / body.thickness, shear, shear)
+        x = np.maximum(np.sqrt(squared) * body.thickness, _LONG)
+        q, nu, shear = x / body.thickness, body.poisson, body.shear_modulus
+        sinh, cosh = np.sinh(np.minimum(x, _DEEP)), np.cosh(np.minimum(x, _DEEP))
+        kappa = 3 - 4 * nu
+        size = (kappa * cosh**2 + x**2 + (1 - 2 * nu) ** 2) * shear * q
+        normal = (1 - nu) * (kappa * sinh * cosh - x) / size
+        tangential = (1 - nu) * (kappa * sinh * cosh + x) / size
+        inward = ((1 - 2 * nu) * kappa * sinh**2 - x**2) / (2 * size)
+        lame, own = body.lame
+        held = (lame + 2 * own) * squared
+        net = normal - inward**2 * held * body.grip / (1 + held * tangential)
+        return cls(
+            give=net / (1 + body.tension * squared * net),
+            spread=-q * inward / net,
+            along=body.grip / tangential,
+            across=body.grip * shear * q / np.tanh(x),
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,11 +229,11 @@ def solve_contact(probes: Sequence[Probe], settings: ContactSettings, grid: Grid
 
     The depth is the pressure p ≥ 0 on the faces times the body's compliance,
 
-        Winkler with a membrane: T∇²w − kw = −p;      half-space: w = ∫ p/(πE*r),
+        springs with a membrane: T∇²w − kw = −p;      a layer: see :class:`Face`,
 
     and each face is w = travel − gap where it presses, w ≥ travel − gap elsewhere. Conjugate
     gradients on the pressure with the forces kept (Polonsky & Keer 1999, Wear 231, 206). The
-    sheet is taken as endless, the Winkler body as repeating beyond the grid.
+    sheet is taken as endless, and what presses as repeating beyond the grid.
 
     Raises
     ------
@@ -265,23 +344,6 @@ def _spread(values: FloatArray, nodes: IntArray, shape: tuple[int, int]) -> Floa
 
 def _compliance(settings: ContactSettings, grid: Grid) -> Callable[[FloatArray], FloatArray]:
     """Pressure (n, n) Pa → depth (n, n) m."""
-    n = grid.n
-    if settings.foundation == "half-space":
-        kernel = rfft2(_boussinesq(settings, grid))
-        return lambda p: np.asarray(irfft2(rfft2(p, (2 * n, 2 * n)) * kernel)[:n, :n])
     qx, qy = grid.wave_numbers
-    spring = 1.0 / (settings.spring + settings.tension * (qx**2 + qy**2))
-    return lambda p: np.asarray(irfft2(rfft2(p) * spring, (n, n)))
-
-
-def _boussinesq(settings: ContactSettings, grid: Grid) -> FloatArray:
-    """(2n, 2n) m/Pa: depth around one pressed cell of the grid, wrapped (Love 1929)."""
-    x = np.fft.fftfreq(2 * grid.n, 1 / (2 * grid.n))[:, None] * grid.step
-    y, half = x.T, grid.step / 2
-    total = np.zeros((2 * grid.n, 2 * grid.n))
-    for sx in (1.0, -1.0):
-        for sy in (1.0, -1.0):
-            a, b = x + sx * half, y + sy * half
-            # a·asinh(b/|a|) + b·asinh(a/|b|) is the potential of a quarter plane's corner
-            total += sx * sy * (a * np.arcsinh(b / np.abs(a)) + b * np.arcsinh(a / np.abs(b)))
-    return np.asarray(total * (1 - settings.poisson**2) / (np.pi * settings.modulus))
+    give = Face.of(settings, qx**2 + qy**2).give
+    return lambda p: np.asarray(irfft2(rfft2(p) * give, p.shape))

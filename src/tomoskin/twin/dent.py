@@ -15,7 +15,7 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 
 from tomoskin.core import FloatArray
 from tomoskin.model.forward import choose_engine
-from tomoskin.twin.contact import ContactSettings, Grid, solve_contact
+from tomoskin.twin.contact import ContactSettings, Face, Grid, solve_contact
 from tomoskin.twin.probe import Probe, Shape
 
 _NODES = 128
@@ -227,7 +227,7 @@ def slope_strain(depth: FloatArray, settings: ContactSettings, grid: Grid) -> Fl
     waves = rfft2(depth)
     wx, wy = (irfft2(1j * q * waves, depth.shape) for q in (qx, qy))
     own = [rfft2(part) for part in (wx * wx / 2, wy * wy / 2, wx * wy / 2)]
-    lame, shear = _lame(settings)
+    lame, shear = settings.lame
     trace = lame * (own[0] + own[1])
     push_x = 1j * (qx * (trace + 2 * shear * own[0]) + qy * 2 * shear * own[2])
     push_y = 1j * (qx * 2 * shear * own[2] + qy * (trace + 2 * shear * own[1]))
@@ -238,15 +238,16 @@ def slope_strain(depth: FloatArray, settings: ContactSettings, grid: Grid) -> Fl
 def bulge_strain(depth: FloatArray, settings: ContactSettings, grid: Grid) -> FloatArray:
     """(3, n, n) strain xx, yy, xy of a sheet that the body's face carries along as it bulges.
 
-    Pressed by w, the body of thickness t would spread by β w/t in each direction; its face moves
-    by the gradient field with that divergence, and drags the sheet through its shear springs.
-    Linear in the depth.
+    Pressed by w, springs of length t would spread by β w/t in each direction, and a layer as its
+    elasticity says (:class:`Face`). The face moves by the gradient field with that divergence, and
+    drags the sheet through its shear. Linear in the depth.
     """
     qx, qy = grid.wave_numbers
     squared = qx**2 + qy**2
+    face = Face.of(settings, squared)
     squared[0, 0] = 1.0
-    spread = 2 * settings.bulge / settings.thickness * rfft2(depth) / squared
-    pull = [-1j * q * spread * settings.shear_spring for q in (qx, qy)]
+    spread = face.spread * rfft2(depth) / squared
+    pull = [-1j * q * spread * face.along for q in (qx, qy)]
     waves = _strain(*_shift(pull[0], pull[1], settings, grid), grid)
     for part in waves[:2]:
         part[0, 0] = spread[0, 0] / 2  # free to spread: no grid around it holds it back
@@ -261,22 +262,20 @@ def drag_strain(traction: FloatArray, settings: ContactSettings, grid: Grid) -> 
 
 
 def _shift(fx: _Waves, fy: _Waves, settings: ContactSettings, grid: Grid) -> tuple[_Waves, _Waves]:
-    """Displacement that balances a load along the sheet: (κ + μq²) u + (λ + μ) q(q·u) = f."""
+    """Displacement that balances a load along the sheet, of shear κ along a wave and across it:
+    (κ + (λ + 2μ)q²) u = f along, (κ + μq²) u = f across."""
     qx, qy = grid.wave_numbers
-    lame, shear = _lame(settings)
     squared = qx**2 + qy**2
-    plain = settings.shear_spring + shear * squared
-    along = (lame + shear) * (qx * fx + qy * fy) / (plain + (lame + shear) * squared)
-    return (fx - qx * along) / plain, (fy - qy * along) / plain
+    lame, shear = settings.lame
+    face = Face.of(settings, squared)
+    squared[0, 0] = 1.0
+    across = face.across + shear * squared
+    along = face.along + (lame + 2 * shear) * squared
+    load = (qx * fx + qy * fy) / squared
+    more = load / along - load / across
+    return fx / across + qx * more, fy / across + qy * more
 
 
 def _strain(ux: _Waves, uy: _Waves, grid: Grid) -> tuple[_Waves, _Waves, _Waves]:
     qx, qy = grid.wave_numbers
     return 1j * qx * ux, 1j * qy * uy, 0.5j * (qx * uy + qy * ux)
-
-
-def _lame(settings: ContactSettings) -> tuple[float, float]:
-    """λ and μ of plane stress, N/m."""
-    nu = settings.sheet_poisson
-    shear = settings.stiffness / (2 * (1 + nu))
-    return settings.stiffness * nu / (1 - nu**2), shear
