@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 
-from bench_rig import load_example
+from bench_rig import INSIDE_90, distance, drawn, gap, load_example, nearest
 from report import Report, mm, table
+from tomoskin import Skin
+from tomoskin.pipeline import prepare
+from tomoskin.twin import Press, SteppedSkin, TwinSettings
 
 SEEDS = (11, 12, 13)
 PLACEMENTS = 100
 EFFECTS = (1.0, 0.5)
 REACH, APART = 35e-3, 30e-3
 WITHIN = 8e-3
+FOAMS, SHEETS, PRESSES, SEED = (3e-3, 15e-3, 30e-3), (8, 16), 40, 6101
+"""Thickness, m; electrodes; presses of each, from a seed that nothing was chosen on."""
+
 POLARISED = (0.0, 0.5e-3, 1e-3, 2e-3, 4e-3)
 
 
@@ -29,11 +36,60 @@ def run() -> Iterator[Report]:
         "10-bit read-out, 64 readings a sample, means of 40 frames; known weight ± 2 %",
     )
     yield table(
+        "presses on soft foam",
+        (
+            _pressed(count, foam, named=named)
+            for count in SHEETS
+            for foam in FOAMS
+            for named in (False, True)
+        ),
+        f"textile twin, springs {' '.join(f'{1e3 * foam:g}' for foam in FOAMS)} mm long; {PRESSES} "
+        f"presses of 2 to 4 N, tips of 8 to 15 mm radius, up to 85 mm from the middle; seed {SEED}",
+        "off: mean distance of the nearest touch; the last of eight frames",
+    )
+    yield table(
         "six expressions of a face",
         _expressions(face),
         f"{seeds}: {face.LEARNT} sessions learnt, {face.ASKED} asked, {face.RUNS} runs each; "
         "electrodes put on again each time",
     )
+
+
+def _pressed(electrodes: int, foam: float, *, named: bool) -> dict[str, Any]:
+    """Presses on ``foam`` m, whose thickness the skin file may name."""
+    skin = Skin.load(f"textile-disc-{electrodes}")
+    if named:
+        skin = skin.altered({"surface": {"layer": f"{1e3 * foam:g} mm"}})
+    given = TwinSettings.preset("textile", SEED)
+    given = replace(
+        given,
+        contact=replace(given.contact, thickness=foam),
+        material=replace(given.material, thickness=foam),
+    )
+    twin, random, away, inside = (
+        SteppedSkin(prepare(skin), given),
+        np.random.default_rng(SEED),
+        [],
+        0,
+    )
+    for trial in range(PRESSES):
+        twin.reset(SEED + trial)
+        (press,) = drawn(random, 1)
+        for part in (0.3, 0.6, *[1.0] * 6):
+            touches = twin.step(
+                (Press(press.x, press.y, part * press.force, press.radius),)
+            ).touches
+        if (touch := nearest(touches, press)) is not None:
+            away.append(gap(touch, press))
+            inside += distance(touch.detection, press.x, press.y) < INSIDE_90
+    return {
+        "electrodes": electrodes,
+        "foam, mm": 1e3 * foam,
+        "layer in the skin file": "yes" if named else "no",
+        "found": f"{len(away)} of {PRESSES}",
+        "off, mm": round(1e3 * float(np.mean(away)), 2),
+        "in the 90 % ellipse": f"{inside / len(away):.0%}",
+    }
 
 
 def _felt(example: ModuleType, effect: float) -> dict[str, Any]:

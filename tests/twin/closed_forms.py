@@ -1,4 +1,4 @@
-"""Dents that are known in closed form: a membrane on springs, and Hertz's ball."""
+"""Dents that are known in closed form: a membrane on springs, a ball on an elastic layer."""
 
 from __future__ import annotations
 
@@ -67,30 +67,11 @@ class BallOnSprings:
         return self.settings.spring * volume + 2 * math.pi * c**2 * self.settings.tension / crown
 
 
-@dataclass(frozen=True)
-class Hertz:
-    """A ball of radius ``crown`` m pressed into a half-space (Johnson 1985, eqs. 4.22–4.24)."""
+def force_on_a_layer(crown: float, travel: float, settings: ContactSettings) -> float:
+    """N of a paraboloid on an incompressible layer glued to its base.
 
-    force: float
-    crown: float
-    settings: ContactSettings
-
-    @property
-    def modulus(self) -> float:
-        """E* of a rigid ball, Pa."""
-        return self.settings.modulus / (1 - self.settings.poisson**2)
-
-    @property
-    def contact(self) -> float:
-        """Radius of the contact, m."""
-        return float((3 * self.force * self.crown / (4 * self.modulus)) ** (1 / 3))
-
-    @property
-    def travel(self) -> float:
-        """m."""
-        return self.contact**2 / self.crown
-
-    @property
-    def peak(self) -> float:
-        """Largest pressure, Pa."""
-        return 3 * self.force / (2 * math.pi * self.contact**2)
+    Garcia & Garcia 2018, Biophys. J. 114, 2923; on a thick one that of Hertz (Johnson 1985, 4.2).
+    """
+    x = math.sqrt(crown * travel) / settings.thickness
+    more = 1 + 1.133 * x + 1.497 * x**2 + 1.469 * x**3 + 0.755 * x**4
+    return 16 / 9 * settings.modulus * math.sqrt(crown) * travel**1.5 * more

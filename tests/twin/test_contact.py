@@ -9,10 +9,17 @@ from scipy.optimize import brentq
 
 from tomoskin.core import GeometryError, ModelError
 from tomoskin.twin import Circle, ContactSettings, Face, Finger, Grid, Probe, Square, solve_contact
-from twin.closed_forms import BallOnSprings, Hertz, even_pressure_depth, flat_punch_stiffness
+from twin.closed_forms import (
+    BallOnSprings,
+    even_pressure_depth,
+    flat_punch_stiffness,
+    force_on_a_layer,
+)
 
 FOAM = ContactSettings()
-GEL = ContactSettings(foundation="half-space", modulus=1e5, poisson=0.5, tension=0.0)
+GEL = ContactSettings(
+    foundation="layer", modulus=1e5, thickness=5e-3, poisson=0.5, tension=0.0, stiffness=0.0
+)
 SHAPES = (
     Circle(0.012),
     Circle(0.012, 0.02),
@@ -89,15 +96,39 @@ def test_a_ball_on_a_membrane():
     assert reach == pytest.approx(exact.contact, rel=0.05)
 
 
-@pytest.mark.parametrize("force", [0.1, 0.5])
-def test_hertz(force):
-    exact = Hertz(force, 0.02, GEL)
-    found = solve_contact([Probe(Circle(0.02, 0.02), 0, 0, force)], GEL, Grid(96, 0.016 / 96))
-    assert found.travel[0] == pytest.approx(exact.travel, rel=3e-3)
-    assert found.pressure.max() == pytest.approx(exact.peak, rel=5e-3)
-    reach = math.sqrt((found.pressure > 0).sum() * found.grid.step**2 / math.pi)
-    assert reach == pytest.approx(exact.contact, rel=0.03)
+@pytest.mark.parametrize("thickness", [0.004, 0.005, 0.01, 0.03])
+@pytest.mark.parametrize("force", [0.05, 0.5])
+def test_a_ball_on_a_layer_glued_to_its_base(thickness, force):
+    """From a layer as thin as the contact is wide to Hertz's half-space."""
+    body = replace(GEL, thickness=thickness)
+    half = 0.012 + 2.5 * thickness
+    found = solve_contact([Probe(Circle(0.009, 0.01), 0, 0, force)], body, Grid(192, half / 96))
+    exact = force_on_a_layer(0.01, float(found.travel[0]), body)
+    assert exact == pytest.approx(force, rel=0.03)
     assert carried(found) == pytest.approx(force, rel=1e-9)
+
+
+def test_a_wide_punch_squeezes_a_thin_layer_sideways_too():
+    """Johnson 1985, section 5.8: p = (1 − ν)E w/(1 + ν)(1 − 2ν)t, far from the rim."""
+    nu = 0.3
+    body = replace(GEL, poisson=nu, thickness=5e-4)
+    found = solve_contact([Probe(Circle(0.02), 0, 0, 5.0)], body, Grid(192, 0.05 / 192))
+    stiff = (1 - nu) * body.modulus / ((1 + nu) * (1 - 2 * nu) * body.thickness)
+    middle = found.pressure[96, 96] / found.travel[0]
+    assert middle == pytest.approx(stiff, rel=0.03)
+
+
+def test_a_sheet_that_slips_leaves_the_face_of_a_layer_alone():
+    stiff = replace(GEL, poisson=0.3, stiffness=1e3)
+    slips, sticks = (
+        solve_contact([Probe(Circle(0.005), 0, 0, 0.2)], replace(stiff, grip=grip), grid(96, 0.03))
+        for grip in (0.0, 1.0)
+    )
+    free = solve_contact(
+        [Probe(Circle(0.005), 0, 0, 0.2)], replace(stiff, stiffness=0.0), grid(96, 0.03)
+    )
+    assert slips.travel[0] == pytest.approx(free.travel[0])
+    assert sticks.travel[0] < 0.999 * free.travel[0]
 
 
 @pytest.mark.parametrize(
@@ -163,7 +194,8 @@ def test_a_face_between_the_nodes_asks_for_a_finer_grid():
         ({"tension": -1.0}, "tension of 0 or more"),
         ({"friction": math.inf}, "friction of 0 or more"),
         ({"lock": 0.0}, "lock above 0"),
-        ({"foundation": "half-space"}, "no tension over a half-space"),
+        ({"poisson": 0.6}, "poisson of 0.5 or less"),
+        ({"grip": -0.1}, "grip of 0 or more"),
     ],
 )
 def test_impossible_settings(change, said):

@@ -13,7 +13,7 @@ from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.pattern import Pattern
 from tomoskin.sensing.fit import Response, Spots, spots_of
-from tomoskin.sensing.fit.spot import depth_of
+from tomoskin.sensing.fit.spot import PLAIN, USUAL, Profile, depth_of
 
 
 def test_content_is_what_the_cells_hold() -> None:
@@ -59,6 +59,33 @@ def test_derivatives_are_those_of_the_exact_change(
         slope = (ahead - behind) / (2 * step)
         size = max(np.abs(slope).max(), 1e-3 * np.abs(jacobian[:, 4 + number]).max())
         assert np.abs(jacobian[:, number] - slope).max() < 2e-4 * size
+
+
+@pytest.mark.parametrize("layer", [0.003, 0.03])
+def test_derivatives_on_a_layer(layer: float) -> None:
+    response = Response(sheet().state, Profile.on(layer))
+    spots = spots_of([[0.05, 0.02]], 0.02, -0.3)
+    change, jacobian, _ = response.expanded(spots)
+    assert change == pytest.approx(response.changes([spots])[0], abs=1e-12)
+    for number, step in enumerate([1e-5, 1e-5, 1e-4, 1e-8]):
+        moved = np.zeros_like(spots)
+        moved[0, number] = step
+        ahead, behind = response.changes([spots + moved, spots - moved])
+        slope = (ahead - behind) / (2 * step)
+        assert np.abs(jacobian[:, number] - slope).max() < 2e-4 * np.abs(slope).max()
+
+
+def test_a_thicker_layer_carries_the_sheet_farther_round_a_steeper_dent() -> None:
+    """Parts of the change 25 mm away, by noise-free presses of the twin; one in the middle."""
+    away = 0.025 / USUAL
+    thin, thick = (
+        profile.at(np.array([0.0, (away / profile.reach) ** 2]))
+        for profile in (Profile.on(0.003), Profile.on(0.03))
+    )
+    assert thin == pytest.approx([1.0, 0.2], abs=0.07)
+    assert thick == pytest.approx([1.0, 0.3], abs=0.07)
+    assert Profile.on(0.03).reach > 2.5 * Profile.on(0.003).reach
+    assert Profile.on(None) is PLAIN
 
 
 def test_a_direction_is_that_of_a_tensor_on_the_whole_model() -> None:

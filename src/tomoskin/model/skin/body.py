@@ -96,7 +96,8 @@ class SurfaceSection(Section, section="surface"):
     )
     layer: float | None = key(
         Quantity("length", "mm", 0.05, 1000),
-        "Thickness of the soft layer under the sheet, which no press can exceed.",
+        "Thickness of the soft layer under the sheet: no press can exceed it, and touches are "
+        "fitted as wide as it carries the sheet along.",
         default=None,
     )
 

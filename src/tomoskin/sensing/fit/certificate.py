@@ -32,10 +32,8 @@ from tomoskin.sensing.fit.spot import (
     FILLING,
     LOG_RADIUS,
     N_PARAMETERS,
-    PROFILE,
-    REACH,
+    Profile,
     Response,
-    profile,
 )
 from tomoskin.sensing.fit.spot_fit import SpotPrior
 from tomoskin.sensing.fit.table import ResponseTable
@@ -53,8 +51,8 @@ class Interaction:
 
     Attributes
     ----------
-    state
-        Of the sheet.
+    state, profile
+        Of the sheet and its spots.
     centres
         (p, 2) m of the patches.
     spread
@@ -67,6 +65,7 @@ class Interaction:
     """
 
     state: State
+    profile: Profile
     centres: FloatArray
     spread: float
     fields: NDArray[np.float32]
@@ -92,6 +91,7 @@ class Interaction:
         shape = 2 * len(area), 2 * len(area)
         return cls(
             state,
+            response.spots.profile,
             centres,
             spread,
             (root[:, None, None] * fields).astype(np.float32),
@@ -116,8 +116,8 @@ class Interaction:
         """(k, p) change of the logarithm of the conductivity of each patch by each spot."""
         square = np.exp(2 * spots[:, LOG_RADIUS]) + self.spread
         away = self.centres - spots[:, None, :2]
-        far = np.einsum("kpd,kpd->kp", away, away) / (REACH**2 * square[:, None])
-        return profile(far) * (spots[:, CONTENT] / (FILLING * square))[:, None]
+        far = np.einsum("kpd,kpd->kp", away, away) / (self.profile.reach**2 * square[:, None])
+        return self.profile.at(far) * (spots[:, CONTENT] / (FILLING * square))[:, None]
 
 
 def _patches(centroids: FloatArray, volumes: FloatArray) -> tuple[IntArray, FloatArray, FloatArray]:
@@ -338,7 +338,7 @@ class Reduced:
         """The same in the native engine; None where that does not run."""
         core = self.interaction.state.model.engine.core
         return core and core.Reduced(
-            profile=PROFILE,
+            profile=self.interaction.profile,
             interaction=self.interaction,
             certificate=self.certificate,
             rim=self.rim.tree.data,

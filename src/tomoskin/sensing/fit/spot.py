@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -23,12 +24,6 @@ N_PARAMETERS = 4
 _SCALES = 6.0
 """A spot ends at this many of its scales."""
 
-_NARROW = 1.15
-"""Squared reaches of a bell in one of the spot with a tail: then their second moments agree."""
-
-_BELL = 0.5
-"""How far a spot is on the way from one with a tail to a bell."""
-
 _SPLIT = 2
 """Each side of a cell is cut into so many, for the mean of a profile over the cell."""
 
@@ -36,28 +31,62 @@ _FEW = 300
 """Up to so many cells a local update is faster than a new solve (1,500 cells, native engine)."""
 
 
-def profile(square: FloatArray) -> FloatArray:
-    """Height at squared distances from the centre, in squared reaches: 1 there, 0 from 1 on.
+class Profile(NamedTuple):
+    """How the change falls off around a touch, as the native engine takes it.
 
     Between a spot with a tail, (1 + v) e⁻ᵛ with v the distance in scales, as a stretched sheet goes
     back to rest on what carries it, and a bell, as soft things press: both are level at the centre.
+
+    Attributes
+    ----------
+    reach
+        Where a spot ends, in radii.
+    filling
+        Content of a spot of depth 1, in squared radii.
+    scales
+        At how many of its scales the tail ends.
+    narrow, height
+        Squared reaches of a bell in one of the spot with a tail; its height over that.
+    part
+        How far the spot is on the way from a tail to a bell.
     """
-    return _shapes(square)[0]
 
+    reach: float
+    filling: float
+    scales: float
+    narrow: float
+    height: float
+    part: float
 
-def _shapes(square: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """:func:`profile`, its derivative by its argument, and the whole way from tail to bell."""
-    (tail, tail_fall), (bell, bell_fall) = _tail(square), _bell(square)
-    size = 1.0 / (1.0 + _BELL * (_BELL_HEIGHT - 1.0))
-    way = size * (bell - tail)
-    return size * tail + _BELL * way, size * (tail_fall + _BELL * (bell_fall - tail_fall)), way
+    @classmethod
+    def on(cls, layer: float | None) -> Profile:
+        """Of a press on a soft ``layer`` m thick; None where its thickness is not given.
 
+        A sheet is carried along by what it lies on: the thicker that is, the farther, as the root
+        of the thickness, and the more the dent itself stands out of that.
+        """
+        if layer is None:
+            return PLAIN
+        reach = math.hypot(_TIP, math.sqrt(_CARRIED * layer)) / USUAL
+        return PLAIN._replace(reach=reach, narrow=_CORE, height=layer / _SUNK)
 
-def _bell(square: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """A bell with the content and second moment of the spot with a tail, and its derivative."""
-    rest = np.maximum(1.0 - _NARROW * square, 0.0)
-    steep = _BELL_HEIGHT * rest * rest
-    return steep * rest, -3.0 * _NARROW * steep
+    def at(self, square: FloatArray) -> FloatArray:
+        """Height at squared distances from the centre, in squared reaches: 1 there, 0 from 1 on."""
+        return self.shapes(square)[0]
+
+    def shapes(self, square: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """:meth:`at`, its derivative by its argument, and the whole way from tail to bell."""
+        (tail, tail_fall), (bell, bell_fall) = _tail(square), self._bell(square)
+        size = 1.0 / (1.0 + self.part * (self.height - 1.0))
+        way = size * (bell - tail)
+        fall = size * (tail_fall + self.part * (bell_fall - tail_fall))
+        return size * tail + self.part * way, fall, way
+
+    def _bell(self, square: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The bell, and its derivative."""
+        rest = np.maximum(1.0 - self.narrow * square, 0.0)
+        steep = self.height * rest * rest
+        return steep * rest, -3.0 * self.narrow * steep
 
 
 def _tail(square: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -85,19 +114,33 @@ def _moments(shape: Callable[[FloatArray], FloatArray]) -> tuple[float, float]:
     return reach, 2.0 * math.pi * float(ring.sum()) * reach**2
 
 
-def _bell_height() -> float:
-    """Of the bell with the content of the spot with a tail, whose height is 1."""
+def _plain() -> Profile:
+    """Half a tail, half a bell of the same content and second moment."""
+    narrow, part = 1.15, 0.5
     reach, filling = _moments(lambda square: _tail(square)[0])
-    return filling / reach**2 * 4.0 * _NARROW / math.pi
+    bare = Profile(
+        reach, filling, _SCALES, narrow, filling / reach**2 * 4.0 * narrow / math.pi, part
+    )
+    reach, filling = _moments(bare.at)
+    return bare._replace(reach=reach, filling=filling)
 
 
-_BELL_HEIGHT = _bell_height()
+PLAIN = _plain()
+"""Of a press on what is thin, or is not described."""
 
-REACH, FILLING = _moments(profile)
-"""Of a spot: where it ends, in radii, and ∫ profile over the plane, in squared radii."""
+FILLING = PLAIN.filling
+"""Content of every spot of depth 1, in squared radii; with another profile by convention."""
 
-PROFILE = REACH, FILLING, _SCALES, _NARROW, _BELL_HEIGHT, _BELL
-"""All numbers of it, for the native engine."""
+USUAL = 0.0195
+"""Radius that a spot on a layer is given, m."""
+
+_TIP, _CARRIED = 0.027, 0.88
+"""Reach of the tail on no layer, m; its square grows by so many m a metre of layer. Both read off
+noise-free presses of the twin's knit on foam."""
+
+_CORE, _SUNK = 30.0, 0.012
+"""Squared reaches of the dent in one of the tail; thickness of a layer, m, on which both are as
+high."""
 
 
 def spots_of(
@@ -194,25 +237,28 @@ class Spots:
     nothing jumps as a spot moves.
     """
 
-    def __init__(self, mesh: Mesh) -> None:
+    def __init__(self, mesh: Mesh, profile: Profile = PLAIN) -> None:
         if mesh.dimension != 2 or mesh.points.shape[1] != 2:
             raise ModelError(
                 "expected a sheet with flat coordinates, got a volume or a curved sheet",
                 hint='set method = "image" in [touch]',
             )
         corners = mesh.points[mesh.cells]
-        self.mesh = mesh
+        self.mesh, self.profile = mesh, profile
         self._points = np.einsum("qk,ckd->cqd", _sub_centroids(_SPLIT), corners)
         self._centroids = np.ascontiguousarray(mesh.centroids.T)
         self._margin = np.linalg.norm(corners - mesh.centroids[:, None], axis=2).max(axis=1)
 
     def __eq__(self, other: object) -> bool:
-        """Whether the sheets are equal."""
-        return isinstance(other, Spots) and self.mesh.identity == other.mesh.identity
+        """Whether the sheets and the profiles are equal."""
+        return isinstance(other, Spots) and (self.mesh.identity, self.profile) == (
+            other.mesh.identity,
+            other.profile,
+        )
 
     def __hash__(self) -> int:
         """The hash of the sheet that the spots lie on."""
-        return hash(self.mesh.identity)
+        return hash((self.mesh.identity, self.profile))
 
     def change(self, spots: FloatArray) -> tuple[IntArray, FloatArray]:
         """Cells (c,) that spots (k, 4) reach together, and (c,) the change of log σ there."""
@@ -220,7 +266,7 @@ class Spots:
         for spot in spots:
             own = self._near(spot)
             square, _ = self._squares(spot, own)
-            total[own] += depth_of(spot) * profile(square).mean(axis=1)
+            total[own] += depth_of(spot) * self.profile.at(square).mean(axis=1)
             reached[own] = True
         return np.flatnonzero(reached), total[reached]
 
@@ -228,25 +274,25 @@ class Spots:
         """What one spot (4,) does to its cells, and how that depends on it."""
         cells = self._near(spot)
         square, offset = self._squares(spot, cells)
-        depth, reach = float(depth_of(spot)), REACH * float(np.exp(spot[LOG_RADIUS]))
-        height, fall, way = _shapes(square)
+        depth, reach = float(depth_of(spot)), self.profile.reach * float(np.exp(spot[LOG_RADIUS]))
+        height, fall, way = self.profile.shapes(square)
         fall *= depth
         mean = height.mean(axis=1)
         towards = -2.0 / reach**2 / _SPLIT**2 * np.einsum("cq,cqd->dc", fall, offset)
         wider = -2.0 * (depth * mean + (fall * square).mean(axis=1))
-        more = mean * (REACH**2 / FILLING / reach**2)
+        more = mean * (self.profile.reach**2 / FILLING / reach**2)
         slopes, directed = np.stack([*towards, wider, more]), _along(-square * fall, offset)
         return Part(cells, depth * mean, slopes, directed, depth * way.mean(axis=1))
 
     def footprints(self, points: FloatArray, radius: float) -> Footprints:
         """Of spots at ``points`` (n, 2) m, of ``radius`` m."""
-        reach = REACH * radius
+        reach = self.profile.reach * radius
         near = cKDTree(self.mesh.centroids).query_ball_point(points, reach + self._margin.max())
         starts = np.cumsum([0, *(len(own) for own in near)])
         cells = np.array([cell for own in near for cell in sorted(own)], dtype=np.int64)
         offset = self._points[cells] - np.repeat(points, np.diff(starts), axis=0)[:, None]
         square = np.einsum("cqd,cqd->cq", offset, offset) / reach**2
-        height, fall, way = _shapes(square)
+        height, fall, way = self.profile.shapes(square)
         directed = _along(-square * fall, offset)
         return Footprints(starts, cells, height.mean(axis=1), directed, way.mean(axis=1))
 
@@ -254,24 +300,24 @@ class Spots:
         """(c, q) squared distances in reaches of the points of cells, and (c, q, 2) offsets, m."""
         offset = self._points[cells] - spot[:2]
         square = np.einsum("cqd,cqd->cq", offset, offset)
-        return square * float(REACH * np.exp(spot[LOG_RADIUS])) ** -2, offset
+        return square * float(self.profile.reach * np.exp(spot[LOG_RADIUS])) ** -2, offset
 
     def _near(self, spot: FloatArray) -> IntArray:
         """Cells that a spot may reach."""
         x, y = self._centroids - spot[:2, None]
-        limit = REACH * np.exp(spot[LOG_RADIUS]) + self._margin
+        limit = self.profile.reach * np.exp(spot[LOG_RADIUS]) + self._margin
         return np.flatnonzero(x * x + y * y < limit * limit)
 
 
 class Response:
     """Exact voltages of spots on a state of the forward model, and their derivatives."""
 
-    def __init__(self, state: State) -> None:
+    def __init__(self, state: State, profile: Profile = PLAIN) -> None:
         """Prepare a flat sheet with a scalar conductivity; ModelError for another one."""
         if state.conductivity.ndim != 1 or np.iscomplexobj(state.conductivity):
             raise ModelError("expected a real scalar conductivity to fit touches, got another one")
         self.state = state
-        self.spots = Spots(state.model.mesh)
+        self.spots = Spots(state.model.mesh, profile)
 
     @cached_property
     def times(self) -> FloatArray:

@@ -4,16 +4,23 @@ what the table of responses lacks of them."""
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 
 from tomoskin.core import FloatArray
 from tomoskin.model.mesh import Mesh
 from tomoskin.sensing.fit.expectation import Expectation, Known
-from tomoskin.sensing.fit.spot import CONTENT, FILLING, LOG_RADIUS, N_PARAMETERS, bounds_of
+from tomoskin.sensing.fit.spot import (
+    CONTENT,
+    FILLING,
+    LOG_RADIUS,
+    N_PARAMETERS,
+    USUAL,
+    bounds_of,
+)
 
 _RADIUS = 0.11
 """Median radius where touches are as large as the sheet lets them be, in parts of its breadth: that
@@ -24,6 +31,12 @@ _FINGER = 0.0195
 
 _SPREAD = 0.45
 """Standard deviation of the radius's logarithm where both agree: a factor of 1.6 either way."""
+
+_ON_LAYER = 0.25
+"""The same on a layer whose thickness is given: that says how far the sheet is carried along."""
+
+_SURER = 0.9, 0.12
+"""Deviations of direction and shape there: its thickness says what the profile is."""
 
 _LEAST, _MOST = 0.045, 0.45
 """Radii that a sheet can show, in parts of its breadth: larger than its cells, smaller than it."""
@@ -49,26 +62,29 @@ class SpotPrior:
         Standard deviation of the radius's logarithm.
     content
         Standard deviation of the content about none, m².
+    directed
+        Standard deviation of a spot's direction (:class:`Part`) about none.
+    reshaped
+        Standard deviation of its shape, of the way from a tail to a bell: both are one from ours.
     """
-
-    directed: ClassVar = 0.7
-    """Standard deviation of a spot's direction (:class:`Part`) about none."""
-
-    reshaped: ClassVar = 0.5
-    """Standard deviation of its shape, of the way from a tail to a bell: both are one from ours."""
 
     area: float
     radius: float
     spread: float
     content: float
+    directed: float = field(default=0.7, repr=False)  # no table depends on these
+    reshaped: float = field(default=0.5, repr=False)
 
     @classmethod
-    def of(cls, mesh: Mesh) -> Self:
+    def of(cls, mesh: Mesh, layer: float | None = None) -> Self:
         """For a sheet of this size, whose touches may be fingers or as small as the sheet.
 
-        The median lies between the two sizes, and the spread holds both.
+        The median lies between the two sizes, and the spread holds both; but on a ``layer`` m thick
+        a touch is as large as its :class:`Profile`.
         """
         area = float(mesh.volumes.sum())
+        if layer is not None:
+            return cls(area, USUAL, _ON_LAYER, _DEPTH * FILLING * USUAL**2, *_SURER)
         scaled = _RADIUS * math.sqrt(area)
         radius = math.sqrt(scaled * _FINGER)
         spread = math.hypot(_SPREAD, math.log(scaled / _FINGER) / 2)

@@ -19,7 +19,7 @@ from tomoskin.sensing.fit.expectation import Known, newcomers
 from tomoskin.sensing.fit.policy import DetectionPolicy
 from tomoskin.sensing.fit.problem import RIDGE, Answer, Limits, Matched, Problem, Solver
 from tomoskin.sensing.fit.solver import NumpySolver, SheetDomain
-from tomoskin.sensing.fit.spot import CONTENT, FILLING, Footprints, Response
+from tomoskin.sensing.fit.spot import CONTENT, FILLING, Footprints, Profile, Response
 from tomoskin.sensing.fit.spot_fit import Deficit, Fit, SpotPrior
 from tomoskin.sensing.fit.table import ResponseTable
 from tomoskin.sensing.fit.tabulate import Tabulation, kept_tabulation
@@ -149,9 +149,10 @@ class SpotModel:
         """
         own = ForwardModel(_mesh(skin), model.pattern, model.contact_impedance, model.current)
         normalised = skin.inverse.difference == "normalised"
-        response, n_meas = Response(own.at(skin.conductivity)), own.pattern.n_meas
+        state, n_meas = own.at(skin.conductivity), own.pattern.n_meas
+        response = Response(state, Profile.on(skin.layer))
         scale = 1 / np.abs(response.reference) if normalised else np.ones(n_meas)
-        return cls(response, SpotPrior.of(own.mesh), skin.touch.sign, scale)
+        return cls(response, SpotPrior.of(own.mesh, skin.layer), skin.touch.sign, scale)
 
     @cached_property
     def tabulation(self) -> Tabulation:
@@ -215,7 +216,7 @@ class SpotModel:
         state = yield from fitting_sheet(self.response.state, reference, deviation)
         if state is self.response.state:
             return self
-        response = Response(state)
+        response = Response(state, self.response.spots.profile)
         table = yield from self.tabulation.adapted(response)
         certificate = yield from self.tabulation.certificate.adapted(response, table)
         candidates = yield from self.candidates.adapted(self.response, response, self._feet)

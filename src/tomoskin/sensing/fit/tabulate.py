@@ -21,7 +21,7 @@ from scipy.spatial import cKDTree
 
 from tomoskin.core import Arrays, FloatArray, IntArray, kept, reach
 from tomoskin.sensing.fit.certificate import Certificate
-from tomoskin.sensing.fit.spot import Footprints, Response, Spots
+from tomoskin.sensing.fit.spot import PLAIN, Footprints, Response, Spots
 from tomoskin.sensing.fit.spot_fit import SpotPrior
 from tomoskin.sensing.fit.table import ABREAST, N_DIRECTIONS, PADDING, PositionGrid, ResponseTable
 
@@ -209,6 +209,8 @@ def _identity(response: Response, prior: SpotPrior, sign: str) -> str:
     """Hash of all that a tabulation depends on."""
     state, model = response.state, response.state.model
     said = f"{FORMAT} {model.mesh.identity} {model.pattern.identity} {prior} {sign}"
+    if (profile := response.spots.profile) != PLAIN:
+        said += f" {profile}"
     digest = hashlib.sha256(said.encode())
     for numbers in (state.conductivity, model.contact_impedance, model.current):
         digest.update(np.ascontiguousarray(numbers, dtype=np.float64).tobytes())
