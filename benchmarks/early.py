@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from itertools import combinations
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,9 +15,7 @@ from tomoskin.board.source import BOARDS, ScanSettings
 from tomoskin.board.wire import Drive
 from tomoskin.core import DriveSamples, Frame, Touch
 from tomoskin.pipeline import Pipeline, Prepared, prepare
-from tomoskin.pipeline.finding import FitFinder
 from tomoskin.twin import Press, ScanClock, TwinSettings, make_electronics, sample_table
-from touch_lab import TwinLab
 from touch_noise import CASES, NEEDED, NoisyBoard, fitted
 
 SEEDS = (9501, 9502)
@@ -44,8 +40,6 @@ LATE = 0.15
 
 UNTOUCHED = 300
 NOISES = ("as the skin file says", "hum, 3 times the noise", "drift, 1 % in 300 s, and walk")
-PART = 0.4
-"""Of the drives that are read."""
 
 Course = Callable[[float], tuple[Press, ...]]
 
@@ -120,9 +114,7 @@ class Seen:
     frames: Shown = field(default_factory=list)
 
 
-def run(data: Path | None) -> Iterator[Report]:
-    """Drives against frames."""
-    del data
+def run() -> Iterator[Report]:
     yield table(
         "the first report of a press, and its release",
         [_pressed(*rig) for rig in RIGS],
@@ -141,12 +133,6 @@ def run(data: Path | None) -> Iterator[Report]:
         f"no friction; within 70 mm of the middle; seeds {SEEDS}, {COURSES} courses of a second "
         "each; against where the finger is once the drive, or the scan, has been read; behind: "
         "median, straight on",
-    )
-    yield table(
-        f"the least error of a touch that stands, from the best {percent(PART)} of the drives",
-        [_bound(name) for name in ("8", "16")],
-        f"Cramér–Rao bound with radius, content, direction and shape unknown; seeds {SEEDS}, "
-        f"{PRESSES} presses each; every choice of drives is tried",
     )
 
 
@@ -307,42 +293,3 @@ def _course(
             offs[way].append((float(np.hypot(*off)), -float(off @ heading), held))
     for _ in range(AFTER):
         rig.turn(lambda _: (), (), None)
-
-
-def _bound(name: str) -> dict[str, Any]:
-    """How much wider the bound of a position gets where the best drives alone are read."""
-    ratios = []
-    for seed in SEEDS:
-        progress(f"standing on {name}, seed {seed}")
-        lab, random = TwinLab(name, "textile", seed), np.random.default_rng(seed)
-        index, model = lab.prepared.pattern.drive_index, lab.prepared.spots
-        assert model is not None
-        count = index.max() + 1
-        chosen = [list(each) for each in combinations(range(count), int(PART * count))]
-        for _ in range(PRESSES):
-            press = _drawn(random, _place(random, lab.skin))
-            finder = lab.by_fit()
-            found = finder.push(lab.shown(lab.volts((press,)) - lab.reference.mean))
-            if not found or not isinstance(finder, FitFinder):
-                continue
-            spot = finder.spots.view.spot(found[0])
-            parts = model.solver.expanded(spot[None])[0] @ model.solver.table.basis
-            unknown = parts[5:] * [[model.prior.directed], [model.prior.reshaped]]
-            slopes = np.vstack([parts[1:5], unknown]) / lab.prepared.readout.noise
-            drives = np.array(
-                [slopes[:, index == k] @ slopes[:, index == k].T for k in range(count)]
-            )
-            known = np.diag([*model.prior.weights**2, 1.0, 1.0])
-            whole = _variance(known + drives.sum(axis=0))
-            ratios.append(_variance(known + drives[chosen].sum(axis=1)).min() / whole)
-    return {
-        "sheet": name,
-        "drives": f"{int(PART * count)} of {count}",
-        "least error against all: median": round(float(np.median(ratios)) ** 0.5, 2),
-        "mean": round(float(np.sqrt(ratios).mean()), 2),
-    }
-
-
-def _variance(information: Floats) -> Any:
-    """M² of the position, of information (…, 6, 6)."""
-    return np.trace(np.linalg.inv(information)[..., :2, :2], axis1=-2, axis2=-1)

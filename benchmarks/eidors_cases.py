@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.io import savemat
 
-from forward_measure import ELECTRODES, PATTERN, Case, disc
+from forward import ELECTRODES, PATTERN, Case, disc
 from report import medians
 from tomoskin.model.forward import ForwardModel
 

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from bench_rig import INSIDE_90, evenly
@@ -220,27 +217,3 @@ def _cell(months: Sequence[Month]) -> str:
         np.mean([not month.health.well for month in months]),
     )
     return ", ".join([f"{error:.1f}", *(f"{part:.0%}" for part in parts)])
-
-
-def draw(lives: Sequence[dict[str, list[Month]]], out: Path) -> None:
-    """Error and honesty month by month."""
-    figure = Figure(figsize=(8, 5), layout="constrained")
-    error, honest = figure.subplots(2, 1, sharex=True)
-    for name in LIVES:
-        months = list(zip(*(one[name] for one in lives), strict=True))
-        error.plot([1e3 * np.mean([m.errors for m in month]) for month in months], label=name)
-        honest.plot([100 * np.mean([m.held for m in month]) for month in months])
-    for month, event in EVENTS.items():
-        for axes in (error, honest):
-            axes.axvline(month, color="0.7", linewidth=0.8)
-        at = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points"}
-        error.annotate(str(event["event"]), (month, 1), (3, -11), fontsize=8, **at)
-    honest.axhline(90, color="0.5", linestyle=":")
-    error.set(ylabel="mean error, mm", ylim=(0, 15))
-    honest.set(ylabel="in the 90 % ellipse, %", xlabel="month", ylim=(0, 102))
-    error.legend(fontsize=8, loc="lower left")
-    figure.savefig(out, dpi=110)
-
-
-if __name__ == "__main__":
-    draw([lived(seed, life()) for seed in SEEDS], Path(sys.argv[1]))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -10,11 +9,10 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from bench_rig import Rig, evenly, gap, held
+from bench_rig import evenly, gap, held
 from report import Floats, Report, mm, progress, table
-from tomoskin.core import FloatArray, Touch
 from tomoskin.model.skin import Skin
-from tomoskin.pipeline import Pipeline, Prepared, prepare
+from tomoskin.pipeline import Prepared, prepare
 from tomoskin.twin import Press, SteppedSkin, TwinSettings
 
 SEEDS = (41, 42)
@@ -181,85 +179,3 @@ def _is_shown(twin: SteppedSkin, seconds: float) -> bool:
     """Whether anything is reported once a touch should be gone."""
     shown = [bool(twin.step(()).touches) for _ in range(round(seconds / twin.period))]
     return any(shown[round(QUIET / twin.period) :])
-
-
-COUNTED = ("textile-disc-8", "textile-disc-16", "textile-disc-32")
-COUNTED_SEEDS, COUNTED_PRESSES = (101, 102), 30
-COUNTED_FORCES, TIP, RIM = (1.0, 2.0, 5.0), 0.01, 0.012
-UNTOUCHED, PRESSED, FREE = 60, 6, 4
-REACHED = 0.0225
-
-
-def run_electrodes() -> Iterator[Report]:
-    """8, 16 and 32 electrodes at one read-out: where presses are found, and what a frame costs."""
-    yield table(
-        "presses found by the fit",
-        map(counted, COUNTED),
-        f"200 mm textile twin, {COUNTED_PRESSES} places a seed, seeds {COUNTED_SEEDS}, "
-        f"{COUNTED_FORCES} N in turn, 50 mA, four conversions of 12 bits, as the Pico's front end "
-        f"reads; found: in the {PRESSED}th frame within {1e3 * REACHED:g} mm; processor time",
-    )
-
-
-def counted(name: str) -> dict[str, Any]:
-    """Values of one skin."""
-    began = time.process_time()
-    pico = Skin.load("textile-disc-32").readout
-    skin = Skin.load(name).altered(
-        {
-            "drive": {"current": "50 mA"},
-            "readout": {
-                "adc_bits": pico.adc_bits,
-                "reference_voltage": f"{pico.reference_voltage} V",
-                "gain": pico.gain,
-                "oversampling": pico.oversampling,
-                "settling": f"{1e6 * pico.settling} us",
-            },
-        }
-    )
-    prepared = prepare(skin)
-    prepared.warm_up()
-    set_up = time.process_time() - began
-    parts = []
-    for seed in COUNTED_SEEDS:
-        progress(f"{name}, seed {seed}")
-        parts.append(measured(prepared, seed))
-    errors, forces = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
-    rest, pressed = (np.concatenate([part[k] for part in parts]) for k in (2, 3))
-    near, light = errors < REACHED, forces == COUNTED_FORCES[0]
-    found = 1e3 * errors[near]
-    return {
-        "electrodes": prepared.pattern.n_electrodes,
-        "measurements": prepared.pattern.n_meas,
-        "set-up, s": f"{set_up:.1f}",
-        "reference, s": f"{max(rest.max(), pressed.max()):.1f}",
-        "frame at rest, ms": f"{1e3 * np.median(rest):.1f}",
-        "pressed, ms": f"{1e3 * np.median(pressed):.1f}",
-        "found": f"{near.sum()} of {len(errors)}",
-        "median error, mm": f"{np.median(found):.1f}",
-        "p90, mm": f"{np.percentile(found, 90):.1f}",
-        "1 N: found": f"{(near & light).sum()} of {light.sum()}",
-        "1 N: median, mm": f"{1e3 * np.median(errors[near & light]):.1f}",
-    }
-
-
-def measured(prepared: Prepared, seed: int) -> tuple[FloatArray, ...]:
-    """Errors m (infinite: none), forces N, s a frame at rest and pressed."""
-    random, pipeline = np.random.default_rng(seed), Pipeline(prepared)
-    rig, forces = Rig(prepared.skin, "textile", seed), np.resize(COUNTED_FORCES, COUNTED_PRESSES)
-    errors, rest, pressed = [], [], []
-
-    def pushed(presses: tuple[Press, ...], count: int, taken: list[float]) -> tuple[Touch, ...]:
-        for frame in [rig.frame(presses) for _ in range(count)]:
-            began = time.process_time()
-            result = pipeline.push(frame)
-            taken.append(time.process_time() - began)
-        return result.touches if result else ()
-
-    pushed((), UNTOUCHED, rest)
-    for force in forces:
-        ((x, y),) = evenly(random, 1, 0.1 - RIM).tolist()
-        touches = pushed((Press(x, y, force, TIP),), PRESSED, pressed)
-        errors.append(min((gap(t, (x, y)) for t in touches), default=np.inf))
-        pushed((), FREE, rest)
-    return np.array(errors), forces, np.array(rest), np.array(pressed)

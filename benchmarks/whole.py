@@ -24,7 +24,7 @@ import page
 import session
 import twin
 from bench_rig import labelled_presses
-from forward_measure import ALPHA, PATTERN, disc, measure_touch, set_up
+from forward import ALPHA, PATTERN, disc, measure_touch, set_up
 from forward_others import INSTALLED, Peer, Script
 from report import Report, cell, clock, medians, progress
 from tomoskin import ForwardModel, Locator, Skin
@@ -219,7 +219,7 @@ def _session() -> Iterator[Line]:
     frames = session.frames_of(skin)
     with tempfile.TemporaryDirectory() as folder:
         paced, long = Path(folder) / "paced.mcap", Path(folder) / "long.mcap"
-        row = session.recorded(paced, skin, frames, RECORDED, paced=True)
+        row = session.recorded(paced, skin, frames, RECORDED)
         yield Line("recording 1,000 frames/s", "% of a core", row["% of a core"], "< 20")
         row = session.opened(session.of_length(long, skin, frames, SOUGHT), SOUGHT)
         seek = row["open and seek ms"]
