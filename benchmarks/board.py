@@ -13,13 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from bench_rig import Rig
 from report import Floats, Report, rms, table
 from tomoskin.board.source import BOARDS, Link, ScanSettings, SerialTransport, Timing
 from tomoskin.core import Event, Frame
 from tomoskin.model.pattern import Pattern, Scan
-from tomoskin.model.skin import Skin
-from tomoskin.sensing.signal import FIGURES, Readout
+from tomoskin.sensing.signal import FIGURES
 from tomoskin.twin.emulator.board_process import BoardProcess, Front, OwnVoltages, SkinMemory
 from tomoskin.twin.emulator.program import programs_of
 
@@ -41,7 +39,7 @@ FREQUENCIES = (
 )
 """Boards, electrodes and Hz of the alternation; 0: direct."""
 
-SECONDS, SEED, TICKS = 60.0, 3, 250e3
+SEED, TICKS = 3, 250e3
 OVERSAMPLING = 16
 """Conversions of 10 bits a sample with alternating drive; of 12 bits a quarter."""
 
@@ -170,7 +168,7 @@ class Seen:
 
 
 def run_chopped() -> Iterator[Report]:
-    """Direct and alternating drive: frames a second and noise of both boards, drift of the twin."""
+    """Direct and alternating drive: frames a second and noise of both boards."""
     cases = ((b, n, f) for b, n, frequencies in FREQUENCIES for f in frequencies)
     yield table(
         f"{CHOPPED_FRAMES} frames of both boards' real firmware",
@@ -181,13 +179,6 @@ def run_chopped() -> Iterator[Report]:
         "noise: standard deviation of a row, of which the converter has 0.7 LSB of 10 "
         "bits; electrodes have a voltage of their own of 2 mV (standard deviation): offset "
         "seen is what the rows show of it, root mean square against none",
-    )
-    yield table(
-        f"{SECONDS:.0f} s of the twin: a gel with 8 electrodes that polarise, untouched",
-        (_drifted(m, kind) for m in ("direct", "chopped") for kind in ("ideal", "polarising")),
-        "200 mm disc, 200 ohm/sq, 1 mA, adjacent; preset hydrogel, whose temperature "
-        f"drifts by itself; seed {SEED}",
-        "noise: from frame to frame; drift: of the mean of a second, first to last; rms of rows",
     )
 
 
@@ -230,28 +221,3 @@ def _rows(
     per_count = REFERENCE / (1024 * GAIN * OVERSAMPLING)
     rows = (samples[:, scan.plus] - samples[:, scan.minus]) * per_count
     return rows, rate, mode.periods if mode else 0
-
-
-def _drifted(mode: str, electrodes: str) -> dict[str, Any]:
-    drive = {"current": "1 mA", "mode": mode}
-    skin = Skin.load("textile-disc-8").altered(
-        {
-            "material": {"sheet_resistance": "200 ohm/sq"},
-            "drive": drive | ({"chop_frequency": "0.3 kHz"} if mode == "chopped" else {}),
-            "readout": {"gain": 4, "offset": "1 V", "settling": "500 us"},
-            "twin": {"preset": "hydrogel", "electrodes": electrodes},
-        }
-    )
-    rig, readout = Rig(skin, "hydrogel", SEED), Readout.of(Scan.of(skin.pattern()), skin.readout)
-    voltages = [readout(rig.at(float(t))) for t in np.arange(0.0, SECONDS, rig.interval)]
-    assert not any(v.excluded.any() for v in voltages)
-    values, second = np.array([v.values for v in voltages]), round(1 / rig.interval)
-    moved = values[-second:].mean(axis=0) - values[:second].mean(axis=0)
-    return {
-        "drive": "0.3 kHz" if mode == "chopped" else "direct",
-        "electrodes": electrodes,
-        "frames/s": f"{1 / rig.interval:.1f}",
-        "noise, uV": f"{1e6 * np.diff(values, axis=0).std() / np.sqrt(2):.0f}",
-        "drift, uV": f"{1e6 * rms(moved):.0f}",
-        "signal, uV": f"{1e6 * rms(values):.0f}",
-    }

@@ -1,7 +1,11 @@
-"""Forward engine: solves, Jacobians, set-up and local update against pyEIT and plain scipy."""
+"""Forward engine: solves, Jacobians, set-up and local update against pyEIT and plain scipy.
+
+``python benchmarks/forward.py FOLDER`` writes the cases that ``eidors/time_eidors.m`` times.
+"""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
@@ -12,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.io import savemat
 
 import forward_others as others
 from forward_others import Script, peer_name
@@ -379,3 +384,45 @@ def _touch_table(m: Measured) -> Report:
         "× is how many times longer a fresh one takes",
         "faer and own: factor and solve alone, as in the table of forward solves",
     )
+
+
+EIDORS_SIZES, EIDORS_SECONDS = (3000, 12_000), 2.0
+"""Triangles of the cases for ``eidors/time_eidors.m``."""
+
+
+def eidors_case(case: Case) -> dict[str, Any]:
+    """What EIDORS needs of the model, counted from 1, with our voltages V and times s."""
+    mesh = case.mesh
+    model = ForwardModel(mesh, PATTERN, case.contact_impedance)
+    sigma = np.exp(0.3 * np.random.default_rng(1).standard_normal(len(mesh.cells)))
+    calls = {"forward": lambda: model.solve(sigma), "jacobian": lambda: model.jacobian(sigma)}
+    times = medians(calls, EIDORS_SECONDS, least=9)
+    nodes = np.empty(ELECTRODES, object)  # MATLAB's cells: arrays of their own lengths
+    for number, facets in enumerate(mesh.electrodes):
+        nodes[number] = np.unique(facets) + 1
+    return {
+        "nodes": mesh.points,
+        "elems": mesh.cells + 1,
+        "electrode_nodes": nodes,
+        "z_contact": np.full(ELECTRODES, case.contact_impedance),
+        "drive": PATTERN.drive + 1,
+        "measure": PATTERN.measure + 1,
+        "sigma": sigma[:, None],
+        "v_tomoskin": model.solve(sigma).voltages[:, None],
+        "forward_s": np.array(times["forward"]),
+        "jacobian_s": np.array(times["jacobian"]),
+    }
+
+
+def main(folder: Path, sizes: tuple[int, ...] = EIDORS_SIZES) -> list[Path]:
+    """Write the cases as MATLAB files, with our voltages and times; their paths."""
+    folder.mkdir(parents=True, exist_ok=True)
+    files = [folder / f"disc16_{cells}.mat" for cells in sizes]
+    for file, cells in zip(files, sizes, strict=True):
+        savemat(file, eidors_case(disc(file.stem, cells)))
+    return files
+
+
+if __name__ == "__main__":
+    for written in main(Path(sys.argv[1] if len(sys.argv) > 1 else "cases")):
+        print(written)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,6 @@ from tomoskin.core import Touch
 from tomoskin.learning import FORCE
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Pipeline, Prepared, prepare
-from tomoskin.run.board_memory import Trial
 from tomoskin.twin import Press
 
 SEEDS = (11,)
@@ -33,15 +31,6 @@ WARMING = 5.0
 """K by which the sheet warms up in the hour, beside its own wandering: 0.38 % of all a kelvin."""
 
 RADIUS, SPREAD = 0.012, 0.05
-
-RESTARTED, RESTARTED_SEEDS = ("textile-disc-8", "textile-disc-16"), range(11, 23)
-"""Nothing here was chosen on these seeds either."""
-
-PAUSES = ((60.0, 0.1), (600.0, 0.5), (3600.0, 3.0), (3600.0, -5.0))
-"""Seconds between two runs, and K by which the sheet warms up meanwhile."""
-
-KEPT, FRAMES, FORCE_BEFORE = 60, 60, 5.0
-VERDICTS = {True: "holds", False: "renewed", None: "touched"}
 
 Seen = tuple[float, tuple[Touch, ...]]
 """A frame: seconds since the press, or since it was lifted, and the touches in it."""
@@ -125,47 +114,3 @@ def judged(held: Sequence[Seen], after: Sequence[Seen], place: Floats) -> dict[s
         "N at first": f"{np.median(forces[first]):.2f}" if forces else None,
         "N at the end": f"{np.median(forces[last]):.2f}" if forces else None,
     }
-
-
-def run_restarted() -> Iterator[Report]:
-    """A program that is started again: does its last reference hold, and show a press?"""
-    rows = []
-    for name in RESTARTED:
-        prepared = prepare(Skin.load(name))
-        for (pause, warmer), force in ((p, f) for p in PAUSES for f in (0.0, FORCE_BEFORE)):
-            progress(f"{name}, {pause:g} s, {warmer:+g} K, {force:g} N")
-            ends = [_again(prepared, pause, warmer, force, s) for s in RESTARTED_SEEDS]
-            verdicts, counts, errors = zip(*ends, strict=True)
-            case = {"skin": name, "pause, s": pause, "warmer, K": warmer, "press": f"{force:g} N"}
-            case |= {verdict: verdicts.count(verdict) for verdict in VERDICTS.values()}
-            known = [error for error in errors if np.isfinite(error)]
-            error = f"{np.median(known):.1f}" if known else "–"
-            rows.append(case | {"touches, at most": max(counts), "error, mm": error})
-    seeds = f"seeds {RESTARTED_SEEDS[0]} to {RESTARTED_SEEDS[-1]}"
-    note = f"preset textile, {seeds}; the press stands before the start"
-    yield table("started again after a pause", rows, note)
-
-
-def _again(
-    prepared: Prepared, pause: float, warmer: float, force: float, seed: int
-) -> tuple[str, int, float]:
-    """Verdict, touches in the last frame, and mm from the press to the nearest of them, of a second
-    run, which begins with the last frames of the first."""
-    x, y = np.random.default_rng(seed).uniform(-SPREAD, SPREAD, 2).tolist()
-    trial, verdict, last = Trial(0.0), None, None
-    rig, pipeline = Rig(prepared.skin, "textile", seed), Pipeline(prepared)
-    begun, rate = KEPT * rig.interval + pause, prepared.skin.readout.tick_rate
-    kept = [rig.frame() for _ in range(KEPT)]
-    rig.board.sheet.warm(warmer)
-    rig.board.sheet.set_presses((Press(x, y, force=force, radius=RADIUS),) if force else ())
-    for number, frame in enumerate(kept):
-        pipeline.push(replace(frame, host_time=begun - 1e-3 * (KEPT - number)))
-    for number in range(FRAMES):
-        since = number * rig.interval
-        frame = replace(rig.at(begun + since), sequence=number, ticks=round(since * rate))
-        if (result := pipeline.push(frame)) is not None:
-            verdict, last = trial.push(result) if verdict is None else verdict, result
-    assert last is not None
-    near = nearest(last.touches, (x, y)) if force else None
-    error = np.nan if near is None else 1e3 * gap(near, (x, y))
-    return VERDICTS[verdict], len(last.touches), error
