@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -42,6 +41,8 @@ UNTOUCHED = 300
 NOISES = ("as the skin file says", "hum, 3 times the noise", "drift, 1 % in 300 s, and walk")
 
 Course = Callable[[float], tuple[Press, ...]]
+Seen = dict[str, list[tuple[float, tuple[Touch, ...]]]]
+"""What "drives" and "frames" have told, and when: s of the rig."""
 
 
 class DriveRig:
@@ -94,24 +95,13 @@ class DriveRig:
             head = self.number, round(start * TICKS), self.time, 0, 0, 0
             result = self.pipeline.push_drive(DriveSamples(*head, 0, drive, drive, counts))
             if seen is not None:
-                seen.drives.append((self.time, self.known if result is None else result.touches))
+                seen["drives"].append((self.time, self.known if result is None else result.touches))
         head = self.number, round(began * TICKS), self.time, 0, 0, 0
         frame = self.pipeline.push(Frame(*head, np.concatenate(parts)))
         if frame is not None:
             self.known = frame.touches
         if seen is not None:
-            seen.frames.append((self.time, self.known))
-
-
-Shown = list[tuple[float, tuple[Touch, ...]]]
-
-
-@dataclass
-class Seen:
-    """What drives and frames have told, and when: s of the rig."""
-
-    drives: Shown = field(default_factory=list)
-    frames: Shown = field(default_factory=list)
+            seen["frames"].append((self.time, self.known))
 
 
 def run() -> Iterator[Report]:
@@ -166,17 +156,17 @@ def _pressed(name: str, board: str) -> dict[str, Any]:
         for _ in range(PRESSES):
             press = _drawn(random, _place(random, Skin.load(name)))
             seen, onset, release = _watched(rig, random, press)
-            for way, shown in (("drives", seen.drives), ("frames", seen.frames)):
+            for way, shown in seen.items():
                 first[way].append(next((t - onset for t, ts in shown if t > onset and ts), np.inf))
                 after = [(t, ts) for t, ts in shown if t > release]
                 last = max([k for k, (_, ts) in enumerate(after) if ts], default=-1) + 1
                 gone[way].append(after[last][0] - release if last < len(after) else np.inf)
-            told = next((ts for t, ts in seen.drives if t > onset and ts), ())
+            told = next((ts for t, ts in seen["drives"] if t > onset and ts), ())
             if (touch := nearest(told, press)) is not None:
                 errors.append(gap(touch, press))
                 inside.append(distance(touch.detection, press.x, press.y) < INSIDE_90)
                 sizes.append(np.hypot(touch.detection.sd_x, touch.detection.sd_y))
-            kept += len({t.id for _, ts in (*seen.drives, *seen.frames) for t in ts}) == 1
+            kept += len({t.id for _, ts in (*seen["drives"], *seen["frames"]) for t in ts}) == 1
     row: dict[str, Any] = {"skin": name, "board": board, "scan ms": round(1e3 * rig.period, 1)}
     for title, ways in (("first", first), ("release", gone)):
         for way, times in ways.items():
@@ -197,7 +187,7 @@ def _watched(rig: DriveRig, random: np.random.Generator, press: Press) -> tuple[
         rig.turn(lambda _: (), ())
     onset = rig.time + random.uniform() * rig.period
     release = onset + (HELD + random.uniform()) * rig.period
-    seen = Seen()
+    seen: Seen = {"drives": [], "frames": []}
     for _ in range(1 + HELD + AFTER):
         rig.turn(lambda t: (press,) if onset <= t < release else (), (onset, release), seen)
     return seen, onset, release
@@ -274,12 +264,12 @@ def _course(
         x, y = at(time).tolist()
         return (Press(x, y, press.force, press.radius),) if time >= onset else ()
 
-    seen = Seen()
+    seen: Seen = {"drives": [], "frames": []}
     arrived = onset + length / speed
     while rig.time < arrived:
         rig.turn(course, (onset,), seen)
     heading = (end - begin) / length
-    for way, shown in (("drives", seen.drives), ("frames", seen.frames)):
+    for way, shown in seen.items():
         for time, touches in shown:
             if not onset + LATE < time < arrived:
                 continue

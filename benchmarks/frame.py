@@ -65,13 +65,6 @@ def row(prepared: Prepared, repeats: int = REPEATS, presses: int = 2) -> dict[st
     }
 
 
-def p50(prepared: Prepared, repeats: int) -> float:
-    """Median of a frame, ms."""
-    idle, pressed = _chunks(prepared, 2)
-    taken, _ = _taken(Decoder(), Pipeline(prepared), idle, pressed, repeats)
-    return 1e3 * float(np.median(taken))
-
-
 def _taken(
     decoder: Decoder, pipeline: Pipeline, idle: list[bytes], pressed: list[bytes], repeats: int
 ) -> tuple[list[float], int]:

@@ -180,7 +180,9 @@ def _touch() -> Iterator[Line]:
     """Places on the twin: fitted to the voltages, and learnt from labelled presses."""
     skin = Skin.load(SKIN)
     fitted = prepare(skin.altered({"touch": {"method": "fit"}}))
-    yield Line("two touches fitted to the voltages, p50", "ms a frame", frame.p50(fitted, 2))
+    yield Line(
+        "two touches fitted to the voltages, p50", "ms a frame", frame.row(fitted, 2)["p50 ms"]
+    )
     dv, xy = labelled_presses(skin, 1, LEARNT + TESTED)
     began = time.process_time()
     locator = Locator.fit(dv[:LEARNT], xy[:LEARNT], skin=skin)
