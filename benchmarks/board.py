@@ -7,7 +7,6 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -101,7 +100,7 @@ def _ran(
     front = Front(0.1, 1e9, 1.0, 0.0, volts, float(1 << bits), 0.0)
     # emulated time runs faster than the host's on a Mega, so must the heartbeat; slower on a Pico
     timing = Timing(ping=0.02) if board == "mega" else Timing(answer=5.0, silence=60.0)
-    wanted, seen = _expected(scan, front, oversampling), Seen()
+    wanted = _expected(scan, front, oversampling)
     arms = np.arange(1.0, electrodes + 1)
     with _emulated(board, front, arms, lambda to: Link(to, scan, settings, timing=timing)) as (
         link,
@@ -109,19 +108,18 @@ def _ran(
     ):
         link.connect()
         before, began = _counted(watch), time.monotonic()
-        seen.watch(link, wanted, count)
+        seconds, wrong, resets = _watched(link, wanted, count)
         after, took = _counted(watch), time.monotonic() - began
         lost, corrupt = link.frames.lost, link.counters.corrupt
-    seconds = (seen.last - seen.first) / TICKS
     row = {
         "electrodes": electrodes,
         "settling, us": f"{1e6 * settling:.0f}",
         "oversampling": oversampling,
-        "frames/s": f"{(seen.frames - 1) / seconds:.1f}",
-        "wrong": seen.wrong,
+        "frames/s": f"{count / seconds:.1f}",
+        "wrong": wrong,
         "lost": lost,
         "corrupt": corrupt,
-        "resets": seen.resets,
+        "resets": resets,
         "times real": f"{seconds / took:.2f}",
     }
     if board == "pico":
@@ -144,27 +142,19 @@ def _expected(scan: Scan, front: Front, oversampling: int) -> np.ndarray:
     return counts
 
 
-@dataclass
-class Seen:
-    """Frames, those that are wrong, fresh starts of the board, ticks of the first and the last."""
-
-    frames: int = 0
-    wrong: int = 0
-    resets: int = 0
-    first: int = 0
-    last: int = 0
-
-    def watch(self, link: Link, wanted: np.ndarray, count: int) -> None:
-        """Look at so many frames."""
-        while self.frames < count:
-            for item in link.poll(0.05):
-                if not isinstance(item, Frame):
-                    self.resets += isinstance(item, Event) and item.kind == "reset"
-                    continue
-                right = np.array_equal(item.samples, wanted)
-                self.wrong += not (right and item.flags == (item.sequence == 0))
-                self.first, self.last = (self.first if self.frames else item.ticks), item.ticks
-                self.frames += 1
+def _watched(link: Link, wanted: np.ndarray, count: int) -> tuple[float, int, int]:
+    """So many frames: s that they took by the board's clock, those that are wrong, its resets."""
+    frames = wrong = resets = first = last = 0
+    while frames < count:
+        for item in link.poll(0.05):
+            if not isinstance(item, Frame):
+                resets += isinstance(item, Event) and item.kind == "reset"
+                continue
+            right = np.array_equal(item.samples, wanted)
+            wrong += not (right and item.flags == (item.sequence == 0))
+            first, last = (first if frames else item.ticks), item.ticks
+            frames += 1
+    return (last - first) * count / (frames - 1) / TICKS, wrong, resets
 
 
 def run_chopped() -> Iterator[Report]:

@@ -71,9 +71,7 @@ def run_long() -> Iterator[Report]:
 
 def measured(seconds: float) -> Report:
     """The whole chain for ``seconds`` after the reference."""
-    prepared = prepare(Skin.load(SKIN).altered({"readout": {"settling": SETTLING}}))
-    progress("tables of the fit")
-    prepared.warm_up()
+    prepared = prepared_chain()
     progress(f"{seconds:.0f} s")
     with tempfile.TemporaryDirectory() as folder:
         row, touches = _ran(prepared, Path(folder), seconds)
@@ -85,6 +83,13 @@ def measured(seconds: float) -> Report:
         f"promised: 99 of 100 within {PROMISED:g} ms",
         f"{touches:,} touches; load of the machine {os.getloadavg()[0]:.0f}",
     )
+
+
+def prepared_chain(name: str = SKIN, settling: str = SETTLING) -> Prepared:
+    """A skin at that settling, with the tables of its fit."""
+    prepared = prepare(Skin.load(name).altered({"readout": {"settling": settling}}))
+    prepared.warm_up()
+    return prepared
 
 
 def _ran(prepared: Prepared, folder: Path, seconds: float) -> tuple[dict[str, Any], int]:
@@ -228,9 +233,7 @@ def run_boards() -> Iterator[Report]:
 
 def boards(count: int, seconds: float) -> Report:
     """The program with so many boards for ``seconds`` after the reference."""
-    prepared = prepare(Skin.load(BOARDS_SKIN).altered({"readout": {"settling": BOARDS_SETTLING}}))
-    progress("tables of the fit")
-    prepared.warm_up()
+    prepared = prepared_chain(BOARDS_SKIN, BOARDS_SETTLING)
     progress(f"{seconds:.0f} s")
     with tempfile.TemporaryDirectory() as folder, contextlib.ExitStack() as stack:
         places = [Path(folder) / f"board{number}" for number in range(count)]

@@ -17,12 +17,11 @@ from pathlib import Path
 import numpy as np
 
 from bench_rig import served
-from chain import LEAD, SETTLING, SKIN, board, elsewhere
+from chain import LEAD, SKIN, board, elsewhere, prepared_chain
 from report import Report, Row, progress, table
 from tomoskin.board.source import SerialTransport
 from tomoskin.core import DataError
-from tomoskin.model.skin import Skin
-from tomoskin.pipeline import Prepared, prepare
+from tomoskin.pipeline import Prepared
 from tomoskin.run import LiveSkin, Runner
 from tomoskin.run.sinks import make_sink
 
@@ -60,7 +59,7 @@ Messages = list[tuple[float, float, bool]]
 
 def run() -> Iterator[Report]:
     """From the stamp of a frame to who listens to a sink, in another process: two minutes."""
-    prepared, rows = _prepared(), []
+    prepared, rows = prepared_chain(), []
     for kind in (LOOP, *SINKS):
         progress(kind)
         with _listened(prepared, (kind,)) as (heard, _):
@@ -80,7 +79,7 @@ def run() -> Iterator[Report]:
 
 def run_lost() -> Iterator[Report]:
     """Seconds from the end of a board's process to every sink that says so."""
-    prepared, rows = _prepared(), []
+    prepared, rows = prepared_chain(), []
     for number in range(LOSSES):
         progress(f"loss {number + 1} of {LOSSES}")
         with _listened(prepared, (LOOP, *SINKS, "page")) as (heard, kill):
@@ -121,12 +120,6 @@ def _told(messages: Messages, gone: float) -> float:
 
 def _ms(seconds: float) -> str:
     return f"{1e3 * seconds:.0f}"
-
-
-def _prepared() -> Prepared:
-    prepared = prepare(Skin.load(SKIN).altered({"readout": {"settling": SETTLING}}))
-    prepared.warm_up()
-    return prepared
 
 
 @contextmanager

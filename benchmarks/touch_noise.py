@@ -22,17 +22,10 @@ PERIOD, BUSY = 0.05, 0.9
 class Noise:
     """Noise beside that of the read-out, of which one row has the deviation 1.
 
-    Attributes
-    ----------
-    samples, rows
-        Of each sample, in parts of the read-out's; of each row by itself, as a differential
-        board's.
-    hum, advance
-        Of the mains in a row, rms; turns by which it goes on between frames.
-    drift, walk
-        Part by which all voltages rise and fall in 300 s; of each electrode's random walk in 30 s.
-    loud, every
-        Times as loud as the others one electrode becomes, another one after so many frames.
+    ``samples``: of each, in parts of the read-out's; ``rows``: of each by itself, as a differential
+    board's; ``hum`` of the mains in a row, rms, with ``advance`` turns between frames; ``drift``:
+    part by which all voltages rise and fall in 300 s; ``walk`` of each electrode in 30 s; ``loud``:
+    times as loud as the others one electrode becomes, another one after ``every`` so many frames.
     """
 
     samples: float = 1.0

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -230,7 +231,7 @@ class Scores:
 def run() -> Iterator[Report]:
     yield table(
         "fingers that move, on uneven sheets",
-        (_row(electrodes, SEEDS, SCENES) for electrodes in ELECTRODES),
+        map(_row, ELECTRODES),
         f"seeds {SEEDS}, {SCENES} scenes of each kind; radii 12 to 20 mm, conductivity "
         f"down by 15 to 35 %, up and down in {1e3 * RAMP:.0f} ms, sheet uneven by 10 %",
         f"ghost: a touch farther than {1e3 * NEAR:.1f} mm from every finger of its own that "
@@ -239,10 +240,14 @@ def run() -> Iterator[Report]:
     )
 
 
-def _row(electrodes: int, seeds: Sequence[int], scenes: int) -> dict[str, Any]:
+def _row(electrodes: int) -> dict[str, Any]:
     scores = Scores()
-    for seed in seeds:
-        _measure(scores, electrodes, seed, scenes)
+    for seed in SEEDS:
+        sheet = Sheet(electrodes, seed)
+        for (index, (kind, drawn)), number in product(enumerate(KINDS.items()), range(SCENES)):
+            progress(f"{electrodes} electrodes, seed {seed}, {kind} {number}")
+            slides, seconds = drawn(np.random.default_rng([seed, index, number]))
+            scores.add(kind, slides, list(sheet.scene(slides, seconds)))
     onsets, releases = np.array(scores.onsets), np.array(scores.releases)
     past, parted = (
         ", ".join(f"{n} {w}" for w, n in scores.who[kind].most_common()) for kind in MEETINGS
@@ -260,15 +265,6 @@ def _row(electrodes: int, seeds: Sequence[int], scenes: int) -> dict[str, Any]:
         "past each other": past,
         "together and apart": parted,
     }
-
-
-def _measure(scores: Scores, electrodes: int, seed: int, scenes: int) -> None:
-    sheet = Sheet(electrodes, seed)
-    for index, (kind, drawn) in enumerate(KINDS.items()):
-        for number in range(scenes):
-            progress(f"{electrodes} electrodes, seed {seed}, {kind} {number}")
-            slides, seconds = drawn(np.random.default_rng([seed, index, number]))
-            scores.add(kind, slides, list(sheet.scene(slides, seconds)))
 
 
 def has_ghost(frame: Shown, slides: Sequence[Slide]) -> bool:
