@@ -271,11 +271,11 @@ def _several(prepared: Prepared, file: Path, ports: list[str], seconds: float) -
             stack.enter_context(runner.audience.subscribe("ages", partial(take, name)))
         stack.enter_context(page(next(iter(run.runners.values()))))
         threading.Event().wait(LEAD)
-        dropped = _dropped(run)
+        dropped = sum(state.dropped for state in run.statuses().values())
         began, before = time.process_time(), time.monotonic()
         threading.Event().wait(seconds)
         used, took = time.process_time() - began, time.monotonic() - before
-        dropped = _dropped(run) - dropped
+        dropped = sum(state.dropped for state in run.statuses().values()) - dropped
     numbers, late = [], list[float]()
     for name, rows in told.items():
         with SessionReader(file, name) as session:
@@ -299,7 +299,3 @@ def _several(prepared: Prepared, file: Path, ports: list[str], seconds: float) -
         "processor a frame, ms": f"{1e3 * used / len(late):.2f}",
         "of one core": f"{100 * used / took:.0f} %",
     }
-
-
-def _dropped(run: RobotRun) -> int:
-    return sum(state.dropped for state in run.statuses().values())

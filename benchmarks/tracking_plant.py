@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
 from itertools import product
 from typing import Any
 
@@ -14,10 +13,9 @@ from scipy.optimize import linear_sum_assignment
 
 from bench_rig import gap, scan_time, stage
 from report import Report, percent, progress, table
-from tomoskin.model.mesh import Mesh
 from tomoskin.pipeline import FrameResult, Pipeline
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
-from touch_lab import Finger, Plant, plant_mesh
+from touch_lab import Finger, Plant, sheet_mesh
 
 UNEVEN = 0.1
 RAMP = 0.05
@@ -61,17 +59,12 @@ class Shown:
     end: float
 
 
-@cache
-def _mesh(electrodes: int) -> Mesh:
-    return plant_mesh(stage(electrodes).skin)
-
-
 class Sheet:
     """A plant with a pipeline that has its reference: one scene after the other."""
 
     def __init__(self, electrodes: int, seed: int) -> None:
         prepared = stage(electrodes)
-        self.plant = Plant(prepared.skin, _mesh(electrodes), UNEVEN, seed)
+        self.plant = Plant(prepared.skin, sheet_mesh(f"{electrodes}"), UNEVEN, seed)
         self.pipeline = Pipeline(prepared)
         self._interval, self._number = scan_time(prepared), 0
         for _ in range(REFERENCE_FRAMES + SETTLED):
