@@ -162,6 +162,8 @@ def test_a_replay_ages_as_if_it_were_now(tmp_path, force_file):
         contacts = until(skin, lambda c: c.valid)
         assert 0 < contacts.age_s < 1.0
         assert contacts.latency is None
+        skin.max_age = 0.01
+        assert "ended" in until(skin, lambda c: c.problem and "ended" in c.problem).problem
 
 
 def test_the_reflex_of_the_documentation_acts_on_newtons(monkeypatch, force_file, tmp_path):

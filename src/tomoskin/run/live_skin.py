@@ -56,7 +56,9 @@ class LiveSkin:
         self._mine.given = news = self.runner.news
         contacts = self.runner.contacts_of(news)
         if contacts.valid and contacts.age_s > self.max_age:
-            return contacts.outdated(f"the newest frame is {contacts.age_s:.2f} s old")
+            played = self.runner.flow.played
+            ended = "the replay has ended" if played and played.ended else ""
+            return contacts.outdated(ended or f"the newest frame is {contacts.age_s:.2f} s old")
         return contacts
 
     def wait(self, timeout: float) -> Contacts:
