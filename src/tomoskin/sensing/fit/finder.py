@@ -13,7 +13,6 @@ import numpy as np
 from tomoskin.core import Detection, FloatArray, reach
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.skin import Skin
-from tomoskin.sensing.fit.drive_view import CellDiscs, DriveView
 from tomoskin.sensing.fit.expectation import Expectation, ResidualResponse
 from tomoskin.sensing.fit.hypotheses import CommonModeJump, Explained, Jumps, Rival, challenged
 from tomoskin.sensing.fit.policy import (
@@ -27,7 +26,7 @@ from tomoskin.sensing.fit.policy import (
 )
 from tomoskin.sensing.fit.problem import Matched, Problem
 from tomoskin.sensing.fit.selection import ForwardSelection, SpotDetections, judged
-from tomoskin.sensing.fit.sight import Sight
+from tomoskin.sensing.fit.sight import CellDiscs, DriveView, Sight
 from tomoskin.sensing.fit.spot import CONTENT, LOG_RADIUS, N_PARAMETERS
 from tomoskin.sensing.fit.spot_fit import Deficit
 from tomoskin.sensing.fit.spot_model import SpotModel

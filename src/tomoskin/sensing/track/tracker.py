@@ -18,14 +18,15 @@ from tomoskin.sensing.track.merging import (
     weigh_meetings,
 )
 from tomoskin.sensing.track.motion import SlideCorrection, TrackSettings, begin
-from tomoskin.sensing.track.residual import ResidualResponses, is_residual
 from tomoskin.sensing.track.trace import (
     Alone,
     Happening,
     MergedFinger,
+    ResidualResponses,
     TouchEvent,
     Trace,
     TrackClock,
+    is_residual,
 )
 
 
