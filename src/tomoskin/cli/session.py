@@ -180,7 +180,7 @@ def export(
     names = (skin,) if skin else skins_in(file)
     if len(names) > 1 and out.suffix.lower() != ".lerobot":
         raise typer.BadParameter(
-            f"expected one of the skins of {file}: {', '.join(names)}", param_hint="--skin"
+            f"expected one of {', '.join(names)}, got none", param_hint="--skin"
         )
     with ExitStack() as stack, Bar(f"writing {out}") as bar:
         session, *others = [stack.enter_context(SessionReader(file, name)) for name in names]

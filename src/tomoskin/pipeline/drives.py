@@ -135,23 +135,32 @@ class DriveWatch:
         self._withdrawn: tuple[Touch, ...] = ()
 
     def push(
-        self, drive: int, dv: FloatArray, clock: tuple[float, float], numbered: int
+        self,
+        drive: int,
+        dv: FloatArray,
+        clock: tuple[float, float],
+        numbered: int,
+        *,
+        late: bool = False,
     ) -> DriveResult | None:
         """Take a drive; what is known then, or None before drives tell anything.
 
         ``dv`` (n_meas,) difference data of which those of this drive are new; ``clock``: device
         and host time, s, of its start and of its last byte; ``numbered``: the last identity given.
+        ``late``: a newer one is there, so touches are not followed through this one.
         """
         if not self._ready() or self._evidence is None or self._filter is None:
             return None
         rows, (time, host_time) = self._evidence.rows[drive], clock
         data = self.view.change(dv)[rows]
         if not self._followed and self._initiation is not None:
-            onset = self._initiation.push(drive, data)
+            onset = self._initiation.push(drive, data, late=late)
             if onset is not None:
                 self._begin(onset, time, host_time, numbered + 1)
-        else:
+        elif not late:
             self._follow(rows, data, time)
+        if late:
+            return None
         there = [each for each in self._followed.values() if each.lifted is None]
         withdrawn, self._withdrawn = self._withdrawn, ()
         touches = tuple([self._shown(each, time) for each in there])
@@ -226,11 +235,11 @@ class DriveWatch:
         if self._filter is None:
             return
         moved = {n: f.moving.at(time + self._length / 2) for n, f in self._followed.items()}
-        changes = {n: self._filter.changes(touch, rows) for n, touch in moved.items()}
-        every = np.sum(list(changes.values()), axis=0)
-        for number, each in self._followed.items():
-            own = data - every + changes[number]
-            each.take(moved[number], *self._filter.pushed(moved[number], rows, own))
+        responses = {n: self._filter.response(touch.state, rows) for n, touch in moved.items()}
+        every = np.sum([change for change, _ in responses.values()], axis=0)
+        for n, each in self._followed.items():
+            own = data - every + responses[n][0]
+            each.take(moved[n], *self._filter.pushed(moved[n], rows, own, responses[n]))
 
     def _going_on(self, touch: Touch, before: Mapping[int, _Followed], time: float) -> _Followed:
         """A touch of a frame whose scan began at ``time`` s: as the drives have it where they

@@ -188,10 +188,10 @@ class Following:
         return self._result(measured, conditioned, view.image, touches, readings)
 
     def push_drive(
-        self, drive: int, values: FloatArray, clock: tuple[float, float]
+        self, drive: int, values: FloatArray, clock: tuple[float, float], *, late: bool
     ) -> DriveResult | None:
         """Take ``values`` (n_meas,) V of which those of a drive are new; what is known then, or
-        None where drives tell nothing. ``clock``: see :meth:`DriveWatch.push`."""
+        None where drives tell nothing. ``clock`` and ``late``: see :meth:`DriveWatch.push`."""
         if not isinstance(self._finder, FitFinder):
             return None
         dv = self.conditioning.newest(values)
@@ -202,7 +202,7 @@ class Following:
             follows = not any(c.kind.locates for c in self.prepared.calibrations.values())
             pattern = self.prepared.pattern
             self._drives = DriveWatch(view, pattern, self._interval, follows=follows)
-        result = self._drives.push(drive, dv, clock, self._tracker.ledger.numbered)
+        result = self._drives.push(drive, dv, clock, self._tracker.ledger.numbered, late=late)
         if result is None:
             return None
         finger = self._tracker.slides.of_finger

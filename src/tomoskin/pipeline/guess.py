@@ -18,7 +18,7 @@ from tomoskin.model.skin import Skin
 from tomoskin.pipeline.frame_result import DOUBTED, ModelAgreement
 from tomoskin.sensing.signal import Recording
 
-_MOST_ELECTRODES = 32
+_LARGEST = 32
 """Electrodes of a skin file."""
 
 _DIAMETER, _COVERED = 0.2, 0.3
@@ -45,9 +45,8 @@ def guess_skin(recording: Recording) -> str:
         When its currents into many electrodes do not combine into the drives of pairs.
     """
     n = electrodes_of(recording.drive, recording.measure)
-    if not 4 <= n <= _MOST_ELECTRODES:
-        expected = f"expected 4 to {_MOST_ELECTRODES} electrodes"
-        raise DataError(f"{expected}, got {n}", where=recording.source)
+    if not 4 <= n <= _LARGEST:
+        raise DataError(f"expected 4 to {_LARGEST} electrodes, got {n}", where=recording.source)
     drive, certain = _drive(recording, n)
     skin = Skin.from_toml(_text(recording, n, drive))
     if recording.is_change:

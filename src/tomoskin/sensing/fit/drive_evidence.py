@@ -19,6 +19,7 @@ from functools import cached_property, lru_cache
 from typing import NamedTuple, Self
 
 import numpy as np
+from scipy.linalg.lapack import dpotrf, dpotrs, dtrtrs
 from scipy.special import ndtri
 
 from tomoskin.core import FloatArray, IntArray
@@ -89,14 +90,28 @@ class DriveEvidence:
         """The measurements of each drive."""
         return _slices(self.firsts, len(self.precision))
 
+    @cached_property
+    def blocks(self) -> tuple[IntArray, FloatArray]:
+        """(n_drive, m) the measurements of each drive, and (n_drive, m, n) the signatures there; 0
+        where a drive has fewer."""
+        count = np.diff(self.firsts, append=len(self.precision))
+        within = np.arange(count.max())
+        every = np.minimum(self.firsts[:, None] + within, len(self.precision) - 1)
+        return every, self.signatures.T[every] * (within < count[:, None])[..., None]
+
+    def matched(self, data: FloatArray) -> FloatArray:
+        """(n_drive, n) products of the signatures' parts with ``data`` (n_meas,) 1/V."""
+        every, signatures = self.blocks
+        return np.asarray(np.matmul(data[every][:, None], signatures)[:, 0])
+
     def sizes(self, order: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
-        """(n, k) squared deviations of candidates of content 1 in the first one, two, … drives of
-        an ``order`` (k,), and (n, k) variances of what they match there."""
-        gram, wavers = (
-            part[:, order][:, :, order].cumsum(axis=1).cumsum(axis=2).diagonal(axis1=1, axis2=2)
-            for part in (self.gram, self.wavers)
-        )
-        return np.maximum(gram, 1e-300), np.maximum(gram, wavers)
+        """(n_drive, n) squared deviations of candidates of content 1 in the first one, two, …
+        drives of an ``order`` (n_drive,), and the deviations of what they match there."""
+        among = np.argsort(order) <= np.arange(len(order))[:, None]
+        both = (among[:, :, None] & among[:, None]).reshape(len(order), -1).astype(np.float64)
+        gram, wavers = (both @ p.reshape(len(p), -1).T for p in (self.gram, self.wavers))
+        gram = np.maximum(gram, 1e-300)
+        return gram, np.sqrt(np.maximum(gram, wavers))
 
     def threshold(self, drives_a_second: float, least: float) -> float:
         """Deviations that noise exceeds :data:`FALSE_AN_HOUR` times in an hour; no less than
@@ -156,43 +171,39 @@ class Initiation:
         self._data, self._order, self._since = other._data, other._order, other._since
         self._matched = self._evidence.precision @ self._data
 
-    def push(self, drive: int, data: FloatArray) -> Onset | None:
+    def push(self, drive: int, data: FloatArray, *, late: bool = False) -> Onset | None:
         """Take the ``data`` (m,) V of a drive; a touch, once one has begun.
 
         A touch comes down while a drive is read: that drive shows a part of it, and counts for its
         existence but not for its position. So a touch is not told before the drive after that.
+        ``late``: a newer drive is there already, which tells what both show.
         """
         evidence, rows = self._evidence, self._evidence.rows[drive]
         self._matched += evidence.precision[:, rows] @ (data - self._data[rows])
         self._data[rows] = data
-        self._order = (drive, *(d for d in self._order if d != drive))
-        if len(self._order) < len(evidence.firsts):
+        self._order = order = (drive, *(d for d in self._order if d != drive))
+        if self._since is not None:
+            self._since = min(self._since + 1, len(order) - 1)
+        if late or len(order) < len(evidence.firsts):
             return None
-        parts = np.add.reduceat(evidence.signatures * self._matched, evidence.firsts, axis=1)
-        content, ratio = self._likely(parts)
-        if self._since is None:
-            best = int(np.argmax(ratio.max(axis=0)))
-            if ratio[:, best].max() < self._threshold:
-                return None
-            self._since = best
-        else:
-            self._since = min(self._since + 1, len(self._order) - 1)
-        if not self._since:
-            return None
-        return self._onset(content[:, self._since - 1], ratio[:, self._since - 1], self._since)
-
-    def _likely(self, parts: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """(n, k) most likely content of each candidate since one, two, … drives, m², and by how
-        many deviations it stands out; ``parts`` (n, n_drive) products with the data."""
-        order = self._order
+        onto = evidence.matched(self._matched)[list(order)].cumsum(axis=0)
+        if self._sign != "both":
+            onto = np.minimum(onto, 0.0) if self._sign == "decrease" else np.maximum(onto, 0.0)
         if order not in self._sizes:
             if len(self._sizes) >= _ORDERS:
                 self._sizes.clear()
-            self._sizes[order] = self._evidence.sizes(order)
-        (size, variance), onto = self._sizes[order], parts[:, order].cumsum(axis=1)
-        if self._sign != "both":
-            onto = np.minimum(onto, 0.0) if self._sign == "decrease" else np.maximum(onto, 0.0)
-        return onto / size, np.abs(onto) / np.sqrt(np.maximum(variance, 1e-300))
+            self._sizes[order] = evidence.sizes(order)
+        size, deviation = self._sizes[order]
+        ratio = np.abs(onto) / deviation
+        if self._since is None:
+            best = int(ratio.argmax())
+            if ratio.flat[best] < self._threshold:
+                return None
+            self._since = best // ratio.shape[1]
+        if not self._since:
+            return None
+        newest = self._since - 1
+        return self._onset(onto[newest] / size[newest], ratio[newest], self._since)
 
     def _onset(self, content: FloatArray, ratio: FloatArray, drives: int) -> Onset:
         """The position by all candidates, each as likely as the data say; a strong touch differs
@@ -287,10 +298,23 @@ class MovingTouch:
         return self.state[:2], self.covariance[:2, :2] + memory
 
 
-def _cost(data: FloatArray, covariance: FloatArray) -> float:
-    """Less the logarithm of the likelihood of normal ``data`` (m,), up to what all have."""
-    square = float(data @ np.linalg.solve(covariance, data))
-    return (square + float(np.linalg.slogdet(covariance)[1])) / 2
+Response = tuple[FloatArray, FloatArray]
+"""(m,) V of a touch in the measurements of a drive, and (m, 8) its slopes."""
+
+
+def _root(covariance: FloatArray) -> FloatArray:
+    """(m, m) lower root; LinAlgError where there is none."""
+    root, fault = dpotrf(covariance, lower=1)
+    if fault:
+        raise np.linalg.LinAlgError("the covariance of a drive is not positive definite")
+    return np.asarray(root)
+
+
+def _cost(data: FloatArray, root: FloatArray) -> float:
+    """Less the logarithm of the likelihood of normal ``data`` (m,) with the ``root`` (m, m) of
+    their covariance, up to what all have."""
+    white = dtrtrs(root, data, lower=1)[0]
+    return float(white @ white) / 2 + float(np.log(root.diagonal()).sum())
 
 
 @lru_cache(maxsize=16)
@@ -328,33 +352,31 @@ class DriveFilter:
     sheet: SheetDomain
     noise: FloatArray
 
-    def changes(self, touch: MovingTouch, rows: slice) -> FloatArray:
-        """(m,) V that a touch changes."""
-        return self._response(touch.state, rows)[0]
-
     def pushed(
-        self, touch: MovingTouch, rows: slice, data: FloatArray
+        self, touch: MovingTouch, rows: slice, data: FloatArray, known: Response | None = None
     ) -> tuple[MovingTouch, float, float]:
-        """The touch after the ``data`` (m,) V of a drive at its time; and the logarithms of how
-        much likelier these are if it has been lifted before the drive, and if while it was read."""
+        """The touch after the ``data`` (m,) V of a drive at its time, where its response may be
+        ``known``; and the logarithms of how much likelier these are if it has been lifted before
+        the drive, and if while it was read."""
         before, spread = touch.state, touch.covariance
         own, state = self.noise[rows, rows], before
         gone = going = 0.0
         for step in range(_STEPS):
-            change, slopes = self._response(state, rows)
-            both = slopes @ spread @ slopes.T + own + np.diag((_OTHERWISE * change) ** 2)
-            off = data - change - slopes @ (before - state)
+            change, slopes = self.response(state, rows) if step or known is None else known
+            across = slopes @ spread
+            both = across @ slopes.T + own + np.diag((_OTHERWISE * change) ** 2)
+            off, root = data - change - slopes @ (before - state), _root(both)
             if not step:
-                stands, half = _cost(off, both), change / 2  # a measurement shows it, or none of it
-                gone = stands - _cost(data, own + _LEFT * np.outer(change, change))
-                going = stands - _cost(data - half, own + np.diag(half**2))
-            gain = np.linalg.solve(both, slopes @ spread).T
+                stands, half = _cost(off, root), change / 2  # a measurement shows it, or none of it
+                gone = stands - _cost(data, _root(own + _LEFT * np.outer(change, change)))
+                going = stands - _cost(data - half, _root(own + np.diag(half**2)))
+            gain = dpotrs(root, across, lower=1)[0].T
             state = self._held(before + gain @ off)
         left = spread - gain @ both @ gain.T
         return MovingTouch(touch.time, state, (left + left.T) / 2), gone, going
 
-    def _response(self, state: FloatArray, rows: slice) -> tuple[FloatArray, FloatArray]:
-        """(m,) V of a state, and (m, 8) its slopes."""
+    def response(self, state: FloatArray, rows: slice) -> Response:
+        """Of a ``state`` (8,)."""
         basis = self.solver.table.basis[:, rows]
         parts = self.solver.expanded(state[None, _SPOT])[0] @ basis
         change, own, unknown = parts[0], parts[1 : 1 + N_PARAMETERS], parts[1 + N_PARAMETERS :]
