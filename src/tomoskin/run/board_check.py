@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tomoskin.board import wire
 from tomoskin.board.source import (
     BOARDS,
     DEFAULT_BOARD,
@@ -19,19 +20,6 @@ from tomoskin.board.source import (
     Timing,
     Transport,
     board_named,
-)
-from tomoskin.board.wire import (
-    Ack,
-    BoardLimits,
-    Command,
-    Fault,
-    FaultCode,
-    Info,
-    Result,
-    SafeOff,
-    SetHeartbeat,
-    Start,
-    Stop,
 )
 from tomoskin.core import FloatArray, Frame, SourceError
 from tomoskin.model.pattern import Scan
@@ -79,8 +67,8 @@ class _Readings:
 
     mean: FloatArray
     sd: FloatArray
-    info: Info
-    board: BoardLimits | None
+    info: wire.Info
+    board: wire.BoardLimits | None
 
     @property
     def record(self) -> BoardRecord:
@@ -251,37 +239,37 @@ def check_safe_off(
     """
     board = Exchange(transport)
     configuration = Configuration.of(scan, settings)
-    set_up: tuple[Command, ...] = (
+    set_up: tuple[wire.Command, ...] = (
         configuration.scan,
         *configuration.patterns,
-        SetHeartbeat(0, _HEARTBEAT),
+        wire.SetHeartbeat(0, _HEARTBEAT),
     )
-    start = Start(0, configuration.identity)
-    _asked(board, Stop(0))
+    start = wire.Start(0, configuration.identity)
+    _asked(board, wire.Stop(0))
     for command in set_up:
         _accepted(_asked(board, command), command, transport)
     _accepted(_asked(board, start), start, transport)
-    _asked(board, Stop(0))
+    _asked(board, wire.Stop(0))
     late = any(isinstance(m, Frame) for m in board.listen(4 * configuration.scan_time))
     text = "frames continue after STOP" if late else "no frame after STOP"
     yield CheckFinding("stop", not late, text)
     _accepted(_asked(board, start), start, transport)
     heard = board.listen(_HEARD)
-    silent = any(isinstance(m, Fault) and m.code is FaultCode.HOST_SILENT for m in heard)
+    silent = any(isinstance(m, wire.Fault) and m.code is wire.FaultCode.HOST_SILENT for m in heard)
     since = f"{_HEARTBEAT} ms after the last message of the host"
     text = f"no frame {since}" if silent else f"frames continue {since}"
     yield CheckFinding("silence", silent, text)
-    _asked(board, SetHeartbeat(0, _USUAL))
-    _asked(board, SafeOff(0))
-    forgotten = _asked(board, start).result is Result.WRONG_CONFIGURATION
-    _asked(board, Stop(0))
+    _asked(board, wire.SetHeartbeat(0, _USUAL))
+    _asked(board, wire.SafeOff(0))
+    forgotten = _asked(board, start).result is wire.Result.WRONG_CONFIGURATION
+    _asked(board, wire.Stop(0))
     text = "nothing starts after SAFE_OFF until the board is set up again"
     text = text if forgotten else "START is accepted after SAFE_OFF"
     yield CheckFinding("safe off", forgotten, text)
 
 
-def _asked(board: Exchange, command: Command) -> Ack:
-    answer = board.ask(command, Ack, patience=_ANSWER, tries=_TRIES)
+def _asked(board: Exchange, command: wire.Command) -> wire.Ack:
+    answer = board.ask(command, wire.Ack, patience=_ANSWER, tries=_TRIES)
     if answer is None:
         raise SourceError(
             f"no answer to {type(command).__name__} for {_ANSWER * _TRIES:g} s",
@@ -291,8 +279,8 @@ def _asked(board: Exchange, command: Command) -> Ack:
     return answer
 
 
-def _accepted(answer: Ack, command: Command, transport: Transport) -> None:
-    if answer.result is not Result.OK:
+def _accepted(answer: wire.Ack, command: wire.Command, transport: Transport) -> None:
+    if answer.result is not wire.Result.OK:
         raise SourceError(
             f"the board refused {type(command).__name__}: {answer.result.name} ({answer.detail})",
             where=transport.name,

@@ -8,40 +8,17 @@ from enum import Enum, auto
 
 import numpy as np
 
+from tomoskin.board import wire
 from tomoskin.board.source.agreement import BOARDS_SINCE, check_held, check_version, fit_board
 from tomoskin.board.source.command_queue import CommandQueue, SequenceFilter
 from tomoskin.board.source.settings import Configuration, ScanSettings, Timing, choose_periods
-from tomoskin.board.wire import (
-    SCHEMA,
-    Ack,
-    BoardLimits,
-    Command,
-    Fault,
-    GetBoard,
-    GetInfo,
-    GetMode,
-    GetPattern,
-    GetScan,
-    HeldMode,
-    HeldPattern,
-    HeldScan,
-    Hello,
-    Info,
-    Message,
-    Ping,
-    Result,
-    SetBaud,
-    SetFormat,
-    Stop,
-    type_byte,
-)
 from tomoskin.core import DriveSamples, Event, Frame, SourceError
 from tomoskin.model.pattern import Scan
 
-_ANSWERED: dict[type[Message], type[Command]] = {
-    HeldScan: GetScan,
-    HeldPattern: GetPattern,
-    HeldMode: GetMode,
+_ANSWERED: dict[type[wire.Message], type[wire.Command]] = {
+    wire.HeldScan: wire.GetScan,
+    wire.HeldPattern: wire.GetPattern,
+    wire.HeldMode: wire.GetMode,
 }
 """What each answer of what a board holds was asked by."""
 
@@ -96,9 +73,9 @@ class ProtocolSession:
         self.drives = Assembler(self.frames, len(scan.drives), asked=settings.singly)
         self.commands = CommandQueue(timing, now, where)
         self.stage = Stage.WAITING
-        self.info: Info | None = None
-        self.board: BoardLimits | None = None
-        self._met: tuple[Info, ScanSettings] | None = None
+        self.info: wire.Info | None = None
+        self.board: wire.BoardLimits | None = None
+        self._met: tuple[wire.Info, ScanSettings] | None = None
         self.is_silent = False
         self._overdue = False
         self._silence = max(timing.silence, 4 * self.configuration.scan_time)
@@ -114,24 +91,24 @@ class ProtocolSession:
             f"messages arrive damaged: the board is set up again at the slower rate of {rate:,} Bd",
         )
 
-    def receive(self, message: Message, now: float) -> list[Received]:
+    def receive(self, message: wire.Message, now: float) -> list[Received]:
         """Act on a message from the board."""
         self._overdue = False
         match message:
             case Frame() | DriveSamples():
                 return self._samples(message, now)
-            case Hello():
+            case wire.Hello():
                 return self._hello(message, now)
-            case Info():
+            case wire.Info():
                 self._info(message, now)
-            case BoardLimits():
+            case wire.BoardLimits():
                 self._limits(message, now)
-            case HeldScan() | HeldPattern() | HeldMode():
+            case wire.HeldScan() | wire.HeldPattern() | wire.HeldMode():
                 return self._held(message, now)
-            case Ack():
+            case wire.Ack():
                 return self._ack(message, now)
-            case Fault():
-                text = SCHEMA.enums["fault"].sentence(message.code)
+            case wire.Fault():
+                text = wire.SCHEMA.enums["fault"].sentence(message.code)
                 return [Event(now, "fault", f"the board has switched its current off: {text}")]
         return []
 
@@ -143,7 +120,7 @@ class ProtocolSession:
         if self.stage is not Stage.RUNNING:
             return []
         if now >= self.commands.last_sent + self._timing.ping:
-            self.commands.send(Ping(0), now)
+            self.commands.send(wire.Ping(0), now)
         if self.is_silent or now < self._last_frame + self._silence:
             return []
         if not self._overdue:  # a busy host may not have read yet what has come
@@ -168,8 +145,8 @@ class ProtocolSession:
         self.stage = Stage.SETTING_UP
         self.info = self.board = self._met = None
         self.frames.close()
-        change = () if at is None else (Stop(0), SetBaud(0, at))
-        self.commands.restart((*change, GetInfo(0), Stop(0)), now)
+        change = () if at is None else (wire.Stop(0), wire.SetBaud(0, at))
+        self.commands.restart((*change, wire.GetInfo(0), wire.Stop(0)), now)
 
     def _answered(self, now: float) -> list[Received]:
         """The pending command has been answered: what follows."""
@@ -211,7 +188,7 @@ class ProtocolSession:
         self._set_up(now)
         return self.drives.say_whole(now)
 
-    def _hello(self, hello: Hello, now: float) -> list[Received]:
+    def _hello(self, hello: wire.Hello, now: float) -> list[Received]:
         check_version(hello, self._where)
         if self.stage is Stage.SETTING_UP and self.info is None:
             return []
@@ -227,9 +204,9 @@ class ProtocolSession:
         text = "the board was reset or missed the heartbeat: it is set up again"
         return [Event(now, "reset", text)] if was_running else []
 
-    def _info(self, info: Info, now: float) -> None:
+    def _info(self, info: wire.Info, now: float) -> None:
         pending = self.commands.pending
-        if isinstance(pending, GetInfo) and info.request == pending.request:
+        if isinstance(pending, wire.GetInfo) and info.request == pending.request:
             check_version(info, self._where)
             fitted = fit_board(info, self._scan, self._settings, self._where)
             if info.minor < BOARDS_SINCE:  # that is all that it says of itself
@@ -237,12 +214,12 @@ class ProtocolSession:
                 self.commands.add(self.configuration.commands(info.minor))
             else:
                 self._met = info, fitted
-                self.commands.add((GetBoard(0),))
+                self.commands.add((wire.GetBoard(0),))
             self._answered(now)
 
-    def _limits(self, board: BoardLimits, now: float) -> None:
+    def _limits(self, board: wire.BoardLimits, now: float) -> None:
         pending = self.commands.pending
-        asked = isinstance(pending, GetBoard) and board.request == pending.request
+        asked = isinstance(pending, wire.GetBoard) and board.request == pending.request
         if not asked or self._met is None:
             return
         info, fitted = self._met
@@ -253,14 +230,16 @@ class ProtocolSession:
         self.commands.add(self.configuration.commands(info.minor))
         self._answered(now)
 
-    def _held(self, held: HeldScan | HeldPattern | HeldMode, now: float) -> list[Received]:
+    def _held(
+        self, held: wire.HeldScan | wire.HeldPattern | wire.HeldMode, now: float
+    ) -> list[Received]:
         pending = self.commands.pending
         if not isinstance(pending, _ANSWERED[type(held)]) or held.request != pending.request:
             return []
         check_held(held, self.configuration.behind(pending), self._where)
         return self._answered(now)
 
-    def _ack(self, ack: Ack, now: float) -> list[Received]:
+    def _ack(self, ack: wire.Ack, now: float) -> list[Received]:
         pending = self.commands.pending
         if self.is_silent and pending is None:
             # It hears the heartbeat but does not scan: its HELLO or FAULT was lost.
@@ -269,15 +248,19 @@ class ProtocolSession:
             return [Event(now, "reset", "the board answers but does not scan: it is set up again")]
         if pending is None or ack.request != pending.request:
             return []
-        if ack.command != type_byte(type(pending)):
+        if ack.command != wire.type_byte(type(pending)):
             return []
-        if ack.result is Result.OK and isinstance(pending, _QUESTIONS):
+        if ack.result is wire.Result.OK and isinstance(pending, _QUESTIONS):
             return []  # no answer to a question
-        return self._answered(now) if ack.result is Result.OK else self._refused(ack, pending, now)
+        return (
+            self._answered(now)
+            if ack.result is wire.Result.OK
+            else self._refused(ack, pending, now)
+        )
 
-    def _refused(self, ack: Ack, command: Command, now: float) -> list[Received]:
+    def _refused(self, ack: wire.Ack, command: wire.Command, now: float) -> list[Received]:
         """The board has refused the pending command: goes on without it where that is possible."""
-        if isinstance(command, SetFormat) and self.drives.unsaid:
+        if isinstance(command, wire.SetFormat) and self.drives.unsaid:
             return self._go_whole(now)
         raise SourceError(
             f"the board refused {type(command).__name__}: {_reason(ack, command)}",
@@ -285,21 +268,23 @@ class ProtocolSession:
         )
 
 
-_QUESTIONS = (GetBoard, *_ANSWERED.values())
+_QUESTIONS = (wire.GetBoard, *_ANSWERED.values())
 
 
-def _reason(ack: Ack, refused: Command) -> str:
+def _reason(ack: wire.Ack, refused: wire.Command) -> str:
     """Why: the field of a value that is out of range by its name, with what the protocol allows."""
-    number = type_byte(type(refused))
-    message = next(message for message in SCHEMA.messages if message.type == number)
-    if ack.result is not Result.BAD_VALUE or ack.detail >= len(message.fields):
-        return f"{SCHEMA.enums['result'].sentence(ack.result)} ({ack.detail})"
+    number = wire.type_byte(type(refused))
+    message = next(message for message in wire.SCHEMA.messages if message.type == number)
+    if ack.result is not wire.Result.BAD_VALUE or ack.detail >= len(message.fields):
+        return f"{wire.SCHEMA.enums['result'].sentence(ack.result)} ({ack.detail})"
     field = message.fields[ack.detail]
     value = f"{getattr(refused, field.name)} {field.unit}".strip()
     return f"{field.name} of {value} is out of range ({field.text})"
 
 
-def _introduction(info: Info, board: BoardLimits | None, configuration: Configuration) -> str:
+def _introduction(
+    info: wire.Info, board: wire.BoardLimits | None, configuration: Configuration
+) -> str:
     firmware = ".".join(map(str, info.firmware))
     name = f"{board.text} " if board else ""
     return (

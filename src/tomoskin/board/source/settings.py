@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Self
 
+from tomoskin.board import wire
 from tomoskin.board.source.boards import BOARDS, DEFAULT_BOARD, board_named
-from tomoskin.board.wire import BoardLimits, Format
-from tomoskin.core import SourceError
-
-if TYPE_CHECKING:
-    from tomoskin.model.skin import Skin
-from functools import cached_property
-
 from tomoskin.board.wire import (
     SCHEMA,
     Command,
@@ -29,7 +24,11 @@ from tomoskin.board.wire import (
     crc16,
     encode_payload,
 )
+from tomoskin.core import SourceError
 from tomoskin.model.pattern import Scan
+
+if TYPE_CHECKING:
+    from tomoskin.model.skin import Skin
 
 PRESCALERS = (16, 32, 64, 128)
 """Clock dividers of the ATmega2560's converter that leave it accurate enough."""
@@ -87,12 +86,12 @@ class ScanSettings:
             raise SourceError(f"expected a prescaler of {PRESCALERS}, got {self.prescaler}")
 
     @property
-    def format(self) -> Format:
+    def format(self) -> wire.Format:
         """How samples are sent: one conversion of ten bits is shorter on the line when packed."""
         packs = self.oversampling == 1 and self.adc_bits == _PACKED_BITS
         if self.singly:
-            return Format.DRIVES_PACKED if packs else Format.DRIVES
-        return Format.PACKED if packs else Format.SIXTEEN
+            return wire.Format.DRIVES_PACKED if packs else wire.Format.DRIVES
+        return wire.Format.PACKED if packs else wire.Format.SIXTEEN
 
     def on_board(self, adc_bits: int) -> Self | None:
         """The settings that give samples of the same scale on a converter of ``adc_bits``.
@@ -153,7 +152,7 @@ def scan_time(
     n_drives: int,
     n_samples: int,
     settings: ScanSettings,
-    board: BoardLimits | None = None,
+    board: wire.BoardLimits | None = None,
     periods: int = 0,
 ) -> float:
     """Seconds of one scan on ``board``; without one, on the slowest that there is.
@@ -173,7 +172,7 @@ def scan_time(
 
 
 def half_time(
-    board: BoardLimits, settings: ScanSettings, periods: int, channels: int, tick_rate: float
+    board: wire.BoardLimits, settings: ScanSettings, periods: int, channels: int, tick_rate: float
 ) -> int:
     """ns that half a period takes at least; the firmware works it out in the same way.
 
@@ -188,7 +187,7 @@ def half_time(
 
 
 def chop_limit(
-    board: BoardLimits, settings: ScanSettings, periods: int, channels: int, tick_rate: float
+    board: wire.BoardLimits, settings: ScanSettings, periods: int, channels: int, tick_rate: float
 ) -> int:
     """Hz: the highest frequency that the board can do with so many periods a drive."""
     half = half_time(board, settings, periods, channels, tick_rate)
@@ -196,7 +195,7 @@ def chop_limit(
 
 
 def choose_periods(
-    board: BoardLimits, settings: ScanSettings, channels: int, tick_rate: float, where: str
+    board: wire.BoardLimits, settings: ScanSettings, channels: int, tick_rate: float, where: str
 ) -> int:
     """The fewest periods a drive with which the board can do ``settings``; 0 for a direct drive.
 
@@ -272,7 +271,7 @@ class Configuration:
     @property
     def singly(self) -> bool:
         """Whether it asks for each drive in a message of its own."""
-        return self.format.format in (Format.DRIVES, Format.DRIVES_PACKED)
+        return self.format.format in (wire.Format.DRIVES, wire.Format.DRIVES_PACKED)
 
     @cached_property
     def channels(self) -> tuple[int, ...]:
@@ -289,7 +288,7 @@ class Configuration:
         return (self.scan, self.format)
 
     def on_board(
-        self, fitted: ScanSettings, board: BoardLimits | None = None, periods: int = 0
+        self, fitted: ScanSettings, board: wire.BoardLimits | None = None, periods: int = 0
     ) -> Self:
         """The same scan as a ``board`` with another converter does it: under the same identity.
 

@@ -12,20 +12,7 @@ from typing import Any, NamedTuple
 from uuid import uuid4
 
 from tomoskin.core import SinkError, TomoskinError, needed
-from tomoskin.files.messages import (
-    KEPT,
-    NAMES,
-    NODE_TYPES,
-    TOPICS,
-    Field,
-    Item,
-    Naming,
-    Stream,
-    dds_name,
-    encode_cdr,
-    ros_messages,
-    type_hash,
-)
+from tomoskin.files import messages
 from tomoskin.run.sinks.sink import Sink, options_of
 
 _WHERE = "sink ros2"
@@ -55,7 +42,11 @@ class Ros2Sink(Sink):
     """
 
     def __init__(
-        self, domain: int, naming: Naming, folder: Path | None = None, release: str = "jazzy"
+        self,
+        domain: int,
+        naming: messages.Naming,
+        folder: Path | None = None,
+        release: str = "jazzy",
     ) -> None:
         self.name = f"ros2 /{naming.namespace}, domain {domain}"
         self.naming, self._domain, self._folder = naming, domain, folder
@@ -68,7 +59,7 @@ class Ros2Sink(Sink):
         self._writers: dict[str, Any] = {}
         self._readers: dict[str, int] = {}
 
-    def open(self, stream: Stream) -> None:
+    def open(self, stream: messages.Stream) -> None:
         """Join the domain; SinkError when there is no network for it."""
         core = self._dds["core"]
         try:
@@ -76,7 +67,7 @@ class Ros2Sink(Sink):
                 self._domain, qos=core.Qos(core.Policy.Userdata(b"enclave=/;"))
             )
             self._writers = {
-                topic: self._writer(participant, stream.naming, topic) for topic in TOPICS
+                topic: self._writer(participant, stream.naming, topic) for topic in messages.TOPICS
             }
             name, services = stream.naming.namespace, _services(stream, self._folder)
             self._node = Node(self._dds, participant, name, services)
@@ -94,12 +85,12 @@ class Ros2Sink(Sink):
                 "Fixed Frame in RViz, or give parent=LINK,at=X/Y/Z"
             )
 
-    def publish(self, item: Item) -> None:
+    def publish(self, item: messages.Item) -> None:
         """Write the messages of ``item``; the source time is that of the measurement."""
-        for message in ros_messages(self._stream, item):
+        for message in messages.ros_messages(self._stream, item):
             topic = message.topic
-            if topic in KEPT or self._readers.get(topic):
-                encoded = encoded_as(TOPICS[topic], message.value)
+            if topic in messages.KEPT or self._readers.get(topic):
+                encoded = encoded_as(messages.TOPICS[topic], message.value)
                 self._writers[topic].write(encoded, message.stamp)
 
     def close(self) -> None:
@@ -108,16 +99,16 @@ class Ros2Sink(Sink):
             self._node.close()
         self._node, self._writers = None, {}
 
-    def _writer(self, participant: Any, naming: Naming, topic: str) -> Any:
-        core, kind = self._dds["core"], TOPICS[topic]
+    def _writer(self, participant: Any, naming: messages.Naming, topic: str) -> Any:
+        core, kind = self._dds["core"], messages.TOPICS[topic]
         policy = core.Policy
-        kept = topic in KEPT
+        kept = topic in messages.KEPT
         qos = core.Qos(
             policy.Reliability.Reliable(_BLOCKING),
             policy.History.KeepLast(1 if kept else _DEPTH),
             policy.Durability.TransientLocal if kept else policy.Durability.Volatile,
             policy.DataRepresentation(use_cdrv0_representation=True),
-            policy.Userdata(f"typehash={type_hash(kind)};".encode()),
+            policy.Userdata(f"typehash={messages.type_hash(kind)};".encode()),
         )
         name = f"rt/{naming.topic(topic)}"
         entity = self._dds["topic"].Topic(participant, name, struct_of(kind))
@@ -129,7 +120,7 @@ class Ros2Sink(Sink):
         return self._dds["pub"].DataWriter(participant, entity, qos=qos, listener=listener)
 
 
-def _services(stream: Stream, folder: Path | None) -> dict[str, Service]:
+def _services(stream: messages.Stream, folder: Path | None) -> dict[str, Service]:
     """What nodes may ask for, by the full names of services."""
     services = parameter_services(
         {
@@ -159,7 +150,7 @@ def open_ros2(argument: str) -> Ros2Sink:
     Without ``domain`` it is the environment's ROS_DOMAIN_ID, as for ROS 2 itself.
     """
     options = options_of(
-        filter(None, argument.split(",")), ("domain", *NAMES, "folder", "release"), _WHERE
+        filter(None, argument.split(",")), ("domain", *messages.NAMES, "folder", "release"), _WHERE
     )
     folder = Path(options["folder"]) if "folder" in options else None
     if folder is not None and not folder.is_dir():
@@ -171,7 +162,9 @@ def open_ros2(argument: str) -> Ros2Sink:
             where=_WHERE,
             hint="humble is for Humble, jazzy for Iron and all later ones",
         )
-    return Ros2Sink(ros_domain(options, _WHERE), Naming.of(options, _WHERE), folder, release)
+    return Ros2Sink(
+        ros_domain(options, _WHERE), messages.Naming.of(options, _WHERE), folder, release
+    )
 
 
 _MOST_DOMAINS = 232
@@ -376,15 +369,17 @@ def ros_domain(options: Mapping[str, str], where: str) -> int:
 def struct_of(kind: str) -> Any:
     """CycloneDDS' class of a message by its name (:data:`~tomoskin.files.messages.NODE_TYPES`)."""
     idl = needed("cyclonedds.idl", "ros2", _WHERE, SinkError)
-    fields = {name: _type_of(Field.of(text)) for name, text in NODE_TYPES[kind].items()}
-    name = dds_name(kind)
+    fields = {
+        name: _type_of(messages.Field.of(text)) for name, text in messages.NODE_TYPES[kind].items()
+    }
+    name = messages.dds_name(kind)
     return idl.make_idl_struct(name.rpartition(":")[2], name.replace("::", "."), fields)
 
 
-def _type_of(field: Field) -> Any:
+def _type_of(field: messages.Field) -> Any:
     types = needed("cyclonedds.idl.types", "ros2", _WHERE, SinkError)
     plain: Mapping[str, Any] = {"string": str, "bool": bool}
-    if field.kind in NODE_TYPES:
+    if field.kind in messages.NODE_TYPES:
         kind = struct_of(field.kind)
     else:
         kind = plain.get(field.kind) or getattr(types, field.kind)
@@ -395,7 +390,7 @@ def _type_of(field: Field) -> Any:
 
 def encoded_as(kind: str, value: Mapping[str, Any]) -> Any:
     """A message of CycloneDDS with those fields; one that is not there is zero, or empty."""
-    return _encoded(struct_of(kind))(encode_cdr(kind, value))
+    return _encoded(struct_of(kind))(messages.encode_cdr(kind, value))
 
 
 @functools.cache
