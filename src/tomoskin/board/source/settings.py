@@ -8,22 +8,6 @@ from typing import TYPE_CHECKING, Self
 
 from tomoskin.board import wire
 from tomoskin.board.source.boards import BOARDS, DEFAULT_BOARD, board_named
-from tomoskin.board.wire import (
-    SCHEMA,
-    Command,
-    Drive,
-    DriveMode,
-    GetMode,
-    GetPattern,
-    GetScan,
-    SetFormat,
-    SetMode,
-    SetPattern,
-    SetScan,
-    Start,
-    crc16,
-    encode_payload,
-)
 from tomoskin.core import SourceError
 from tomoskin.model.pattern import Scan
 
@@ -250,23 +234,23 @@ class Configuration:
     """
 
     identity: int
-    scan: SetScan
-    patterns: tuple[SetPattern, ...]
-    format: SetFormat
+    scan: wire.SetScan
+    patterns: tuple[wire.SetPattern, ...]
+    format: wire.SetFormat
     n_samples: int
     scan_time: float
-    mode: SetMode | None = None
+    mode: wire.SetMode | None = None
     """None: the drive is direct, as SET_SCAN leaves it."""
 
-    def commands(self, minor: int) -> tuple[Command, ...]:
+    def commands(self, minor: int) -> tuple[wire.Command, ...]:
         """What sets it on a board of protocol 1.``minor``, reads it back, and starts it."""
-        start = Start(0, self.identity)
+        start = wire.Start(0, self.identity)
         if minor < _FORMATS_SINCE:
             return (self.scan, *self.patterns, start)
-        read_back = (GetPattern(0, pattern.first) for pattern in self.patterns)
-        mode, held = ((self.mode,), (GetMode(0),)) if self.mode else ((), ())
+        read_back = (wire.GetPattern(0, pattern.first) for pattern in self.patterns)
+        mode, held = ((self.mode,), (wire.GetMode(0),)) if self.mode else ((), ())
         settings = (self.scan, *self.patterns, self.format, *mode)
-        return (*settings, GetScan(0), *read_back, *held, start)
+        return (*settings, wire.GetScan(0), *read_back, *held, start)
 
     @property
     def singly(self) -> bool:
@@ -279,11 +263,11 @@ class Configuration:
         drives = (drive for pattern in self.patterns for drive in pattern.drives)
         return tuple(drive.mask.bit_count() for drive in drives)
 
-    def behind(self, question: Command) -> tuple[Command, ...]:
+    def behind(self, question: wire.Command) -> tuple[wire.Command, ...]:
         """The commands that set what a GET_SCAN, GET_PATTERN or GET_MODE asks for."""
-        if isinstance(question, GetMode):
+        if isinstance(question, wire.GetMode):
             return (self.mode,) if self.mode else ()
-        if isinstance(question, GetPattern):
+        if isinstance(question, wire.GetPattern):
             return tuple(pattern for pattern in self.patterns if pattern.first == question.first)
         return (self.scan, self.format)
 
@@ -305,7 +289,7 @@ class Configuration:
     @classmethod
     def of(cls, scan: Scan, settings: ScanSettings) -> Self:
         """Timing, and drives in chunks."""
-        announce = SetScan(
+        announce = wire.SetScan(
             request=0,
             configuration=0,
             n_drives=len(scan.drives),
@@ -316,32 +300,32 @@ class Configuration:
             current_limit=round(settings.current_limit * 1e6),
         )
         chunks = _chunks(scan)
-        content = encode_payload(announce) + b"".join(encode_payload(chunk) for chunk in chunks)
+        content = b"".join(map(wire.encode_payload, (announce, *chunks)))
         mode = None
         if settings.chop_frequency:
-            mode = SetMode(0, 0, DriveMode.CHOPPED, settings.chop_frequency, 0)
-        content += encode_payload(mode) if mode else b""
-        identity = crc16(content) or 1
+            mode = wire.SetMode(0, 0, wire.DriveMode.CHOPPED, settings.chop_frequency, 0)
+        content += wire.encode_payload(mode) if mode else b""
+        identity = wire.crc16(content) or 1
         return cls(
             identity,
             replace(announce, configuration=identity),
             tuple(replace(chunk, configuration=identity) for chunk in chunks),
-            SetFormat(0, identity, settings.format),
+            wire.SetFormat(0, identity, settings.format),
             scan.n_samples,
             scan_time(len(scan.drives), scan.n_samples, settings),
             mode and replace(mode, configuration=identity),
         )
 
 
-def _chunks(scan: Scan) -> list[SetPattern]:
+def _chunks(scan: Scan) -> list[wire.SetPattern]:
     drives = [
-        Drive(source, sink, mask)
+        wire.Drive(source, sink, mask)
         for (source, sink), mask in zip(scan.drives.tolist(), scan.masks.tolist(), strict=True)
     ]
-    empty = len(encode_payload(SetPattern(0, 0, 0, ())))
-    size = len(encode_payload(SetPattern(0, 0, 0, (Drive(0, 0, 0),)))) - empty
-    most = (SCHEMA.to_device_bytes - 2 - empty) // size
+    empty = len(wire.encode_payload(wire.SetPattern(0, 0, 0, ())))
+    size = len(wire.encode_payload(wire.SetPattern(0, 0, 0, (wire.Drive(0, 0, 0),)))) - empty
+    most = (wire.SCHEMA.to_device_bytes - 2 - empty) // size
     return [
-        SetPattern(0, 0, first, tuple(drives[first : first + most]))
+        wire.SetPattern(0, 0, first, tuple(drives[first : first + most]))
         for first in range(0, len(drives), most)
     ]
