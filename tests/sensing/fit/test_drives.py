@@ -74,9 +74,11 @@ def test_of_drives_that_wait_the_newest_tells_what_all_show() -> None:
         told.append(several.push(drive, frame[rows[drive]], late=late))
         assert not (late and told[-1])
     begun = next(k for k, onset in enumerate(singly) if onset)
-    first = next(k for k, onset in enumerate(told) if onset)
+    first, onset = next((k, onset) for k, onset in enumerate(told) if onset)
     assert begun <= first <= begun + 3
-    assert (told[first].ratio, told[first].drives) == (singly[first].ratio, singly[first].drives)
+    alone = singly[first]
+    assert alone is not None
+    assert (onset.ratio, onset.drives) == (alone.ratio, alone.drives)
 
 
 def test_noise_alone_is_no_touch_and_the_threshold_keeps_its_promise() -> None:
