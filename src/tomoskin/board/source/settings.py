@@ -300,7 +300,8 @@ class Configuration:
             current_limit=round(settings.current_limit * 1e6),
         )
         chunks = _chunks(scan)
-        content = b"".join([wire.encode_payload(command) for command in (announce, *chunks)])
+        packed = b"".join(map(wire.encode_payload, chunks))
+        content = wire.encode_payload(announce) + packed
         mode = None
         if settings.chop_frequency:
             mode = wire.SetMode(0, 0, wire.DriveMode.CHOPPED, settings.chop_frequency, 0)
