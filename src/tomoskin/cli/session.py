@@ -177,7 +177,11 @@ def export(
             f"expected it together with X.lerobot, got {out}", param_hint="--like"
         )
     worn = None if robot is None else with_joints(Robot.load(robot))
-    names = (skin,) if skin or out.suffix.lower() != ".lerobot" else skins_in(file)
+    names = (skin,) if skin else skins_in(file)
+    if len(names) > 1 and out.suffix.lower() != ".lerobot":
+        raise typer.BadParameter(
+            f"expected one of {', '.join(names)}, got none", param_hint="--skin"
+        )
     with ExitStack() as stack, Bar(f"writing {out}") as bar:
         session, *others = [stack.enter_context(SessionReader(file, name)) for name in names]
         job = Export(session, every, bar, force, tuple(others), like, worn)

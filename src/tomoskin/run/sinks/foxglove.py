@@ -8,16 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tomoskin.core import Event, SinkError, encode_json, needed
-from tomoskin.files.messages import (
-    Contacts,
-    Item,
-    Naming,
-    Stream,
-    grid_message,
-    log_message,
-    scene_message,
-    time_of,
-)
+from tomoskin.files import messages
 from tomoskin.files.session import schema_of
 from tomoskin.run.sinks.sink import Sink, port_of
 
@@ -45,7 +36,7 @@ _robots_lock = threading.Lock()
 class FoxgloveSink(Sink):
     """Serves ``ws://host:port`` by Foxglove's SDK; what nobody has subscribed to is not made."""
 
-    naming = Naming("")
+    naming = messages.Naming("")
 
     def __init__(self, host: str, port: int) -> None:
         self.name = f"foxglove at ws://{host}:{port}"
@@ -54,7 +45,7 @@ class FoxgloveSink(Sink):
         self._server: _Server | None = None
         self._channels: dict[str, Any] = {}
 
-    def open(self, stream: Stream) -> None:
+    def open(self, stream: messages.Stream) -> None:
         """Begin to serve the channels of one skin."""
         sdk, self._stream = self._sdk, stream
         self._server = self._joined(stream)
@@ -68,24 +59,24 @@ class FoxgloveSink(Sink):
                 context=self._server.context,
             )
 
-    def publish(self, item: Item) -> None:
+    def publish(self, item: messages.Item) -> None:
         """Send the messages of ``item``."""
-        now = self._stream.log_time(time_of(item))
+        now = self._stream.log_time(messages.time_of(item))
         for event in (item,) if isinstance(item, Event) else item.events:
-            self._send("/events", log_message(event, now), now)
+            self._send("/events", messages.log_message(event, now), now)
         if isinstance(item, Event):
             return
         if item.is_due:
             self._send("/touches", item.content(), now)
         self._show(item, now)
 
-    def _show(self, contacts: Contacts, now: int) -> None:
+    def _show(self, contacts: messages.Contacts, now: int) -> None:
         """The touches in space, as often as the image, and where there are none for good."""
         pixels, image = self._stream.pixels, contacts.image
         if image is not None or contacts.voltages is None:
-            self._send("/scene", scene_message(contacts.touches, now), now)
+            self._send("/scene", messages.scene_message(contacts.touches, now), now)
         if image is not None and pixels is not None and self._channels["/image"].has_sinks():
-            self._send("/image", grid_message(image, pixels, contacts.host_time, now), now)
+            self._send("/image", messages.grid_message(image, pixels, contacts.host_time, now), now)
 
     def close(self) -> None:
         """Close the channels, and with the last skin the server."""
@@ -103,7 +94,7 @@ class FoxgloveSink(Sink):
                 del _robots[self._address]
         server.server.stop()
 
-    def _joined(self, stream: Stream) -> _Server:
+    def _joined(self, stream: messages.Stream) -> _Server:
         """The server of the robot, or one of its own."""
         if stream.place is None:
             return self._begun(f"tomoskin, {stream.source}")

@@ -159,6 +159,7 @@ class SinkConsumer(Consumer):
         self.ready = "; ".join(filter(None, ("takes results", self._sink.hint)))
         self.trouble = ""
         self._reporter.repeat()
+        self.tend()
 
     def take(self, item: FrameResult | Event) -> None:
         """Send it; and of an event that the source is lost what that means for touches."""
@@ -171,8 +172,8 @@ class SinkConsumer(Consumer):
         self._delay = _FIRST_DELAY
 
     def tend(self) -> None:
-        """Report that the source is still lost, where it is."""
-        if (report := self._reporter.still_lost()) is not None:
+        """Report that no frame has come, or that the source is lost, where it is so."""
+        if (report := self._reporter.silent()) is not None:
             self._sink.publish(report)
 
     def close(self) -> None:
