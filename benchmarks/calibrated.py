@@ -66,10 +66,8 @@ def _scenes(prepared: Prepared, seed: int, count: int, turn: float, scores: Scor
     for scene in range(SCENES):
         places = _places(prepared.skin, random, count)
         forces = random.uniform(*FORCES, count).tolist()
-        presses = [
-            Press(x, y, force, RADIUS)
-            for (x, y), force in zip(places.tolist(), forces, strict=True)
-        ]
+        each = zip(places.tolist(), forces, strict=True)
+        presses = [Press(*place, force, RADIUS) for place, force in each]
         twin = SteppedSkin(prepared, TwinSettings.preset("textile", 1000 * seed + scene))
         frames = held(twin, presses, LAST * twin.period, RAMP * twin.period)
         there = [Press(*place, 1.0, RADIUS) for place in _turned(places, turn).tolist()]

@@ -10,7 +10,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -28,6 +28,7 @@ from tomoskin.model.skin import Skin
 from tomoskin.pipeline import FrameResult, Prepared, prepare
 from tomoskin.run import LiveSkin, Runner, commands
 from tomoskin.run.robot_run import Member, RobotRun
+from tomoskin.run.sinks import Contacts
 from tomoskin.twin import Press, TwinSettings, TwinSkin
 from tomoskin.twin.emulator.board_process import SkinMemory
 from tomoskin.twin.emulator.program import BUILD, make_firmware
@@ -92,34 +93,44 @@ def prepared_chain(name: str = SKIN, settling: str = SETTLING) -> Prepared:
     return prepared
 
 
+@contextmanager
+def control_loop(runner: Runner, heard: Callable[[Contacts], None]) -> Iterator[None]:
+    """A thread of this program that waits for news of the skin, while the block lasts."""
+    skin, ended = LiveSkin(runner), threading.Event()
+
+    def follow() -> None:
+        while not ended.is_set():
+            heard(skin.wait(WAIT))
+
+    thread = threading.Thread(target=follow)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
+
+
 def _ran(prepared: Prepared, folder: Path, seconds: float) -> tuple[dict[str, Any], int]:
     """A row, and how many touches there were."""
     calls: list[tuple[int, float, float, int]] = []
 
-    ended = threading.Event()
-
-    def control() -> None:
-        while not ended.is_set():
-            contacts = live.wait(WAIT)
-            now, touches = time.monotonic(), len(contacts.touches)
-            if contacts.sequence >= 0 and (not calls or contacts.host_time > calls[-1][1]):
-                calls.append((contacts.sequence, contacts.host_time, now, touches))
+    def heard(contacts: Contacts) -> None:
+        now, touches = time.monotonic(), len(contacts.touches)
+        if contacts.sequence >= 0 and (not calls or contacts.host_time > calls[-1][1]):
+            calls.append((contacts.sequence, contacts.host_time, now, touches))
 
     file = folder / "chain.mcap"
     with board(prepared.skin, folder) as (port, _):
         runner = Runner(prepared, lambda: SerialTransport(port))
         runner.ask(commands.Record(file))
         runner.start()
-        live, loop = LiveSkin(runner), threading.Thread(target=control)
-        loop.start()
-        with page(runner):
+        with control_loop(runner, heard), page(runner):
             threading.Event().wait(LEAD)
             began, before = time.process_time(), time.monotonic()
             threading.Event().wait(seconds)
             used = (time.process_time() - began) / (time.monotonic() - before)
             status = runner.status()
-        ended.set()
-        loop.join()
         runner.stop()
     rate, rows = prepared.skin.readout.tick_rate, np.array(calls)
     frames = np.array(
@@ -228,22 +239,16 @@ BOARDS_SECONDS, BOARDS_PROMISED = 600.0, 10.0
 
 def run_boards() -> Iterator[Report]:
     """Eight boards of 16 electrodes in one program, recorded and shown, for ten minutes."""
-    yield boards(BOARDS, BOARDS_SECONDS)
-
-
-def boards(count: int, seconds: float) -> Report:
-    """The program with so many boards for ``seconds`` after the reference."""
     prepared = prepared_chain(BOARDS_SKIN, BOARDS_SETTLING)
-    progress(f"{seconds:.0f} s")
     with tempfile.TemporaryDirectory() as folder, contextlib.ExitStack() as stack:
-        places = [Path(folder) / f"board{number}" for number in range(count)]
         ports = []
-        for place in places:
+        for number in range(BOARDS):
+            place = Path(folder) / f"board{number}"
             place.mkdir()
             ports.append(stack.enter_context(board(prepared.skin, place))[0])
-        row = _several(prepared, Path(folder) / "boards.mcap", ports, seconds)
-    return table(
-        f"{count} boards of 16 electrodes in one program",
+        row = _several(prepared, Path(folder) / "boards.mcap", ports, BOARDS_SECONDS)
+    yield table(
+        f"{BOARDS} boards of 16 electrodes in one program",
         [row],
         f"firmware with a Pico's timing on ptys; presses that go round; {BOARDS_SKIN}, seed "
         f"{SEED}; one recording, one page",

@@ -121,7 +121,9 @@ def measure(case: Case, *, script: bool = True, peer: str = "") -> Measured:
         times |= medians({"set-up": lambda: set_up(case)}, SECONDS / 2)
     times |= medians({"model": lambda: _model(case)}, SECONDS / 2)
     if others.INSTALLED:
-        times |= _against_peer(model, sigma, peer)
+        calls = others.Peer(model.mesh, model.pattern).calls(sigma, ALPHA)
+        chosen = {name: call for name, call in calls.items() if name.split()[1][0] in peer}
+        times |= medians(chosen, SECONDS) if chosen else {}
     return Measured(case, model.assembly.n_unknowns, times, peaks(case))
 
 
@@ -195,12 +197,6 @@ def _agree(other: FloatArray, own: FloatArray, whose: str) -> None:
     off = np.abs(other - own).max() / np.abs(own).max()
     if not off < AGREE:
         raise AssertionError(f"{whose}: off by {off:.1e}")
-
-
-def _against_peer(model: ForwardModel, sigma: FloatArray, which: str) -> dict[str, float]:
-    calls = others.Peer(model.mesh, model.pattern).calls(sigma, ALPHA)
-    chosen = {name: call for name, call in calls.items() if name.split()[1][0] in which}
-    return medians(chosen, SECONDS) if chosen else {}
 
 
 def _model(case: Case) -> object:

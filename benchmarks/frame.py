@@ -20,9 +20,8 @@ from tomoskin.pipeline import Pipeline, Prepared, prepare
 from tomoskin.twin import Press
 
 SKINS, CELLS, TIME_CONSTANTS = ("textile-disc-8", "textile-disc-16"), (660, 3000), ("0 s", "0.2 s")
-BY_FIT = (1, 2, 3)
 IDLE, PRESSED, REPEATS, FIT_REPEATS = 30, 60, 40, 10
-SETTLED, SEED = 20, 1
+SETTLED, SEED, BY_FIT = 20, 1, (1, 2, 3)
 
 
 def run() -> Iterator[Report]:

@@ -93,10 +93,8 @@ class Worn:
         board = replace(settings.electronics, gain_sd=parting)
         self._board = TwinElectronics(sheet, skin.readout, skin.current, board, seed)
         scan = Scan.of(skin.pattern())
-        self._table, self._readout = (
-            table_of(scan, ScanSettings.of(skin)),
-            Readout.of(scan, skin.readout),
-        )
+        self._readout = Readout.of(scan, skin.readout)
+        self._table = table_of(scan, ScanSettings.of(skin))
         self._shift, self._time = np.array(condition.shift), 0.0
         used = np.hstack([skin.pattern().drive, skin.pattern().measure])
         self._missing = np.isin(used, condition.lost).any(axis=1)

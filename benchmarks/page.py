@@ -170,17 +170,14 @@ def _measured() -> Measurements:
     with chromium() as browser:
         for cells, most in CELLS.items():
             begun = time.process_time()
-            prepared = prepare(_skin(cells))
+            skin = Skin.load("textile-disc-8").altered({"mesh": {"cells": cells}})
+            prepared = prepare(skin)
             took = round(time.process_time() - begun, 1)
             yield f"prepared, s of processor, {cells}", took, ""
             yield from _ready(browser, prepared, cells)
             yield from _watched(browser, prepared, cells, most)
             if cells == min(CELLS):
                 yield from _several(browser, prepared)
-
-
-def _skin(cells: int) -> Skin:
-    return Skin.load("textile-disc-8").altered({"mesh": {"cells": cells}})
 
 
 def _ready(browser: Any, prepared: Prepared, cells: int) -> Measurements:

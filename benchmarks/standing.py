@@ -46,9 +46,7 @@ FIRST, BETWEEN, AGAIN, AFTER = 5.0, (0.4, 0.9), 0.6, 2.0
 QUIET = 0.35
 """Seconds from the start of the release on, after which a reported touch counts as left behind."""
 
-Changes = Mapping[str, Mapping[str, Any]]
-
-SKINS: dict[str, tuple[str, Changes]] = {
+SKINS: dict[str, tuple[str, Mapping[str, Mapping[str, Any]]]] = {
     **{name: (name, {}) for name in ("textile-disc-8", _DISC, "textile-disc-32", _SQUARE)},
     "disc, 12": (_DISC, {"electrodes": {"count": 12}}),
     "disc, 24": (_DISC, {"electrodes": {"count": 24}}),

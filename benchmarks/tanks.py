@@ -26,8 +26,6 @@ WIDTHS = (0.0115, 0.0125, 0.0135)
 GAP, RIM, SMALLEST = 6, 0.108, 400
 """Pixels between targets, the circle that holds them, m, and the smallest, pixels."""
 
-Inside = Callable[[FloatArray], NDArray[np.bool_]]
-
 
 def simulated(example: Any, seed: int, inj: FloatArray, mpat: FloatArray) -> Any:
     """A sample with one to four targets, its own contacts, channels and change of the water."""
@@ -78,7 +76,7 @@ def targets(rng: np.random.Generator) -> NDArray[np.uint8]:
     return labels.reshape(PIXELS, PIXELS)
 
 
-def shape(rng: np.random.Generator) -> Inside:
+def shape(rng: np.random.Generator) -> Callable[[FloatArray], NDArray[np.bool_]]:
     """A disc, ellipse, rectangle, triangle, polygon, cross, L or C, 28 to 100 mm across."""
     r, kind = rng.uniform(0.014, 0.042), rng.integers(8)
     ratio, thick, long = rng.uniform(0.4, 1.0), r * rng.uniform(0.3, 0.45), 1.25 * r

@@ -94,7 +94,9 @@ class NoisyBoard:
         counts = self.rest * (1 + noise.drift * np.sin(2 * np.pi * time / 300.0))
         counts = counts + sd * random.standard_normal(len(sd))
         if noise.rows:
-            counts += self.inverse @ (noise.rows * self.unit * random.standard_normal(self.n_meas))
+            counts += self.inverse @ (
+                noise.rows * self.unit * random.standard_normal(len(self.makes))
+            )
         if noise.hum:
             turn = self.phase + 2 * np.pi * noise.advance * number
             counts += self.hum * np.sin(self.mains + turn)
@@ -103,11 +105,6 @@ class NoisyBoard:
             self.offset += step * random.standard_normal(len(self.offset))
             counts += self.offset
         return counts + self.inverse @ (self.volts / self.prepared.readout.volts_per_count)
-
-    @property
-    def n_meas(self) -> int:
-        """Rows."""
-        return len(self.makes)
 
     def frames(self, count: int, first: int = 0) -> Iterator[Frame]:
         """Frames as the pipeline takes them."""

@@ -53,11 +53,8 @@ def run_steps() -> Iterator[Report]:
 def _labelled() -> Report:
     """Labelled frames by one process and by two, starts and writing included."""
     took: dict[int, list[float]] = {n: [] for n in PROCESSES}
-    for number in range(SET_ROUNDS):
-        for n in PROCESSES:
-            plan = SetPlan(Skin.load(SET_SKIN).to_toml(), COMMON_PRESSES, "textile", number, SET)
-            with TemporaryDirectory() as folder:
-                took[n].append(_set_seconds(plan, Path(folder) / "set", n))
+    for number, n in product(range(SET_ROUNDS), PROCESSES):
+        took[n].append(_set_seconds(number, n))
     rows = (
         {
             "skin": SET_SKIN,
@@ -78,12 +75,14 @@ def _labelled() -> Report:
     )
 
 
-def _set_seconds(plan: SetPlan, out: Path, processes: int) -> float:
-    solved_dent.cache_clear()
-    start = time.perf_counter()
+def _set_seconds(seed: int, processes: int) -> float:
+    plan = SetPlan(Skin.load(SET_SKIN).to_toml(), COMMON_PRESSES, "textile", seed, SET)
     workers = in_this_process if processes == 1 else in_processes(processes)
-    make_set(plan, out, workers, lambda _, __: None)
-    return time.perf_counter() - start
+    solved_dent.cache_clear()
+    with TemporaryDirectory() as folder:
+        start = time.perf_counter()
+        make_set(plan, Path(folder) / "set", workers, lambda _, __: None)
+        return time.perf_counter() - start
 
 
 def row(name: str, preset: str, triangles: int) -> dict[str, Any]:

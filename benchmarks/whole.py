@@ -66,18 +66,10 @@ class Line:
 
 
 def run() -> Iterator[Report]:
-    parts: dict[str, Callable[[], Iterator[Line]]] = {
-        "start": _start,
-        "forward": _forward,
-        "frame": _frame,
-        "touch": _touch,
-        "twin": _twin,
-        "wire": _wire,
-        "session": _session,
-        "page": _page,
-    }
+    parts = (_start, _forward, _frame, _touch, _twin, _wire, _session, _page)
     rows = []
-    for number, (part, lines) in enumerate(parts.items(), start=1):
+    for number, lines in enumerate(parts, start=1):
+        part = lines.__name__.removeprefix("_")
         progress(f"{part} ({number} of {len(parts)})")
         rows += [_row(part, line) for line in lines()]
     columns = ("part", "what", "measured", "promised", "plain scipy", "×", "pyEIT", "×")
@@ -118,14 +110,12 @@ def _start() -> Iterator[Line]:
 
 def _begun(code: str) -> float:
     """Median processor time of a program, the interpreter's own included, ms."""
-    return 1e3 * statistics.median(_once(code) for _ in range(REPEATS))
-
-
-def _once(code: str) -> float:
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    used = [0.0]
+    for _ in range(REPEATS):
+        subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
+        children = resource.getrusage(resource.RUSAGE_CHILDREN)
+        used.append(children.ru_utime + children.ru_stime)
+    return 1e3 * float(np.median(np.diff(used)))
 
 
 def _forward() -> Iterator[Line]:
