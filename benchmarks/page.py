@@ -134,6 +134,9 @@ def heap(page: Any) -> float:
     return float(used)
 
 
+_GARBAGE = 1e6
+"""Bytes by which a heap differs from one collection to the next; a leak of 0.5 kB a frame is more."""
+
 CORES = 2
 """A browser and a server: what every machine that shows a page has."""
 
@@ -212,7 +215,8 @@ def _watched(browser: Any, prepared: Prepared, cells: int, most: int) -> Measure
     pair = f"{1e3 * painted.p50:.1f}, {1e3 * painted.p99:.1f}"
     yield f"arrival to drawn, ms, {cells}: median, p99", pair, ""
     yield f"frames/s shown, {cells}", round(1e3 * shown / (now - then), 1), "≤ 60"
-    yield f"memory gained over {streamed} frames, kB, {cells}", round(grown / 1e3), "none"
+    gained = "none" if grown < _GARBAGE else round(grown / 1e3)
+    yield f"memory gained over {streamed} frames, kB, {cells}", gained, "none"
 
 
 def _several(browser: Any, prepared: Prepared) -> Measurements:
