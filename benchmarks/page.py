@@ -135,7 +135,7 @@ def heap(page: Any) -> float:
 
 
 _GARBAGE = 1e6
-"""Bytes by which a heap differs from one collection to the next; a leak of 0.5 kB a frame is more."""
+"""Bytes by which a heap differs between collections; a leak of 0.5 kB a frame is more."""
 
 CORES = 2
 """A browser and a server: what every machine that shows a page has."""
