@@ -376,7 +376,7 @@ class DriveFilter:
         return MovingTouch(touch.time, state, (left + left.T) / 2), gone, going
 
     def response(self, state: FloatArray, rows: slice) -> Response:
-        """Of a ``state`` (8,)."""
+        """The response of a touch in a ``state`` (8,)."""
         basis = self.solver.table.basis[:, rows]
         parts = self.solver.expanded(state[None, _SPOT])[0] @ basis
         change, own, unknown = parts[0], parts[1 : 1 + N_PARAMETERS], parts[1 + N_PARAMETERS :]
