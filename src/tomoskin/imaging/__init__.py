@@ -1,12 +1,9 @@
 """From a change of voltages to a change of conductivity."""
 
-from tomoskin.imaging.choice.alpha_choice import (
+from tomoskin.imaging.choice import (
+    RULES as RULES,
     AlphaChoice as AlphaChoice,
     Curve as Curve,
-    Evidence as Evidence,
-)
-from tomoskin.imaging.choice.criteria import (
-    RULES as RULES,
     LightTouch as LightTouch,
     choose as choose,
     for_recording as for_recording,

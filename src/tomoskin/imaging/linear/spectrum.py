@@ -31,7 +31,7 @@ class Spectrum:
     """Modes of W^½JQ⁻¹JᴴW^½ = U diag(λ) Uᴴ: data and images that go with each other.
 
     Data dv have coefficients β = UᴴW^½dv; the image is Σ bᵢ gᵢ βᵢ with gᵢ = 1/(λᵢ + α²). So a
-    new alpha costs one product, and residual, seminorm and noise cost next to nothing. The
+    new alpha costs one product, and its noise next to nothing. The
     images that Q does not weigh are modes of their own, with λ = ∞ and g = 1 (the standard form
     of Eldén 1982); the others are orthogonal to what the data tell of these.
 
@@ -111,7 +111,7 @@ class Spectrum:
 
     def filters(self, alpha: float) -> FloatArray:
         """(n_meas,) filter factors λ/(λ + α²): the part of each coefficient that is believed."""
-        return 1.0 - _complement(self, alpha)
+        return 1.0 - np.where(np.isfinite(self.values), alpha**2 * self.gains(alpha), 0.0)
 
     def operator(self, alpha: float) -> Operator:
         """The operator of ``alpha``, the same as ``problem.operator(alpha)``, by one product."""
@@ -120,18 +120,6 @@ class Spectrum:
     def coefficients(self, dv: NDArray[Any]) -> NDArray[Any]:
         """(…, n_meas) β of difference data (…, n_meas)."""
         return np.asarray(dv @ self.analysis.T)
-
-    def residual(self, alpha: float, dv: NDArray[Any]) -> FloatArray:
-        """(…,) ‖dv − Jx‖_W of the images x of data (…, n_meas)."""
-        unexplained = _complement(self, alpha) * self.coefficients(dv)
-        return np.asarray(np.linalg.norm(unexplained, axis=-1))
-
-    def seminorm(self, alpha: float, dv: NDArray[Any]) -> FloatArray:
-        """(…,) √(xᴴQx) of the images x of data (…, n_meas)."""
-        weighed = np.isfinite(self.values)
-        scale = self.gains(alpha)[weighed] * np.sqrt(self.values[weighed])
-        weight = scale * self.coefficients(dv)[..., weighed]
-        return np.asarray(np.linalg.norm(weight, axis=-1))
 
     def noise_coefficients(self, noise: FloatArray) -> NDArray[Any]:
         """(n_meas, n_meas) covariance of β for independent ``noise`` (n_meas,) of the data."""
@@ -149,11 +137,6 @@ class Spectrum:
         """(n_meas, n_meas) ∫bᵢ*bⱼ over the sheet."""
         volumes = self.problem.model.mesh.volumes
         return np.asarray((self.modes.conj().T * volumes) @ self.modes)
-
-
-def _complement(spectrum: Spectrum, alpha: float) -> FloatArray:
-    """1 − filter factor, without loss of digits."""
-    return np.where(np.isfinite(spectrum.values), alpha**2 * spectrum.gains(alpha), 0.0)
 
 
 def _filtered(spectrum: Spectrum, alpha: float) -> NDArray[Any]:
