@@ -17,6 +17,7 @@ from tomoskin.core.errors import (
     TomoskinError as TomoskinError,
     WireError as WireError,
     meant as meant,
+    meant_or_known as meant_or_known,
 )
 from tomoskin.core.inputs import (
     check_fits as check_fits,
@@ -46,6 +47,7 @@ if TYPE_CHECKING:
         kept as kept,
         load_arrays as load_arrays,
         numbers as numbers,
+        numeric as numeric,
         pack_arrays as pack_arrays,
         real_numbers as real_numbers,
         save_arrays as save_arrays,

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from platformdirs import user_cache_path
 
-from tomoskin.core.errors import EMPTY, DataError
+from tomoskin.core.errors import EMPTY, DataError, TomoskinError
 from tomoskin.core.inputs import check_fits, open_input
 from tomoskin.core.outputs import StrPath, written
 from tomoskin.core.records import FloatArray, IntArray
@@ -152,11 +152,23 @@ MOST_ELECTRODES = 1024
 """More are taken for damage of a file."""
 
 
+def numeric(
+    value: Any, error: type[TomoskinError], what: str = "", where: str = "", *, real: bool = False
+) -> NDArray[Any]:
+    """``value`` as an array of numbers, or an ``error`` that says ``what`` they should be."""
+    numbers = "real numbers" if real else "numbers"
+    try:
+        array = np.asarray(value)
+    except ValueError as cause:
+        raise error("expected rows of equal length, got different lengths", where=where) from cause
+    if array.dtype.kind not in ("biuf" if real else "biufc"):
+        raise error(f"expected {numbers}{what}, got {array.dtype}", where=where)
+    return array
+
+
 def numbers(arrays: Arrays, key: str, source: str) -> NDArray[Any]:
     """Array ``key`` as float64, or complex128 where it is complex."""
-    array = arrays[key]
-    if array.dtype.kind not in "biufc":
-        raise DataError(f"expected numbers in {key}, got {array.dtype}", where=source)
+    array = numeric(arrays[key], DataError, f" in {key}", source)
     return array.astype(np.complex128 if array.dtype.kind == "c" else np.float64, copy=False)
 
 

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import issparse
 
-from tomoskin.core import DataError, FloatArray, IntArray
+from tomoskin.core import DataError, FloatArray, IntArray, numeric
 from tomoskin.files.imports.interchange import OWN
 from tomoskin.files.imports.tables import drives_of, pairs_of, voltages_of
 from tomoskin.sensing.signal import Recording
@@ -142,7 +142,5 @@ def _numbers(variables: Mapping[str, Any], name: str, shape: tuple[int, ...]) ->
 
 def _dense(value: Any, where: str) -> NDArray[Any]:
     sparse: Any = value
-    array = np.asarray(sparse.toarray() if issparse(value) else value)
-    if array.dtype.kind not in "biufc":
-        raise DataError(f"expected numbers, got {array.dtype}", where=where)
+    array = numeric(sparse.toarray() if issparse(value) else value, DataError, where=where)
     return array.astype(np.complex128 if array.dtype.kind == "c" else np.float64, copy=False)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tomoskin.core import DataError, FloatArray
+from tomoskin.core import DataError, FloatArray, numeric
 
 _NOTHING = 1e-9
 """A combination of voltages this far below the strongest one is none."""
@@ -46,10 +46,10 @@ class Observation:
             For what is not real numbers, shapes that do not fit, values that count and are not
             finite, which are named, noise that is not positive, or when nothing counts.
         """
-        taken = _real(values, "values")
+        taken = numeric(values, DataError, where="values", real=True).astype(float)
         if taken.ndim != 1:
             raise DataError(f"expected values of shape (n,), got {taken.shape}")
-        deviation = _real(noise, "noise")
+        deviation = numeric(noise, DataError, where="noise", real=True).astype(float)
         if deviation.shape not in ((), taken.shape):
             raise DataError(f"expected one noise or {len(taken)}, got shape {deviation.shape}")
         deviation = np.broadcast_to(deviation, taken.shape)
@@ -86,7 +86,7 @@ class Observation:
         if self.combine is None:
             rows = np.zeros((len(target), n_meas))
             rows[np.arange(len(target)), np.flatnonzero(counts)] = scale
-            return Whitened(target, rows, 0.0, 0)
+            return Whitened(target, rows)
         return _reduced(target, self.combine[counts] * scale[:, None])
 
 
@@ -100,37 +100,14 @@ class Whitened:
         (m,) values.
     rows
         (m, n_meas): what they are of the pattern's voltages.
-    unexplained, redundant
-        Square sum of the part that no voltages can explain, and how many values that part has:
-        their ratio is near one where the noise is as stated.
     """
 
     target: FloatArray
     rows: FloatArray
-    unexplained: float
-    redundant: int
-
-
-def _real(value: ArrayLike, name: str) -> FloatArray:
-    try:
-        raw = np.asarray(value)
-    except ValueError as error:
-        raise DataError(
-            "expected rows of equal length, got different lengths", where=name
-        ) from error
-    if raw.dtype.kind not in "biuf":
-        raise DataError(f"expected real numbers, got {raw.dtype}", where=name)
-    return raw.astype(np.float64)
 
 
 def _reduced(target: FloatArray, rows: FloatArray) -> Whitened:
     """The same sum of squares from as many values as the rows have rank."""
     left, size, right = np.linalg.svd(rows, full_matrices=False)
     rank = int(np.count_nonzero(size > _NOTHING * size[0]))
-    kept = left[:, :rank].T @ target
-    return Whitened(
-        kept,
-        size[:rank, None] * right[:rank],
-        max(float(target @ target - kept @ kept), 0.0),
-        len(target) - rank,
-    )
+    return Whitened(left[:, :rank].T @ target, size[:rank, None] * right[:rank])

@@ -117,8 +117,7 @@ class LocalUpdate:
 
     def _factorised(self, touch: Touches) -> tuple[NDArray[Any], NDArray[Any]]:
         """Results of a large patch; the new state checks its own voltages."""
-        if fault := touch.fault(len(self._conductivity)):
-            raise fault
+        touch.check(len(self._conductivity))
         kind = np.result_type(self._conductivity, touch.conductivity)
         changed = self._conductivity.astype(kind)
         changed[touch.cells] = touch.conductivity
@@ -135,7 +134,8 @@ class LocalUpdate:
                 self._need(missing)
                 grounded, lost, missing = self._patches.change(*arrays)
         except ValueError as error:
-            raise touches.fault(len(self._conductivity)) or singular() from error
+            touches.check(len(self._conductivity))
+            raise singular() from error
         return grounded, lost
 
     def _by_halves(self, touches: Touches) -> tuple[NDArray[Any], NDArray[Any]]:

@@ -14,7 +14,6 @@ from scipy.spatial import cKDTree
 
 from tomoskin.core import FloatArray, GeometryError, IntArray
 from tomoskin.model.mesh.check import check_cells
-from tomoskin.model.mesh.files import at_source
 from tomoskin.model.mesh.flatten import flattened, rim_of, same_turn
 from tomoskin.model.mesh.mesh import MeshFile
 from tomoskin.model.mesh.polygon import Polygon
@@ -84,7 +83,7 @@ class Draped(Surface):
         try:
             return cls.of(file.places[used], compact.reshape(file.cells.shape))
         except GeometryError as error:
-            raise at_source(error, file.source) from error
+            raise error.within(file.source, GeometryError) from error
 
     @cached_property
     def outline(self) -> Polygon:

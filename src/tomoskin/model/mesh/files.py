@@ -13,14 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tomoskin.core import (
-    DataError,
-    FloatArray,
-    GeometryError,
-    IntArray,
-    check_is_file,
-    install_hint,
-)
+from tomoskin.core import FloatArray, GeometryError, IntArray, check_is_file, install_hint
 from tomoskin.model.mesh.triangles import boundary_facets
 
 READERS = {
@@ -39,12 +32,6 @@ _LARGEST = 50_000_000
 """Bytes that a mesh file may have; a million triangles of a .stl take so many."""
 
 _CORNERS = {"vertex": 1, "line": 2, "triangle": 3, "tetra": 4}
-
-
-def at_source(error: GeometryError, source: str) -> GeometryError:
-    """The error with the file that it is about."""
-    where = f"{source}, {error.where}" if error.where else source
-    return GeometryError(error.message, where=where, hint=error.hint)
 
 
 def parsed(file: Path) -> Any:
@@ -90,10 +77,7 @@ def _scene(collada: Any, file: Path) -> Any:
 
 
 def _check_readable(file: Path) -> None:
-    try:
-        check_is_file(file)
-    except DataError as error:
-        raise GeometryError(error.message, where=error.where, hint=error.hint) from error
+    check_is_file(file, GeometryError)
     if file.stat().st_size > _LARGEST:
         raise GeometryError(
             f"is too large for a mesh ({file.stat().st_size / 1e6:.0f} MB, at most "

@@ -11,11 +11,10 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from tomoskin.core import FloatArray, GeometryError, IntArray, PixelMap
+from tomoskin.core import FloatArray, GeometryError, IntArray, PixelMap, numeric
 from tomoskin.model.mesh.check import check_mesh, checked_metric
 from tomoskin.model.mesh.files import (
     Electrodes,
-    at_source,
     cells_of,
     check_repeats,
     choose,
@@ -194,7 +193,7 @@ class MeshFile:
             points, height = points_of(raw, cells, scale)
             groups = groups_of(raw, cells.shape[1] - 1)
         except GeometryError as error:
-            raise at_source(error, str(file)) from error
+            raise error.within(str(file), GeometryError) from error
         return cls(points, cells, groups, str(file), height)
 
     @property
@@ -214,20 +213,13 @@ class MeshFile:
             tables = [renumbered(number, f, f"E{i}") for i, f in enumerate(facets, 1)]
             return Mesh(self.points[used], compact.reshape(self.cells.shape), tuple(tables))
         except GeometryError as error:
-            raise at_source(error, self.source) from error
+            raise error.within(self.source, GeometryError) from error
 
 
 def _frozen(value: object, dtype: DTypeLike, where: str) -> NDArray[Any]:
-    try:
-        raw = np.array(value)
-    except ValueError as error:
-        raise GeometryError(
-            "expected rows of equal length, got different lengths", where=where
-        ) from error
+    raw = numeric(value, GeometryError, where=where, real=True)
     if raw.ndim != 2:
         raise GeometryError(f"expected a table with two axes, got shape {raw.shape}", where=where)
-    if raw.dtype.kind not in "iuf":
-        raise GeometryError(f"expected real numbers, got {raw.dtype}", where=where)
     with np.errstate(invalid="ignore"):
         array = raw.astype(dtype)
     if array.dtype.kind == "i" and not np.array_equal(array, raw):

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, GeometryError
-from tomoskin.model.mesh.boundary import MIN_GAP, ElectrodeArc, among, check_arcs
+from tomoskin.model.mesh.boundary import MIN_GAP, ElectrodeArc, among, check_width
 from tomoskin.model.mesh.outline import Outline
 
 _SAME = 1e-7
@@ -87,7 +87,7 @@ def check_patches(outline: Outline, height: float, patches: Sequence[Patch]) -> 
     for number, patch in wall:
         _check_heights(height, patch, f"E{number + 1}")
         if patch.arc is not None:
-            _check_arc(outline, patch.arc, f"E{number + 1}")
+            check_width(outline, patch.arc, f"E{number + 1}")
     for (low, one), (high, other) in combinations(wall, 2):
         _check_apart(outline, one, other, low, high)
 
@@ -99,13 +99,6 @@ def _check_heights(height: float, patch: WallPatch, where: str) -> None:
             f"got {patch.bottom * 1e3:.4g} mm to {patch.top * 1e3:.4g} mm",
             where=where,
         )
-
-
-def _check_arc(outline: Outline, arc: ElectrodeArc, where: str) -> None:
-    try:
-        check_arcs(outline, [arc])
-    except GeometryError as error:
-        raise GeometryError(error.message, where=where, hint=error.hint) from error
 
 
 def _check_apart(outline: Outline, one: WallPatch, other: WallPatch, low: int, high: int) -> None:

@@ -12,7 +12,7 @@ from tomoskin.board.wire import BoardLimits, GetBoard, GetInfo, Info
 from tomoskin.core import SourceError
 from tomoskin.twin.emulator.board_process import BoardIdentity
 from tomoskin.twin.emulator.program import firmware_image, run_tool
-from tomoskin.twin.emulator.uf2 import find_boot_drive, uf2_of, write_uf2
+from tomoskin.twin.emulator.uf2 import find_boot_drive, pack_uf2, write_uf2
 
 _REFERENCE = 1.225
 """V across the board's sense resistor."""
@@ -51,7 +51,7 @@ def write_firmware(record: BoardRecord, channels: int, place: str | None) -> str
     """
     if record.flash == "uf2":
         drive = find_boot_drive() if place is None else Path(place)
-        write_uf2(uf2_of(firmware_image(record, channels)), drive)
+        write_uf2(pack_uf2(firmware_image(record, channels).read_bytes()), drive)
         return str(drive)
     if record.flash != "avrdude" or place is None:
         raise SourceError(

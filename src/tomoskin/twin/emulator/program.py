@@ -17,7 +17,7 @@ from typing import IO
 from tomoskin.board.source import BOARDS, BoardRecord, FirmwareFiles
 from tomoskin.core import SourceError, written
 from tomoskin.twin.emulator.board_process import BoardPrograms
-from tomoskin.twin.emulator.uf2 import uf2_of
+from tomoskin.twin.emulator.uf2 import pack_uf2
 
 FOLDER = Path(__file__).resolve().parents[4] / "firmware"
 """Where the sources are, in a checkout."""
@@ -127,7 +127,7 @@ def build_firmware(record: BoardRecord, channels: int) -> Path:
     program = BUILD / files.program.format(channels)
     if record.flash != "uf2":
         return program
-    data, uf2 = uf2_of(program), program.with_suffix(".uf2")
+    data, uf2 = pack_uf2(program.read_bytes()), program.with_suffix(".uf2")
     if not uf2.is_file() or uf2.read_bytes() != data:
         with written(uf2, overwrite=True) as part:
             part.write_bytes(data)

@@ -31,9 +31,6 @@ _ABOUT, _WRITTEN = "INFO_UF2.TXT", "tomoskin.uf2"
 _DEPTHS = (_ABOUT, f"*/{_ABOUT}", f"*/*/{_ABOUT}")
 _HINT = "hold BOOTSEL while you plug the Pico in: it shows itself as a drive, RPI-RP2"
 
-_STAGE = 252
-"""Bytes of the boot's second stage; its checksum follows."""
-
 
 def pack_uf2(image: bytes, address: int = FLASH) -> bytes:
     """The UF2 that puts ``image`` at ``address``."""
@@ -46,40 +43,10 @@ def pack_uf2(image: bytes, address: int = FLASH) -> bytes:
     )
 
 
-def uf2_of(image: Path) -> bytes:
-    """The UF2 of a Pico's firmware; SourceError where its boot ROM would not run that."""
-    data = image.read_bytes()
-    check_boot(data, str(image))
-    return pack_uf2(data)
-
-
 def settings_uf2(current: float) -> bytes:
     """The UF2 that says what a Pico's current limiter is set to, A; its firmware stays."""
     page = struct.pack("<I", round(current * 1e6)).ljust(PAGE, b"\xff")
     return pack_uf2(page, FLASH + _SETTINGS)
-
-
-def check_boot(image: bytes, where: str) -> None:
-    """Raise SourceError unless the boot ROM would run ``image``: it checks the second stage."""
-    expected = boot_checksum(image[:_STAGE])
-    (held,) = struct.unpack_from("<I", image, _STAGE)
-    if held != expected:
-        raise SourceError(
-            f"expected the checksum 0x{expected:08X} of the boot's second stage, "
-            f"found 0x{held:08X}",
-            where=where,
-            hint="a Pico would not start: correct the last word of firmware/pico/boot2.S",
-        )
-
-
-def boot_checksum(stage: bytes) -> int:
-    """CRC-32 as the boot ROM has it: 0x04C11DB7, not reflected, from 0xFFFFFFFF."""
-    crc = 0xFFFFFFFF
-    for byte in stage:
-        crc ^= byte << 24
-        for _ in range(8):
-            crc = (crc << 1 ^ (0x04C11DB7 if crc >> 31 else 0)) & 0xFFFFFFFF
-    return crc
 
 
 def write_uf2(uf2: bytes, drive: StrPath) -> None:
