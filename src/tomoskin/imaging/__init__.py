@@ -11,15 +11,15 @@ from tomoskin.imaging.choice import (
 from tomoskin.imaging.iterative.absolute import (
     Absolute as Absolute,
     AbsoluteImaging as AbsoluteImaging,
+    SharpDifference as SharpDifference,
     homogeneous as homogeneous,
 )
-from tomoskin.imaging.iterative.observation import Observation as Observation
 from tomoskin.imaging.iterative.shapes import (
     RandomField as RandomField,
     Segmented as Segmented,
     ShapeImaging as ShapeImaging,
 )
-from tomoskin.imaging.iterative.sharp_difference import SharpDifference as SharpDifference
+from tomoskin.imaging.iterative.unknowns import Observation as Observation
 from tomoskin.imaging.linear.linear_problem import (
     LinearProblem as LinearProblem,
     OneStep as OneStep,

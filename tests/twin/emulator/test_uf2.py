@@ -12,8 +12,8 @@ from firmware.boards import FIRMWARE
 from tomoskin.cli.app import app
 from tomoskin.core import SourceError
 from tomoskin.twin.emulator import write_uf2
-from tomoskin.twin.emulator.program import PicoPrograms
-from tomoskin.twin.emulator.uf2 import FLASH, find_boot_drive, pack_uf2
+from tomoskin.twin.emulator.flash import find_boot_drive
+from tomoskin.twin.emulator.program import FLASH, PicoPrograms, pack_uf2
 from twin.emulator.pico import boot_checksum, check_boot, powered
 
 IMAGE = bytes(range(256)) * 2 + b"end"

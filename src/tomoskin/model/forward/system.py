@@ -11,8 +11,7 @@ from scipy.sparse import csr_array
 
 from tomoskin.core import FloatArray, IntArray, ModelError, numeric
 from tomoskin.model.forward.arguments import number_type
-from tomoskin.model.forward.assembly import SystemAssembly, gradient_operator
-from tomoskin.model.forward.element import Element
+from tomoskin.model.forward.assembly import Element, SystemAssembly, gradient_operator
 from tomoskin.model.forward.engine import Factorise
 from tomoskin.model.forward.engine_choice import choose_engine
 from tomoskin.model.mesh import Mesh
