@@ -50,6 +50,7 @@ if TYPE_CHECKING:
         numeric as numeric,
         pack_arrays as pack_arrays,
         real_numbers as real_numbers,
+        refuse_first as refuse_first,
         save_arrays as save_arrays,
         unpack_arrays as unpack_arrays,
         whole_number as whole_number,

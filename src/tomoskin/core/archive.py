@@ -166,6 +166,19 @@ def numeric(
     return array
 
 
+def refuse_first(
+    bad: NDArray[np.bool_] | np.bool_,
+    values: NDArray[Any],
+    expected: str,
+    place: str,
+    error: type[TomoskinError],
+) -> None:
+    """Raise an ``error`` for the first of ``values`` that is ``bad``, (n,), at that ``place``."""
+    if bad.any():
+        first = int(np.argmax(bad))
+        raise error(f"expected {expected}, got {values[first].tolist()}", where=f"{place} {first}")
+
+
 def numbers(arrays: Arrays, key: str, source: str) -> NDArray[Any]:
     """Array ``key`` as float64, or complex128 where it is complex."""
     array = numeric(arrays[key], DataError, f" in {key}", source)
@@ -195,12 +208,8 @@ def electrode_table(arrays: Arrays, key: str, source: str) -> IntArray:
     if table.ndim != 2 or table.shape[1] != 2:
         raise DataError(f"expected {key} of shape (n_meas, 2), got {table.shape}", where=source)
     good = (table >= 0) & (table < MOST_ELECTRODES) & (table == np.round(table))
-    if not good.all():
-        row = int(np.argmin(good.all(axis=1)))
-        raise DataError(
-            f"expected whole electrode numbers from 0 (E1), got {table[row].tolist()}",
-            where=f"{source}, {key} row {row}",
-        )
+    whole = "whole electrode numbers from 0 (E1)"
+    refuse_first(~good.all(axis=1), table, whole, f"{source}, {key} row", DataError)
     return table.astype(np.int64)
 
 

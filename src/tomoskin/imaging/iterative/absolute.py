@@ -12,11 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 from tomoskin.core import FloatArray, Image, ModelError
 from tomoskin.imaging.iterative.newton import Descent, Goal, descend
 from tomoskin.imaging.iterative.unknowns import (
-    Cells,
     Contacts,
     ImageMap,
     Joint,
     ModelPoint,
+    Modes,
     Observation,
     Unknowns,
     Whitened,
@@ -150,7 +150,8 @@ class AbsoluteImaging:
             When the observation is not one of this pattern.
         """
         data = observation.whitened(self.model.pattern.n_meas)
-        image = Cells(len(self.model.mesh.cells))
+        n_cells = len(self.model.mesh.cells)
+        image = Modes.of_cells(n_cells, n_cells)
         unknowns, begin = medium(self.model, data, image, self.contacts, background)
         descent = descend(
             self._goal(unknowns, data.target),
@@ -214,7 +215,9 @@ def _uniform(
 ) -> Absolute:
     if background is None:
         background = _of_right_size(model, data.target, data.rows)
-    unknowns = Unknowns(model, _Nothing(len(model.mesh.cells)), background, contacts, data.rows)
+    unknowns = Unknowns(
+        model, Modes.of_cells(len(model.mesh.cells), 0), background, contacts, data.rows
+    )
     descent = descend(
         Goal(unknowns.at, data.target, lambda _: others(unknowns.n_contacts)),
         Descent.begin(unknowns.size),
@@ -255,22 +258,6 @@ def _of_right_size(model: ForwardModel, target: FloatArray, rows: NDArray[Any]) 
     unit = rows @ model.at(1.0).voltages
     share = float(target @ unit) / float(unit @ unit)
     return 1.0 / share if share > 0 else 1.0
-
-
-@dataclass(frozen=True)
-class _Nothing:
-    """No image: the contrast is zero everywhere."""
-
-    n_cells: int
-    size: int = 0
-
-    def contrast(self, latent: FloatArray) -> FloatArray:
-        del latent
-        return np.zeros(self.n_cells)
-
-    def chain(self, latent: FloatArray, jacobian: FloatArray) -> FloatArray:
-        del latent
-        return jacobian[:, :0]
 
 
 _RANGE, _HALVINGS = (1e-1, 1e3), 6

@@ -9,8 +9,9 @@ from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import csr_array, eye_array
 
-from tomoskin.core import DataError, FloatArray, ModelError, numeric
+from tomoskin.core import DataError, FloatArray, ModelError, numeric, refuse_first
 from tomoskin.model.forward import ForwardModel, State
 from tomoskin.model.prior import Carried, Diagonal, Penalty
 
@@ -57,9 +58,7 @@ class Observation:
         if deviation.shape not in ((), taken.shape):
             raise DataError(f"expected one noise or {len(taken)}, got shape {deviation.shape}")
         deviation = np.broadcast_to(deviation, taken.shape)
-        if not (deviation > 0).all():
-            row = int(np.argmin(deviation > 0))
-            raise DataError(f"expected noise above 0, got {deviation[row]}", where=f"row {row}")
+        refuse_first(~(deviation > 0), deviation, "noise above 0", "row", DataError)
         counts = np.isfinite(deviation)
         bad = np.flatnonzero(counts & ~np.isfinite(taken)).tolist()
         if bad:
@@ -141,20 +140,30 @@ class ImageMap(Protocol):
         """(m, size) derivative by the latent image, from (m, n_cells) by the contrast."""
 
 
-@dataclass(frozen=True)
-class Cells:
-    """The latent image is the contrast itself, one number a cell."""
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """The contrast is linear in the latent image: ``basis`` (n_cells, size) times it."""
 
-    size: int
+    basis: csr_array
+
+    @classmethod
+    def of_cells(cls, n_cells: int, size: int) -> Modes:
+        """One latent value a cell, or none: no image."""
+        return cls(csr_array(eye_array(n_cells, size)))
+
+    @property
+    def size(self) -> int:
+        """The number of latent values."""
+        return int(self.basis.shape[1])
 
     def contrast(self, latent: FloatArray) -> FloatArray:
-        """The latent values are the contrast itself."""
-        return latent
+        """(n_cells,) log of conductivity over background."""
+        return np.asarray(self.basis @ latent)
 
     def chain(self, latent: FloatArray, jacobian: FloatArray) -> FloatArray:
-        """The derivatives need no change."""
+        """(m, size) derivative by the latent image."""
         del latent
-        return jacobian
+        return np.asarray(jacobian @ self.basis)
 
 
 @dataclass(frozen=True, eq=False)

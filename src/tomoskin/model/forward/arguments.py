@@ -9,7 +9,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from tomoskin.core import IntArray, ModelError, numeric
+from tomoskin.core import IntArray, ModelError, numeric, refuse_first
 from tomoskin.model.mesh import Mesh
 
 _SYMMETRY = 1e-10
@@ -40,7 +40,7 @@ def checked_conductivity(value: ArrayLike, mesh: Mesh) -> NDArray[Any]:
         sigma = np.full(n, sigma)
     if not (sigma.real.min(initial=1.0) > 0 and np.isfinite(sigma).all()):
         bad = ~(np.isfinite(sigma) & (sigma.real > 0))
-        _refuse_first(bad, sigma, "a positive finite conductivity")
+        refuse_first(bad, sigma, "a positive finite conductivity", "cell", ModelError)
     return sigma
 
 
@@ -50,17 +50,15 @@ def number_type(raw: NDArray[Any]) -> type[np.floating[Any] | np.complexfloating
 
 
 def _checked_tensor(sigma: NDArray[Any], mesh: Mesh) -> NDArray[Any]:
-    _refuse_first(~np.isfinite(sigma).all(axis=(1, 2)), sigma, "a finite conductivity")
+    infinite = ~np.isfinite(sigma).all(axis=(1, 2))
+    refuse_first(infinite, sigma, "a finite conductivity", "cell", ModelError)
     skew = np.abs(sigma - sigma.swapaxes(1, 2)).max(axis=(1, 2))
-    _refuse_first(
-        skew > _SYMMETRY * np.abs(sigma).max(axis=(1, 2)), sigma, "a symmetric conductivity tensor"
-    )
+    skewed = skew > _SYMMETRY * np.abs(sigma).max(axis=(1, 2))
+    refuse_first(skewed, sigma, "a symmetric conductivity tensor", "cell", ModelError)
     principal = np.linalg.eigvalsh(_in_sheet(sigma.real, mesh))
-    _refuse_first(
-        principal[:, 0] <= _DEFINITE * np.abs(principal[:, -1]),
-        sigma,
-        "a conductivity tensor that is positive definite",
-    )
+    indefinite = principal[:, 0] <= _DEFINITE * np.abs(principal[:, -1])
+    positive = "a conductivity tensor that is positive definite"
+    refuse_first(indefinite, sigma, positive, "cell", ModelError)
     return sigma
 
 
@@ -69,12 +67,6 @@ def _in_sheet(sigma: NDArray[Any], mesh: Mesh) -> NDArray[Any]:
     corner = mesh.corners
     basis, _ = np.linalg.qr((corner[:, 1:] - corner[:, :1]).swapaxes(1, 2))
     return np.asarray(basis.swapaxes(1, 2) @ sigma @ basis)
-
-
-def _refuse_first(bad: NDArray[np.bool_], sigma: NDArray[Any], expected: str) -> None:
-    if bad.any():
-        cell = int(np.argmax(bad))
-        raise ModelError(f"expected {expected}, got {sigma[cell].tolist()}", where=f"cell {cell}")
 
 
 Touch = tuple[ArrayLike, ArrayLike]

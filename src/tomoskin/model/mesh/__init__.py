@@ -11,7 +11,14 @@ from tomoskin.model.mesh.extrude import (
 )
 from tomoskin.model.mesh.mesh import Mesh as Mesh, MeshFile as MeshFile
 from tomoskin.model.mesh.outline import Disc as Disc, Ellipse as Ellipse, Outline as Outline
-from tomoskin.model.mesh.polygon import Polygon as Polygon, Rectangle as Rectangle
+from tomoskin.model.mesh.polygon import (
+    Polygon as Polygon,
+    Rectangle as Rectangle,
+    centroid as centroid,
+    inside as inside,
+    off_segment as off_segment,
+    signed_area as signed_area,
+)
 from tomoskin.model.mesh.surface import (
     Cap as Cap,
     Plane as Plane,

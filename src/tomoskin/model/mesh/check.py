@@ -6,7 +6,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from tomoskin.core import FloatArray, GeometryError, IntArray
+from tomoskin.core import FloatArray, GeometryError, IntArray, refuse_first
 from tomoskin.model.mesh.triangles import check_finite, facets, paired_facets, simplex_measure
 
 _FLAT = 1e-12
@@ -49,15 +49,10 @@ def _check_shapes(points: FloatArray, cells: IntArray) -> None:
 
 def _check_indices(points: FloatArray, cells: IntArray, electrodes: tuple[IntArray, ...]) -> None:
     n = len(points)
-    tables = [("cell {row}", cells), *((f"E{i}", e) for i, e in enumerate(electrodes, 1))]
+    tables = [("cell", cells), *((f"E{i}, facet", e) for i, e in enumerate(electrodes, 1))]
     for name, table in tables:
         outside = ((table < 0) | (table >= n)).any(axis=1)
-        if outside.any():
-            row = int(np.argmax(outside))
-            raise GeometryError(
-                f"expected points from 0 to {n - 1}, got {table[row].tolist()}",
-                where=name.format(row=row),
-            )
+        refuse_first(outside, table, f"points from 0 to {n - 1}", name, GeometryError)
     used = np.zeros(n, dtype=bool)
     used[cells] = True
     if not used.all():
@@ -142,11 +137,6 @@ def checked_metric(metric: FloatArray, points: FloatArray, cells: IntArray) -> F
         size = checked[:, 0, 0] + checked[:, 1, 1]
         definite = np.linalg.det(checked) > _FLAT * size**2
     good = np.isfinite(checked).all(axis=(1, 2)) & definite & (size > 0) & (skew <= _FLAT * size)
-    if not good.all():
-        cell = int(np.argmin(good))
-        raise GeometryError(
-            f"expected a symmetric positive definite metric, got {checked[cell].tolist()}",
-            where=f"cell {cell}",
-        )
+    refuse_first(~good, checked, "a symmetric positive definite metric", "cell", GeometryError)
     checked.flags.writeable = False
     return checked

@@ -24,7 +24,7 @@ from tomoskin.model.mesh.files import (
     renumbered,
 )
 from tomoskin.model.mesh.pixels import pixel_map, step_for
-from tomoskin.model.mesh.triangles import boundary_facets, neighbour_pairs, owners, simplex_measure
+from tomoskin.model.mesh.triangles import boundary_facets, owners, paired_facets, simplex_measure
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +126,7 @@ class Mesh:
     @cached_property
     def neighbours(self) -> IntArray:
         """(n_pairs, 2) cells that share a facet, each pair once."""
-        return neighbour_pairs(self.cells)
+        return paired_facets(self.cells)[0]
 
     @cached_property
     def boundary(self) -> IntArray:

@@ -8,17 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from tomoskin.core import FloatArray, GeometryError, IntArray
+from tomoskin.core import FloatArray, GeometryError, IntArray, refuse_first
 
 
 def check_finite(points: FloatArray, what: str) -> None:
     """Raise GeometryError that names the first of ``points`` (n, d) that is not finite."""
-    finite = np.isfinite(points).all(axis=1)
-    if not finite.all():
-        bad = int(np.argmin(finite))
-        raise GeometryError(
-            f"expected finite coordinates, got {points[bad].tolist()}", where=f"{what} {bad}"
-        )
+    bad = ~np.isfinite(points).all(axis=1)
+    refuse_first(bad, points, "finite coordinates", what, GeometryError)
 
 
 def simplex_measure(points: FloatArray, simplices: IntArray) -> FloatArray:
@@ -58,18 +54,13 @@ def owners(cells: IntArray, chosen: IntArray) -> IntArray:
     return np.asarray(owner[order[np.searchsorted(number, wanted, sorter=order)]])
 
 
-def neighbour_pairs(cells: IntArray) -> IntArray:
-    """(n_pairs, 2) cells that share a facet, each pair once."""
-    return paired_facets(cells)[0]
-
-
 def boundary_facets(cells: IntArray) -> IntArray:
     """(n_facets, k − 1) facets that belong to one cell only, corners sorted."""
     return paired_facets(cells)[1]
 
 
 def paired_facets(cells: IntArray) -> tuple[IntArray, IntArray]:
-    """:func:`neighbour_pairs` and :func:`boundary_facets`, from one sort."""
+    """(n_pairs, 2) cells that share a facet, each pair once; and :func:`boundary_facets`."""
     facet, owner = facets(cells)
     order = np.lexsort(facet.T[::-1])
     facet, owner = facet[order], owner[order]

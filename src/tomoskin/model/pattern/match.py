@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +15,14 @@ _LISTED = 5
 
 _SPAN = 1e-3
 """Currents combine into a drive to within this part of it; weaker parts of them do not count."""
+
+
+_FORMS = (
+    (((0, 1, 2, 3), 1.0),),
+    (((1, 0, 2, 3), -1.0), ((0, 1, 3, 2), -1.0), ((1, 0, 3, 2), 1.0)),
+    (((2, 3, 0, 1), 1.0), ((3, 2, 0, 1), -1.0), ((2, 3, 1, 0), -1.0), ((3, 2, 1, 0), 1.0)),
+)
+"""Orders of a row's ends and signs: as itself, with pairs reversed, as its reciprocal."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,11 +56,12 @@ def match_rows(pattern: Pattern, drive: ArrayLike, measure: ArrayLike) -> RowMat
     """
     foreign = Pattern.from_tables(drive, measure)
     table: dict[tuple[int, ...], tuple[int, float]] = {}
-    for row, (d, m) in enumerate(_rows(foreign)):
-        key, sign = _canonical(d, m)
-        table.setdefault(key, (row, sign))
-        table.setdefault(_as_it_stands(d, m), (row, 1.0))
-    located = [_find(table, d, m) for d, m in _rows(pattern)]
+    for forms in _FORMS:
+        for row, ends in enumerate(np.hstack([foreign.drive, foreign.measure]).tolist()):
+            for order, sign in forms:
+                table.setdefault(tuple(ends[end] for end in order), (row, sign))
+    wanted = np.hstack([pattern.drive, pattern.measure]).tolist()
+    located = [table.get(tuple(row)) for row in wanted]
     missing = [row for row, hit in enumerate(located) if hit is None]
     if missing:
         raise PatternError(
@@ -123,30 +131,6 @@ def sum_rows(pattern: Pattern, currents: ArrayLike, measure: ArrayLike) -> RowSu
 def _way(pairs: IntArray) -> FloatArray:
     """(n,) 1 where a pair ascends, else −1."""
     return np.where(pairs[:, 0] < pairs[:, 1], 1.0, -1.0)
-
-
-def _rows(pattern: Pattern) -> Iterator[tuple[list[int], list[int]]]:
-    return zip(pattern.drive.tolist(), pattern.measure.tolist(), strict=True)
-
-
-def _canonical(d: list[int], m: list[int]) -> tuple[tuple[int, ...], float]:
-    sign = (1.0 if d[0] < d[1] else -1.0) * (1.0 if m[0] < m[1] else -1.0)
-    return (min(d), max(d), min(m), max(m)), sign
-
-
-def _as_it_stands(d: list[int], m: list[int]) -> tuple[int, ...]:
-    return (-1, *d, *m)
-
-
-def _find(
-    table: dict[tuple[int, ...], tuple[int, float]], d: list[int], m: list[int]
-) -> tuple[int, float] | None:
-    itself = table.get(_as_it_stands(d, m))
-    if itself is not None:
-        return itself
-    key, sign = _canonical(d, m)
-    hit = table.get(key) or table.get(key[2:] + key[:2])
-    return None if hit is None else (hit[0], hit[1] * sign)
 
 
 def _describe(pattern: Pattern, missing: list[int]) -> str:
