@@ -19,9 +19,8 @@ from numpy.typing import NDArray
 from platformdirs import user_cache_path
 
 from tomoskin.core.errors import EMPTY, DataError, TomoskinError
-from tomoskin.core.inputs import check_fits, open_input
-from tomoskin.core.outputs import StrPath, written
 from tomoskin.core.records import FloatArray, IntArray
+from tomoskin.core.user_files import StrPath, check_fits, open_input, written
 
 _UNREADABLE = (
     ValueError,

@@ -14,7 +14,7 @@ from scipy.spatial.distance import cdist
 
 from tomoskin.core import DataError, FloatArray, ModelError, reach
 from tomoskin.imaging.linear.spectrum import Spectrum
-from tomoskin.imaging.trained.merit import noise_figure
+from tomoskin.imaging.trained.merit import deviations, noise_figure
 from tomoskin.model.mesh import Mesh
 
 RADIUS = 0.055
@@ -70,14 +70,7 @@ def known_noise(noise: FloatArray | None, n_meas: int) -> FloatArray:
             "the noise of the measurements is missing",
             hint="give two or more idle frames as the reference",
         )
-    if noise.shape != (n_meas,):
-        raise DataError(f"expected noise of shape ({n_meas},), got {noise.shape}")
-    if not (np.isfinite(noise).all() and (noise >= 0).all() and noise.any()):
-        raise DataError(
-            f"expected finite noise above 0, got {noise.min():g} to {noise.max():g}",
-            hint="idle frames that are all the same show no noise: record new ones",
-        )
-    return noise
+    return deviations(noise, n_meas)
 
 
 @dataclass(frozen=True, eq=False)

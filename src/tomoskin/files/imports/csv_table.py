@@ -130,7 +130,7 @@ def _real(values: NDArray[Any], name: str, source: str) -> FloatArray:
 
 def _values(rows: Iterator[list[str]], header: list[str], source: str) -> NDArray[Any]:
     """The numbers of all lines, one after another: complex where one of them is."""
-    values, imaginary, most = array("d"), array("d"), most_bytes()
+    values, most = array("d"), most_bytes()
     for number, row in enumerate(rows, start=2):
         if not row:
             continue
@@ -141,15 +141,13 @@ def _values(rows: Iterator[list[str]], header: list[str], source: str) -> NDArra
                 hint="a decimal comma splits a field in two",
             )
         where = f"{source}, line {number}"
-        line = [_number(text, name, where) for text, name in zip(row, header, strict=True)]
-        if not imaginary and any(isinstance(value, complex) for value in line):
-            imaginary.frombytes(bytes(values.itemsize * len(values)))
-        if imaginary or any(isinstance(value, complex) for value in line):
-            imaginary.extend(value.imag for value in line)
-        values.extend(value.real for value in line)
+        for text, name in zip(row, header, strict=True):
+            value = _number(text, name, where)
+            values.extend((value.real, value.imag))
         if values.itemsize * len(values) > most:
             check_fits(values.itemsize * len(values), source)
-    return np.asarray(values) + 1j * np.asarray(imaginary) if imaginary else np.asarray(values)
+    table = np.asarray(values).view(np.complex128)
+    return table if table.imag.any() else table.real
 
 
 def _number(text: str, name: str, where: str) -> float | complex:

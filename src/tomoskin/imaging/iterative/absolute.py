@@ -15,8 +15,8 @@ from tomoskin.imaging.iterative.unknowns import (
     Contacts,
     ImageMap,
     Joint,
+    LinearMap,
     ModelPoint,
-    Modes,
     Observation,
     Unknowns,
     Whitened,
@@ -151,7 +151,7 @@ class AbsoluteImaging:
         """
         data = observation.whitened(self.model.pattern.n_meas)
         n_cells = len(self.model.mesh.cells)
-        image = Modes.of_cells(n_cells, n_cells)
+        image = LinearMap.of_cells(n_cells, n_cells)
         unknowns, begin = medium(self.model, data, image, self.contacts, background)
         descent = descend(
             self._goal(unknowns, data.target),
@@ -216,7 +216,7 @@ def _uniform(
     if background is None:
         background = _of_right_size(model, data.target, data.rows)
     unknowns = Unknowns(
-        model, Modes.of_cells(len(model.mesh.cells), 0), background, contacts, data.rows
+        model, LinearMap.of_cells(len(model.mesh.cells), 0), background, contacts, data.rows
     )
     descent = descend(
         Goal(unknowns.at, data.target, lambda _: others(unknowns.n_contacts)),

@@ -141,13 +141,13 @@ class ImageMap(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Modes:
+class LinearMap:
     """The contrast is linear in the latent image: ``basis`` (n_cells, size) times it."""
 
     basis: csr_array
 
     @classmethod
-    def of_cells(cls, n_cells: int, size: int) -> Modes:
+    def of_cells(cls, n_cells: int, size: int) -> LinearMap:
         """One latent value a cell, or none: no image."""
         return cls(csr_array(eye_array(n_cells, size)))
 

@@ -18,13 +18,13 @@ from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
 
 from tomoskin.core import FloatArray, GeometryError, IntArray
-from tomoskin.model.mesh.check import check_cells
 from tomoskin.model.mesh.mesh import MeshFile
 from tomoskin.model.mesh.polygon import Polygon
 from tomoskin.model.mesh.surface import Surface, rows_of
 from tomoskin.model.mesh.triangles import (
     SIDES,
     barycentric,
+    check_cells,
     check_crossings,
     closest,
     paired_facets,

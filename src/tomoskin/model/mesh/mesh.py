@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from tomoskin.core import FloatArray, GeometryError, IntArray, PixelMap, numeric
-from tomoskin.model.mesh.check import check_mesh, checked_metric
 from tomoskin.model.mesh.files import (
     Electrodes,
     cells_of,
@@ -24,7 +23,14 @@ from tomoskin.model.mesh.files import (
     renumbered,
 )
 from tomoskin.model.mesh.pixels import pixel_map, step_for
-from tomoskin.model.mesh.triangles import boundary_facets, owners, paired_facets, simplex_measure
+from tomoskin.model.mesh.triangles import (
+    boundary_facets,
+    check_mesh,
+    checked_metric,
+    owners,
+    paired_facets,
+    simplex_measure,
+)
 
 
 @dataclass(frozen=True, eq=False)
