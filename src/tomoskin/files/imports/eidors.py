@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -59,17 +58,16 @@ def parse(variables: Mapping[str, Any], source: str) -> Recording:
         )
     reference = _read(variables, _REFERENCE, select, len(drive), source)
     idle = _numbers(variables, "idle", ())
-    is_count = idle is not None and idle in range(1, len(voltages) + 1)
-    recording = voltages_of(
+    return voltages_of(
         source,
         voltages,
         (drive, measure),
         time=_numbers(variables, "time_s", (len(voltages),)),
         reference=None if reference is None else reference[0],
         labels=_numbers(variables, "xy_m", (len(voltages), 2)),
+        idle=int(idle) if idle is not None and idle in range(1, len(voltages) + 1) else 1,
+        board_known=OWN in variables,
     )
-    recording = replace(recording, board_known=OWN in variables)
-    return replace(recording, idle=int(idle)) if is_count and idle is not None else recording
 
 
 def _stimulation(variables: Any) -> list[Mapping[str, Any]] | None:

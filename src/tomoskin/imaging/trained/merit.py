@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tomoskin.core import DataError, FloatArray, Image, IntArray
+from tomoskin.core import DataError, FloatArray, Image, IntArray, TomoskinError
 from tomoskin.imaging.linear.operator import Operator
 from tomoskin.imaging.trained.targets import Balls, Targets, centre_of
 from tomoskin.model.mesh import Mesh
@@ -17,13 +17,13 @@ _LEVEL = 0.25
 """What counts as the target in the image: a quarter of the greatest value, section 3.1."""
 
 
-def deviations(noise: ArrayLike, n_meas: int) -> FloatArray:
-    """(n_meas,) standard deviations of data, of these or one number; DataError for others."""
+def deviations(noise: ArrayLike, n_meas: int, error: type[TomoskinError] = DataError) -> FloatArray:
+    """(n_meas,) standard deviations of data, of these or one number; an ``error`` for others."""
     sd = np.asarray(noise, dtype=np.float64)
     if sd.shape not in ((), (n_meas,)):
-        raise DataError(f"expected noise of shape ({n_meas},), got {sd.shape}")
+        raise error(f"expected noise of shape ({n_meas},), got {sd.shape}")
     if not (np.isfinite(sd).all() and (sd >= 0).all() and sd.any()):
-        raise DataError(f"expected finite noise above 0, got {sd.min():g} to {sd.max():g}")
+        raise error(f"expected finite noise above 0, got {sd.min():g} to {sd.max():g}")
     return np.broadcast_to(sd, (n_meas,))
 
 

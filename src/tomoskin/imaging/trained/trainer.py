@@ -77,7 +77,7 @@ class Trainer:
         """Set up for targets, noise, one deviation or (n_meas,), and the ``radius`` that targets
         are to be shown with. Raises ModelError."""
         data = (training.dv / training.amount[:, None]).T
-        sd = deviations(noise, len(data))
+        sd = deviations(noise, len(data), ModelError)
         refuse_first(~(sd > 0), sd, "noise above 0", "row", ModelError)
         scaled = sd * np.sqrt(((data / sd[:, None]) ** 2).sum() / len(sd))
         centre = int(np.linalg.norm(training.places - centre_of(mesh), axis=1).argmin())

@@ -87,17 +87,6 @@ def _check_readable(file: Path) -> None:
         )
 
 
-def check_repeats(cells: IntArray) -> None:
-    """Raise GeometryError that names a cell with the corners of an earlier one."""
-    ordered = np.sort(cells, axis=1)
-    _, first, which = np.unique(ordered, axis=0, return_index=True, return_inverse=True)
-    earlier = first[which.reshape(-1)]
-    again = earlier < np.arange(len(cells))
-    if again.any():
-        cell = int(np.argmax(again))
-        raise GeometryError(f"repeats cell {earlier[cell]}", where=f"cell {cell}")
-
-
 def renumbered(number: IntArray, facets: IntArray, where: str) -> IntArray:
     """Facets by each point's new ``number``; −1, which the mesh refuses, for points of no cell."""
     if facets.dtype.kind not in "iu" or facets.ndim != 2:

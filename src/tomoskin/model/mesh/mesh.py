@@ -15,7 +15,6 @@ from tomoskin.core import FloatArray, GeometryError, IntArray, PixelMap, numeric
 from tomoskin.model.mesh.files import (
     Electrodes,
     cells_of,
-    check_repeats,
     choose,
     groups_of,
     parsed,
@@ -211,7 +210,6 @@ class MeshFile:
     def mesh(self, electrodes: Electrodes = None) -> Mesh:
         """Return the mesh with those electrodes. Raises GeometryError."""
         try:
-            check_repeats(self.cells)
             facets = choose(self.points, self.cells, self.groups, electrodes)
             used, compact = np.unique(self.cells, return_inverse=True)
             number = np.full(len(self.points), -1)

@@ -15,13 +15,13 @@ from tomoskin.core import FloatArray, GeometryError, SkinError, StrPath, meant_o
 from tomoskin.model.robot.link_shapes import (
     MOST_TRIANGLES,
     LinkShape,
+    Pose,
     name_of,
     numbers_of,
     origin_of,
     read_shapes,
     thinned,
 )
-from tomoskin.model.robot.pose import Pose
 from tomoskin.model.skin import read_text
 
 _LARGEST = 20_000_000
