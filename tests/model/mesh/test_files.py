@@ -285,7 +285,7 @@ def test_a_cell_that_stands_twice_is_named(tmp_path: Path) -> None:
     file = write_cells(tmp_path / "a.vtu", POINTS[:4], [("triangle", cells)])
     with pytest.raises(GeometryError, match="in one or two cells") as caught:
         Mesh.read(file, [[[0, 1]]])
-    assert caught.value.where.endswith("a.vtu, cells 0, 1, 2")
+    assert caught.value.where.endswith("a.vtu, cells 0, 2, 1")
     assert "one is listed twice" in caught.value.hint
 
 
