@@ -25,7 +25,7 @@ from tomoskin.imaging.linear.linear_problem import (
     OneStep as OneStep,
 )
 from tomoskin.imaging.linear.operator import MOST_EXCLUDED as MOST_EXCLUDED, Operator as Operator
-from tomoskin.imaging.linear.spectrum import Assembly as Assembly, Spectrum as Spectrum
+from tomoskin.imaging.linear.spectrum import Spectrum as Spectrum
 from tomoskin.imaging.linear.temporal import Modes as Modes, Temporal as Temporal
 from tomoskin.imaging.resolution import (
     Picard as Picard,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, ModelError, Voltages
-from tomoskin.imaging import AlphaChoice, Assembly, Spectrum, choose
+from tomoskin.imaging import AlphaChoice, Spectrum, choose
 from tomoskin.pipeline.frame_result import NO_AGREEMENT, ModelAgreement
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.sensing.signal import Reference
@@ -148,13 +148,10 @@ def _tune_image(prepared: Prepared, reference: Reference) -> Steps:
         return
     yield None
     spectrum = prepared.light_touch.spectrum
-    assembly = Assembly(spectrum, choice.alpha)
     rows = max(int(_STEP / len(noise) ** 2), 1)
-    while not assembly.done:
-        assembly.advance(rows)
-        yield None
+    operator = yield from spectrum.operator_in_pieces(choice.alpha, rows)
     reason = f"{choice.reason}, measured on {reference.n_frames} idle frames"
-    yield prepared.with_alpha(replace(choice, reason=reason), spectrum, assembly.operator())
+    yield prepared.with_alpha(replace(choice, reason=reason), spectrum, operator)
 
 
 def _tune_sheet(prepared: Prepared, reference: Reference, excluded: Mask | None) -> Steps:

@@ -137,11 +137,21 @@ def points_of(raw: Any, cells: IntArray, scale: float) -> tuple[FloatArray, floa
 
 
 def groups_of(raw: Any, corners: int) -> dict[str, IntArray]:
-    """Name → (n, corners) facets, for all groups that hold any."""
+    """Name → (n, corners) facets, for all groups that hold any: cell sets, where gmsh 4.1 has its
+    named physical groups; those of gmsh by name, or number where they have none; and marks."""
+    physical = {
+        int(number): name
+        for name, (number, dimension) in raw.field_data.items()
+        if dimension == corners - 1
+    }
     parts: dict[str, list[IntArray]] = {}
-    for source in (_sets, _physical, _marked):
+    for source in (
+        _sets(raw, corners),
+        _by_number(raw, "gmsh:physical", corners, lambda n: physical.get(n, str(n))),
+        _by_number(raw, MARKER, corners, "E{}".format),
+    ):
         groups: dict[str, list[IntArray]] = {}
-        for name, facets in source(raw, corners):
+        for name, facets in source:
             groups.setdefault(name, []).append(facets)
         parts = {**groups, **parts}  # what is a set already is not read twice
     joined = {name: np.concatenate(tables).astype(np.int64) for name, tables in parts.items()}
@@ -149,37 +159,20 @@ def groups_of(raw: Any, corners: int) -> dict[str, IntArray]:
 
 
 def _sets(raw: Any, corners: int) -> Iterator[tuple[str, IntArray]]:
-    """Cell sets; gmsh 4.1 has its named physical groups here."""
     for name, members in raw.cell_sets.items():
         for block, chosen in zip(raw.cells, members, strict=True):
             if not name.startswith("gmsh:") and chosen is not None and _fits(block, corners):
                 yield name, block.data[np.asarray(chosen, dtype=np.int64)]
 
 
-def _physical(raw: Any, corners: int) -> Iterator[tuple[str, IntArray]]:
-    """gmsh's physical groups, by name, or by number where they have none."""
-    names = {
-        int(number): name
-        for name, (number, dimension) in raw.field_data.items()
-        if dimension == corners - 1
-    }
-    for number, facets in _by_number(raw, "gmsh:physical", corners):
-        yield names.get(number, str(number)), facets
-
-
-def _marked(raw: Any, corners: int) -> Iterator[tuple[str, IntArray]]:
-    for number, facets in _by_number(raw, MARKER, corners):
-        yield f"E{number}", facets
-
-
-def _by_number(raw: Any, key: str, corners: int) -> Iterator[tuple[int, IntArray]]:
-    if key not in raw.cell_data:
-        return
-    for block, values in zip(raw.cells, raw.cell_data[key], strict=True):
+def _by_number(
+    raw: Any, key: str, corners: int, name: Callable[[int], str]
+) -> Iterator[tuple[str, IntArray]]:
+    for block, values in zip(raw.cells, raw.cell_data.get(key, ()), strict=False):
         if _fits(block, corners):
             numbers = np.asarray(values).reshape(-1)
             for number in np.unique(numbers[numbers > 0]).tolist():
-                yield int(number), block.data[numbers == number]
+                yield name(int(number)), block.data[numbers == number]
 
 
 def _fits(block: Any, corners: int) -> bool:
