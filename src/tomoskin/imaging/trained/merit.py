@@ -8,13 +8,23 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tomoskin.core import DataError, FloatArray, Image, IntArray
+from tomoskin.core import DataError, FloatArray, Image, IntArray, TomoskinError
 from tomoskin.imaging.linear.operator import Operator
 from tomoskin.imaging.trained.targets import Balls, Targets, centre_of
 from tomoskin.model.mesh import Mesh
 
 _LEVEL = 0.25
 """What counts as the target in the image: a quarter of the greatest value, section 3.1."""
+
+
+def deviations(noise: ArrayLike, n_meas: int, error: type[TomoskinError] = DataError) -> FloatArray:
+    """(n_meas,) standard deviations of data, of these or one number; an ``error`` for others."""
+    sd = np.asarray(noise, dtype=np.float64)
+    if sd.shape not in ((), (n_meas,)):
+        raise error(f"expected noise of shape ({n_meas},), got {sd.shape}")
+    if not (np.isfinite(sd).all() and (sd >= 0).all() and sd.any()):
+        raise error(f"expected finite noise above 0, got {sd.min():g} to {sd.max():g}")
+    return np.broadcast_to(sd, (n_meas,))
 
 
 def noise_figure(
@@ -45,12 +55,7 @@ def noise_figure(
     DataError
         When the signal is zero, or the noise is not above 0 or of another shape.
     """
-    sd = np.asarray(noise, dtype=np.float64)
-    if sd.shape not in ((), signal.shape):
-        raise DataError(f"expected noise of shape {signal.shape}, got {sd.shape}")
-    sd = np.broadcast_to(sd, signal.shape)
-    if not (np.isfinite(sd).all() and (sd >= 0).all() and sd.any()):
-        raise DataError(f"expected finite noise above 0, got {sd.min():g} to {sd.max():g}")
+    sd = deviations(noise, len(signal))
     image = np.abs(volumes * (matrix @ signal)).mean()
     if not (signal.any() and image > 0):
         raise DataError("the target causes no signal, or no image")

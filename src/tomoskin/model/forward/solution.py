@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import FloatArray, IntArray
-from tomoskin.model.forward.engine import Factor, singular
+from tomoskin.core import FloatArray
+from tomoskin.model.forward.engine import Compressed, Factor, singular
 from tomoskin.model.forward.system import System
 
 MOST_RESIDUAL = 1e-6
@@ -19,25 +19,6 @@ MOST_RESIDUAL = 1e-6
 
 _FLOOR = 1e-12
 """Voltages that are zero by symmetry are right to this part of √(R_drive · R_measure)."""
-
-
-def solve_checked(
-    factor: Factor, values: NDArray[Any], rows: IntArray
-) -> tuple[NDArray[Any], NDArray[Any], float]:
-    """Columns X (n_unknowns, n_rows) of the inverse of the matrix A with these values.
-
-    And what the residual costs, Xᵀ (E − A X) with E the columns of the identity; and its largest
-    entry.
-
-    Raises
-    ------
-    ModelError
-        When the residual shows that the matrix is singular to working precision.
-    """
-    columns, lost, largest = factor.checked_columns(values, rows)
-    if not largest < MOST_RESIDUAL:
-        raise singular()
-    return columns, lost, largest
 
 
 def checked_voltages(
@@ -128,28 +109,59 @@ def error_of_drives(model: System, matrix: Any, basis: NDArray[Any]) -> NDArray[
 class Solution:
     """Potentials and voltages for one conductivity; complex where σ or z is.
 
-    What is more than the voltages is computed when it is asked for, once.
+    Everything follows from one basis, and is computed when it is asked for, once.
 
     Attributes
     ----------
     model
-        What was solved.
+        What is solved.
     conductivity
         (n_cells,), or a tensor per cell (n_cells, d, d), S or S/m.
-    basis
-        (n_unknowns, n_electrodes − 1) V/A: fields of 1 A into each electrode and out at the last,
-        which is at zero.
-    voltages
-        (n_meas,) V, in the pattern's order.
-    residual
-        Largest relative residual of the linear solves.
     """
 
     model: System
     conductivity: NDArray[Any]
-    basis: NDArray[Any]
-    voltages: NDArray[Any]
-    residual: float
+
+    @cached_property
+    def factor(self) -> Factor:
+        """The system matrix, factorised."""
+        return self.model.factorise(self._matrix.values)
+
+    @cached_property
+    def _matrix(self) -> Compressed:
+        return self.model.assembly.matrix(self.conductivity, self.model.contacts)
+
+    @cached_property
+    def _solved(self) -> tuple[NDArray[Any], NDArray[Any], float]:
+        """Basis, voltages and residual; ModelError where rounding has spoilt them."""
+        model, matrix, assembly = self.model, self._matrix, self.model.assembly
+        electrodes = np.arange(assembly.n_points, assembly.n_unknowns)
+        basis, lost, largest = self.factor.checked_columns(matrix.values, electrodes)
+        if not largest < MOST_RESIDUAL:
+            raise singular()
+        voltages = checked_voltages(
+            model,
+            basis[assembly.n_points :],
+            lost,
+            sharper=lambda: error_of_drives(model, matrix.matrix, basis),
+        )
+        return basis, voltages, largest
+
+    @property
+    def basis(self) -> NDArray[Any]:
+        """(n_unknowns, n_electrodes − 1) V/A: fields of 1 A into each electrode and out at the
+        last, which is at zero."""
+        return self._solved[0]
+
+    @property
+    def voltages(self) -> NDArray[Any]:
+        """(n_meas,) V, in the pattern's order."""
+        return self._solved[1]
+
+    @property
+    def residual(self) -> float:
+        """Largest relative residual of the linear solves."""
+        return self._solved[2]
 
     @cached_property
     def transfer_resistance(self) -> NDArray[Any]:

@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array
 
-from tomoskin.core import FloatArray, IntArray, ModelError
-from tomoskin.model.forward.arguments import number_type, numbers
-from tomoskin.model.forward.assembly import SystemAssembly, gradient_operator
-from tomoskin.model.forward.element import Element
+from tomoskin.core import FloatArray, IntArray, ModelError, numeric
+from tomoskin.model.forward.arguments import number_type
+from tomoskin.model.forward.assembly import Element, SystemAssembly, gradient_operator
 from tomoskin.model.forward.engine import Factorise
 from tomoskin.model.forward.engine_choice import choose_engine
 from tomoskin.model.mesh import Mesh
@@ -100,7 +99,7 @@ class System:
 
 
 def _impedance(value: ArrayLike, n: int) -> NDArray[Any]:
-    raw = numbers(value, "contact impedance")
+    raw = numeric(value, ModelError, " as contact impedance")
     if raw.shape not in ((), (n,)):
         raise ModelError(f"expected one contact impedance or {n}, got shape {raw.shape}")
     z = np.broadcast_to(raw, (n,)).astype(number_type(raw))
@@ -115,7 +114,7 @@ def _impedance(value: ArrayLike, n: int) -> NDArray[Any]:
 
 
 def _current(value: ArrayLike, n_drive: int) -> FloatArray:
-    raw = numbers(value, "current")
+    raw = numeric(value, ModelError, " as current")
     if raw.shape not in ((), (n_drive,)):
         raise ModelError(f"expected one current or {n_drive}, got shape {raw.shape}")
     if raw.dtype.kind == "c":

@@ -11,13 +11,10 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from tomoskin.core import FloatArray, GeometryError, IntArray, PixelMap
-from tomoskin.model.mesh.check import check_mesh, checked_metric
+from tomoskin.core import FloatArray, GeometryError, IntArray, PixelMap, numeric
 from tomoskin.model.mesh.files import (
     Electrodes,
-    at_source,
     cells_of,
-    check_repeats,
     choose,
     groups_of,
     parsed,
@@ -25,7 +22,14 @@ from tomoskin.model.mesh.files import (
     renumbered,
 )
 from tomoskin.model.mesh.pixels import pixel_map, step_for
-from tomoskin.model.mesh.triangles import boundary_facets, neighbour_pairs, owners, simplex_measure
+from tomoskin.model.mesh.triangles import (
+    boundary_facets,
+    check_mesh,
+    checked_metric,
+    owners,
+    paired_facets,
+    simplex_measure,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +131,7 @@ class Mesh:
     @cached_property
     def neighbours(self) -> IntArray:
         """(n_pairs, 2) cells that share a facet, each pair once."""
-        return neighbour_pairs(self.cells)
+        return paired_facets(self.cells)[0]
 
     @cached_property
     def boundary(self) -> IntArray:
@@ -194,7 +198,7 @@ class MeshFile:
             points, height = points_of(raw, cells, scale)
             groups = groups_of(raw, cells.shape[1] - 1)
         except GeometryError as error:
-            raise at_source(error, str(file)) from error
+            raise error.within(str(file), GeometryError) from error
         return cls(points, cells, groups, str(file), height)
 
     @property
@@ -206,7 +210,6 @@ class MeshFile:
     def mesh(self, electrodes: Electrodes = None) -> Mesh:
         """Return the mesh with those electrodes. Raises GeometryError."""
         try:
-            check_repeats(self.cells)
             facets = choose(self.points, self.cells, self.groups, electrodes)
             used, compact = np.unique(self.cells, return_inverse=True)
             number = np.full(len(self.points), -1)
@@ -214,20 +217,13 @@ class MeshFile:
             tables = [renumbered(number, f, f"E{i}") for i, f in enumerate(facets, 1)]
             return Mesh(self.points[used], compact.reshape(self.cells.shape), tuple(tables))
         except GeometryError as error:
-            raise at_source(error, self.source) from error
+            raise error.within(self.source, GeometryError) from error
 
 
 def _frozen(value: object, dtype: DTypeLike, where: str) -> NDArray[Any]:
-    try:
-        raw = np.array(value)
-    except ValueError as error:
-        raise GeometryError(
-            "expected rows of equal length, got different lengths", where=where
-        ) from error
+    raw = numeric(value, GeometryError, where=where, real=True)
     if raw.ndim != 2:
         raise GeometryError(f"expected a table with two axes, got shape {raw.shape}", where=where)
-    if raw.dtype.kind not in "iuf":
-        raise GeometryError(f"expected real numbers, got {raw.dtype}", where=where)
     with np.errstate(invalid="ignore"):
         array = raw.astype(dtype)
     if array.dtype.kind == "i" and not np.array_equal(array, raw):
