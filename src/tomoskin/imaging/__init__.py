@@ -35,9 +35,10 @@ from tomoskin.imaging.resolution import (
 )
 from tomoskin.imaging.trained.merit import (
     Merit as Merit,
+    Targets as Targets,
     ThesisMetrics as ThesisMetrics,
+    along as along,
     figures as figures,
     noise_figure as noise_figure,
 )
-from tomoskin.imaging.trained.targets import Targets as Targets, along as along
 from tomoskin.imaging.trained.trainer import Greit as Greit

@@ -21,8 +21,7 @@ from scipy.sparse import csr_array
 
 from tomoskin.core import FloatArray, ModelError, refuse_first
 from tomoskin.imaging.linear.operator import Operator
-from tomoskin.imaging.trained.merit import deviations, noise_figure
-from tomoskin.imaging.trained.targets import Balls, Targets, centre_of
+from tomoskin.imaging.trained.merit import Balls, Targets, centre_of, deviations, noise_figure
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Mesh
 

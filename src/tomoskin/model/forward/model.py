@@ -14,8 +14,7 @@ from tomoskin.core import FloatArray, ModelError
 from tomoskin.model.forward import derivatives
 from tomoskin.model.forward.arguments import checked_conductivity
 from tomoskin.model.forward.engine import singular
-from tomoskin.model.forward.solution import Solution
-from tomoskin.model.forward.system import System
+from tomoskin.model.forward.solution import Solution, System
 from tomoskin.model.forward.update import LocalUpdate
 
 
