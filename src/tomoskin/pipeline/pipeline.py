@@ -142,10 +142,11 @@ class Pipeline:
         scan = self._clock.middle(frame, given.longest_scan, rate)
         return self.follow(given.readout(frame, rate, scan))
 
-    def push_drive(self, part: DriveSamples) -> DriveResult | None:
+    def push_drive(self, part: DriveSamples, *, late: bool = False) -> DriveResult | None:
         """Take one drive, before the frame that it becomes a part of.
 
-        What is known of touches then, or None where drives tell nothing.
+        What is known of touches then, or None where drives tell nothing, and where this one is
+        ``late``: a newer one is there already, which is to be asked.
         """
         state, given = self._state, self._given
         drives = given.scan.sample_drive == part.drive
@@ -159,7 +160,7 @@ class Pipeline:
         if railed[given.pattern.drive_index == part.drive].any():
             return None
         time = part.ticks / (self.tick_rate or given.readout.tick_rate)
-        return state.push_drive(part.drive, values, (time, part.host_time))
+        return state.push_drive(part.drive, values, (time, part.host_time), late=late)
 
     def early(self, result: FrameResult) -> FrameResult:
         """The newest ``result`` for those who were told of drives before: it neither shows touches
@@ -170,16 +171,12 @@ class Pipeline:
         """Take one frame whose voltages are known already: what :meth:`push` does with counts."""
         if isinstance(self._state, Following):
             return self._state.push(measured)
-        return self._collect(self._state, measured)
-
-    def _collect(self, state: Collecting, measured: Voltages) -> FrameResult:
-        given = self._given
-        rest = state.push(measured)
-        if rest is not None:
-            reach("reference")
-            self._state = Following.from_rest(given, rest, self._tracker, self._setting)
-            return self._state.first(measured)
-        return FrameResult.at_rest(measured, given.no_image, given.operator.reference)
+        given, rest = self._given, self._state.push(measured)
+        if rest is None:
+            return FrameResult.at_rest(measured, given.no_image, given.operator.reference)
+        reach("reference")
+        self._state = Following.from_rest(given, rest, self._tracker, self._setting)
+        return self._state.first(measured)
 
     def _new_tracker(self) -> Tracker:
         return Tracker(TrackSettings(self._given.skin.touch.snr, still=self._setting.alone))
