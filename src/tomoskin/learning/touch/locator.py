@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 
 from tomoskin.core import Detection, FloatArray
 from tomoskin.learning.kind import Progress, silent
+from tomoskin.learning.touch.gaussian_process import squared_distances
 from tomoskin.learning.touch.per_channel import Envelope, likeliest_envelope, rings
 from tomoskin.learning.touch.posterior import Estimates
 from tomoskin.learning.touch.presses import Features, Presses, Strength, frames, mean_about
@@ -33,13 +34,16 @@ _STEPS = 4
 _PLACES = 600
 """Positions in the grid; what is between them is their mean."""
 
-_SHARED = 256
+SHARED = 256
 """Measurements above which it is not asked where their electrodes are: so many tell enough."""
 
 _MISSING = 2.0
 """Power of the part of the rows that a frame has, by which its covariance is divided: filled in,
 the others say little. Chosen on the twin's textile disc without one of 8 electrodes, seeds 1 to 3.
 """
+
+_INSIDE = 0.9
+"""Part of the way to the rim at which presses are asked for."""
 
 _WIDEST = 2.0
 """Deviation, in radii of the region, at which nothing is known of a place: another skin may be
@@ -157,7 +161,7 @@ class Locator:
         data = features(presses.dv)
         progress(0, _STEPS)
         envelope = Envelope()
-        if origin[0] is not None and len(features.rows) <= _SHARED:
+        if origin[0] is not None and len(features.rows) <= SHARED:
             around = rings(origin[0], region.scaled(region.outline))
             of_rows = (ring.of_rows(features.rows) for ring in around)
             envelope = likeliest_envelope(of_rows, positions, data)
@@ -272,8 +276,13 @@ class Locator:
         )
 
     def next_place(self) -> FloatArray:
-        """(2,) m where the next labelled press tells most: the maps are least certain there."""
-        return self.region.metres(self.estimates.least_known)
+        """(2,) m where the next labelled press tells most: the farthest from those that were made.
+
+        What the maps say of their own uncertainty chooses no better.
+        """
+        places = _INSIDE * self.estimates.grid
+        away = squared_distances(places, self.region.scaled(self.presses.xy)).min(axis=1)
+        return self.region.metres(places[int(away.argmax())])
 
 
 def detection_at(position: FloatArray, covariance: FloatArray, strength: float) -> Detection:
