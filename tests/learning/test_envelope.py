@@ -95,7 +95,7 @@ def test_a_locator_that_knows_its_pattern_uses_it() -> None:
         ([0, 1], (1, 1), ""),
         ([1, 0], (1, 1), "with x and y exchanged:"),
         ([0, 1], (1, -1), "with y of the other sign:"),
-        ([1, 0], (-1, 1), "with a quarter turn to the right:"),
+        ([1, 0], (-1, 1), "with x and y exchanged and y of the other sign:"),
     ],
 )
 def test_labels_on_other_axes_are_said(

@@ -26,10 +26,7 @@ _RELIABLE = 0.5
 _PRIOR_FRAMES = (1.0, 0.01)
 """Frames that the templates found without labels count as beside the labelled ones, as tried."""
 
-_DRAWS, _FOLDS = 3, 5
-_CERTAIN = 0.002
-"""Part of the frames that may always be wrong, or right."""
-
+_DRAWS = 3
 _BY_CHANCE, _HONEST = 0.05, 0.1
 """Probability below which it is no chance that so few labels agree with a fit, and by how much less
 than it expects may be right."""
@@ -48,7 +45,7 @@ class Alignment:
         Whether what is said of its frames can be believed.
     reliability
         Expected part of the frames whose combination is right, 0 to 1: what the fit says of them,
-        less its optimism, as far as labels agree that were left out of it.
+        less its optimism.
     grown
         Size of the templates against those learnt before.
     reasons
@@ -83,18 +80,12 @@ def aligned(
     in which no flag is set, None where there is no such thing.
     """
     fitted = _fitted(prior, x, numbers)
-    n = int((numbers >= 0).sum())
-    expected = _expected_right(prior, fitted, x, n)
-    reasons: tuple[str, ...] = ()
-    if n:
-        agree = _agreeing(prior, x, numbers)
-        less = np.maximum(expected - _HONEST, _CERTAIN)  # a fit with fewer labels
-        log = agree * np.log(less) + (n - agree) * np.log1p(-less)
-        reliability = float(np.average(expected, weights=np.exp(log - log.max())))
-        if bdtr(agree, n, reliability - _HONEST) < _BY_CHANCE:
-            reasons = (f"{n - agree} of {n} labels contradict the other frames",)
+    labelled = numbers >= 0
+    reliability = _reliability(prior, fitted, x, int(labelled.sum()))
+    if labelled.any():
+        free = fitted.adapted(x, np.full(len(x), -1))
+        reasons = _contradictions(free, x[labelled], numbers[labelled], reliability)
     else:
-        reliability = float(np.median(expected[1:]))
         reasons = _doubts(prior, fitted, rest)
     if reliability < _RELIABLE:
         reasons = (*reasons, f"only {reliability:.0%} of {len(x)} such frames would be right")
@@ -104,28 +95,40 @@ def aligned(
 def _fitted(prior: Mixture, x: FloatArray, numbers: IntArray) -> Mixture:
     """``prior`` fitted to frames x (n, d), of which ``numbers`` (n,) names some, −1 the others.
 
-    Labels name what was found without them, and templates are tried as they alone give them, with
-    the noise of ``prior``: those that have changed much are not found from where they were. The
-    likeliest of these fits is taken.
+    Labels name what was found without them, and each template is tried as they alone give it, all
+    of them with the noise of ``prior`` too: those that have changed much are not found from where
+    they were, nor in the noise of a wrong fit. The likeliest of these fits is taken.
     """
     unnamed = prior.moved_to(x).adapted(x, np.full(len(x), -1))
     labelled = numbers >= 0
     if not labelled.any():
         return unnamed
     named = _named(prior, unnamed, x[labelled], numbers[labelled])
-    own = replace(named, covariance=prior.covariance)
-    starts = [named, *_from_labels(own, x[labelled], numbers[labelled])]
+    starts = [named, *_from_labels(named, prior, x[labelled], numbers[labelled])]
     fits = [start.adapted(x, numbers) for start in starts]
     return max(fits, key=lambda fit: fit.log_likelihood(x, numbers))
 
 
-def _from_labels(named: Mixture, x: FloatArray, numbers: IntArray) -> Iterator[Mixture]:
-    """``named`` with its templates as labelled frames x (n, d) have them."""
+def _from_labels(
+    named: Mixture, prior: Mixture, x: FloatArray, numbers: IntArray
+) -> Iterator[Mixture]:
+    """``named`` with one of its templates, or all, as labelled frames x (n, d) have them."""
     design = named.table[numbers] - named.table[numbers].mean(axis=0)
+    if not named.exclusive:
+        for name, flag in enumerate(design.T):
+            if flag.any():
+                others = np.delete(design, name, axis=1) @ np.delete(
+                    named.templates[1:], name, axis=0
+                )
+                residual = x - x.mean(axis=0) - others
+                effects = named.templates[1:].copy()
+                effects[name] = flag @ residual / (flag @ flag)
+                yield named.about(x, numbers, effects)
     for frames in _PRIOR_FRAMES:
         weigh = design.T @ design + frames * np.eye(design.shape[1])
         pull = design.T @ (x - x.mean(axis=0)) + frames * named.templates[1:]
-        yield named.about(x, numbers, np.linalg.solve(weigh, pull))
+        made = named.about(x, numbers, np.linalg.solve(weigh, pull))
+        yield from (made, replace(made, covariance=prior.covariance))
 
 
 def _doubts(prior: Mixture, fitted: Mixture, rest: FloatArray | None) -> tuple[str, ...]:
@@ -188,28 +191,26 @@ def _named(prior: Mixture, fitted: Mixture, x: FloatArray, numbers: IntArray) ->
     return fitted.renamed(order, np.where(agree[order, np.arange(len(order))] < 0, -1.0, 1.0))
 
 
-def _agreeing(prior: Mixture, x: FloatArray, numbers: IntArray) -> int:
-    """How many labels ``numbers`` (n,), −1 where there is none, a fit without them and some others
-    finds by itself."""
-    labelled, agree = np.flatnonzero(numbers >= 0), 0
-    for fold in range(min(_FOLDS, len(labelled))):
-        out, others = labelled[fold::_FOLDS], numbers.copy()
-        others[out] = -1
-        told = _fitted(prior, x, others).distances(x[out]).argmin(axis=1)
-        agree += int((told == numbers[out]).sum())
-    return agree
+def _contradictions(
+    free: Mixture, x: FloatArray, numbers: IntArray, reliability: float
+) -> tuple[str, ...]:
+    """What labels ``numbers`` (n,) of frames x (n, d) say against a fit ``free`` of them that began
+    with them: that fewer agree than its ``reliability`` allows."""
+    agree = int((free.distances(x).argmin(axis=1) == numbers).sum())
+    if bdtr(agree, len(x), reliability - _HONEST) > _BY_CHANCE:
+        return ()
+    return (f"{len(x) - agree} of {len(x)} labels contradict the other frames",)
 
 
-def _expected_right(prior: Mixture, fitted: Mixture, x: FloatArray, labels: int) -> FloatArray:
-    """(1 + d,) part of frames x (n, d) that may be right: what ``fitted`` says, then the same less
-    what may be its optimism.
+def _reliability(prior: Mixture, fitted: Mixture, x: FloatArray, labels: int) -> float:
+    """Expected part of frames x (n, d) that are right: what ``fitted`` says, less its optimism.
 
-    That is by how much more is said than is right of a session that is drawn from ``fitted`` and
-    fitted as this one was, with so many ``labels`` (parametric bootstrap: Efron & Tibshirani 1993,
-    10.6). Seeds are fixed, so that a file gives the same again.
+    That is by how much more is said than is right of sessions that are drawn from ``fitted`` and
+    fitted as this one was, with so many ``labels`` (median; parametric bootstrap: Efron &
+    Tibshirani 1993, 10.6). Seeds are fixed, so that a file gives the same again.
     """
     root = np.linalg.cholesky(fitted.covariance)
-    optimism = [0.0]
+    optimism = []
     for seed in range(_DRAWS):
         rng = np.random.default_rng(seed)
         truth = rng.integers(0, len(fitted.table), len(x))
@@ -219,4 +220,4 @@ def _expected_right(prior: Mixture, fitted: Mixture, x: FloatArray, labels: int)
         right = weights.argmax(axis=1) == truth[labels:]
         optimism.append(float((weights.max(axis=1) - right).mean()))
     said = float(posterior(fitted.distances(x)).max(axis=1).mean())
-    return np.clip(said - np.array(optimism), _CERTAIN, 1 - _CERTAIN)
+    return float(np.clip(said - np.median(optimism), 0.0, 1.0))

@@ -4,6 +4,7 @@ what labelled presses say of a fit."""
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import compress, product
 from typing import Self
 
 import numpy as np
@@ -191,16 +192,7 @@ _TINY = 0.12
 """Part of the sheet's extent below which labels are of another unit: ten of it make one of ours, or
 twenty-five."""
 
-_AXES = {
-    "x and y exchanged": (1, 0, 1, 1),
-    "x of the other sign": (0, 1, -1, 1),
-    "y of the other sign": (0, 1, 1, -1),
-    "both of the other sign": (0, 1, -1, -1),
-    "x and y exchanged, both of the other sign": (1, 0, -1, -1),
-    "a quarter turn to the left": (1, 0, -1, 1),
-    "a quarter turn to the right": (1, 0, 1, -1),
-}
-"""Where x and y are taken from, and the sign of each."""
+_AXES = ("x and y exchanged", "x of the other sign", "y of the other sign")
 
 
 def label_doubts(locator: Locator, skin: Skin) -> str:
@@ -222,17 +214,17 @@ def label_doubts(locator: Locator, skin: Skin) -> str:
     rim = Envelope.of(locator.pattern, region.scaled(skin.electrode_centres))
     near, data = rim.of_rows(features.rows), features(locator.presses.dv)
 
-    def evidence(labels: FloatArray, envelope: Envelope = near) -> float:
+    def evidence(turned: tuple[bool, ...], envelope: Envelope = near) -> float:
+        labels = (xy[:, ::-1] if turned[0] else xy) * np.where(turned[1:], -1, 1)
         return evidence_of(envelope, region.scaled(labels), data)
 
-    likely = {
-        text: evidence(xy[:, [x, y]] * (over, up)) for text, (x, y, over, up) in _AXES.items()
-    }
-    best = max(likely, key=lambda text: likely[text])
-    if likely[best] < SURE + max(evidence(xy), evidence(xy, Envelope())):
+    own, *others = product((False, True), repeat=3)
+    best = max(others, key=evidence)
+    if evidence(best) < SURE + max(evidence(own), evidence(own, Envelope())):
         return ""
+    changes = " and ".join(compress(_AXES, best))
     return (
-        f"the labels fit the electrodes of this skin better with {best}: check the axes of the "
+        f"the labels fit the electrodes of this skin better with {changes}: check the axes of the "
         "labels, and [electrodes] first and order in the skin file"
     )
 
