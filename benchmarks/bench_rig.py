@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import sys
-import tempfile
 import threading
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -20,12 +19,19 @@ from report import Floats
 from tomoskin import Skin
 from tomoskin.board.source import Configuration, ScanSettings
 from tomoskin.core import Detection, Frame, Touch
-from tomoskin.files.imports import read_recording
 from tomoskin.pipeline import FrameResult, Pipeline, Prepared, prepare
-from tomoskin.run import Runner, in_this_process, make_set
+from tomoskin.run import Runner
 from tomoskin.server import AccessPolicy, Hub, Server, application, listen
 from tomoskin.server.settings_handlers import SettingsHandlers
-from tomoskin.twin import COMMON_PRESSES, Faults, Press, SetPlan, SteppedSkin, TwinSettings
+from tomoskin.twin import (
+    COMMON_PRESSES,
+    Faults,
+    Press,
+    SetPlan,
+    SteppedSkin,
+    TwinSettings,
+    make_shard,
+)
 from tomoskin.twin.source import Scans
 
 INSIDE_90 = 4.605
@@ -147,14 +153,8 @@ def stage(electrodes: int) -> Prepared:
 
 def labelled_presses(skin: Skin, seed: int, count: int) -> tuple[Floats, Floats]:
     """(n, n_meas) V of single presses on the textile twin, and where they are, (n, 2) m."""
-    plan = SetPlan(skin.to_toml(), COMMON_PRESSES, "textile", seed, count)
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "presses.npz"
-        make_set(plan, file, in_this_process, lambda _done, _total: None)
-        recording = read_recording(file).in_order_of(skin.pattern())
-    assert recording.labels is not None
-    assert recording.reference is not None
-    return recording.voltages - recording.reference, recording.labels
+    made = make_shard(SetPlan(skin.to_toml(), COMMON_PRESSES, "textile", seed, count), 0)
+    return made["voltages"] - made["reference"], made["xy_m"]
 
 
 @contextmanager

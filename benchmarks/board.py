@@ -7,19 +7,16 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from bench_rig import Rig
 from report import Floats, Report, rms, table
 from tomoskin.board.source import BOARDS, Link, ScanSettings, SerialTransport, Timing
 from tomoskin.core import Event, Frame
 from tomoskin.model.pattern import Pattern, Scan
-from tomoskin.model.skin import Skin
-from tomoskin.sensing.signal import FIGURES, Readout
+from tomoskin.sensing.signal import FIGURES
 from tomoskin.twin.emulator.board_process import BoardProcess, Front, OwnVoltages, SkinMemory
 from tomoskin.twin.emulator.program import programs_of
 
@@ -41,7 +38,7 @@ FREQUENCIES = (
 )
 """Boards, electrodes and Hz of the alternation; 0: direct."""
 
-SECONDS, SEED, TICKS = 60.0, 3, 250e3
+SEED, TICKS = 3, 250e3
 OVERSAMPLING = 16
 """Conversions of 10 bits a sample with alternating drive; of 12 bits a quarter."""
 
@@ -103,7 +100,7 @@ def _ran(
     front = Front(0.1, 1e9, 1.0, 0.0, volts, float(1 << bits), 0.0)
     # emulated time runs faster than the host's on a Mega, so must the heartbeat; slower on a Pico
     timing = Timing(ping=0.02) if board == "mega" else Timing(answer=5.0, silence=60.0)
-    wanted, seen = _expected(scan, front, oversampling), Seen()
+    wanted = _expected(scan, front, oversampling)
     arms = np.arange(1.0, electrodes + 1)
     with _emulated(board, front, arms, lambda to: Link(to, scan, settings, timing=timing)) as (
         link,
@@ -111,19 +108,18 @@ def _ran(
     ):
         link.connect()
         before, began = _counted(watch), time.monotonic()
-        seen.watch(link, wanted, count)
+        seconds, wrong, resets = _watched(link, wanted, count)
         after, took = _counted(watch), time.monotonic() - began
         lost, corrupt = link.frames.lost, link.counters.corrupt
-    seconds = (seen.last - seen.first) / TICKS
     row = {
         "electrodes": electrodes,
         "settling, us": f"{1e6 * settling:.0f}",
         "oversampling": oversampling,
-        "frames/s": f"{(seen.frames - 1) / seconds:.1f}",
-        "wrong": seen.wrong,
+        "frames/s": f"{count / seconds:.1f}",
+        "wrong": wrong,
         "lost": lost,
         "corrupt": corrupt,
-        "resets": seen.resets,
+        "resets": resets,
         "times real": f"{seconds / took:.2f}",
     }
     if board == "pico":
@@ -146,31 +142,23 @@ def _expected(scan: Scan, front: Front, oversampling: int) -> np.ndarray:
     return counts
 
 
-@dataclass
-class Seen:
-    """Frames, those that are wrong, fresh starts of the board, ticks of the first and the last."""
-
-    frames: int = 0
-    wrong: int = 0
-    resets: int = 0
-    first: int = 0
-    last: int = 0
-
-    def watch(self, link: Link, wanted: np.ndarray, count: int) -> None:
-        """Look at so many frames."""
-        while self.frames < count:
-            for item in link.poll(0.05):
-                if not isinstance(item, Frame):
-                    self.resets += isinstance(item, Event) and item.kind == "reset"
-                    continue
-                right = np.array_equal(item.samples, wanted)
-                self.wrong += not (right and item.flags == (item.sequence == 0))
-                self.first, self.last = (self.first if self.frames else item.ticks), item.ticks
-                self.frames += 1
+def _watched(link: Link, wanted: np.ndarray, count: int) -> tuple[float, int, int]:
+    """So many frames: s that they took by the board's clock, those that are wrong, its resets."""
+    frames = wrong = resets = first = last = 0
+    while frames < count:
+        for item in link.poll(0.05):
+            if not isinstance(item, Frame):
+                resets += isinstance(item, Event) and item.kind == "reset"
+                continue
+            right = np.array_equal(item.samples, wanted)
+            wrong += not (right and item.flags == (item.sequence == 0))
+            first, last = (first if frames else item.ticks), item.ticks
+            frames += 1
+    return (last - first) * count / (frames - 1) / TICKS, wrong, resets
 
 
 def run_chopped() -> Iterator[Report]:
-    """Direct and alternating drive: frames a second and noise of both boards, drift of the twin."""
+    """Direct and alternating drive: frames a second and noise of both boards."""
     cases = ((b, n, f) for b, n, frequencies in FREQUENCIES for f in frequencies)
     yield table(
         f"{CHOPPED_FRAMES} frames of both boards' real firmware",
@@ -181,13 +169,6 @@ def run_chopped() -> Iterator[Report]:
         "noise: standard deviation of a row, of which the converter has 0.7 LSB of 10 "
         "bits; electrodes have a voltage of their own of 2 mV (standard deviation): offset "
         "seen is what the rows show of it, root mean square against none",
-    )
-    yield table(
-        f"{SECONDS:.0f} s of the twin: a gel with 8 electrodes that polarise, untouched",
-        (_drifted(m, kind) for m in ("direct", "chopped") for kind in ("ideal", "polarising")),
-        "200 mm disc, 200 ohm/sq, 1 mA, adjacent; preset hydrogel, whose temperature "
-        f"drifts by itself; seed {SEED}",
-        "noise: from frame to frame; drift: of the mean of a second, first to last; rms of rows",
     )
 
 
@@ -230,28 +211,3 @@ def _rows(
     per_count = REFERENCE / (1024 * GAIN * OVERSAMPLING)
     rows = (samples[:, scan.plus] - samples[:, scan.minus]) * per_count
     return rows, rate, mode.periods if mode else 0
-
-
-def _drifted(mode: str, electrodes: str) -> dict[str, Any]:
-    drive = {"current": "1 mA", "mode": mode}
-    skin = Skin.load("textile-disc-8").altered(
-        {
-            "material": {"sheet_resistance": "200 ohm/sq"},
-            "drive": drive | ({"chop_frequency": "0.3 kHz"} if mode == "chopped" else {}),
-            "readout": {"gain": 4, "offset": "1 V", "settling": "500 us"},
-            "twin": {"preset": "hydrogel", "electrodes": electrodes},
-        }
-    )
-    rig, readout = Rig(skin, "hydrogel", SEED), Readout.of(Scan.of(skin.pattern()), skin.readout)
-    voltages = [readout(rig.at(float(t))) for t in np.arange(0.0, SECONDS, rig.interval)]
-    assert not any(v.excluded.any() for v in voltages)
-    values, second = np.array([v.values for v in voltages]), round(1 / rig.interval)
-    moved = values[-second:].mean(axis=0) - values[:second].mean(axis=0)
-    return {
-        "drive": "0.3 kHz" if mode == "chopped" else "direct",
-        "electrodes": electrodes,
-        "frames/s": f"{1 / rig.interval:.1f}",
-        "noise, uV": f"{1e6 * np.diff(values, axis=0).std() / np.sqrt(2):.0f}",
-        "drift, uV": f"{1e6 * rms(moved):.0f}",
-        "signal, uV": f"{1e6 * rms(values):.0f}",
-    }

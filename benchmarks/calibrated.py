@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from itertools import islice
 from typing import Any
 
 import numpy as np
 
-from bench_rig import far_apart, held, labelled_presses, matched
-from report import Floats, Report, mm, progress, rms, table
+from bench_rig import far_apart, held, labelled_presses
+from report import Floats, Report, progress, table
 from tomoskin import Locator, Skin
 from tomoskin.learning import TOUCH
 from tomoskin.pipeline import Prepared, prepare
 from tomoskin.twin import Press, SteppedSkin, TwinSettings
+from touch_plant import Scores
 
 SKINS = ("textile-disc-8", "textile-disc-16")
 SEEDS = (41, 42, 43)
@@ -35,29 +35,6 @@ TURNS = (0.0, 14.0)
 """Degrees by which labels are turned against the skin file: its first electrode is wrong."""
 
 
-@dataclass
-class Tally:
-    """Of each frame whether every press was found, and more touches; m of the errors."""
-
-    complete: list[bool] = field(default_factory=list)
-    ghosts: list[bool] = field(default_factory=list)
-    errors: list[float] = field(default_factory=list)
-
-    def add(self, touches: Floats, presses: Floats) -> None:
-        """Count a frame of touches (k, 2) m on presses (n, 2) m."""
-        self.ghosts.append(len(touches) > len(presses))
-        errors = [e for *_, e in matched(presses, touches)] if len(touches) >= len(presses) else []
-        self.complete.append(bool(errors) and max(errors) < FOUND)
-        self.errors += errors
-
-    def columns(self, name: str) -> dict[str, Any]:
-        """As the table has them."""
-        parts = (round(100 * float(np.mean(v)), 1) for v in (self.complete, self.ghosts))
-        found, ghosts = parts
-        error = mm(rms(self.errors), digits=1)[0]
-        return {f"{name}found, %": found, f"{name}ghosts, %": ghosts, f"{name}RMS, mm": error}
-
-
 def run() -> Iterator[Report]:
     yield table(
         "touches on a calibrated skin",
@@ -69,7 +46,7 @@ def run() -> Iterator[Report]:
 
 def _rows(name: str, turn: float) -> Iterator[dict[str, Any]]:
     plain = prepare(Skin.load(name))
-    tallies = [(Tally(), Tally()) for _ in range(3)]
+    tallies = [(Scores(), Scores()) for _ in range(3)]
     for seed in SEEDS:
         progress(f"{name}, turned by {turn:g}°, seed {seed}")
         dv, xy = labelled_presses(plain.skin, seed, LABELLED)
@@ -80,24 +57,22 @@ def _rows(name: str, turn: float) -> Iterator[dict[str, Any]]:
                 _scenes(prepared, seed, count, turn, tally)
     for count, (fit, ours) in enumerate(tallies, start=1):
         skin = {"skin, labels turned by": f"{name}, {turn:g}°", "presses": count}
-        yield skin | fit.columns("") | ours.columns("calibrated: ")
+        yield skin | fit.columns("fit") | ours.columns("calibrated")
 
 
-def _scenes(prepared: Prepared, seed: int, count: int, turn: float, tally: Tally) -> None:
+def _scenes(prepared: Prepared, seed: int, count: int, turn: float, scores: Scores) -> None:
     """Presses that stand, each scene on a twin of its own, with a reference of its own."""
     random = np.random.default_rng((seed, count))
     for scene in range(SCENES):
         places = _places(prepared.skin, random, count)
         forces = random.uniform(*FORCES, count).tolist()
-        presses = [
-            Press(x, y, force, RADIUS)
-            for (x, y), force in zip(places.tolist(), forces, strict=True)
-        ]
+        each = zip(places.tolist(), forces, strict=True)
+        presses = [Press(*place, force, RADIUS) for place, force in each]
         twin = SteppedSkin(prepared, TwinSettings.preset("textile", 1000 * seed + scene))
         frames = held(twin, presses, LAST * twin.period, RAMP * twin.period)
+        there = [Press(*place, 1.0, RADIUS) for place in _turned(places, turn).tolist()]
         for touches in islice(frames, SETTLED, LAST):
-            found = np.array([(t.detection.x, t.detection.y) for t in touches]).reshape(-1, 2)
-            tally.add(found, _turned(places, turn))
+            scores.add(there, [0.0] * count, [touch.detection for touch in touches], FOUND)
 
 
 def _places(skin: Skin, random: np.random.Generator, count: int) -> Floats:

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
-from itertools import combinations
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,9 +14,7 @@ from tomoskin.board.source import BOARDS, ScanSettings
 from tomoskin.board.wire import Drive
 from tomoskin.core import DriveSamples, Frame, Touch
 from tomoskin.pipeline import Pipeline, Prepared, prepare
-from tomoskin.pipeline.finding import FitFinder
 from tomoskin.twin import Press, ScanClock, TwinSettings, make_electronics, sample_table
-from touch_lab import TwinLab
 from touch_noise import CASES, NEEDED, NoisyBoard, fitted
 
 SEEDS = (9501, 9502)
@@ -44,10 +39,10 @@ LATE = 0.15
 
 UNTOUCHED = 300
 NOISES = ("as the skin file says", "hum, 3 times the noise", "drift, 1 % in 300 s, and walk")
-PART = 0.4
-"""Of the drives that are read."""
 
 Course = Callable[[float], tuple[Press, ...]]
+Seen = dict[str, list[tuple[float, tuple[Touch, ...]]]]
+"""What "drives" and "frames" have told, and when: s of the rig."""
 
 
 class DriveRig:
@@ -100,29 +95,16 @@ class DriveRig:
             head = self.number, round(start * TICKS), self.time, 0, 0, 0
             result = self.pipeline.push_drive(DriveSamples(*head, 0, drive, drive, counts))
             if seen is not None:
-                seen.drives.append((self.time, self.known if result is None else result.touches))
+                seen["drives"].append((self.time, self.known if result is None else result.touches))
         head = self.number, round(began * TICKS), self.time, 0, 0, 0
         frame = self.pipeline.push(Frame(*head, np.concatenate(parts)))
         if frame is not None:
             self.known = frame.touches
         if seen is not None:
-            seen.frames.append((self.time, self.known))
+            seen["frames"].append((self.time, self.known))
 
 
-Shown = list[tuple[float, tuple[Touch, ...]]]
-
-
-@dataclass
-class Seen:
-    """What drives and frames have told, and when: s of the rig."""
-
-    drives: Shown = field(default_factory=list)
-    frames: Shown = field(default_factory=list)
-
-
-def run(data: Path | None) -> Iterator[Report]:
-    """Drives against frames."""
-    del data
+def run() -> Iterator[Report]:
     yield table(
         "the first report of a press, and its release",
         [_pressed(*rig) for rig in RIGS],
@@ -141,12 +123,6 @@ def run(data: Path | None) -> Iterator[Report]:
         f"no friction; within 70 mm of the middle; seeds {SEEDS}, {COURSES} courses of a second "
         "each; against where the finger is once the drive, or the scan, has been read; behind: "
         "median, straight on",
-    )
-    yield table(
-        f"the least error of a touch that stands, from the best {percent(PART)} of the drives",
-        [_bound(name) for name in ("8", "16")],
-        f"Cramér–Rao bound with radius, content, direction and shape unknown; seeds {SEEDS}, "
-        f"{PRESSES} presses each; every choice of drives is tried",
     )
 
 
@@ -180,17 +156,17 @@ def _pressed(name: str, board: str) -> dict[str, Any]:
         for _ in range(PRESSES):
             press = _drawn(random, _place(random, Skin.load(name)))
             seen, onset, release = _watched(rig, random, press)
-            for way, shown in (("drives", seen.drives), ("frames", seen.frames)):
+            for way, shown in seen.items():
                 first[way].append(next((t - onset for t, ts in shown if t > onset and ts), np.inf))
                 after = [(t, ts) for t, ts in shown if t > release]
                 last = max([k for k, (_, ts) in enumerate(after) if ts], default=-1) + 1
                 gone[way].append(after[last][0] - release if last < len(after) else np.inf)
-            told = next((ts for t, ts in seen.drives if t > onset and ts), ())
+            told = next((ts for t, ts in seen["drives"] if t > onset and ts), ())
             if (touch := nearest(told, press)) is not None:
                 errors.append(gap(touch, press))
                 inside.append(distance(touch.detection, press.x, press.y) < INSIDE_90)
                 sizes.append(np.hypot(touch.detection.sd_x, touch.detection.sd_y))
-            kept += len({t.id for _, ts in (*seen.drives, *seen.frames) for t in ts}) == 1
+            kept += len({t.id for _, ts in (*seen["drives"], *seen["frames"]) for t in ts}) == 1
     row: dict[str, Any] = {"skin": name, "board": board, "scan ms": round(1e3 * rig.period, 1)}
     for title, ways in (("first", first), ("release", gone)):
         for way, times in ways.items():
@@ -211,7 +187,7 @@ def _watched(rig: DriveRig, random: np.random.Generator, press: Press) -> tuple[
         rig.turn(lambda _: (), ())
     onset = rig.time + random.uniform() * rig.period
     release = onset + (HELD + random.uniform()) * rig.period
-    seen = Seen()
+    seen: Seen = {"drives": [], "frames": []}
     for _ in range(1 + HELD + AFTER):
         rig.turn(lambda t: (press,) if onset <= t < release else (), (onset, release), seen)
     return seen, onset, release
@@ -288,12 +264,12 @@ def _course(
         x, y = at(time).tolist()
         return (Press(x, y, press.force, press.radius),) if time >= onset else ()
 
-    seen = Seen()
+    seen: Seen = {"drives": [], "frames": []}
     arrived = onset + length / speed
     while rig.time < arrived:
         rig.turn(course, (onset,), seen)
     heading = (end - begin) / length
-    for way, shown in (("drives", seen.drives), ("frames", seen.frames)):
+    for way, shown in seen.items():
         for time, touches in shown:
             if not onset + LATE < time < arrived:
                 continue
@@ -307,42 +283,3 @@ def _course(
             offs[way].append((float(np.hypot(*off)), -float(off @ heading), held))
     for _ in range(AFTER):
         rig.turn(lambda _: (), (), None)
-
-
-def _bound(name: str) -> dict[str, Any]:
-    """How much wider the bound of a position gets where the best drives alone are read."""
-    ratios = []
-    for seed in SEEDS:
-        progress(f"standing on {name}, seed {seed}")
-        lab, random = TwinLab(name, "textile", seed), np.random.default_rng(seed)
-        index, model = lab.prepared.pattern.drive_index, lab.prepared.spots
-        assert model is not None
-        count = index.max() + 1
-        chosen = [list(each) for each in combinations(range(count), int(PART * count))]
-        for _ in range(PRESSES):
-            press = _drawn(random, _place(random, lab.skin))
-            finder = lab.by_fit()
-            found = finder.push(lab.shown(lab.volts((press,)) - lab.reference.mean))
-            if not found or not isinstance(finder, FitFinder):
-                continue
-            spot = finder.spots.view.spot(found[0])
-            parts = model.solver.expanded(spot[None])[0] @ model.solver.table.basis
-            unknown = parts[5:] * [[model.prior.directed], [model.prior.reshaped]]
-            slopes = np.vstack([parts[1:5], unknown]) / lab.prepared.readout.noise
-            drives = np.array(
-                [slopes[:, index == k] @ slopes[:, index == k].T for k in range(count)]
-            )
-            known = np.diag([*model.prior.weights**2, 1.0, 1.0])
-            whole = _variance(known + drives.sum(axis=0))
-            ratios.append(_variance(known + drives[chosen].sum(axis=1)).min() / whole)
-    return {
-        "sheet": name,
-        "drives": f"{int(PART * count)} of {count}",
-        "least error against all: median": round(float(np.median(ratios)) ** 0.5, 2),
-        "mean": round(float(np.sqrt(ratios).mean()), 2),
-    }
-
-
-def _variance(information: Floats) -> Any:
-    """M² of the position, of information (…, 6, 6)."""
-    return np.trace(np.linalg.inv(information)[..., :2, :2], axis1=-2, axis2=-1)

@@ -93,21 +93,6 @@ class Peer:
     def __init__(self, mesh: Mesh, pattern: Pattern) -> None:
         self._mesh, self._pattern = mesh, pattern
         self._nodes = np.array([_middle(mesh, facets) for facets in mesh.electrodes])
-        self._forward: Any = None
-
-    def prepare(self) -> None:
-        """Make what is made once per mesh."""
-        from pyeit.eit.fem import EITForward
-
-        self._forward = EITForward(self._its_mesh(), self._protocol())
-
-    def forward(self, sigma: FloatArray) -> object:
-        """Voltages."""
-        return self._forward.solve_eit(sigma)
-
-    def jacobian(self, sigma: FloatArray) -> object:
-        """Jacobian and voltages."""
-        return self._forward.compute_jac(sigma)
 
     def set_up(self, alpha: float) -> Any:
         """One-step operator, from points and cells."""
@@ -118,11 +103,13 @@ class Peer:
         return solver.H
 
     def calls(self, sigma: FloatArray, alpha: float) -> dict[str, Callable[[], object]]:
-        """What is timed of it, by name."""
-        self.prepare()
+        """What is timed of it, by name; what is made once per mesh is made here."""
+        from pyeit.eit.fem import EITForward
+
+        forward = EITForward(self._its_mesh(), self._protocol())
         return {
-            "peer forward": lambda: self.forward(sigma),
-            "peer jacobian": lambda: self.jacobian(sigma),
+            "peer forward": lambda: forward.solve_eit(sigma),
+            "peer jacobian": lambda: forward.compute_jac(sigma),
             "peer set-up": lambda: self.set_up(alpha),
         }
 

@@ -20,9 +20,8 @@ from tomoskin.pipeline import Pipeline, Prepared, prepare
 from tomoskin.twin import Press
 
 SKINS, CELLS, TIME_CONSTANTS = ("textile-disc-8", "textile-disc-16"), (660, 3000), ("0 s", "0.2 s")
-BY_FIT = (1, 2, 3)
 IDLE, PRESSED, REPEATS, FIT_REPEATS = 30, 60, 40, 10
-SETTLED, SEED = 20, 1
+SETTLED, SEED, BY_FIT = 20, 1, (1, 2, 3)
 
 
 def run() -> Iterator[Report]:
@@ -63,13 +62,6 @@ def row(prepared: Prepared, repeats: int = REPEATS, presses: int = 2) -> dict[st
         "touches": round(touches / len(taken), 2),
         "growth B/frame": round(_growth(decoder, pipeline, pressed), 1),
     }
-
-
-def p50(prepared: Prepared, repeats: int) -> float:
-    """Median of a frame, ms."""
-    idle, pressed = _chunks(prepared, 2)
-    taken, _ = _taken(Decoder(), Pipeline(prepared), idle, pressed, repeats)
-    return 1e3 * float(np.median(taken))
 
 
 def _taken(

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -81,40 +81,34 @@ def run(data: Path | None) -> Iterator[Report]:
     )
 
 
-@dataclass
-class _Cut:
-    """What became of one stage: m by which presses were missed, and what should not be."""
-
-    missed: list[float] = field(default_factory=list)
-    noticed: list[int] = field(default_factory=list)
-    ghosts: int = 0
-    extra: int = 0
+Stage = defaultdict[str, list[float]]
+"""Of one stage, each a list: presses ``missed`` by m, cuts ``noticed``, ``ghosts``, ``extra``."""
 
 
 def _cuts() -> Iterator[dict[str, Any]]:
     """No electrode, one and then two cut off while running."""
     for name, preset in CUT_SKINS:
         prepared = prepare(Skin.load(name))
-        stages = [_Cut(), _Cut(), _Cut()]
+        stages = [Stage(list) for _ in range(3)]
         for seed in SEEDS:
             _cut_run(prepared, preset, seed, stages)
-        whole = float(np.nanmedian(stages[0].missed))
+        whole = float(np.nanmedian(stages[0]["missed"]))
         for number, stage in enumerate(stages):
-            median, p90 = np.nanpercentile(stage.missed, (50, 90))
+            median, p90 = np.nanpercentile(stage["missed"], (50, 90))
             yield {
                 "skin": f"{name}, {preset}",
                 "cut": number,
-                "noticed after frames": max(stage.noticed, default="–"),
+                "noticed after frames": max(map(int, stage["noticed"]), default="–"),
                 "median error mm": mm(median)[0],
                 "of the whole skin's": round(float(median) / whole, 2),
                 "p90 mm": mm(p90, digits=1)[0],
-                "not found": int(np.isnan(stage.missed).sum()),
-                "ghosts at the cut": stage.ghosts,
-                "ghosts beside presses": stage.extra,
+                "not found": int(np.isnan(stage["missed"]).sum()),
+                "ghosts at the cut": int(sum(stage["ghosts"])),
+                "ghosts beside presses": int(sum(stage["extra"])),
             }
 
 
-def _cut_run(prepared: Prepared, preset: str, seed: int, stages: list[_Cut]) -> None:
+def _cut_run(prepared: Prepared, preset: str, seed: int, stages: list[Stage]) -> None:
     random = np.random.default_rng(seed)
     first, second = random.choice(prepared.skin.n_electrodes, 2, replace=False).tolist()
     spots = evenly(random, PRESSES, REACH).tolist()
@@ -123,15 +117,15 @@ def _cut_run(prepared: Prepared, preset: str, seed: int, stages: list[_Cut]) -> 
     for stage, cut in zip(stages, ((), (first,), (first, second)), strict=True):
         faults = Faults(cut=frozenset(cut))
         idle = rig.push(pipeline, 6, (), faults)
-        stage.ghosts += sum(len(result.touches) for result in idle)
+        stage["ghosts"].append(sum(len(result.touches) for result in idle))
         if cut:
             sick = [{e.electrode for e in r.health.sick} if r.health else () for r in idle]
-            stage.noticed.append(next((n for n, s in enumerate(sick, 1) if cut[-1] in s), 99))
+            stage["noticed"].append(next((n for n, s in enumerate(sick, 1) if cut[-1] in s), 99))
         for x, y in spots:
             touches = rig.push(pipeline, 5, [Press(x, y, FORCE, PROBE)], faults)[-1].touches
             near = nearest(touches, (x, y))
-            stage.missed.append(np.nan if near is None else gap(near, (x, y)))
-            stage.extra += max(0, len(touches) - 1)
+            stage["missed"].append(np.nan if near is None else gap(near, (x, y)))
+            stage["extra"].append(max(0, len(touches) - 1))
             rig.push(pipeline, 6, (), faults)
 
 

@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 import force as weighing
-from bench_rig import Rig, gap, nearest
-from report import Floats, Report, progress, table
+from bench_rig import Rig, gap
+from report import Report, percent, progress, table
 from tomoskin.core import Touch
 from tomoskin.learning import FORCE
 from tomoskin.model.skin import Skin
-from tomoskin.pipeline import Pipeline, Prepared, prepare
-from tomoskin.run.board_memory import Trial
+from tomoskin.pipeline import Pipeline, prepare
 from tomoskin.twin import Press
 
-SEEDS = (11,)
-"""Nothing here was chosen on them."""
+SEED = 11
+"""Nothing here was chosen on it."""
 
 CASES = (("textile-disc-8", "image"), ("textile-disc-8", "fit"), ("textile-disc-16", "fit"))
 FORCES = (3.0, 8.0)
@@ -34,138 +32,56 @@ WARMING = 5.0
 
 RADIUS, SPREAD = 0.012, 0.05
 
-RESTARTED, RESTARTED_SEEDS = ("textile-disc-8", "textile-disc-16"), range(11, 23)
-"""Nothing here was chosen on these seeds either."""
-
-PAUSES = ((60.0, 0.1), (600.0, 0.5), (3600.0, 3.0), (3600.0, -5.0))
-"""Seconds between two runs, and K by which the sheet warms up meanwhile."""
-
-KEPT, FRAMES, FORCE_BEFORE = 60, 60, 5.0
-VERDICTS = {True: "holds", False: "renewed", None: "touched"}
-
-Seen = tuple[float, tuple[Touch, ...]]
-"""A frame: seconds since the press, or since it was lifted, and the touches in it."""
-
 
 def run() -> Iterator[Report]:
-    rows = []
-    for name, method in CASES:
-        changes = {"touch": {"method": method}, "readout": {"settling": SETTLING}}
-        prepared = prepare(Skin.load(name).altered(changes))
-        for seed in SEEDS:
-            weighed = _weighing(prepared, seed) if method == "fit" else prepared
-            for force in FORCES:
-                progress(f"{name}, {method}, {force:g} N, seed {seed}")
-                place = np.random.default_rng(seed).uniform(-SPREAD, SPREAD, 2)
-                case = {"skin": name, "method": method, "N": force, "seed": seed}
-                rows.append(case | judged(*seen(weighed, place, force, seed), place))
     yield table(
         f"a press held for {HOUR / 60:.0f} minutes while the sheet warms up by {WARMING:g} K",
-        rows,
-        "preset textile (creep, a wandering temperature, wear), time of the twin; "
+        (held(*case, force) for case in CASES for force in FORCES),
+        f"preset textile (creep, a wandering temperature, wear), time of the twin, seed {SEED}; "
         "frames are counted from the onset",
         "forces: medians of the first and of the last minute; calibrated by presses of 2 s",
     )
 
 
-def _weighing(prepared: Prepared, seed: int) -> Prepared:
-    """With a calibration of forces, by short presses of the same tip."""
-    scale = weighing.Scale(seed, (RADIUS,), prepared.skin.name)
-    model = weighing.calibrated(scale)
-    return prepared.calibrated(FORCE.of(model, prepared.pattern, prepared.skin))
-
-
-def seen(
-    prepared: Prepared, place: Floats, force: float, seed: int, hold: float = HOUR
-) -> tuple[list[Seen], list[Seen]]:
-    """Frames while a press is held, and after it is lifted."""
-    rig, pipeline = Rig(prepared.skin, "textile", seed), Pipeline(prepared)
-    press = (Press(float(place[0]), float(place[1]), force=force, radius=RADIUS),)
-    held, after, warmed = [], [], 0.0
-    while (time := rig.number * rig.interval - LEAD) < hold + AFTER:
-        result = pipeline.push(rig.frame(press if 0 <= time < hold else ()))
-        if result is None or time < 0:
-            continue
-        if time >= hold:
-            after.append((time - hold, result.touches))
-            continue
-        held.append((time, result.touches))
-        due = WARMING * time / hold
-        rig.board.sheet.warm(due - warmed)
-        warmed = due
-    return held, after
-
-
-def judged(held: Sequence[Seen], after: Sequence[Seen], place: Floats) -> dict[str, Any]:
-    """What stands in a row, from the frames on in which it was first reported."""
-    begun = next((n for n, (_, touches) in enumerate(held) if touches), len(held))
-    frames = held[begun:]
-    if not frames:
-        return {"frames": 0}
-    near = [(time, nearest(touches, place)) for time, touches in frames]
-    found = [touch for _, touch in near if touch is not None]
-    gaps = np.diff([*(time for time, touch in near if touch is not None), held[-1][0]])
-    errors = [np.nan if t is None else 1e3 * gap(t, place) for _, t in near]
-    strength = [np.nan if t is None else abs(t.detection.peak) for _, t in near]
-    forces = [t.detection.force.newtons for t in found if t.detection.force]
-    few = max(1, len(frames) // 60)
-    gone = next((time for time, touches in after if not touches), None)
-    first, last = (slice(few), slice(-few, None))
-    grown = np.nanmedian(strength[last]) / np.nanmedian(strength[first])
+def held(name: str, method: str, force: float) -> dict[str, Any]:
+    """What is reported of one press, from the frame on in which it is first."""
+    progress(f"{name}, {method}, {force:g} N")
+    changes = {"touch": {"method": method}, "readout": {"settling": SETTLING}}
+    prepared = prepare(Skin.load(name).altered(changes))
+    if method == "fit":  # presses of the same tip teach forces
+        model = weighing.calibrated(weighing.Scale(SEED, (RADIUS,), skin=name))
+        prepared = prepared.calibrated(FORCE.of(model, prepared.pattern, prepared.skin))
+    x, y = np.random.default_rng(SEED).uniform(-SPREAD, SPREAD, 2).tolist()
+    rig, pipeline = Rig(prepared.skin, "textile", SEED), Pipeline(prepared)
+    frames, gone = list[tuple[Touch, ...]](), np.inf
+    while (time := rig.number * rig.interval - LEAD) < HOUR + AFTER:
+        pressed = 0 <= time < HOUR
+        result = pipeline.push(rig.frame([Press(x, y, force, RADIUS)] if pressed else ()))
+        if pressed:
+            rig.board.sheet.warm(WARMING * rig.interval / HOUR)
+            if result and (frames or result.touches):
+                frames.append(result.touches)
+        elif result and time >= HOUR and not result.touches:
+            gone = min(gone, time - HOUR)
+    alone = [touches[0] for touches in frames if len(touches) == 1]
+    ends = alone[: len(alone) // 60], alone[-len(alone) // 60 :]
+    error, strength = (
+        [np.median([value(touch) for touch in end]) for end in ends]
+        for value in (lambda t: 1e3 * gap(t, (x, y)), lambda t: abs(t.detection.peak))
+    )
+    newtons = [
+        np.median([t.detection.force.value for t in end if t.detection.force] or [np.nan])
+        for end in ends
+    ]
     return {
+        "skin": name,
+        "method": method,
+        "N": force,
         "frames": len(frames),
-        "frames reported, %": f"{100 * len(found) / len(frames):.2f}",
-        "longest gap, s": f"{gaps.max():.1f}",
-        "identities": len({t.id for t in found}),
-        "frames with another touch, %": f"{100 * np.mean([len(t) > 1 for _, t in frames]):.2f}",
-        "error at first, mm": f"{np.nanmedian(errors[first]):.1f}",
-        "at the end, mm": f"{np.nanmedian(errors[last]):.1f}",
-        "strength at the end, %": f"{100 * grown:.0f}",
-        "gone after, s": "never" if gone is None else f"{gone:.1f}",
-        "N at first": f"{np.median(forces[first]):.2f}" if forces else None,
-        "N at the end": f"{np.median(forces[last]):.2f}" if forces else None,
+        "with this touch alone": percent(len(alone) / len(frames)),
+        "identities": len({touch.id for touch in alone}),
+        "error at first, at the end, mm": f"{error[0]:.1f}, {error[1]:.1f}",
+        "strength at the end": percent(strength[1] / strength[0]),
+        "gone after, s": f"{gone:.1f}",
+        "N at first, at the end": f"{newtons[0]:.2f}, {newtons[1]:.2f}",
     }
-
-
-def run_restarted() -> Iterator[Report]:
-    """A program that is started again: does its last reference hold, and show a press?"""
-    rows = []
-    for name in RESTARTED:
-        prepared = prepare(Skin.load(name))
-        for (pause, warmer), force in ((p, f) for p in PAUSES for f in (0.0, FORCE_BEFORE)):
-            progress(f"{name}, {pause:g} s, {warmer:+g} K, {force:g} N")
-            ends = [_again(prepared, pause, warmer, force, s) for s in RESTARTED_SEEDS]
-            verdicts, counts, errors = zip(*ends, strict=True)
-            case = {"skin": name, "pause, s": pause, "warmer, K": warmer, "press": f"{force:g} N"}
-            case |= {verdict: verdicts.count(verdict) for verdict in VERDICTS.values()}
-            known = [error for error in errors if np.isfinite(error)]
-            error = f"{np.median(known):.1f}" if known else "–"
-            rows.append(case | {"touches, at most": max(counts), "error, mm": error})
-    seeds = f"seeds {RESTARTED_SEEDS[0]} to {RESTARTED_SEEDS[-1]}"
-    note = f"preset textile, {seeds}; the press stands before the start"
-    yield table("started again after a pause", rows, note)
-
-
-def _again(
-    prepared: Prepared, pause: float, warmer: float, force: float, seed: int
-) -> tuple[str, int, float]:
-    """Verdict, touches in the last frame, and mm from the press to the nearest of them, of a second
-    run, which begins with the last frames of the first."""
-    x, y = np.random.default_rng(seed).uniform(-SPREAD, SPREAD, 2).tolist()
-    trial, verdict, last = Trial(0.0), None, None
-    rig, pipeline = Rig(prepared.skin, "textile", seed), Pipeline(prepared)
-    begun, rate = KEPT * rig.interval + pause, prepared.skin.readout.tick_rate
-    kept = [rig.frame() for _ in range(KEPT)]
-    rig.board.sheet.warm(warmer)
-    rig.board.sheet.set_presses((Press(x, y, force=force, radius=RADIUS),) if force else ())
-    for number, frame in enumerate(kept):
-        pipeline.push(replace(frame, host_time=begun - 1e-3 * (KEPT - number)))
-    for number in range(FRAMES):
-        since = number * rig.interval
-        frame = replace(rig.at(begun + since), sequence=number, ticks=round(since * rate))
-        if (result := pipeline.push(frame)) is not None:
-            verdict, last = trial.push(result) if verdict is None else verdict, result
-    assert last is not None
-    near = nearest(last.touches, (x, y)) if force else None
-    error = np.nan if near is None else 1e3 * gap(near, (x, y))
-    return VERDICTS[verdict], len(last.touches), error

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from bench_rig import INSIDE_90, evenly
 from report import Floats, Report, progress, table
 from tomoskin import Locator, Skin
 from tomoskin.board.source import ScanSettings
 from tomoskin.core import Frame
-from tomoskin.learning import CalibrationHealth, Watch
+from tomoskin.learning import Watch
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import triangulate
 from tomoskin.model.pattern import Scan
@@ -97,10 +93,8 @@ class Worn:
         board = replace(settings.electronics, gain_sd=parting)
         self._board = TwinElectronics(sheet, skin.readout, skin.current, board, seed)
         scan = Scan.of(skin.pattern())
-        self._table, self._readout = (
-            table_of(scan, ScanSettings.of(skin)),
-            Readout.of(scan, skin.readout),
-        )
+        self._readout = Readout.of(scan, skin.readout)
+        self._table = table_of(scan, ScanSettings.of(skin))
         self._shift, self._time = np.array(condition.shift), 0.0
         used = np.hstack([skin.pattern().drive, skin.pattern().measure])
         self._missing = np.isin(used, condition.lost).any(axis=1)
@@ -132,17 +126,6 @@ def left(points: Floats, condition: Condition) -> Floats:
     return np.asarray(worn * np.where(inside, condition.cut, 1.0))
 
 
-@dataclass(frozen=True)
-class Month:
-    """What a calibration is worth in a month: errors m, whether each lies in its 90 % ellipse,
-    whether so little is said of it that it counts as unknown; and what the page says."""
-
-    errors: Floats
-    held: NDArray[np.bool_]
-    unknown: NDArray[np.bool_]
-    health: CalibrationHealth
-
-
 def labelled(locator: Locator, skin: Worn, rng: np.random.Generator) -> Locator:
     """Some presses at known positions."""
     xy, forces = touches(locator.region, LABELS, rng)
@@ -165,13 +148,18 @@ def touches(region: Region, n: int, rng: np.random.Generator) -> tuple[Floats, F
     return region.metres(evenly(rng, n, REACH)), rng.uniform(*FORCES, n)
 
 
-def lived(seed: int, conditions: Sequence[Condition]) -> dict[str, list[Month]]:
+Worth = tuple[float, float, float, bool]
+"""Of a calibration in a month: mean error m, part of the presses in their 90 % ellipses, part of
+them of which so little is said that they count as unknown; whether the page says that it fits."""
+
+
+def lived(seed: int, conditions: Sequence[Condition]) -> dict[str, list[Worth]]:
     """Each way of life, month by month."""
     skin = Skin.load(SKIN)
     region = Region.of(skin)
     xy, forces = touches(region, LEARNT, np.random.default_rng(seed))
     first = Locator.fit(Worn(skin, conditions[0], seed)(xy, forces), xy, skin=skin)
-    newest, found = dict.fromkeys(LIVES, first), {name: list[Month]() for name in LIVES}
+    newest, found = dict.fromkeys(LIVES, first), {name: list[Worth]() for name in LIVES}
     for condition in conditions:
         progress(f"seed {seed}, month {condition.month}")
         asked, hard = touches(region, ASKED, np.random.default_rng((seed, condition.month, 1)))
@@ -184,7 +172,7 @@ def lived(seed: int, conditions: Sequence[Condition]) -> dict[str, list[Month]]:
     return found
 
 
-def worth(locator: Locator, dv: Floats, xy: Floats) -> Month:
+def worth(locator: Locator, dv: Floats, xy: Floats) -> Worth:
     """Of presses at ``xy``, located one after the other as in a live run."""
     watch = Watch(locator)
     positions, covariances = watch(dv)
@@ -192,7 +180,8 @@ def worth(locator: Locator, dv: Floats, xy: Floats) -> Month:
     far = np.einsum("ni,nij,nj->n", off, np.linalg.inv(covariances), off)
     size = np.sqrt(np.trace(covariances, axis1=1, axis2=2) / 2)
     unknown = size > UNSURE * locator.region.unit
-    return Month(np.linalg.norm(off, axis=1), far < INSIDE_90, unknown, watch.health)
+    error = float(np.linalg.norm(off, axis=1).mean())
+    return error, float((far < INSIDE_90).mean()), float(unknown.mean()), watch.health.well
 
 
 def run() -> Iterator[Report]:
@@ -212,35 +201,6 @@ def run() -> Iterator[Report]:
     )
 
 
-def _cell(months: Sequence[Month]) -> str:
-    error = 1e3 * np.mean([month.errors.mean() for month in months])
-    parts = (
-        np.mean([month.held.mean() for month in months]),
-        np.mean([month.unknown.mean() for month in months]),
-        np.mean([not month.health.well for month in months]),
-    )
-    return ", ".join([f"{error:.1f}", *(f"{part:.0%}" for part in parts)])
-
-
-def draw(lives: Sequence[dict[str, list[Month]]], out: Path) -> None:
-    """Error and honesty month by month."""
-    figure = Figure(figsize=(8, 5), layout="constrained")
-    error, honest = figure.subplots(2, 1, sharex=True)
-    for name in LIVES:
-        months = list(zip(*(one[name] for one in lives), strict=True))
-        error.plot([1e3 * np.mean([m.errors for m in month]) for month in months], label=name)
-        honest.plot([100 * np.mean([m.held for m in month]) for month in months])
-    for month, event in EVENTS.items():
-        for axes in (error, honest):
-            axes.axvline(month, color="0.7", linewidth=0.8)
-        at = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points"}
-        error.annotate(str(event["event"]), (month, 1), (3, -11), fontsize=8, **at)
-    honest.axhline(90, color="0.5", linestyle=":")
-    error.set(ylabel="mean error, mm", ylim=(0, 15))
-    honest.set(ylabel="in the 90 % ellipse, %", xlabel="month", ylim=(0, 102))
-    error.legend(fontsize=8, loc="lower left")
-    figure.savefig(out, dpi=110)
-
-
-if __name__ == "__main__":
-    draw([lived(seed, life()) for seed in SEEDS], Path(sys.argv[1]))
+def _cell(months: Sequence[Worth]) -> str:
+    error, held, unknown, well = np.mean(months, axis=0)
+    return f"{1e3 * error:.1f}, {held:.0%}, {unknown:.0%}, {1 - well:.0%}"

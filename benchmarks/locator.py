@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from bench_rig import INSIDE_90
 from report import Floats, Report, percent, recordings, table
 from tomoskin import Locator, Pattern, Skin
-from tomoskin.learning import SessionAlignment, Several, Watch
+from tomoskin.learning import SessionAlignment, Watch
 from tomoskin.learning.touch.gaussian_process import Process, squared_distances
 
 SKINS = {"noPattern": 2.28, "fullCB": 6.74, "parallel": 3.13, "concentric": 4.99, "radial": 3.84}
@@ -168,35 +168,6 @@ def run(data: Path | None) -> Iterator[Report]:
         f"learnt from the presses before the last {BEFORE + AFTER} (at most 300); then, after "
         f"{BEFORE} presses, a fifth of the rows (drawn, seed {SEEDS[0]}); tested on the last "
         f"{AFTER}",
-    )
-
-
-def run_fingers(data: Path | None) -> Iterator[Report]:
-    """Two fingers on a public hydrogel by a calibration of single presses."""
-    folder = recordings(data, "eskin_hydrogel_round") / "eskin_hydrogel_round"
-    learnt = Set.of(folder / "round16_single550.npz")
-    several = Several.of(Locator.fit(learnt.dv, learnt.xy))
-    with np.load(folder / "round16_twotouch.npz") as kept:
-        pairs = kept["v_down"].astype(float) - kept["v_up"]
-        truth, numbers = kept["separation_mm"].tolist(), kept["row"].tolist()
-    rows = []
-    for far, number, readings in zip(truth, numbers, several(pairs), strict=True):
-        row = {"truly apart, mm": far, "row": number, "says": "one", "found apart, mm": "–"}
-        if len(readings) == 2:
-            one, other = readings
-            apart = float(np.hypot(one.x - other.x, one.y - other.y))
-            row |= {"says": "two", "found apart, mm": round(1e3 * apart)}
-        elif readings[0].close:
-            row["says"] = "too close"
-        rows.append(row)
-    singles = several(Set.of(folder / "round16_single500_ohmc.npz").dv[:200])
-    wrong = sum(len(readings) == 2 for readings in singles)
-    yield table(
-        "two fingers on a hydrogel skin, learnt from single presses",
-        rows,
-        "eskin_hydrogel_round, 16 electrodes, learnt from single550; no held-out test: the method "
-        "was shaped with these rows in view, and four of the 108 mm file stand twice",
-        f"of 200 single presses of another session (single500_ohmc) {wrong} are taken for two",
     )
 
 

@@ -112,12 +112,6 @@ def recordings(data: Path | None, *needed: str) -> Path:
     return folder
 
 
-def resident() -> float:
-    """Resident memory of this process, MB."""
-    pages = int(Path("/proc/self/statm").read_text().split()[1])
-    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
-
-
 Clock = Callable[[], float]
 
 

@@ -88,6 +88,5 @@ def page(address):
 
 
 if __name__ == "__main__":
-    {"ros2": ros2, "mqtt": mqtt, "foxglove": foxglove, "lsl": lsl, "page": page}[sys.argv[1]](
-        sys.argv[2]
-    )
+    kinds = {"ros2": ros2, "mqtt": mqtt, "foxglove": foxglove, "lsl": lsl, "page": page}
+    kinds[sys.argv[1]](sys.argv[2])

@@ -8,7 +8,6 @@ import socket
 import subprocess
 import sys
 import tempfile
-import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -17,14 +16,13 @@ from pathlib import Path
 import numpy as np
 
 from bench_rig import served
-from chain import LEAD, SETTLING, SKIN, board, elsewhere
+from chain import LEAD, SKIN, board, control_loop, elsewhere, prepared_chain
 from report import Report, Row, progress, table
 from tomoskin.board.source import SerialTransport
 from tomoskin.core import DataError
-from tomoskin.model.skin import Skin
-from tomoskin.pipeline import Prepared, prepare
-from tomoskin.run import LiveSkin, Runner
-from tomoskin.run.sinks import make_sink
+from tomoskin.pipeline import Prepared
+from tomoskin.run import Runner
+from tomoskin.run.sinks import Contacts, make_sink
 
 SECONDS = 10.0
 LOSSES = 10
@@ -60,7 +58,7 @@ Messages = list[tuple[float, float, bool]]
 
 def run() -> Iterator[Report]:
     """From the stamp of a frame to who listens to a sink, in another process: two minutes."""
-    prepared, rows = _prepared(), []
+    prepared, rows = prepared_chain(), []
     for kind in (LOOP, *SINKS):
         progress(kind)
         with _listened(prepared, (kind,)) as (heard, _):
@@ -80,7 +78,7 @@ def run() -> Iterator[Report]:
 
 def run_lost() -> Iterator[Report]:
     """Seconds from the end of a board's process to every sink that says so."""
-    prepared, rows = _prepared(), []
+    prepared, rows = prepared_chain(), []
     for number in range(LOSSES):
         progress(f"loss {number + 1} of {LOSSES}")
         with _listened(prepared, (LOOP, *SINKS, "page")) as (heard, kill):
@@ -88,13 +86,13 @@ def run_lost() -> Iterator[Report]:
             gone = time.time()
             kill()
             time.sleep(2 * LOST)
-            rows.append({name: _told(messages, gone) for name, messages in heard().items()})
+            rows.append({name: _said(told, gone) for name, told in heard().items()})
     yield table(
         f"ms until a board whose process was killed is told, {LOSSES} times",
         [
-            {"sink": kind, "median": _ms(np.median(s)), "longest": _ms(np.max(s))}
+            {"sink": kind, "median": f"{np.median(ms):.0f}", "longest": f"{max(ms):.0f}"}
             for kind in rows[0]
-            if (s := [row[kind] for row in rows])
+            if (ms := [1e3 * row[kind] for row in rows])
         ],
         "all sinks at once",
         f"promised: within {1e3 * LOST:.0f} ms; load of the machine {os.getloadavg()[0]:.1f}",
@@ -114,19 +112,9 @@ def _row(name: str, messages: Messages, before: float) -> Row:
     }
 
 
-def _told(messages: Messages, gone: float) -> float:
+def _said(messages: Messages, gone: float) -> float:
     """s after ``gone`` of the first message that says so; infinite where none does."""
     return next((came - gone for came, _, valid in messages if came > gone and not valid), np.inf)
-
-
-def _ms(seconds: float) -> str:
-    return f"{1e3 * seconds:.0f}"
-
-
-def _prepared() -> Prepared:
-    prepared = prepare(Skin.load(SKIN).altered({"readout": {"settling": SETTLING}}))
-    prepared.warm_up()
-    return prepared
 
 
 @contextmanager
@@ -159,8 +147,13 @@ def _listened(
             stack.callback(client.wait)
             stack.callback(client.kill)
         own: Messages = []
+
+        def take(contacts: Contacts) -> None:
+            now = time.time()
+            own.append((now, now - contacts.age_s, contacts.valid))
+
         if LOOP in kinds:
-            stack.enter_context(_loop(runner, own))
+            stack.enter_context(control_loop(runner, take))
 
         def heard() -> dict[str, Messages]:
             return {kind: _read(files[kind]) if kind in files else own for kind in kinds}
@@ -174,25 +167,6 @@ def _read(file: Path) -> Messages:
     """The whole lines of a subscriber."""
     lines = (line.split() for line in file.read_text().rpartition("\n")[0].splitlines())
     return [(float(came), float(stamp), valid == "1") for came, stamp, valid in lines]
-
-
-@contextmanager
-def _loop(runner: Runner, messages: Messages) -> Iterator[None]:
-    skin, ended = LiveSkin(runner), threading.Event()
-
-    def follow() -> None:
-        while not ended.is_set():
-            contacts = skin.wait(0.1)
-            now = time.time()
-            messages.append((now, now - contacts.age_s, contacts.valid))
-
-    thread = threading.Thread(target=follow)
-    thread.start()
-    try:
-        yield
-    finally:
-        ended.set()
-        thread.join()
 
 
 def _free_port() -> int:

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import time
+from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from bench_rig import Rig, evenly, gap, held
+from bench_rig import evenly, gap, held
 from report import Floats, Report, mm, progress, table
-from tomoskin.core import FloatArray, Touch
 from tomoskin.model.skin import Skin
-from tomoskin.pipeline import Pipeline, Prepared, prepare
+from tomoskin.pipeline import prepare
 from tomoskin.twin import Press, SteppedSkin, TwinSettings
 
 SEEDS = (41, 42)
@@ -47,9 +46,7 @@ FIRST, BETWEEN, AGAIN, AFTER = 5.0, (0.4, 0.9), 0.6, 2.0
 QUIET = 0.35
 """Seconds from the start of the release on, after which a reported touch counts as left behind."""
 
-Changes = Mapping[str, Mapping[str, Any]]
-
-SKINS: dict[str, tuple[str, Changes]] = {
+SKINS: dict[str, tuple[str, Mapping[str, Mapping[str, Any]]]] = {
     **{name: (name, {}) for name in ("textile-disc-8", _DISC, "textile-disc-32", _SQUARE)},
     "disc, 12": (_DISC, {"electrodes": {"count": 12}}),
     "disc, 24": (_DISC, {"electrodes": {"count": 24}}),
@@ -60,68 +57,51 @@ SKINS: dict[str, tuple[str, Changes]] = {
 """Of each name a built-in skin, and what of it is changed."""
 
 
-@dataclass
-class Counts:
-    """Presses that were missed, torn into several or interrupted, shown twice, shown afterwards;
-    and distances of touches from them, m."""
-
-    missed: int = 0
-    torn: int = 0
-    doubled: int = 0
-    late: int = 0
-    away: tuple[float, ...] = ()
-
-    def add(self, other: Counts) -> None:
-        """Count those of ``other`` too."""
-        for name, value in vars(other).items():
-            setattr(self, name, getattr(self, name) + value)
+FAULTS = ("not found", "torn or interrupted", "doubled", "still shown after")
 
 
 def run() -> Iterator[Report]:
-    rows = []
-    for name, (base, changes) in SKINS.items():
-        prepared, counts = prepare(Skin.load(base).altered(changes)), Counts()
-        for seed in SEEDS:
-            progress(f"{name}, seed {seed}")
-            counts.add(standing(prepared, seed))
-        row = {"skin, electrodes": name, "presses": PRESSES * len(SEEDS)}
-        row |= {"not found": counts.missed, "torn or interrupted": counts.torn}
-        row |= {"doubled": counts.doubled, "still shown after": counts.late}
-        median = mm(np.median(counts.away), digits=1)[0] if counts.away else None
-        rows.append(row | {"median, mm": median})
     yield table(
         "standing presses, one after the other",
-        rows,
+        (standing(name) for name in SKINS),
         f"textile preset, seeds {SEEDS}, {FORCES[0]:g} to {FORCES[1]:g} N, held for {HELD:g} s "
         f"every {HELD + PAUSE:g} s without a new reference, as a live run shows them",
         f"after: {GONE:g} s after the release",
     )
 
 
-def standing(prepared: Prepared, seed: int) -> Counts:
-    """Presses, one after the other, on one run of a twin."""
-    twin = SteppedSkin(prepared, TwinSettings.preset("textile", seed))
-    random, counts = np.random.default_rng((seed, 99)), Counts()
-    places = _places(prepared.skin, random, PRESSES)
-    forces, radii = random.uniform(*FORCES, PRESSES), random.uniform(*RADII, PRESSES)
-    for (x, y), force, radius in zip(places.tolist(), forces, radii, strict=True):
-        counts.add(_one(twin, Press(x, y, float(force), float(radius))))
-    return counts
+def standing(name: str) -> dict[str, Any]:
+    """Presses, one after the other, on one run of a twin for each seed."""
+    base, changes = SKINS[name]
+    prepared, faults, away = prepare(Skin.load(base).altered(changes)), Counter[str](), []
+    for seed in SEEDS:
+        progress(f"{name}, seed {seed}")
+        twin = SteppedSkin(prepared, TwinSettings.preset("textile", seed))
+        random = np.random.default_rng((seed, 99))
+        places = _places(prepared.skin, random, PRESSES)
+        forces, radii = random.uniform(*FORCES, PRESSES), random.uniform(*RADII, PRESSES)
+        for (x, y), force, radius in zip(places.tolist(), forces, radii, strict=True):
+            found, gaps = _one(twin, Press(x, y, float(force), float(radius)))
+            faults.update(found)
+            away += gaps
+    median = mm(np.median(away), digits=1)[0] if away else None
+    counts = {fault: faults[fault] for fault in FAULTS}
+    presses = PRESSES * len(SEEDS)
+    return {"skin, electrodes": name, "presses": presses} | counts | {"median, mm": median}
 
 
-def _one(twin: SteppedSkin, press: Press) -> Counts:
+def _one(twin: SteppedSkin, press: Press) -> tuple[list[str], list[float]]:
+    """Faults of one press, and how far its touches are from it, m."""
     ramp = max(round(RAMP / twin.period), 1)
     frames = list(held(twin, (press,), HELD, RAMP))[ramp + round(SETTLED / twin.period) :]
     after = [twin.step(()).touches for _ in range(round(PAUSE / twin.period))]
     near = [[t for t in touches if gap(t, press) < NEAR] for touches in frames]
     ids = {touches[0].id if touches else None for touches in near}
-    return Counts(
-        missed=ids == {None},
-        torn=len(ids) > 1,
-        doubled=any(len(touches) > 1 for touches in frames),
-        late=any(after[round(GONE / twin.period) :]),
-        away=tuple(gap(touches[0], press) for touches in near if touches),
-    )
+    doubled = any(len(touches) > 1 for touches in frames)
+    late = any(after[round(GONE / twin.period) :])
+    faults = zip(FAULTS, (ids == {None}, len(ids) > 1, doubled, late), strict=True)
+    away = [gap(touches[0], press) for touches in near if touches]
+    return [fault for fault, is_so in faults if is_so], away
 
 
 def _places(skin: Skin, random: np.random.Generator, count: int) -> Floats:
@@ -136,20 +116,9 @@ def _places(skin: Skin, random: np.random.Generator, count: int) -> Floats:
 
 def run_released() -> Iterator[Report]:
     """What is left after a press: nothing is reported, and a new light press is found."""
-    rows = []
-    for name in RELEASED_SKINS:
-        prepared = prepare(Skin.load(name))
-        for heavy, light in ((heavy, light) for heavy in HEAVY for light in LIGHT):
-            progress(f"{name}, {heavy:g} N, then {light:g} N")
-            trials = np.array(
-                [t for s in RELEASED_SEEDS for t in _trials(prepared, s, heavy, light)]
-            )
-            row = {"skin": name, "first N": heavy, "then N": light, "presses": len(trials)}
-            found = zip(RELEASED, trials.sum(axis=0).tolist(), strict=True)
-            rows.append(row | dict(found))
     yield table(
         "a light press on the spot of a heavy one, within a second of its release",
-        rows,
+        (_released(*case) for case in product(RELEASED_SKINS, HEAVY, LIGHT)),
         f"textile preset, seeds {RELEASED_SEEDS}; the first is held for {FIRST:g} s, the pause "
         f"is {BETWEEN[0]:g} to {BETWEEN[1]:g} s, the light one is held for {AGAIN:g} s",
         f"reported: any touch later than {QUIET:g} s after the start of a release, until "
@@ -157,18 +126,20 @@ def run_released() -> Iterator[Report]:
     )
 
 
-def _trials(prepared: Prepared, seed: int, heavy: float, light: float) -> list[tuple[bool, ...]]:
-    """A press and a light one after it: what of RELEASED is true."""
-    twin, trials = SteppedSkin(prepared, TwinSettings.preset("textile", seed)), []
-    for number in range(TRIALS):
+def _released(name: str, heavy: float, light: float) -> dict[str, Any]:
+    """How often what of RELEASED is true, of a press and a light one after it."""
+    progress(f"{name}, {heavy:g} N, then {light:g} N")
+    prepared, trials = prepare(Skin.load(name)), []
+    for seed, number in product(RELEASED_SEEDS, range(TRIALS)):
         random = np.random.default_rng((seed, number))
         ((x, y),) = evenly(random, 1, 0.07).tolist()
-        twin.reset(seed)
+        twin = SteppedSkin(prepared, TwinSettings.preset("textile", seed))
         first = _is_found(twin, Press(x, y, heavy, 10e-3), FIRST)
         between = _is_shown(twin, random.uniform(*BETWEEN))
         again = _is_found(twin, Press(x, y, light, 10e-3), AGAIN)
         trials.append((first, between, again, _is_shown(twin, AFTER)))
-    return trials
+    found = zip(RELEASED, np.sum(trials, axis=0).tolist(), strict=True)
+    return {"skin": name, "first N": heavy, "then N": light, "presses": len(trials)} | dict(found)
 
 
 def _is_found(twin: SteppedSkin, press: Press, seconds: float) -> bool:
@@ -181,85 +152,3 @@ def _is_shown(twin: SteppedSkin, seconds: float) -> bool:
     """Whether anything is reported once a touch should be gone."""
     shown = [bool(twin.step(()).touches) for _ in range(round(seconds / twin.period))]
     return any(shown[round(QUIET / twin.period) :])
-
-
-COUNTED = ("textile-disc-8", "textile-disc-16", "textile-disc-32")
-COUNTED_SEEDS, COUNTED_PRESSES = (101, 102), 30
-COUNTED_FORCES, TIP, RIM = (1.0, 2.0, 5.0), 0.01, 0.012
-UNTOUCHED, PRESSED, FREE = 60, 6, 4
-REACHED = 0.0225
-
-
-def run_electrodes() -> Iterator[Report]:
-    """8, 16 and 32 electrodes at one read-out: where presses are found, and what a frame costs."""
-    yield table(
-        "presses found by the fit",
-        map(counted, COUNTED),
-        f"200 mm textile twin, {COUNTED_PRESSES} places a seed, seeds {COUNTED_SEEDS}, "
-        f"{COUNTED_FORCES} N in turn, 50 mA, four conversions of 12 bits, as the Pico's front end "
-        f"reads; found: in the {PRESSED}th frame within {1e3 * REACHED:g} mm; processor time",
-    )
-
-
-def counted(name: str) -> dict[str, Any]:
-    """Values of one skin."""
-    began = time.process_time()
-    pico = Skin.load("textile-disc-32").readout
-    skin = Skin.load(name).altered(
-        {
-            "drive": {"current": "50 mA"},
-            "readout": {
-                "adc_bits": pico.adc_bits,
-                "reference_voltage": f"{pico.reference_voltage} V",
-                "gain": pico.gain,
-                "oversampling": pico.oversampling,
-                "settling": f"{1e6 * pico.settling} us",
-            },
-        }
-    )
-    prepared = prepare(skin)
-    prepared.warm_up()
-    set_up = time.process_time() - began
-    parts = []
-    for seed in COUNTED_SEEDS:
-        progress(f"{name}, seed {seed}")
-        parts.append(measured(prepared, seed))
-    errors, forces = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
-    rest, pressed = (np.concatenate([part[k] for part in parts]) for k in (2, 3))
-    near, light = errors < REACHED, forces == COUNTED_FORCES[0]
-    found = 1e3 * errors[near]
-    return {
-        "electrodes": prepared.pattern.n_electrodes,
-        "measurements": prepared.pattern.n_meas,
-        "set-up, s": f"{set_up:.1f}",
-        "reference, s": f"{max(rest.max(), pressed.max()):.1f}",
-        "frame at rest, ms": f"{1e3 * np.median(rest):.1f}",
-        "pressed, ms": f"{1e3 * np.median(pressed):.1f}",
-        "found": f"{near.sum()} of {len(errors)}",
-        "median error, mm": f"{np.median(found):.1f}",
-        "p90, mm": f"{np.percentile(found, 90):.1f}",
-        "1 N: found": f"{(near & light).sum()} of {light.sum()}",
-        "1 N: median, mm": f"{1e3 * np.median(errors[near & light]):.1f}",
-    }
-
-
-def measured(prepared: Prepared, seed: int) -> tuple[FloatArray, ...]:
-    """Errors m (infinite: none), forces N, s a frame at rest and pressed."""
-    random, pipeline = np.random.default_rng(seed), Pipeline(prepared)
-    rig, forces = Rig(prepared.skin, "textile", seed), np.resize(COUNTED_FORCES, COUNTED_PRESSES)
-    errors, rest, pressed = [], [], []
-
-    def pushed(presses: tuple[Press, ...], count: int, taken: list[float]) -> tuple[Touch, ...]:
-        for frame in [rig.frame(presses) for _ in range(count)]:
-            began = time.process_time()
-            result = pipeline.push(frame)
-            taken.append(time.process_time() - began)
-        return result.touches if result else ()
-
-    pushed((), UNTOUCHED, rest)
-    for force in forces:
-        ((x, y),) = evenly(random, 1, 0.1 - RIM).tolist()
-        touches = pushed((Press(x, y, force, TIP),), PRESSED, pressed)
-        errors.append(min((gap(t, (x, y)) for t in touches), default=np.inf))
-        pushed((), FREE, rest)
-    return np.array(errors), forces, np.array(rest), np.array(pressed)

@@ -1,9 +1,8 @@
-"""Scores in the tank of the Kuopio challenge: its four samples, and simulated ones."""
+"""Scores and certainty in simulated tanks of the Kuopio challenge."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -26,8 +25,6 @@ WIDTHS = (0.0115, 0.0125, 0.0135)
 
 GAP, RIM, SMALLEST = 6, 0.108, 400
 """Pixels between targets, the circle that holds them, m, and the smallest, pixels."""
-
-Inside = Callable[[FloatArray], NDArray[np.bool_]]
 
 
 def simulated(example: Any, seed: int, inj: FloatArray, mpat: FloatArray) -> Any:
@@ -79,7 +76,7 @@ def targets(rng: np.random.Generator) -> NDArray[np.uint8]:
     return labels.reshape(PIXELS, PIXELS)
 
 
-def shape(rng: np.random.Generator) -> Inside:
+def shape(rng: np.random.Generator) -> Callable[[FloatArray], NDArray[np.bool_]]:
     """A disc, ellipse, rectangle, triangle, polygon, cross, L or C, 28 to 100 mm across."""
     r, kind = rng.uniform(0.014, 0.042), rng.integers(8)
     ratio, thick, long = rng.uniform(0.4, 1.0), r * rng.uniform(0.3, 0.45), 1.25 * r
@@ -130,74 +127,52 @@ def _mixed(model: ForwardModel, truth: NDArray[np.uint8], values: FloatArray) ->
     return np.asarray(water * (1 + reflection) / (1 - reflection))
 
 
-LEVELS = range(1, 8)
-METHODS = ("shapes", "linear and Otsu", "water only")
-TANKS = 8
-"""Simulated tanks at a level. Each has its own; settings were chosen on others."""
+LEVELS, TANKS = range(1, 8), 21
+"""Each level has tanks of its own; settings were chosen on others."""
 
 COARSE = 64
 """Pixels a side where certainty is judged."""
 
-
-CERTAINTY = ("wrong", "ranked", "loss", "constant")
-"""Part of the pixels with a wrong label; how often a wrong pixel is less sure than a right one; the
-mean of −log₂ of the probability that the true label was given, in bits; and what that were if each
-label counted as wrong as often as labels are."""
-
-Judged = dict[str, float]
-"""Of one tank at one level: the score of each of METHODS, ``seconds`` of processor time of one
-segmentation, and CERTAINTY."""
+FIGURES = ("score", "wrong", "ranked", "loss, bits", "constant, bits")
 
 
 def run(data: Path | None) -> Iterator[Report]:
     """Segment tanks at every level; ``data`` is the folder of public recordings."""
     file = Path("ktc2023_tank32") / "train.npz"
     example = load_example("ktc2023")
-    measured = list(example.samples(recordings(data, str(file)) / file))
-    inj, mpat = measured[0].inj, measured[0].mpat
-    groups: dict[str, list[list[Judged]]] = {
-        "4 measured": [[judged(example, tank, level) for tank in measured] for level in LEVELS],
-        f"{TANKS} simulated": [_simulated(example, level, inj, mpat) for level in LEVELS],
-    }
+    real = next(iter(example.samples(recordings(data, str(file)) / file)))
+    every = np.array([_level(example, level, real) for level in LEVELS])
+    mean, error = every.mean(axis=1), every[:, :, 0].std(axis=1, ddof=1) / np.sqrt(TANKS)
+    texts = [[f"{value:.3f}" for value in row] for row in mean.T]
+    texts[0] = [f"{text} ± {e:.3f}" for text, e in zip(texts[0], error, strict=True)]
+    levels = [f"level {level}" for level in LEVELS]
     yield table(
-        "score, 1 is best",
-        (row for name, group in groups.items() for row in _scores(name, group)),
-        "times 21: the challenge's sum over three samples at each of seven levels",
-        "±: standard error of the mean over tanks; simulated ones are others at each level",
-    )
-    yield table(
-        "where it is sure",
-        (row for name, group in groups.items() for row in _certainty(name, group)),
+        f"{TANKS} simulated tanks of the Kuopio challenge",
+        (
+            {"": what} | dict(zip(levels, t, strict=True))
+            for what, t in zip(FIGURES, texts, strict=True)
+        ),
+        "score: 1 is best; ±: standard error of the mean over tanks; wrong: part of the pixels",
         "ranked: how often a wrong pixel is less sure than a right one; 0.5 is chance",
         "loss: mean of −log₂ of the probability given to the true label",
         "constant: the same if every label counted as wrong as often as labels are",
     )
 
 
-def _simulated(example: Any, level: int, inj: FloatArray, mpat: FloatArray) -> list[Judged]:
+def _level(example: Any, level: int, real: Any) -> list[tuple[float, ...]]:
     seeds = range(6000 + 100 * level, 6000 + 100 * level + TANKS)
-    return [judged(example, simulated(example, seed, inj, mpat), level) for seed in seeds]
+    tanks = (simulated(example, seed, real.inj, real.mpat) for seed in seeds)
+    return [judged(example, tank, level) for tank in tanks]
 
 
-def judged(example: Any, tank: Any, level: int) -> Judged:
-    """Segment one tank without the electrodes that ``level`` leaves out."""
+def judged(example: Any, tank: Any, level: int) -> tuple[float, ...]:
+    """FIGURES of a tank, segmented without the electrodes that ``level`` leaves out."""
     keep = example.kept(tank.inj, tank.mpat, level)
-    begun = time.process_time()
     found = example.regions(*example.checked(tank.u, tank.u_ref, tank.inj, tank.mpat, keep))
-    labels = example.labelled(found)
-    seconds = time.process_time() - begun
-    linear = example.linear(tank.u, tank.u_ref, tank.inj, tank.mpat, keep)
-    pictures = (labels, linear, np.zeros_like(labels))
-    scores = (example.score(picture, tank.truth) for picture in pictures)
+    score = example.score(example.labelled(found), tank.truth)
     points, inside = example.pixels(COARSE)
     step = example.PIXELS // COARSE
     truth = np.asarray(tank.truth)[step // 2 :: step, step // 2 :: step][inside]
-    about = zip(CERTAINTY, certainty(found, points, truth), strict=True)
-    return {**dict(zip(METHODS, scores, strict=True)), "seconds": seconds, **dict(about)}
-
-
-def certainty(found: Any, points: FloatArray, truth: Any) -> tuple[float, float, float, float]:
-    """What CERTAINTY names, at ``points``."""
     wrong = found.at(points) != truth
     rank, n = rankdata(found.entropy(points)), int(wrong.sum())
     above = rank[wrong].sum() - n * (n + 1) / 2
@@ -205,28 +180,4 @@ def certainty(found: Any, points: FloatArray, truth: Any) -> tuple[float, float,
     often = (n + 1) / (len(truth) + 2)
     constant = -often * np.log2(often / 2) - (1 - often) * np.log2(1 - often)
     ranked = above / (n * (len(truth) - n)) if n else 1.0
-    return float(wrong.mean()), float(ranked), float(-np.log2(given + 1e-3).mean()), float(constant)
-
-
-def _scores(name: str, group: Sequence[Sequence[Judged]]) -> Iterator[dict[str, Any]]:
-    """Mean and its standard error at each level, and over all."""
-    for method in METHODS:
-        scores = np.array([[tank[method] for tank in tanks] for tanks in group])
-        error = scores.std(axis=1, ddof=1) / np.sqrt(scores.shape[1])
-        means = [*scores.mean(axis=1), scores.mean()]
-        errors = [*error, np.sqrt((error**2).sum()) / len(error)]
-        values = [f"{m:.3f} ± {e:.3f}" for m, e in zip(means, errors, strict=True)]
-        yield _by_level(name, method, values) | {"times 21": f"{21 * scores.mean():.2f}"}
-    taken = np.array([np.mean([tank["seconds"] for tank in tanks]) for tanks in group])
-    yield _by_level(name, "seconds", [f"{s:.1f}" for s in (*taken, taken.mean())])
-
-
-def _certainty(name: str, group: Sequence[Sequence[Judged]]) -> Iterator[dict[str, Any]]:
-    for what in CERTAINTY:
-        means = np.array([np.mean([tank[what] for tank in tanks]) for tanks in group])
-        yield _by_level(name, what, [f"{m:.3f}" for m in (*means, means.mean())])
-
-
-def _by_level(name: str, method: str, values: Sequence[str]) -> dict[str, Any]:
-    columns = (*(f"level {n}" for n in LEVELS), "mean")
-    return {"tanks": name, "method": method, **dict(zip(columns, values, strict=True))}
+    return score, wrong.mean(), ranked, -np.log2(given + 1e-3).mean(), constant

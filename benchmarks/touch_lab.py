@@ -141,11 +141,6 @@ class Plant:
         return Frame(0, 0, 0.0, 1, 0, 0, counts.astype(np.uint16))
 
 
-def plant_mesh(skin: Skin) -> Mesh:
-    """Finer than any that is fitted on, and of another seed."""
-    return laid_on(triangulate(skin.outline, skin.arcs, CELLS, seed=MESH_SEED), skin.surface)
-
-
 def _moved(finger: Finger, column: int, step: float) -> Finger:
     name = ("x", "y", "radius", "fall")[column]
     return replace(finger, **{name: finger.parameters[column] + step})
@@ -199,8 +194,10 @@ def stages(name: str) -> tuple[Skin, Prepared, Prepared]:
 
 
 @cache
-def _mesh(name: str) -> Mesh:
-    return plant_mesh(stages(name)[0])
+def sheet_mesh(name: str) -> Mesh:
+    """Finer than any that is fitted on, and of another seed."""
+    skin = stages(name)[0]
+    return laid_on(triangulate(skin.outline, skin.arcs, CELLS, seed=MESH_SEED), skin.surface)
 
 
 class TwinLab:
@@ -277,7 +274,7 @@ class PlantLab:
         self, name: str, uneven: float, excluded: int | None, idle: int, seed: int
     ) -> None:
         self.skin, fit, image = stages(name)
-        self.plant = Plant(self.skin, _mesh(name), uneven, seed)
+        self.plant = Plant(self.skin, sheet_mesh(name), uneven, seed)
         self.lost = np.zeros(self.skin.pattern().n_meas, bool)
         if excluded is not None:
             roles = Roles.of(self.skin.pattern())

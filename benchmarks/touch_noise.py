@@ -22,17 +22,10 @@ PERIOD, BUSY = 0.05, 0.9
 class Noise:
     """Noise beside that of the read-out, of which one row has the deviation 1.
 
-    Attributes
-    ----------
-    samples, rows
-        Of each sample, in parts of the read-out's; of each row by itself, as a differential
-        board's.
-    hum, advance
-        Of the mains in a row, rms; turns by which it goes on between frames.
-    drift, walk
-        Part by which all voltages rise and fall in 300 s; of each electrode's random walk in 30 s.
-    loud, every
-        Times as loud as the others one electrode becomes, another one after so many frames.
+    ``samples``: of each, in parts of the read-out's; ``rows``: of each by itself, as a differential
+    board's; ``hum`` of the mains in a row, rms, with ``advance`` turns between frames; ``drift``:
+    part by which all voltages rise and fall in 300 s; ``walk`` of each electrode in 30 s; ``loud``:
+    times as loud as the others one electrode becomes, another one after ``every`` so many frames.
     """
 
     samples: float = 1.0
@@ -101,7 +94,9 @@ class NoisyBoard:
         counts = self.rest * (1 + noise.drift * np.sin(2 * np.pi * time / 300.0))
         counts = counts + sd * random.standard_normal(len(sd))
         if noise.rows:
-            counts += self.inverse @ (noise.rows * self.unit * random.standard_normal(self.n_meas))
+            counts += self.inverse @ (
+                noise.rows * self.unit * random.standard_normal(len(self.makes))
+            )
         if noise.hum:
             turn = self.phase + 2 * np.pi * noise.advance * number
             counts += self.hum * np.sin(self.mains + turn)
@@ -110,11 +105,6 @@ class NoisyBoard:
             self.offset += step * random.standard_normal(len(self.offset))
             counts += self.offset
         return counts + self.inverse @ (self.volts / self.prepared.readout.volts_per_count)
-
-    @property
-    def n_meas(self) -> int:
-        """Rows."""
-        return len(self.makes)
 
     def frames(self, count: int, first: int = 0) -> Iterator[Frame]:
         """Frames as the pipeline takes them."""

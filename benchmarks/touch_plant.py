@@ -50,7 +50,6 @@ CASES = (
     Case("8", 1, 0.1, excluded=2),
     *(Case("16", k, 0.1, excluded=4) for k in (1, 2)),
 )
-QUICK = (Case("8", 2, 0.0), Case("8", 3, 0.1), Case("16", 1, 0.1), Case("16", 3, 0.1))
 TWIN = (
     *(Case(name, 1, preset, anywhere=True) for name in TWIN_SKINS for preset in PRESETS),
     *(Case(TWIN_SKINS[1], k, preset) for preset in PRESETS for k in (1, 2, 3)),
@@ -58,12 +57,15 @@ TWIN = (
 
 
 def run() -> Iterator[Report]:
-    yield on_plant(CASES, SHEETS)
-
-
-def run_quick() -> Iterator[Report]:
-    """Some cases of touch_plant, with a third of the frames: what a change does, in a minute."""
-    yield on_plant(QUICK, 1)
+    yield table(
+        "flat fingers on uneven sheets",
+        (_row(case, _plant_frames(case)) for case in CASES),
+        f"seeds {SEEDS}, {len(SEEDS) * SHEETS * PLACEMENTS} frames each, every one alone; "
+        f"reference of {IDLE} frames; radii {1e3 * RADII[0]:.0f} to {1e3 * RADII[1]:.0f} mm, "
+        f"conductivity down by {100 * FALLS[0]:.0f} to {100 * FALLS[1]:.0f} %, over "
+        f"{100 * INSIDE:.0f} % of the breadth, {1e3 * APART:.0f} mm apart at least",
+        "all found: each press within half of that; bound: Cramér–Rao of the plant itself",
+    )
 
 
 def run_twin() -> Iterator[Report]:
@@ -75,20 +77,6 @@ def run_twin() -> Iterator[Report]:
         "probes of 8 to 15 mm radius, 2 to 4 N; each frame alone, from a cold start",
         "ideal: read-out noise alone; bound: Cramér–Rao of the twin itself; first rows: wherever "
         "the nearest touch is",
-    )
-
-
-def on_plant(cases: Sequence[Case], sheets: int) -> Report:
-    """Each case by both methods."""
-    frames = len(SEEDS) * sheets * PLACEMENTS
-    return table(
-        "flat fingers on uneven sheets",
-        (_row(case, _plant_frames(case, sheets)) for case in cases),
-        f"seeds {SEEDS}, {frames} frames each, every one alone; reference of {IDLE} "
-        f"frames; radii {1e3 * RADII[0]:.0f} to {1e3 * RADII[1]:.0f} mm, conductivity down by "
-        f"{100 * FALLS[0]:.0f} to {100 * FALLS[1]:.0f} %, over {100 * INSIDE:.0f} % of the "
-        f"breadth, {1e3 * APART:.0f} mm apart at least",
-        "all found: each press within half of that; bound: Cramér–Rao of the plant itself",
     )
 
 
@@ -147,9 +135,9 @@ def _row(case: Case, frames: Iterator[Frame]) -> dict[str, Any]:
     return case.columns | fit.columns("fit") | over | image.columns("image")
 
 
-def _plant_frames(case: Case, sheets: int) -> Iterator[Frame]:
+def _plant_frames(case: Case) -> Iterator[Frame]:
     assert isinstance(case.sheet, float)
-    for seed in (100 * seed + number for seed in SEEDS for number in range(sheets)):
+    for seed in (100 * seed + number for seed in SEEDS for number in range(SHEETS)):
         lab = PlantLab(case.skin, case.sheet, case.excluded, IDLE, seed)
         random = np.random.default_rng([seed, case.presses])
         for _ in range(PLACEMENTS):

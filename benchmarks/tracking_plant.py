@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -13,10 +13,9 @@ from scipy.optimize import linear_sum_assignment
 
 from bench_rig import gap, scan_time, stage
 from report import Report, percent, progress, table
-from tomoskin.model.mesh import Mesh
 from tomoskin.pipeline import FrameResult, Pipeline
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
-from touch_lab import Finger, Plant, plant_mesh
+from touch_lab import Finger, Plant, sheet_mesh
 
 UNEVEN = 0.1
 RAMP = 0.05
@@ -60,17 +59,12 @@ class Shown:
     end: float
 
 
-@cache
-def _mesh(electrodes: int) -> Mesh:
-    return plant_mesh(stage(electrodes).skin)
-
-
 class Sheet:
     """A plant with a pipeline that has its reference: one scene after the other."""
 
     def __init__(self, electrodes: int, seed: int) -> None:
         prepared = stage(electrodes)
-        self.plant = Plant(prepared.skin, _mesh(electrodes), UNEVEN, seed)
+        self.plant = Plant(prepared.skin, sheet_mesh(f"{electrodes}"), UNEVEN, seed)
         self.pipeline = Pipeline(prepared)
         self._interval, self._number = scan_time(prepared), 0
         for _ in range(REFERENCE_FRAMES + SETTLED):
@@ -230,7 +224,7 @@ class Scores:
 def run() -> Iterator[Report]:
     yield table(
         "fingers that move, on uneven sheets",
-        (_row(electrodes, SEEDS, SCENES) for electrodes in ELECTRODES),
+        map(_row, ELECTRODES),
         f"seeds {SEEDS}, {SCENES} scenes of each kind; radii 12 to 20 mm, conductivity "
         f"down by 15 to 35 %, up and down in {1e3 * RAMP:.0f} ms, sheet uneven by 10 %",
         f"ghost: a touch farther than {1e3 * NEAR:.1f} mm from every finger of its own that "
@@ -239,10 +233,14 @@ def run() -> Iterator[Report]:
     )
 
 
-def _row(electrodes: int, seeds: Sequence[int], scenes: int) -> dict[str, Any]:
+def _row(electrodes: int) -> dict[str, Any]:
     scores = Scores()
-    for seed in seeds:
-        _measure(scores, electrodes, seed, scenes)
+    for seed in SEEDS:
+        sheet = Sheet(electrodes, seed)
+        for (index, (kind, drawn)), number in product(enumerate(KINDS.items()), range(SCENES)):
+            progress(f"{electrodes} electrodes, seed {seed}, {kind} {number}")
+            slides, seconds = drawn(np.random.default_rng([seed, index, number]))
+            scores.add(kind, slides, list(sheet.scene(slides, seconds)))
     onsets, releases = np.array(scores.onsets), np.array(scores.releases)
     past, parted = (
         ", ".join(f"{n} {w}" for w, n in scores.who[kind].most_common()) for kind in MEETINGS
@@ -260,15 +258,6 @@ def _row(electrodes: int, seeds: Sequence[int], scenes: int) -> dict[str, Any]:
         "past each other": past,
         "together and apart": parted,
     }
-
-
-def _measure(scores: Scores, electrodes: int, seed: int, scenes: int) -> None:
-    sheet = Sheet(electrodes, seed)
-    for index, (kind, drawn) in enumerate(KINDS.items()):
-        for number in range(scenes):
-            progress(f"{electrodes} electrodes, seed {seed}, {kind} {number}")
-            slides, seconds = drawn(np.random.default_rng([seed, index, number]))
-            scores.add(kind, slides, list(sheet.scene(slides, seconds)))
 
 
 def has_ghost(frame: Shown, slides: Sequence[Slide]) -> bool:

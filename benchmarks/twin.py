@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
+from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -11,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from bench_rig import Rig
-from report import Report, progress, spent, table
+from report import Report, spent, table
 from tomoskin.model.forward import State
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import prepare
@@ -28,7 +29,7 @@ CASES = (
 )
 FRAMES, ROUND, CHECKED, SEED = 300, 100, 20, 1
 SET, SET_SKIN, SET_ROUNDS, PROCESSES = 5000, "textile-disc-8", 2, (1, 2)
-STEPS, STEPPED_SEED, STEPS_PROMISED = 500, 11, 1000
+STEPS, STEPPED_SEED = 500, 11
 
 
 def run() -> Iterator[Report]:
@@ -45,17 +46,15 @@ def run() -> Iterator[Report]:
 
 def run_steps() -> Iterator[Report]:
     """Steps a second of a twin that is pressed step by step, with and without its touches."""
-    yield table("steps a second of processor time, one core", _stepped())
+    cases = product(("textile-disc-8", "textile-disc-16"), ("ideal", "textile"), STEPPED)
+    yield table("steps a second of processor time, one core", (_stepped(*case) for case in cases))
 
 
 def _labelled() -> Report:
     """Labelled frames by one process and by two, starts and writing included."""
     took: dict[int, list[float]] = {n: [] for n in PROCESSES}
-    for number in range(SET_ROUNDS):
-        for n in PROCESSES:
-            plan = SetPlan(Skin.load(SET_SKIN).to_toml(), COMMON_PRESSES, "textile", number, SET)
-            with TemporaryDirectory() as folder:
-                took[n].append(_set_seconds(plan, Path(folder) / "set", n))
+    for number, n in product(range(SET_ROUNDS), PROCESSES):
+        took[n].append(_set_seconds(number, n))
     rows = (
         {
             "skin": SET_SKIN,
@@ -76,12 +75,14 @@ def _labelled() -> Report:
     )
 
 
-def _set_seconds(plan: SetPlan, out: Path, processes: int) -> float:
-    solved_dent.cache_clear()
-    start = time.perf_counter()
+def _set_seconds(seed: int, processes: int) -> float:
+    plan = SetPlan(Skin.load(SET_SKIN).to_toml(), COMMON_PRESSES, "textile", seed, SET)
     workers = in_this_process if processes == 1 else in_processes(processes)
-    make_set(plan, out, workers, lambda _, __: None)
-    return time.perf_counter() - start
+    solved_dent.cache_clear()
+    with TemporaryDirectory() as folder:
+        start = time.perf_counter()
+        make_set(plan, Path(folder) / "set", workers, lambda _, __: None)
+        return time.perf_counter() - start
 
 
 def row(name: str, preset: str, triangles: int) -> dict[str, Any]:
@@ -148,27 +149,19 @@ def _presses(number: int, skin: Skin) -> tuple[Press, ...]:
     return tuple(Press(x, y, 3.0, 0.012) for x, y in places.tolist())
 
 
-def _stepped() -> Iterator[dict[str, Any]]:
-    kinds: dict[str, Callable[[int], tuple[Press, ...]]] = {
-        "moving": lambda step: (Press(0.03 * float(np.cos(step / 50)), 0.01, 5.0, 0.012),),
-        "held": lambda _: (Press(0.03, 0.01, 5.0, 0.012),),
-        "none": lambda _: (),
+STEPPED: dict[str, Callable[[int], tuple[Press, ...]]] = {
+    "moving": lambda step: (Press(0.03 * float(np.cos(step / 50)), 0.01, 5.0, 0.012),),
+    "held": lambda _: (Press(0.03, 0.01, 5.0, 0.012),),
+    "none": lambda _: (),
+}
+
+
+def _stepped(name: str, preset: str, press: str) -> dict[str, Any]:
+    prepared, settings = prepare(Skin.load(name)), TwinSettings.preset(preset, STEPPED_SEED)
+    return {"skin": name, "preset": preset, "press": press} | {
+        what: round(_rate(SteppedSkin(prepared, settings, with_touches=on), STEPPED[press]))
+        for what, on in (("voltages alone", False), ("with touches", True))
     }
-    for name in ("textile-disc-8", "textile-disc-16"):
-        prepared = prepare(Skin.load(name))
-        for preset in ("ideal", "textile"):
-            progress(f"{name}, {preset}")
-            settings = TwinSettings.preset(preset, STEPPED_SEED)
-            alone, both = (SteppedSkin(prepared, settings, with_touches=on) for on in (False, True))
-            for kind, press in kinds.items():
-                yield {
-                    "skin": name,
-                    "preset": preset,
-                    "press": kind,
-                    "voltages alone": round(_rate(alone, press)),
-                    "with touches": round(_rate(both, press)),
-                    "promised": STEPS_PROMISED,
-                }
 
 
 def _rate(skin: SteppedSkin, press: Callable[[int], tuple[Press, ...]]) -> float:

@@ -11,7 +11,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -21,14 +21,16 @@ from scipy.interpolate import RBFInterpolator
 
 import frame
 import page
-import session
 import twin
 from bench_rig import labelled_presses
-from forward_measure import ALPHA, PATTERN, disc, measure_touch, set_up
+from forward import ALPHA, PATTERN, disc, measure_touch, set_up
 from forward_others import INSTALLED, Peer, Script
 from report import Report, cell, clock, medians, progress
 from tomoskin import ForwardModel, Locator, Skin
-from tomoskin.core import FloatArray
+from tomoskin.board.wire import encode
+from tomoskin.core import Capacity, FloatArray, Frame, Mark, MarkedFrame, Worker
+from tomoskin.files.session import RawRead, Recorder, SessionReader, SessionWriter
+from tomoskin.model.pattern import Scan
 from tomoskin.pipeline import prepare
 from tomoskin.server.server import STATIC
 
@@ -36,8 +38,8 @@ CELLS, SECONDS = 3000, 8.0
 REPEATS = 5
 """Starts of each program."""
 
-RECORDED, SOUGHT = 10, 600
-"""Seconds recorded at their own pace, and of the session that is sought in."""
+RECORDED, WARM, SOUGHT = 10, 2000, 600
+"""Seconds recorded at their own pace, frames before what counts, s of the session sought in."""
 
 SKIN, LEARNT, TESTED = "textile-disc-16", 200, 200
 SMOOTHING = 1.0
@@ -64,18 +66,10 @@ class Line:
 
 
 def run() -> Iterator[Report]:
-    parts: dict[str, Callable[[], Iterator[Line]]] = {
-        "start": _start,
-        "forward": _forward,
-        "frame": _frame,
-        "touch": _touch,
-        "twin": _twin,
-        "wire": _wire,
-        "session": _session,
-        "page": _page,
-    }
+    parts = (_start, _forward, _frame, _touch, _twin, _wire, _session, _page)
     rows = []
-    for number, (part, lines) in enumerate(parts.items(), start=1):
+    for number, lines in enumerate(parts, start=1):
+        part = lines.__name__.removeprefix("_")
         progress(f"{part} ({number} of {len(parts)})")
         rows += [_row(part, line) for line in lines()]
     columns = ("part", "what", "measured", "promised", "plain scipy", "×", "pyEIT", "×")
@@ -116,14 +110,12 @@ def _start() -> Iterator[Line]:
 
 def _begun(code: str) -> float:
     """Median processor time of a program, the interpreter's own included, ms."""
-    return 1e3 * statistics.median(_once(code) for _ in range(REPEATS))
-
-
-def _once(code: str) -> float:
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    used = [0.0]
+    for _ in range(REPEATS):
+        subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
+        children = resource.getrusage(resource.RUSAGE_CHILDREN)
+        used.append(children.ru_utime + children.ru_stime)
+    return 1e3 * float(np.median(np.diff(used)))
 
 
 def _forward() -> Iterator[Line]:
@@ -180,7 +172,9 @@ def _touch() -> Iterator[Line]:
     """Places on the twin: fitted to the voltages, and learnt from labelled presses."""
     skin = Skin.load(SKIN)
     fitted = prepare(skin.altered({"touch": {"method": "fit"}}))
-    yield Line("two touches fitted to the voltages, p50", "ms a frame", frame.p50(fitted, 2))
+    yield Line(
+        "two touches fitted to the voltages, p50", "ms a frame", frame.row(fitted, 2)["p50 ms"]
+    )
     dv, xy = labelled_presses(skin, 1, LEARNT + TESTED)
     began = time.process_time()
     locator = Locator.fit(dv[:LEARNT], xy[:LEARNT], skin=skin)
@@ -215,15 +209,59 @@ def _wire() -> Iterator[Line]:
 
 
 def _session() -> Iterator[Line]:
-    skin = Skin.load(session.SKIN)
-    frames = session.frames_of(skin)
+    skin, rng = Skin.load(SKIN), np.random.default_rng(1)
+    n = Scan.of(skin.pattern()).n_samples
+    samples = rng.integers(200, 3000, (500, n)).astype("<u2")
+    frames = [Frame(0, 0, 0.0, 0x1A2B, 0, 0, row) for row in samples]
     with tempfile.TemporaryDirectory() as folder:
-        paced, long = Path(folder) / "paced.mcap", Path(folder) / "long.mcap"
-        row = session.recorded(paced, skin, frames, RECORDED, paced=True)
-        yield Line("recording 1,000 frames/s", "% of a core", row["% of a core"], "< 20")
-        row = session.opened(session.of_length(long, skin, frames, SOUGHT), SOUGHT)
-        seek = row["open and seek ms"]
+        used = _recorded(Path(folder) / "paced.mcap", skin, frames)
+        yield Line("recording 1,000 frames/s", "% of a core", used, "< 20")
+        seek = _sought(Path(folder) / "long.mcap", skin, frames)
         yield Line(f"open and seek in {SOUGHT // 60} minutes", "ms", seek, "< 200")
+
+
+def _at(frames: list[Frame], number: int, rate: float) -> tuple[Frame, bytes]:
+    """Frames come again and again, with new numbers and times; and the bytes of one."""
+    ticks, seconds = round(number * 16e6 / rate), number / rate
+    frame = frames[number % len(frames)]
+    return replace(frame, sequence=number, ticks=ticks, host_time=seconds), encode(frame)
+
+
+def _recorded(path: Path, skin: Skin, frames: list[Frame]) -> float:
+    """Per cent of a core that a recording takes, frame by frame at their own pace."""
+    recorder = Recorder(path, lambda: SessionWriter(path, skin), None, lambda *_: None)
+    worker = Worker(recorder, Capacity(50_000, "oldest"), lambda *_: None)
+    worker.start()
+    made = [_at(frames, number, 1000.0) for number in range(1000 * RECORDED)]
+    processor = begun = 0.0
+    for number, (item, raw) in enumerate(made):
+        if number == WARM:
+            processor, begun = time.process_time(), time.monotonic()
+        worker.put(RawRead(item.host_time, raw))
+        worker.put(MarkedFrame(item, Mark.NONE))
+        if number >= WARM:
+            time.sleep(max(item.host_time - (time.monotonic() - begun), 0.0))
+    used = time.process_time() - processor
+    worker.end()
+    worker.join()
+    return 100 * used / RECORDED
+
+
+def _sought(path: Path, skin: Skin, frames: list[Frame]) -> float:
+    """Median of ms until a session is open and a random frame of it is there."""
+    with SessionWriter(path, skin) as session:
+        for number in range(100 * SOUGHT):
+            item, raw = _at(frames, number, 100.0)
+            session.raw(item.host_time, raw)
+            session.frame(item)
+    sought = []
+    for place in np.random.default_rng(1).uniform(0, SOUGHT - 1, 40):
+        start = time.perf_counter()
+        with SessionReader(path) as reader:
+            first = next(reader.frames(since=place)).frame
+            sought.append(1e3 * (time.perf_counter() - start))
+        assert abs(first.host_time - place) <= 0.01
+    return statistics.median(sought)
 
 
 def _page() -> Iterator[Line]:

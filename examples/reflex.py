@@ -112,8 +112,9 @@ def main(arguments: Sequence[str] | None = None) -> dict[str, float]:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--skin", default="textile-disc-8", help="built-in name or path")
     parser.add_argument("--presses", type=int, default=20, help="how many")
+    parser.add_argument("--seed", type=int, default=1, help="of the twin and of the places")
     options = parser.parse_args(arguments)
-    found = measured(Skin.load(options.skin), options.presses, seed=1)
+    found = measured(Skin.load(options.skin), options.presses, options.seed)
     for name, value in found.items():
         print(f"{name:<24} {value:.1f}")
     return found

@@ -1,4 +1,4 @@
-% Times EIDORS on the cases of eidors_cases.py, and compares the voltages.
+% Times EIDORS on the cases of forward.py, and compares the voltages.
 %
 %   octave --quiet benchmarks/eidors/time_eidors.m FOLDER PATH/TO/eidors/startup.m
 %

@@ -7,7 +7,10 @@ from functools import partial
 
 import pytest
 
+from cli.conftest import tomoskin
 from tomoskin.board.source import Timing
+
+__all__ = ["tomoskin"]
 
 
 @pytest.fixture(scope="module", autouse=True)

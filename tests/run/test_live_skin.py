@@ -17,7 +17,7 @@ from tomoskin import open_robot, open_skin
 from tomoskin.core import DataError, SkinError, SourceError
 from tomoskin.learning import FORCE
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
-from tomoskin.run import LiveSkin, Runner, commands, live_skin
+from tomoskin.run import LiveSkin, Runner, commands, robot_run
 from tomoskin.twin import Press
 
 PATIENCE = 300
@@ -162,12 +162,14 @@ def test_a_replay_ages_as_if_it_were_now(tmp_path, force_file):
         contacts = until(skin, lambda c: c.valid)
         assert 0 < contacts.age_s < 1.0
         assert contacts.latency is None
+        skin.max_age = 0.01
+        assert "ended" in until(skin, lambda c: c.problem and "ended" in c.problem).problem
 
 
 def test_the_reflex_of_the_documentation_acts_on_newtons(monkeypatch, force_file, tmp_path):
     program = robot_program("tomoskin")
     assert len([line for line in program.splitlines() if line.strip()]) <= MOST_LINES
-    open_source, wait, opened, said = live_skin.open_source, LiveSkin.wait, [], []
+    open_source, wait, opened, said = robot_run.open_source, LiveSkin.wait, [], []
 
     def keep(*arguments):
         opened.append(open_source(*arguments))
@@ -184,7 +186,7 @@ def test_the_reflex_of_the_documentation_acts_on_newtons(monkeypatch, force_file
         if words[0] != "hold:":
             raise KeyboardInterrupt  # as a person ends it
 
-    monkeypatch.setattr(live_skin, "open_source", keep)
+    monkeypatch.setattr(robot_run, "open_source", keep)
     monkeypatch.setattr(LiveSkin, "wait", pressed_once_valid)
     monkeypatch.chdir(tmp_path)
     Path("force.npz").write_bytes(force_file.read_bytes())

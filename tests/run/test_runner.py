@@ -1,6 +1,8 @@
 """The thread between source and pages: newest result, losses, clean ends."""
 
 import errno
+import gc
+import sys
 import threading
 import time
 from pathlib import Path
@@ -362,3 +364,14 @@ def test_a_skin_that_saturates_is_said_before_its_electrodes_are_blamed(board):
     assert " mA with a gain of 0.7" in runner.status().problem
     runner.stop()
     assert "saturated" in [event.kind for event in runner.events.since(0)[1]]
+
+
+def test_python_holds_up_no_frame_for_long_while_a_run_lasts(runner, until):
+    turn = sys.getswitchinterval()
+    runner.start()
+    until(lambda: runner.newest)
+    assert gc.get_freeze_count() > 10_000  # what is there is not looked through while frames come
+    assert sys.getswitchinterval() <= 1e-3 < turn
+    runner.stop()
+    assert gc.get_freeze_count() == 0
+    assert sys.getswitchinterval() == turn

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import threading
+import time
 from contextlib import closing
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
+from run.board import Board
 from run.test_runner import PATIENCE, Watch
 from server.serving import Site
 from tomoskin.core import Event, SinkError
 from tomoskin.files.messages import event_content
+from tomoskin.files.messages.reporter import WAITING
 from tomoskin.files.session.replay import open_replay
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import prepare
@@ -76,7 +80,8 @@ def test_bad_sinks_delay_nothing(runner, sinks):
     assert runner.status().dropped == 0
     assert len(sinks["hung"].items) == 1
     runner.stop()
-    good = [item for item in sinks["good"].items if isinstance(item, Contacts)]
+    told = [item for item in sinks["good"].items if isinstance(item, Contacts)]
+    good = [item for item in told if item.sequence >= 0]
     assert [item.sequence for item in good] == list(range(runner.status().frames))
     assert good[-1].image is None or good[-1].valid
     assert [item.valid for item in good] == [
@@ -123,6 +128,21 @@ def test_a_replay_is_published_with_the_times_of_its_day():
     event = Event(0.5, "connected", "board 01")
     assert event_content(stream, event, of_frame=True)["utc_s"] == 1e9 + 0.5
     assert event_content(stream, event)["utc_s"] is None  # it is of today
+
+
+def test_before_the_first_frame_every_sink_is_told_that_none_has_come(prepared):
+    sink = Sink("good")
+    runner = Runner(prepared, Board().open, sinks=(sink,))
+    runner.start()
+    begun = time.monotonic()
+    while len(told := [item for item in sink.items if isinstance(item, Contacts)]) < 3:
+        assert time.monotonic() - begun < PATIENCE
+        time.sleep(0.1)
+    runner.stop()
+    assert told[0].host_time - begun < 0.5  # its board answers, and sends no frame
+    assert {(c.valid, c.problem, c.touches) for c in told} == {(False, WAITING, ())}
+    assert all(contacts.is_due and contacts.reports for contacts in told)
+    assert min(b.host_time - a.host_time for a, b in pairwise(told)) > 0.5
 
 
 def test_a_board_that_is_lost_is_said_on_every_sink(prepared, board):

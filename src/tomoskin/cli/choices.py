@@ -9,6 +9,7 @@ import typer
 
 from tomoskin.cli.options import DEFAULT_SKIN
 from tomoskin.cli.output import remark
+from tomoskin.core import parse_quantity
 
 if TYPE_CHECKING:
     from tomoskin.model.skin import Skin
@@ -67,8 +68,6 @@ def say_headroom(headroom: Headroom) -> None:
 
 def quantity(text: str, dimension: str, option: str) -> float:
     """The value of an ``option`` in SI units."""
-    from tomoskin.core import parse_quantity
-
     try:
         return parse_quantity(text, dimension)
     except ValueError as error:

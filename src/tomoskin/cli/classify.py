@@ -13,6 +13,7 @@ from tomoskin.cli.named_files import TABLE, ForceFlag, Reads, Writes
 from tomoskin.cli.named_parts import Recorded
 from tomoskin.cli.options import RecordingArgument, ReferenceOption, SameSkinOption
 from tomoskin.cli.output import Bar, JsonFlag, tell
+from tomoskin.core import written
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -83,8 +84,6 @@ def _documents(data: Recording, answers: Answers) -> list[dict[str, Any]]:
 def _write(
     path: Path, frames: list[dict[str, Any]], names: tuple[str, ...], *, overwrite: bool
 ) -> None:
-    from tomoskin.core import written
-
     with (
         written(path, overwrite=overwrite) as part,
         part.open("w", newline="", encoding="utf-8") as file,

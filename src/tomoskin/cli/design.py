@@ -12,7 +12,7 @@ from tomoskin.cli.choices import quantity, say_headroom
 from tomoskin.cli.named_files import FIGURE, ForceFlag, Writes
 from tomoskin.cli.options import DEFAULT_SKIN, NamedSkinOption
 from tomoskin.cli.output import Bar, JsonFlag, tables, tell
-from tomoskin.core import DataError
+from tomoskin.core import DataError, TomoskinError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -143,7 +143,6 @@ def _part(bar: Bar, number: int, jobs: int) -> Callable[[float, float], None]:
 def _compared(
     skin: Skin, demand: Demand, counts: list[int], patterns: list[str], bar: Bar
 ) -> list[dict[str, Any]]:
-    from tomoskin.core import TomoskinError
     from tomoskin.model.pattern import Scan
     from tomoskin.sensing.fit import resolution_bounds, variants
 

@@ -41,7 +41,7 @@ def record(
         float | None,
         typer.Option(help="How long to record. Default: until Ctrl-C or the end of a replay."),
     ] = None,
-    frames: Annotated[int | None, typer.Option(min=1, help="Number of frames to record.")] = None,
+    frames: Annotated[int | None, typer.Option(min=1, help="Stop after so many frames.")] = None,
     sink: SinkOption = None,
     slow: Annotated[
         int, typer.Option(min=0, help="Say of so many of the slowest frames why they were slow.")
@@ -64,7 +64,7 @@ def record(
     runner = Runner(prepared, lambda: open_source(source, chosen), sinks=sinks)
     with ended_by_signals(), recording_to(runner, file) as stopped:
         if seconds is None and frames is None and not json:
-            typer.echo(f"{runner.flow.source} is recorded to {file} until Ctrl-C", err=True)
+            typer.echo(f"{runner.flow.source} is recorded to {file}; Ctrl-C ends it", err=True)
         _wait(runner, seconds, frames)
         if (doubt := runner.status().problem) is not None:
             remark(doubt)

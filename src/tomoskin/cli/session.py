@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tomoskin.cli.app import group
-from tomoskin.cli.named_files import RECORDING, TABLE, ForceFlag, Given, Reads, Writes
+from tomoskin.cli.named_files import RECORDING, ForceFlag, Given, Reads, Writes
 from tomoskin.cli.named_parts import say_notes, span_lines
+from tomoskin.cli.options import TouchesOut
 from tomoskin.cli.output import Bar, JsonFlag, remark, tell
+from tomoskin.core import Output
 
 if TYPE_CHECKING:
-    from tomoskin.core import Output
     from tomoskin.files.session import Lost, Repaired, SessionInfo
 
 app = group("session")
@@ -49,8 +50,6 @@ EXPORTS = {
 
 def _mended(out: Path | None, given: Given, called: str) -> list[Output]:
     """The file that a repair makes."""
-    from tomoskin.core import Output
-
     return [Output(_repaired(given["file"], out), RECORDING, called if out else "")]
 
 
@@ -60,7 +59,6 @@ def _repaired(file: Path, out: Path | None) -> Path:
 
 def _exported(out: Path | None, _: Given, called: str) -> list[Output]:
     """What an export writes: of a series more than the file that is named."""
-    from tomoskin.core import Output
     from tomoskin.files.exports import series_files
 
     assert out is not None
@@ -136,11 +134,7 @@ def export(
         ),
         Writes(EXPORTS, _exported),
     ],
-    touches: Annotated[
-        Path | None,
-        typer.Option(metavar="X.csv", help="File for the touches."),
-        Writes(TABLE),
-    ] = None,
+    touches: TouchesOut = None,
     every: Annotated[
         float, typer.Option(min=1e-3, help="Seconds between two images, for formats with images.")
     ] = 0.1,
@@ -177,7 +171,11 @@ def export(
             f"expected it together with X.lerobot, got {out}", param_hint="--like"
         )
     worn = None if robot is None else with_joints(Robot.load(robot))
-    names = (skin,) if skin or out.suffix.lower() != ".lerobot" else skins_in(file)
+    names = (skin,) if skin else skins_in(file)
+    if len(names) > 1 and out.suffix.lower() != ".lerobot":
+        raise typer.BadParameter(
+            f"expected one of {', '.join(names)}, got none", param_hint="--skin"
+        )
     with ExitStack() as stack, Bar(f"writing {out}") as bar:
         session, *others = [stack.enter_context(SessionReader(file, name)) for name in names]
         job = Export(session, every, bar, force, tuple(others), like, worn)

@@ -13,9 +13,9 @@ from tomoskin.cli.choices import say_headroom
 from tomoskin.cli.named_files import RECORDING, ForceFlag, Given, Reads, Writes
 from tomoskin.cli.options import DEFAULT_SKIN, NamedSkinOption
 from tomoskin.cli.output import Bar, JsonFlag, remark, tell
+from tomoskin.core import Output
 
 if TYPE_CHECKING:
-    from tomoskin.core import Output
     from tomoskin.model.skin import Skin
     from tomoskin.run import Workers
     from tomoskin.twin import SetPlan
@@ -25,8 +25,6 @@ ONE_FILE = {".npz": "labelled frames in one file"}
 
 def _simulated(out: Path | None, given: Given, called: str) -> list[Output]:
     """A session; or labelled frames, of which a folder that is there is looked into later."""
-    from tomoskin.core import Output
-
     assert out is not None
     if given["presses"] is None:
         return [Output(out, RECORDING, called)]

@@ -14,6 +14,7 @@ from tomoskin.cli.named_files import SKIN, ForceFlag, Otherwise, Reads, Writes
 from tomoskin.cli.options import DEFAULT_SKIN, NamedSkinOption, RecordingArgument, SkinArgument
 from tomoskin.cli.output import JsonFlag, remark, tell
 from tomoskin.cli.skin_merit import merit
+from tomoskin.core import DIMENSIONS, DataError, SkinError, write_text
 
 if TYPE_CHECKING:
     from tomoskin.core import FloatArray
@@ -48,7 +49,6 @@ def show(name: SkinArgument, json: JsonFlag = False) -> None:
 @app.command()
 def check(file: SkinArgument, json: JsonFlag = False) -> None:
     """Check a skin file, mesh it, and compare the expected voltages with the board's limits."""
-    from tomoskin.core import SkinError
     from tomoskin.model.mesh import quality
     from tomoskin.model.skin import Skin, regions_doubt
     from tomoskin.sensing.signal import Headroom
@@ -85,7 +85,6 @@ def guess(
     force: ForceFlag = False,
 ) -> None:
     """Write a skin file for a recording of another board; comments say what is sure in it."""
-    from tomoskin.core import write_text
     from tomoskin.files.imports import read_recording
     from tomoskin.pipeline import guess_skin
 
@@ -118,7 +117,6 @@ def lay(
     force: ForceFlag = False,
 ) -> None:
     """Write the skin file of a sheet on a scanned or drawn surface."""
-    from tomoskin.core import DIMENSIONS, DataError, write_text
     from tomoskin.model.skin import Skin, lay as laid
 
     if unit not in ("mm", "cm", "m"):
@@ -148,7 +146,6 @@ def _positions(path: Path) -> FloatArray:
     """(n, 3) numbers of a CSV file, which may have a heading."""
     import numpy as np
 
-    from tomoskin.core import DataError
     from tomoskin.model.skin import read_text
 
     rows = []
@@ -162,8 +159,6 @@ def _positions(path: Path) -> FloatArray:
 
 
 def _numbers(fields: list[str], where: str) -> list[float]:
-    from tomoskin.core import DataError
-
     try:
         x, y, z = map(float, fields)
     except ValueError:
@@ -211,7 +206,6 @@ def place(
     ] = False,
 ) -> None:
     """Lay a skin on a link of a robot: add it to a robot file, for `tomoskin live --robot`."""
-    from tomoskin.core import write_text
     from tomoskin.model.robot import Robot, Urdf, add_skin
     from tomoskin.model.skin import Skin
 
@@ -254,7 +248,6 @@ def _name_of(link: str) -> str:
 
 def _pose(urdf: Any, link: str, at: str | None, *, on_mesh: bool) -> dict[str, list[str]]:
     """Keys of the skin's section that say where it lies."""
-    from tomoskin.core import SkinError
     from tomoskin.model.robot import pose_numbers
 
     if on_mesh:

@@ -1,7 +1,6 @@
 """The one frame flow, pure: a reference is collected, then frames are followed to touches."""
 
 from tomoskin.pipeline.drives import DriveResult as DriveResult
-from tomoskin.pipeline.electrode_order import order_fault as order_fault
 from tomoskin.pipeline.finding import (
     located_alone as located_alone,
     voltage_covariance as voltage_covariance,
@@ -12,13 +11,14 @@ from tomoskin.pipeline.frame_result import (
     ModelAgreement as ModelAgreement,
     ReferenceState as ReferenceState,
 )
-from tomoskin.pipeline.guess import guess_skin as guess_skin
+from tomoskin.pipeline.guess import guess_skin as guess_skin, order_fault as order_fault
 from tomoskin.pipeline.imaging import Unresolved as Unresolved
 from tomoskin.pipeline.offline import (
     ALONE as ALONE,
     Gathered as Gathered,
     Reconstruction as Reconstruction,
     reconstruct as reconstruct,
+    sharpened as sharpened,
 )
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES as REFERENCE_FRAMES, Pipeline as Pipeline
 from tomoskin.pipeline.prepare import (
@@ -34,4 +34,3 @@ from tomoskin.pipeline.rest import (
     tuned_image as tuned_image,
     with_choice as with_choice,
 )
-from tomoskin.pipeline.sharp import sharpened as sharpened

@@ -13,16 +13,7 @@ from tomoskin.learning import Differences
 from tomoskin.model.pattern import Scan
 from tomoskin.pipeline.frame_subspace import JUMP, Drift, Nuisance
 from tomoskin.pipeline.prepare import Prepared
-from tomoskin.sensing.signal import (
-    Baseline,
-    BaselineState,
-    Health,
-    Monitor,
-    NuisanceSubspace,
-    Reference,
-    difference,
-    nuisance_directions,
-)
+from tomoskin.sensing import signal
 
 MOST_NUISANCE = 0.5
 """No image is made when more than this part of the data carries no information."""
@@ -56,7 +47,7 @@ class Conditioned:
 
     differences: Differences | None
     n_excluded: int
-    health: Health | None = None
+    health: signal.Health | None = None
     problem: str | None = None
 
 
@@ -88,10 +79,10 @@ class BaselineDifferences:
     def __init__(
         self,
         prepared: Prepared,
-        monitor: Monitor,
-        baseline: Baseline,
+        monitor: signal.Monitor,
+        baseline: signal.Baseline,
         drift: Drift,
-        health: Health | None = None,
+        health: signal.Health | None = None,
     ) -> None:
         self._monitor, self._baseline, self._drift = monitor, baseline, drift
         self._scale = _scale(prepared, baseline.start)
@@ -107,7 +98,7 @@ class BaselineDifferences:
     def of(
         cls,
         prepared: Prepared,
-        reference: Reference,
+        reference: signal.Reference,
         without_reference: NDArray[np.bool_],
         scan: Scan | None,
     ) -> Self:
@@ -116,7 +107,7 @@ class BaselineDifferences:
         ``without_reference`` (n_meas,) bool: measurements that have none. ``scan``: what samples
         are, where frames bring them; None where there are voltages only.
         """
-        monitor = Monitor(
+        monitor = signal.Monitor(
             prepared.pattern,
             reference,
             prepared.operator.reference,
@@ -128,7 +119,7 @@ class BaselineDifferences:
         drift = Drift(prepared, reference)
         return cls(prepared, monitor, _baseline(prepared, reference), drift)
 
-    def with_settings(self, prepared: Prepared, reference: Reference) -> BaselineDifferences:
+    def with_settings(self, prepared: Prepared, reference: signal.Reference) -> BaselineDifferences:
         """One for other settings of the same skin that goes on where this one is.
 
         ``reference`` is that which this one was made with.
@@ -143,13 +134,13 @@ class BaselineDifferences:
         self._given = self.prepared = prepared
         health = self._health
         if health is not None and health.sick:
-            lost = nuisance_directions(prepared.pattern, health.lost, health.floating)
+            lost = signal.nuisance_directions(prepared.pattern, health.lost, health.floating)
             if lost.shape[1] <= MOST_NUISANCE * len(lost):  # else no image is made
                 self.prepared = prepared.without_directions(lost / self._scale[:, None])
         self._nuisance = Nuisance(self.prepared, self._scale, self._drift)
 
     @property
-    def reference(self) -> Reference:
+    def reference(self) -> signal.Reference:
         """The baseline of this moment as a reference."""
         return self._baseline.reference
 
@@ -159,11 +150,11 @@ class BaselineDifferences:
         return self._baseline.mean
 
     @property
-    def state(self) -> BaselineState:
+    def state(self) -> signal.BaselineState:
         """The values of the baseline, and how long it has been held."""
         return self._baseline.state
 
-    def subspace(self) -> NuisanceSubspace:
+    def subspace(self) -> signal.NuisanceSubspace:
         """The nuisance subspace of late."""
         return self._nuisance(self._health).nuisance
 
@@ -199,7 +190,7 @@ class BaselineDifferences:
             return Conditioned(None, n_excluded, health, f"{_gain_text(times)}; no image is shown")
         if times is not None:
             values = values / times  # touches and noise are then as large as they were learnt
-        whole = difference(values, mean, self.prepared.operator.difference)
+        whole = signal.difference(values, mean, self.prepared.operator.difference)
         differences = Differences(
             dv=subspace.nuisance(whole),
             nuisance=subspace.nuisance.directions,
@@ -223,7 +214,7 @@ class BaselineDifferences:
         if self._has_gain:
             return None
         mean = self._baseline.mean
-        return difference(values, mean, self.prepared.operator.difference)
+        return signal.difference(values, mean, self.prepared.operator.difference)
 
     def learn(
         self, time: float, moved: FloatArray | float, *, touched: bool, noise: bool = True
@@ -320,8 +311,8 @@ Conditioning = BaselineDifferences | GivenDifferences
 """What makes difference data of one frame after the other."""
 
 
-def _baseline(prepared: Prepared, reference: Reference) -> Baseline:
-    return Baseline(reference, follows=prepared.skin.signal.baseline == "follow")
+def _baseline(prepared: Prepared, reference: signal.Reference) -> signal.Baseline:
+    return signal.Baseline(reference, follows=prepared.skin.signal.baseline == "follow")
 
 
 def _scale(prepared: Prepared, reference: FloatArray) -> FloatArray:

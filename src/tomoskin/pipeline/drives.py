@@ -14,15 +14,7 @@ import numpy as np
 
 from tomoskin.core import Detection, FloatArray, Touch
 from tomoskin.model.pattern import Pattern
-from tomoskin.sensing.fit import (
-    DriveEvidence,
-    DriveFilter,
-    DriveView,
-    Initiation,
-    MovingTouch,
-    NoiseKey,
-    Onset,
-)
+from tomoskin.sensing import fit
 from tomoskin.sensing.track import GATE, RESIDUAL
 
 _LIFTED = 5.0
@@ -72,7 +64,7 @@ class _Followed:
     """
 
     touch: Touch
-    moving: MovingTouch
+    moving: fit.MovingTouch
     full: float
     begun: float = 0.0
     odds: float = 0.0
@@ -80,7 +72,9 @@ class _Followed:
     lifted: float | None = None
     frames: int | None = None
 
-    def take(self, moved: MovingTouch, told: MovingTouch, gone: float, going: float) -> None:
+    def take(
+        self, moved: fit.MovingTouch, told: fit.MovingTouch, gone: float, going: float
+    ) -> None:
         """Take a drive: the touch as it has ``moved`` and as the drive has ``told``, and what that
         says of the odds: it was lifted before, or while the drive was read.
 
@@ -119,39 +113,48 @@ class DriveWatch:
     """
 
     def __init__(
-        self, view: DriveView, pattern: Pattern, interval: float, *, follows: bool
+        self, view: fit.DriveView, pattern: Pattern, interval: float, *, follows: bool
     ) -> None:
         self.view, self._follows = view, follows
         self._drives = pattern.drive_index
         self._length = interval / pattern.n_drive
         self._steps = max(1, int(self._length / _STEP))
-        self._key: NoiseKey | None = None
+        self._key: fit.NoiseKey | None = None
         self._blocked = True
-        self._making: Generator[None, None, DriveEvidence] | None = None
-        self._initiation: Initiation | None = None
-        self._evidence: DriveEvidence | None = None
-        self._filter: DriveFilter | None = None
+        self._making: Generator[None, None, fit.DriveEvidence] | None = None
+        self._initiation: fit.Initiation | None = None
+        self._evidence: fit.DriveEvidence | None = None
+        self._filter: fit.DriveFilter | None = None
         self._followed: dict[int, _Followed] = {}
         self._withdrawn: tuple[Touch, ...] = ()
 
     def push(
-        self, drive: int, dv: FloatArray, clock: tuple[float, float], numbered: int
+        self,
+        drive: int,
+        dv: FloatArray,
+        clock: tuple[float, float],
+        numbered: int,
+        *,
+        late: bool = False,
     ) -> DriveResult | None:
         """Take a drive; what is known then, or None before drives tell anything.
 
         ``dv`` (n_meas,) difference data of which those of this drive are new; ``clock``: device
         and host time, s, of its start and of its last byte; ``numbered``: the last identity given.
+        ``late``: a newer one is there, so touches are not followed through this one.
         """
         if not self._ready() or self._evidence is None or self._filter is None:
             return None
         rows, (time, host_time) = self._evidence.rows[drive], clock
         data = self.view.change(dv)[rows]
         if not self._followed and self._initiation is not None:
-            onset = self._initiation.push(drive, data)
+            onset = self._initiation.push(drive, data, late=late)
             if onset is not None:
                 self._begin(onset, time, host_time, numbered + 1)
-        else:
+        elif not late:
             self._follow(rows, data, time)
+        if late:
+            return None
         there = [each for each in self._followed.values() if each.lifted is None]
         withdrawn, self._withdrawn = self._withdrawn, ()
         touches = tuple([self._shown(each, time) for each in there])
@@ -193,9 +196,9 @@ class DriveWatch:
                 self._blocked |= says_less
             self._key, model = key, self.view.model
             noise, stays = self.view.noise()
-            self._making = DriveEvidence.making(model.candidates, noise, stays, self._drives)
+            self._making = fit.DriveEvidence.making(model.candidates, noise, stays, self._drives)
             sign = self.view.skin.touch.sign
-            self._filter = DriveFilter(model.solver, model.prior, sign, model.sheet, noise)
+            self._filter = fit.DriveFilter(model.solver, model.prior, sign, model.sheet, noise)
         for _ in range(self._steps if self._blocked else 1):
             if self._making is None:
                 break
@@ -206,15 +209,15 @@ class DriveWatch:
                 self._initiation = self._renewed(end.value)
         return not self._blocked or bool(self._followed)
 
-    def _renewed(self, evidence: DriveEvidence) -> Initiation:
+    def _renewed(self, evidence: fit.DriveEvidence) -> fit.Initiation:
         touch = self.view.skin.touch
-        made = Initiation(evidence, evidence.threshold(1 / self._length, touch.snr), touch.sign)
+        made = fit.Initiation(evidence, evidence.threshold(1 / self._length, touch.snr), touch.sign)
         if self._initiation is not None:
             made.go_on(self._initiation)
         return made
 
-    def _begin(self, onset: Onset, time: float, host_time: float, number: int) -> None:
-        moving = MovingTouch.of_onset(time + self._length / 2, onset, self.view.model.prior)
+    def _begin(self, onset: fit.Onset, time: float, host_time: float, number: int) -> None:
+        moving = fit.MovingTouch.of_onset(time + self._length / 2, onset, self.view.model.prior)
         detection = self.view.shown(moving.spot, onset.covariance, onset.ratio)
         kind = "decrease" if moving.content < 0 else "increase"
         since = host_time - onset.drives * self._length
@@ -226,11 +229,11 @@ class DriveWatch:
         if self._filter is None:
             return
         moved = {n: f.moving.at(time + self._length / 2) for n, f in self._followed.items()}
-        changes = {n: self._filter.changes(touch, rows) for n, touch in moved.items()}
-        every = np.sum(list(changes.values()), axis=0)
-        for number, each in self._followed.items():
-            own = data - every + changes[number]
-            each.take(moved[number], *self._filter.pushed(moved[number], rows, own))
+        responses = {n: self._filter.response(touch.state, rows) for n, touch in moved.items()}
+        every = np.sum([change for change, _ in responses.values()], axis=0)
+        for n, each in self._followed.items():
+            own = data - every + responses[n][0]
+            each.take(moved[n], *self._filter.pushed(moved[n], rows, own, responses[n]))
 
     def _going_on(self, touch: Touch, before: Mapping[int, _Followed], time: float) -> _Followed:
         """A touch of a frame whose scan began at ``time`` s: as the drives have it where they
@@ -239,7 +242,7 @@ class DriveWatch:
         if known is None:
             known = next((each for each in before.values() if each.frames is not None), None)
         middle = time + self._length * self._drives[-1] / 2
-        moving = MovingTouch.begin(
+        moving = fit.MovingTouch.begin(
             middle, self.view.spot(touch.detection), _spread(touch.detection), self.view.model.prior
         )
         if known is not None and not known.stands(touch, moving.content, time):
@@ -266,12 +269,12 @@ class DriveWatch:
         return replace(each.touch, detection=replace(detection, force=frame.force))
 
 
-def _is_same(key: NoiseKey, before: NoiseKey) -> bool:
+def _is_same(key: fit.NoiseKey, before: fit.NoiseKey) -> bool:
     same = all(one is other for one, other in zip(key[:-1], before[:-1], strict=True))
     return same and key[-1] == before[-1]
 
 
-def _says_less(key: NoiseKey, before: NoiseKey) -> bool:
+def _says_less(key: fit.NoiseKey, before: fit.NoiseKey) -> bool:
     """Whether drives told less in the noise of a ``key`` than in that ``before``: then they must
     not be read by that."""
     (nuisance, *_, excess, left), (*_, less, known) = key, before

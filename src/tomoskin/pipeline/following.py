@@ -11,6 +11,7 @@ import numpy as np
 from tomoskin.core import Detection, FloatArray, Image, ModelError, Touch, Voltages, reach
 from tomoskin.learning import BENDS, Differences, FrameView
 from tomoskin.model.pattern import Scan
+from tomoskin.pipeline import finding
 from tomoskin.pipeline.conditioning import (
     BaselineDifferences,
     Conditioned,
@@ -18,13 +19,6 @@ from tomoskin.pipeline.conditioning import (
     GivenDifferences,
 )
 from tomoskin.pipeline.drives import DriveResult, DriveWatch
-from tomoskin.pipeline.finding import (
-    FinderSteps,
-    FitConditions,
-    FitFinder,
-    finder_of,
-    located_alone,
-)
 from tomoskin.pipeline.frame_result import FrameResult, looks_bent
 from tomoskin.pipeline.imaging import Filtered, SingleFrame
 from tomoskin.pipeline.prepare import Prepared
@@ -109,12 +103,12 @@ class Following:
         if not interval > 0:
             interval = setting.interval
         self._steps = max(1, int(interval / _STEP)) if interval > 0 else 1
-        known = rest is None or not located_alone(prepared, rest.agreement)
-        self._finder = finder_of(prepared, reference, setting.pace, interval, fitted=known)
-        self._renewal: FinderSteps | None = None
+        known = rest is None or not finding.located_alone(prepared, rest.agreement)
+        self._finder = finding.finder_of(prepared, reference, setting.pace, interval, fitted=known)
+        self._renewal: finding.FinderSteps | None = None
         self._is_outdated = False
-        fitted = isinstance(self._finder, FitFinder)
-        conditions = FitConditions(prepared, reference, fitted, interval)
+        fitted = isinstance(self._finder, finding.FitFinder)
+        conditions = finding.FitConditions(prepared, reference, fitted, interval)
         self._applied = {k: c.apply(conditions) for k, c in prepared.calibrations.items()}
         self._tuning = None if reference is None else tune(prepared, reference, excluded)
         self._interval = interval if interval > 0 else prepared.longest_scan
@@ -188,11 +182,11 @@ class Following:
         return self._result(measured, conditioned, view.image, touches, readings)
 
     def push_drive(
-        self, drive: int, values: FloatArray, clock: tuple[float, float]
+        self, drive: int, values: FloatArray, clock: tuple[float, float], *, late: bool
     ) -> DriveResult | None:
         """Take ``values`` (n_meas,) V of which those of a drive are new; what is known then, or
-        None where drives tell nothing. ``clock``: see :meth:`DriveWatch.push`."""
-        if not isinstance(self._finder, FitFinder):
+        None where drives tell nothing. ``clock`` and ``late``: see :meth:`DriveWatch.push`."""
+        if not isinstance(self._finder, finding.FitFinder):
             return None
         dv = self.conditioning.newest(values)
         if dv is None:
@@ -202,7 +196,7 @@ class Following:
             follows = not any(c.kind.locates for c in self.prepared.calibrations.values())
             pattern = self.prepared.pattern
             self._drives = DriveWatch(view, pattern, self._interval, follows=follows)
-        result = self._drives.push(drive, dv, clock, self._tracker.ledger.numbered)
+        result = self._drives.push(drive, dv, clock, self._tracker.ledger.numbered, late=late)
         if result is None:
             return None
         finger = self._tracker.slides.of_finger

@@ -9,13 +9,7 @@ import numpy as np
 
 from tomoskin.core import FloatArray
 from tomoskin.pipeline.prepare import Prepared
-from tomoskin.sensing.signal import (
-    Baseline,
-    Health,
-    NuisanceSubspace,
-    Reference,
-    nuisance_directions,
-)
+from tomoskin.sensing import signal
 
 _KEPT = 8
 """Sets of excluded measurements whose subspace is remembered."""
@@ -39,7 +33,7 @@ class Drift:
         How often they have been learnt.
     """
 
-    def __init__(self, prepared: Prepared, reference: Reference) -> None:
+    def __init__(self, prepared: Prepared, reference: signal.Reference) -> None:
         self._projects = prepared.skin.signal.common_modes == "projected"
         gain = reference.mean[:, None]
         self.directions: FloatArray = gain if self._projects else gain[:, :0]
@@ -51,7 +45,7 @@ class Drift:
         size = np.linalg.norm(self.directions, axis=0)
         return np.asarray(JUMP * self.directions * (size[:1] / size))
 
-    def learn(self, baseline: Baseline, signatures: Callable[[], FloatArray]) -> None:
+    def learn(self, baseline: signal.Baseline, signatures: Callable[[], FloatArray]) -> None:
         """Take the end of an idle block.
 
         ``signatures`` gives (n_meas, n_cells) V, what touches do to the data.
@@ -78,7 +72,7 @@ class FrameSubspace:
         (n_meas, k) and (n_meas, j) of difference data: all but the drift, and that with a size.
     """
 
-    nuisance: NuisanceSubspace
+    nuisance: signal.NuisanceSubspace
     drift: FloatArray
     unknown: FloatArray
     jumps: FloatArray
@@ -102,9 +96,9 @@ class Nuisance:
         self._calibrated = prepared.directions
         self._null_space = _null_space(prepared)
         self._kept: dict[tuple[int, bytes], FrameSubspace] = {}
-        self._newest: tuple[Health | None, int, FrameSubspace] | None = None
+        self._newest: tuple[signal.Health | None, int, FrameSubspace] | None = None
 
-    def __call__(self, health: Health | None) -> FrameSubspace:
+    def __call__(self, health: signal.Health | None) -> FrameSubspace:
         """Of a frame; a monitor gives the same record while all is well."""
         revision = self._drift.revision
         newest = self._newest
@@ -118,7 +112,7 @@ class Nuisance:
         self._newest = health, revision, self._kept[key]
         return self._kept[key]
 
-    def _made(self, health: Health | None) -> FrameSubspace:
+    def _made(self, health: signal.Health | None) -> FrameSubspace:
         drift, excluded = self._drift.directions, self._excluded(health)
         scale = self._scale[:, None]
         unknown = np.hstack([self._calibrated, excluded]) / scale
@@ -128,15 +122,15 @@ class Nuisance:
             subspace, np.hstack([drift, excluded]), unknown, self._drift.jumps / scale
         )
 
-    def _excluded(self, health: Health | None) -> FloatArray:
+    def _excluded(self, health: signal.Health | None) -> FloatArray:
         pattern = self._prepared.pattern
         if health is None:
             return np.zeros((pattern.n_meas, 0))
-        return nuisance_directions(pattern, health.lost, health.floating)
+        return signal.nuisance_directions(pattern, health.lost, health.floating)
 
-    def _subspace(self, directions: FloatArray) -> NuisanceSubspace:
+    def _subspace(self, directions: FloatArray) -> signal.NuisanceSubspace:
         operator, images = self._prepared.operator, self._null_space
-        subspace = NuisanceSubspace.of(directions, operator.precision)
+        subspace = signal.NuisanceSubspace.of(directions, operator.precision)
         if not images.shape[1]:
             return subspace
         data = (self._prepared.problem.jacobian @ images).real

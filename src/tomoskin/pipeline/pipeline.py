@@ -142,10 +142,11 @@ class Pipeline:
         scan = self._clock.middle(frame, given.longest_scan, rate)
         return self.follow(given.readout(frame, rate, scan))
 
-    def push_drive(self, part: DriveSamples) -> DriveResult | None:
+    def push_drive(self, part: DriveSamples, *, late: bool = False) -> DriveResult | None:
         """Take one drive, before the frame that it becomes a part of.
 
-        What is known of touches then, or None where drives tell nothing.
+        What is known of touches then, or None where drives tell nothing, and where this one is
+        ``late``: a newer one is there already, which is to be asked.
         """
         state, given = self._state, self._given
         drives = given.scan.sample_drive == part.drive
@@ -159,7 +160,7 @@ class Pipeline:
         if railed[given.pattern.drive_index == part.drive].any():
             return None
         time = part.ticks / (self.tick_rate or given.readout.tick_rate)
-        return state.push_drive(part.drive, values, (time, part.host_time))
+        return state.push_drive(part.drive, values, (time, part.host_time), late=late)
 
     def early(self, result: FrameResult) -> FrameResult:
         """The newest ``result`` for those who were told of drives before: it neither shows touches

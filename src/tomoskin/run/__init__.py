@@ -19,16 +19,14 @@ from tomoskin.run.labelled_frames import (
     on_cluster as on_cluster,
     processors as processors,
 )
-from tomoskin.run.live_skin import (
-    LiveSkin as LiveSkin,
-    open_skin as open_skin,
-    prepared_for as prepared_for,
-)
 from tomoskin.run.recordings import FILE_NAME as FILE_NAME
 from tomoskin.run.robot_run import (
+    LiveSkin as LiveSkin,
     Member as Member,
     RobotRun as RobotRun,
     open_robot as open_robot,
+    open_skin as open_skin,
+    prepared_for as prepared_for,
     with_joints as with_joints,
 )
 from tomoskin.run.runner import Runner as Runner

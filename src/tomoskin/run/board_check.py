@@ -8,36 +8,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tomoskin.board.source import (
-    BOARDS,
-    DEFAULT_BOARD,
-    BoardRecord,
-    Configuration,
-    Exchange,
-    Link,
-    ScanSettings,
-    Timing,
-    Transport,
-    board_named,
-)
-from tomoskin.board.wire import (
-    Ack,
-    BoardLimits,
-    Command,
-    Fault,
-    FaultCode,
-    Info,
-    Result,
-    SafeOff,
-    SetHeartbeat,
-    Start,
-    Stop,
-)
+from tomoskin.board import source, wire
 from tomoskin.core import FloatArray, Frame, SourceError
 from tomoskin.model.pattern import Scan
 from tomoskin.sensing.signal import CountScale, LoadRing, diagnose
 
-BITS = BOARDS[DEFAULT_BOARD].adc_bits
+BITS = source.BOARDS[source.DEFAULT_BOARD].adc_bits
 """Of a count here: the samples of a finer converter are scaled to it."""
 
 _NOISE = 2.0
@@ -52,7 +28,7 @@ _UNSETTLED = 2.0
 _SINK_OHMS = 0.3
 """Ω from an electrode to ground: a transistor of 0.03 Ω, tracks, joints."""
 
-_AT_ONCE = Timing(hello=0.05)
+_AT_ONCE = source.Timing(hello=0.05)
 """Of a board that has spoken before."""
 
 
@@ -79,18 +55,18 @@ class _Readings:
 
     mean: FloatArray
     sd: FloatArray
-    info: Info
-    board: BoardLimits | None
+    info: wire.Info
+    board: wire.BoardLimits | None
 
     @property
-    def record(self) -> BoardRecord:
+    def record(self) -> source.BoardRecord:
         """What is known of such a board; of an unknown one, what is known of the first."""
-        known = board_named(self.board.text) if self.board else None
-        return known or BOARDS[DEFAULT_BOARD]
+        known = source.board_named(self.board.text) if self.board else None
+        return known or source.BOARDS[source.DEFAULT_BOARD]
 
 
 def check_board(
-    transport: Transport,
+    transport: source.Transport,
     ring: LoadRing,
     current: float,
     *,
@@ -110,8 +86,8 @@ def check_board(
     """
     n = len(ring.ohms)
     onward, back = ring.scans()
-    settings = ScanSettings(4, _LATE, current, BITS)
-    first = _measure(transport, onward, settings, frames, Timing())
+    settings = source.ScanSettings(4, _LATE, current, BITS)
+    first = _measure(transport, onward, settings, frames, source.Timing())
     yield _identity(first, n, current)
     yield from _differences(first)
     second = _measure(transport, back, settings, frames, _AT_ONCE)
@@ -149,10 +125,14 @@ def check_board(
 
 
 def _measure(
-    transport: Transport, scan: Scan, settings: ScanSettings, frames: int, timing: Timing
+    transport: source.Transport,
+    scan: Scan,
+    settings: source.ScanSettings,
+    frames: int,
+    timing: source.Timing,
 ) -> _Readings:
     """Mean and noise over ``frames``; the board is stopped, the transport stays open."""
-    link = Link(transport, scan, settings, timing=timing)
+    link = source.Link(transport, scan, settings, timing=timing)
     got: list[np.ndarray] = []
     info = link.connect()
     end = time.monotonic() + _PATIENCE
@@ -242,46 +222,46 @@ _HEARD = 10.0
 
 
 def check_safe_off(
-    transport: Transport, scan: Scan, settings: ScanSettings
+    transport: source.Transport, scan: Scan, settings: source.ScanSettings
 ) -> Iterator[CheckFinding]:
     """STOP, a silent host, SAFE_OFF: frames end, and nothing starts again by itself.
 
     Frames stand for the current here, since only a drive is sampled; whether a switch really opens
     is what the channels' readings and the multimeter say. Raises SourceError without an answer.
     """
-    board = Exchange(transport)
-    configuration = Configuration.of(scan, settings)
-    set_up: tuple[Command, ...] = (
+    board = source.Exchange(transport)
+    configuration = source.Configuration.of(scan, settings)
+    set_up: tuple[wire.Command, ...] = (
         configuration.scan,
         *configuration.patterns,
-        SetHeartbeat(0, _HEARTBEAT),
+        wire.SetHeartbeat(0, _HEARTBEAT),
     )
-    start = Start(0, configuration.identity)
-    _asked(board, Stop(0))
+    start = wire.Start(0, configuration.identity)
+    _asked(board, wire.Stop(0))
     for command in set_up:
         _accepted(_asked(board, command), command, transport)
     _accepted(_asked(board, start), start, transport)
-    _asked(board, Stop(0))
+    _asked(board, wire.Stop(0))
     late = any(isinstance(m, Frame) for m in board.listen(4 * configuration.scan_time))
     text = "frames continue after STOP" if late else "no frame after STOP"
     yield CheckFinding("stop", not late, text)
     _accepted(_asked(board, start), start, transport)
     heard = board.listen(_HEARD)
-    silent = any(isinstance(m, Fault) and m.code is FaultCode.HOST_SILENT for m in heard)
+    silent = any(isinstance(m, wire.Fault) and m.code is wire.FaultCode.HOST_SILENT for m in heard)
     since = f"{_HEARTBEAT} ms after the last message of the host"
     text = f"no frame {since}" if silent else f"frames continue {since}"
     yield CheckFinding("silence", silent, text)
-    _asked(board, SetHeartbeat(0, _USUAL))
-    _asked(board, SafeOff(0))
-    forgotten = _asked(board, start).result is Result.WRONG_CONFIGURATION
-    _asked(board, Stop(0))
+    _asked(board, wire.SetHeartbeat(0, _USUAL))
+    _asked(board, wire.SafeOff(0))
+    forgotten = _asked(board, start).result is wire.Result.WRONG_CONFIGURATION
+    _asked(board, wire.Stop(0))
     text = "nothing starts after SAFE_OFF until the board is set up again"
     text = text if forgotten else "START is accepted after SAFE_OFF"
     yield CheckFinding("safe off", forgotten, text)
 
 
-def _asked(board: Exchange, command: Command) -> Ack:
-    answer = board.ask(command, Ack, patience=_ANSWER, tries=_TRIES)
+def _asked(board: source.Exchange, command: wire.Command) -> wire.Ack:
+    answer = board.ask(command, wire.Ack, patience=_ANSWER, tries=_TRIES)
     if answer is None:
         raise SourceError(
             f"no answer to {type(command).__name__} for {_ANSWER * _TRIES:g} s",
@@ -291,8 +271,8 @@ def _asked(board: Exchange, command: Command) -> Ack:
     return answer
 
 
-def _accepted(answer: Ack, command: Command, transport: Transport) -> None:
-    if answer.result is not Result.OK:
+def _accepted(answer: wire.Ack, command: wire.Command, transport: source.Transport) -> None:
+    if answer.result is not wire.Result.OK:
         raise SourceError(
             f"the board refused {type(command).__name__}: {answer.result.name} ({answer.detail})",
             where=transport.name,

@@ -141,9 +141,10 @@ class Flow:
             for event in intake.repeats.push(items[-1].host_time, items):
                 out.put(event)
         late = intake.backlog.late(frames, intake.waited) if frames else 0
+        drives = [item for item in items if isinstance(item, DriveSamples)]
         for item in items:
             if isinstance(item, DriveSamples):
-                _tell_drive(self, item)
+                _tell_drive(self, item, late=item is not drives[-1])
             elif isinstance(item, Frame):
                 self._mark(item, late=late > 0)
                 late -= 1
@@ -265,14 +266,15 @@ class Flow:
         self.out.tell(result)
 
 
-def _tell_drive(flow: Flow, drive: DriveSamples) -> None:
-    """Tell where touches are by now; frames alone are recorded."""
+def _tell_drive(flow: Flow, drive: DriveSamples, *, late: bool) -> None:
+    """Tell where touches are by now, unless that is ``late``: of drives that wait the newest alone
+    is told. Frames alone are recorded."""
     newest = flow.newest
     if newest is None or flow.marker.held:
         return
     try:
         with flow.turns:
-            known = flow.pipeline.push_drive(drive)
+            known = flow.pipeline.push_drive(drive, late=late)
     except (TomoskinError, np.linalg.LinAlgError) as error:  # frames go on
         _leave_out(flow, "drive", drive.host_time, error)
         return

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 import logging
+import sys
+import threading
 import time
 from concurrent.futures import Future
 from contextlib import suppress
@@ -22,7 +25,47 @@ _WAITING = "waiting for the board to answer"
 _WARMING = "preparing to fit touches; for a new skin this takes some seconds"
 _FIRST_DELAY, _LONGEST_DELAY = 0.25, 5.0
 
+_TURN = 5e-4
+"""Seconds after which a thread of Python lets another one go on that waits; it is 5 ms by itself,
+two frames of a quick board."""
+
 _log = logging.getLogger(__name__)
+
+
+class _Interpreter:
+    """A context manager under which Python holds up no frame for long, while any run lasts.
+
+    Threads take turns often. What is there once a run is prepared is no garbage, so the collector
+    leaves it alone: to look through it took 50 ms, at some moment while touches were followed.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._runs, self._turn = 0, _TURN
+
+    def __enter__(self) -> None:
+        with self._lock:
+            if not self._runs:
+                self._turn = sys.getswitchinterval()
+                sys.setswitchinterval(min(_TURN, self._turn))
+            self._runs += 1
+
+    def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self._runs -= 1
+            if not self._runs:
+                sys.setswitchinterval(self._turn)
+                gc.unfreeze()
+
+    def settle(self) -> None:
+        """Keep what is there, and collect what has become garbage since this was done last."""
+        with self._lock:
+            gc.unfreeze()
+            gc.collect()
+            gc.freeze()
+
+
+_INTERPRETER = _Interpreter()
 
 
 class _StoppedError(Exception):
@@ -64,8 +107,9 @@ class Loop:
         """
         try:
             # a frame's products are small: more threads would only wait for each other
-            with threadpool_limits(1):
+            with threadpool_limits(1), _INTERPRETER:
                 self._warm_up()
+                _INTERPRETER.settle()
                 self.trouble = _WAITING
                 transport = transport or self._next()
                 while transport is not None:
@@ -187,6 +231,7 @@ class Loop:
         self.flow.out.stop()
         self.flow, self.open = Flow(change.prepared, self._audience), opener
         self.flow.begin(transport)
+        _INTERPRETER.settle()
         self.trouble = _WAITING
         future.set_result(None)
         return transport

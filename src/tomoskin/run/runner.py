@@ -12,18 +12,8 @@ from tomoskin.board.source import Transport
 from tomoskin.core import Event, ModelError, OutputError, SourceError, StrPath, WireError
 from tomoskin.model.robot import Place
 from tomoskin.pipeline import Prepared
+from tomoskin.run import commands
 from tomoskin.run.board_memory import BoardMemory
-from tomoskin.run.commands import (
-    Command,
-    DirectCommand,
-    Note,
-    Opener,
-    Record,
-    SetPose,
-    SetTwin,
-    StopRecording,
-    TakeReference,
-)
 from tomoskin.run.flow import Flow, News, Snapshot
 from tomoskin.run.intake import play
 from tomoskin.run.loop import Loop
@@ -33,7 +23,7 @@ from tomoskin.run.sinks import Contacts, Sink
 from tomoskin.run.status import Status
 
 
-def do(flow: Flow, command: DirectCommand) -> None:
+def do(flow: Flow, command: commands.DirectCommand) -> None:
     """Carry out what any thread may do.
 
     Raises
@@ -44,18 +34,18 @@ def do(flow: Flow, command: DirectCommand) -> None:
         For a shape that its sheet cannot take.
     """
     match command:
-        case Note():
+        case commands.Note():
             newest = flow.newest
             host_time = newest.result.host_time if newest else flow.now()
             flow.out.put(Event(host_time, "note", command.text))
-        case SetTwin():
+        case commands.SetTwin():
             if not flow.twin.breakable:
                 raise WireError(f"{flow.source} cannot simulate faults")
             try:
                 flow.twin.set_harm(command)
             except ModelError as error:
                 raise WireError(str(error)) from None
-        case SetPose():
+        case commands.SetPose():
             if not flow.twin.bendable:
                 raise WireError(f"{flow.source} cannot be bent on the page")
             flow.twin.set_pose(command, flow.prepared.skin.surface)
@@ -100,7 +90,7 @@ class Runner:
     def __init__(
         self,
         prepared: Prepared,
-        open_transport: Opener,
+        open_transport: commands.Opener,
         *,
         clock: Callable[[], float] = time.monotonic,
         sinks: Sequence[Sink] = (),
@@ -155,12 +145,12 @@ class Runner:
         self._loop.flow.remember()
         self._loop.flow.out.stop()
 
-    def submit(self, command: Command) -> Future[None]:
+    def submit(self, command: commands.Command) -> Future[None]:
         """Have ``command`` carried out soon; the future says when, or what is wrong with it.
 
         A :data:`~tomoskin.run.commands.DirectCommand` is carried out before this returns.
         """
-        if not isinstance(command, DirectCommand):
+        if not isinstance(command, commands.DirectCommand):
             return self._loop.commands.put(command)
         future: Future[None] = Future()
         try:
@@ -171,7 +161,7 @@ class Runner:
             future.set_result(None)
         return future
 
-    def ask(self, command: Command) -> None:
+    def ask(self, command: commands.Command) -> None:
         """Have ``command`` carried out, and return when it is; from any thread but the run's own.
 
         Raises
@@ -193,16 +183,16 @@ class Runner:
         file = out.recordings.path
         match request:
             case "reference":
-                self.ask(TakeReference())
+                self.ask(commands.TakeReference())
                 return "the next frames are the reference: do not touch the skin"
             case "record":
                 if file is not None:
                     raise OutputError("is being recorded to", where=str(file), hint="stop it first")
                 file = out.stream.file(Path(folder) / time.strftime(FILE_NAME))
-                self.ask(Record(file))
+                self.ask(commands.Record(file))
                 return f"recording to {file}"
             case "stop":
-                self.ask(StopRecording())
+                self.ask(commands.StopRecording())
                 return f"{file} is complete" if file else "nothing was being recorded"
         raise WireError(f'expected "reference", "record" or "stop", got "{request}"')
 

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import pairwise
+from operator import attrgetter
 from pathlib import Path
 from typing import Literal
 
@@ -44,6 +45,8 @@ class FrameCost:
     ----------
     number, sequence, host_time
         Of the frame: counted by the host and by the board, and when it was read, s.
+    seconds
+        That all stages took together.
     stages
         Of each stage its name, µs, and how often it began, in the order of the first time.
     """
@@ -51,12 +54,8 @@ class FrameCost:
     number: int
     sequence: int
     host_time: float
+    seconds: float
     stages: tuple[tuple[str, float, int], ...]
-
-    @property
-    def seconds(self) -> float:
-        """The seconds that all stages took together."""
-        return 1e-6 * sum(spent for _, spent, _ in self.stages)
 
     @property
     def text(self) -> str:
@@ -95,12 +94,11 @@ class CostMeter:
     def _keep(self, frame: Frame, marks: list[tuple[str, float]]) -> None:
         number, self._count, slowest = self._count, self._count + 1, self.slowest
         seconds = marks[-1][1] - marks[0][1]
-        full = len(slowest) == _KEPT and number % _OFTEN
-        if full and seconds <= slowest[-1].seconds:
+        if len(slowest) == _KEPT and number % _OFTEN and seconds <= slowest[-1].seconds:
             return
-        cost = FrameCost(number, frame.sequence, frame.host_time, _stages(marks))
+        cost = FrameCost(number, frame.sequence, frame.host_time, seconds, _stages(marks))
         newest = [one for one in (*slowest, cost) if one.number > number - _SLOW_AMONG]
-        self.slowest = tuple(sorted(newest, key=lambda one: -one.seconds)[:_KEPT])
+        self.slowest = tuple(sorted(newest, key=attrgetter("seconds"), reverse=True)[:_KEPT])
 
 
 def _stages(marks: list[tuple[str, float]]) -> tuple[tuple[str, float, int], ...]:

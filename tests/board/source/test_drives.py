@@ -20,9 +20,9 @@ from board.source.boards import (
     linked,
     poll_until,
 )
-from tomoskin.board.source.assembler import Assembler
 from tomoskin.board.source.command_queue import SequenceFilter
-from tomoskin.board.source.configuration import Configuration
+from tomoskin.board.source.protocol_session import Assembler
+from tomoskin.board.source.settings import Configuration
 from tomoskin.board.wire import (
     OLDER,
     Ack,

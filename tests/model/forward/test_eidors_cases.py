@@ -18,7 +18,7 @@ BENCHMARKS = Path(__file__).resolve().parents[3] / "benchmarks"
 
 def test_the_files_hold_what_the_script_reads_and_give_our_voltages_again(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(BENCHMARKS)
-    written = runpy.run_path(str(BENCHMARKS / "eidors_cases.py"))["main"](tmp_path, (400,))
+    written = runpy.run_path(str(BENCHMARKS / "forward.py"))["main"](tmp_path, (400,))
     case = loadmat(written[0])
     script = (BENCHMARKS / "eidors" / "time_eidors.m").read_text(encoding="utf-8")
     asked = set(re.findall(r"\bc\.(\w+)", script))

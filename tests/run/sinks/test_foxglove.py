@@ -8,8 +8,13 @@ subscription (u32), the log time in ns (u64) and the payload.
 from __future__ import annotations
 
 import json
+import os
+import socket
+import stat
 import struct
 import time
+from contextlib import suppress
+from pathlib import Path
 
 import pytest
 from websockets.sync.client import connect
@@ -20,6 +25,7 @@ from tomoskin.core import SinkError
 from tomoskin.files.session import schema_of
 from tomoskin.run.sinks import make_sink
 
+OPEN = Path("/dev/fd")
 _MESSAGE = struct.Struct("<BIQ")
 
 
@@ -91,6 +97,22 @@ def test_what_a_client_sees(served):
     assert found["/touches"]["valid"]
     assert found["/scene"]["entities"][0]["id"] == "touch-4"
     assert found["/image"]["column_count"] == 48
+
+
+@pytest.mark.skipif(not OPEN.is_dir(), reason="the system does not show what is open")
+def test_no_message_waits_until_the_one_before_is_acknowledged(served):
+    _, port = served
+    told = []
+    with connected(port) as connection:
+        Client(connection)
+        for number in [int(path.name) for path in OPEN.iterdir()]:
+            with suppress(OSError):
+                if stat.S_ISSOCK(os.fstat(number).st_mode):
+                    with socket.socket(fileno=os.dup(number)) as one:
+                        if one.getsockname()[1:2] == (port,) and one.getpeername():
+                            told.append(one.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY))
+    assert told
+    assert all(told)
 
 
 def test_a_port_in_use_is_said_and_a_closed_server_leaves_it(served, stream):

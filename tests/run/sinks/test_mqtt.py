@@ -157,7 +157,7 @@ def test_a_lost_board_is_told_and_kept_until_frames_come_again(broker, heard, st
     sink.publish(reporter.of(result_at(1.0, TOUCH)))
     assert [heard()[0] for _ in range(2)] == ["robot/skin/status", "robot/skin/touches"]
     sink.publish(reporter.lost(Event(1.2, "source-lost", "the cable is out")))
-    sink.publish(reporter.still_lost())
+    sink.publish(reporter.silent())
     assert heard() == ("robot/skin/status", "offline")
     topic, text = heard()
     told = json.loads(text)

@@ -12,7 +12,7 @@ import pytest
 
 from files.session.runs import TOUCH
 from run.sinks.conftest import result_at
-from tomoskin.core import Event, stop_workers
+from tomoskin.core import Event, SinkError, stop_workers
 from tomoskin.model.robot import Place
 from tomoskin.run.sinks import make_sink, sink_names, sink_worker
 
@@ -35,7 +35,7 @@ def installed(tmp_path, monkeypatch):
     lines = "".join(f"{name} = {value}\n" for name, value in points.items())
     (about / "entry_points.txt").write_text(f"[tomoskin.sinks]\n{lines}")
     monkeypatch.syspath_prepend(tmp_path)
-    yield
+    yield tmp_path
     for name in ("my_package", "my_package.lines"):
         sys.modules.pop(name, None)
 
@@ -59,6 +59,22 @@ def test_a_sink_is_a_module_and_an_entry_point(tmp_path, stream, news):
     lines = lines_of(tmp_path / "touches.txt", stream, news, *frames, lost)
     d = TOUCH.detection
     assert lines == [f"{stream.skin} 4 {d.x} {d.y} 0.0", f"{stream.skin} the cable is out"]
+
+
+@pytest.mark.usefixtures("installed")
+@pytest.mark.parametrize(
+    ("body", "why"),
+    [
+        ("import no_such_package", "No module named 'no_such_package'"),
+        ("open_lines = int", "ValueError"),
+        ("open_lines = str", "expected a Sink with a name, got 'x'"),
+    ],
+)
+def test_a_sink_at_fault_is_named_with_its_package(installed, body, why):
+    (installed / "my_package" / "lines.py").write_text(body)
+    with pytest.raises(SinkError, match=f"sink lines: cannot be made: .*{why}") as raised:
+        make_sink("lines:x")
+    assert "my_package.lines:open_lines" in raised.value.hint
 
 
 @pytest.mark.usefixtures("installed")

@@ -242,11 +242,11 @@ def test_a_lost_source_says_so_once_and_reports_on(stream):
     live = replace(stream, clock=lambda: now[0])
     reporter = Reporter(live)
     reporter.of(result_at(0.9, TOUCH))
-    assert reporter.still_lost() is None
+    assert reporter.silent() is None
     assert reporter.lost(EVENT) is None
     sent = [messages_of(live, reporter.lost(Event(0.95, "source-lost", "the cable is out")))]
     for now[0] in (1.9, 2.8):
-        sent.append(messages_of(live, reporter.still_lost()))
+        sent.append(messages_of(live, reporter.silent()))
     assert sent[0]["valid"] == {"data": False}
     assert msgspec.json.decode(sent[0]["touches"]["data"])["touches"] == []
     assert [set(values) for values in sent[1:]] == [{"rows", "/diagnostics"}] * 2
@@ -257,7 +257,7 @@ def test_a_lost_source_says_so_once_and_reports_on(stream):
         [1.0, 1.9, 2.8], abs=1e-6
     )
     back = messages_of(live, reporter.of(result_at(3.0)))
-    assert (back["valid"]["data"], reporter.still_lost()) == (True, None)
+    assert (back["valid"]["data"], reporter.silent()) == (True, None)
 
 
 def test_markers_replace_those_before(stream):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shapes import disc
-from tomoskin.sensing.fit.drive_view import CellDiscs
+from tomoskin.sensing.fit.sight import CellDiscs
 
 
 @pytest.mark.parametrize("radius", [1e-6, 0.004, 0.03, 0.5])

@@ -58,9 +58,27 @@ def test_windows_have_the_size_that_the_whole_has() -> None:
     order = (3, 1, 0, 2, *range(4, DRIVES))
     own, white = evidence(), np.linalg.cholesky(np.linalg.inv(covariance()))
     squares = np.square(own.signatures @ white).sum(axis=1)
-    size, variance = own.sizes(order)
-    np.testing.assert_allclose(size[:, -1], squares, rtol=1e-6)
-    np.testing.assert_allclose(variance, size, rtol=1e-6)
+    size, deviation = own.sizes(order)
+    np.testing.assert_allclose(size[-1], squares, rtol=1e-6)
+    np.testing.assert_allclose(deviation**2, size, rtol=1e-6)
+
+
+def test_of_drives_that_wait_the_newest_tells_what_all_show() -> None:
+    rows, frames = evidence().rows, noise(16, 2 * DRIVES, 6)
+    data = [frame + (k >= DRIVES + 4) * pressed(AT) for k, frame in enumerate(frames)]
+    one, several = watch(), watch()
+    singly, told = [], []
+    for number, frame in enumerate(data):
+        drive, late = number % DRIVES, number % 3 != 0
+        singly.append(one.push(drive, frame[rows[drive]]))
+        told.append(several.push(drive, frame[rows[drive]], late=late))
+        assert not (late and told[-1])
+    begun = next(k for k, onset in enumerate(singly) if onset)
+    first, onset = next((k, onset) for k, onset in enumerate(told) if onset)
+    assert begun <= first <= begun + 3
+    alone = singly[first]
+    assert alone is not None
+    assert (onset.ratio, onset.drives) == (alone.ratio, alone.drives)
 
 
 def test_noise_alone_is_no_touch_and_the_threshold_keeps_its_promise() -> None:

@@ -4,7 +4,6 @@ from tomoskin.board.source.agreement import (
     BOARDS_SINCE as BOARDS_SINCE,
     current_damaged as current_damaged,
 )
-from tomoskin.board.source.assembler import Received as Received
 from tomoskin.board.source.boards import (
     BOARDS as BOARDS,
     DEFAULT_BOARD as DEFAULT_BOARD,
@@ -19,14 +18,15 @@ from tomoskin.board.source.clock import (
     ClockFitter as ClockFitter,
     ScanTimer as ScanTimer,
 )
-from tomoskin.board.source.configuration import Configuration as Configuration
 from tomoskin.board.source.link import Link as Link
+from tomoskin.board.source.protocol_session import Received as Received
 from tomoskin.board.source.serial import (
     SerialTransport as SerialTransport,
     list_ports as list_ports,
 )
 from tomoskin.board.source.settings import (
     PRESCALERS as PRESCALERS,
+    Configuration as Configuration,
     ScanSettings as ScanSettings,
     Timing as Timing,
     choose_periods as choose_periods,

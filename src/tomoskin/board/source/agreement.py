@@ -6,20 +6,10 @@ from collections.abc import Sequence
 from dataclasses import fields, replace
 from typing import Protocol, runtime_checkable
 
+from tomoskin.board import wire
 from tomoskin.board.source.boards import BOARDS, DEFAULT_BOARD
 from tomoskin.board.source.clock import TICK_RATES
 from tomoskin.board.source.settings import ScanSettings
-from tomoskin.board.wire import (
-    OLDER,
-    SCHEMA,
-    Command,
-    Counters,
-    HeldMode,
-    HeldPattern,
-    HeldScan,
-    Hello,
-    Info,
-)
 from tomoskin.core import SourceError, WireError
 from tomoskin.model.pattern import Scan
 
@@ -68,7 +58,7 @@ class RateFollower:
         if rate is not None:
             self._transport.use_rate(rate)
 
-    def slower(self, counters: Counters, *, running: bool) -> int | None:
+    def slower(self, counters: wire.Counters, *, running: bool) -> int | None:
         """The rate to set the board up at, where this one damages too much; else None."""
         corrupt = counters.corrupt - self._corrupt
         damaged = corrupt >= _DAMAGED
@@ -84,13 +74,13 @@ _UPDATE_BOARD = "flash the firmware of this tomoskin: tomoskin firmware flash"
 _UPDATE_HOST = "update tomoskin on this computer, or flash an older firmware"
 
 
-def check_version(board: Hello | Info, where: str) -> None:
+def check_version(board: wire.Hello | wire.Info, where: str) -> None:
     """Raise WireError unless the board was made from this host's schema or one that it grew from.
 
     The message says which side is older.
     """
-    theirs, ours = (board.major, board.minor), (SCHEMA.major, SCHEMA.minor)
-    hashes = {**OLDER, ours: SCHEMA.hash}
+    theirs, ours = (board.major, board.minor), (wire.SCHEMA.major, wire.SCHEMA.minor)
+    hashes = {**wire.OLDER, ours: wire.SCHEMA.hash}
     if hashes.get(theirs) == board.schema_hash:
         return
     spoken = (
@@ -113,7 +103,7 @@ def current_damaged(current: int) -> bool:
     return current == 0xFFFFFFFF
 
 
-def fit_board(info: Info, scan: Scan, asked: ScanSettings, where: str) -> ScanSettings:
+def fit_board(info: wire.Info, scan: Scan, asked: ScanSettings, where: str) -> ScanSettings:
     """What to set on this board for what is ``asked``; SourceError says what it lacks."""
     if not TICK_RATES[0] <= info.tick_rate <= TICK_RATES[1]:
         raise SourceError(
@@ -162,7 +152,7 @@ def fit_board(info: Info, scan: Scan, asked: ScanSettings, where: str) -> ScanSe
     return replace(settings, singly=singly)
 
 
-def _check_size(info: Info, scan: Scan, asked: ScanSettings, where: str) -> None:
+def _check_size(info: wire.Info, scan: Scan, asked: ScanSettings, where: str) -> None:
     channels = 1 + int(max(scan.drives.max(), scan.sample_electrode.max()))
     fewer = "use a skin with fewer electrodes"
     largest = max(BOARDS.values(), key=lambda board: board.channels[-1])
@@ -189,7 +179,7 @@ def _check_enough(needed: int, offered: int, what: str, hint: str, where: str) -
 
 
 def check_held(
-    held: HeldScan | HeldPattern | HeldMode, sent: Sequence[Command], where: str
+    held: wire.HeldScan | wire.HeldPattern | wire.HeldMode, sent: Sequence[wire.Command], where: str
 ) -> None:
     """Raise SourceError unless the board holds what ``sent`` has set; it names what differs.
 

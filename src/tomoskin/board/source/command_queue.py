@@ -6,8 +6,7 @@ from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from tomoskin.board.source.configuration import Configuration
-from tomoskin.board.source.settings import Timing
+from tomoskin.board.source.settings import Configuration, Timing
 from tomoskin.board.wire import Command, SetBaud, encode
 from tomoskin.core import DriveSamples, Event, Frame, SourceError
 

@@ -8,11 +8,9 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 
 from tomoskin.board.source.agreement import Rated, RateFollower
-from tomoskin.board.source.assembler import Received
 from tomoskin.board.source.clock import ClockWatch
-from tomoskin.board.source.configuration import Configuration
-from tomoskin.board.source.protocol_session import ProtocolSession, Stage
-from tomoskin.board.source.settings import ScanSettings, Timing
+from tomoskin.board.source.protocol_session import ProtocolSession, Received, Stage
+from tomoskin.board.source.settings import Configuration, ScanSettings, Timing
 from tomoskin.board.source.transport import Diagnosable, Played, Transport
 from tomoskin.board.wire import Ack, BoardLimits, Decoder, Info, Stop
 from tomoskin.core import Frame, SourceError

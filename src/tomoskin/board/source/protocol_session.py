@@ -1,4 +1,5 @@
-"""The host's side of the protocol: messages and the time in, bytes and events out. No I/O."""
+"""The host's side of the protocol: messages and the time in, bytes and events out; and the frames
+that full turns of single drives make. No I/O."""
 
 from __future__ import annotations
 
@@ -7,42 +8,17 @@ from enum import Enum, auto
 
 import numpy as np
 
+from tomoskin.board import wire
 from tomoskin.board.source.agreement import BOARDS_SINCE, check_held, check_version, fit_board
-from tomoskin.board.source.assembler import Assembler, Received
 from tomoskin.board.source.command_queue import CommandQueue, SequenceFilter
-from tomoskin.board.source.configuration import Configuration
-from tomoskin.board.source.settings import ScanSettings, Timing, choose_periods
-from tomoskin.board.wire import (
-    SCHEMA,
-    Ack,
-    BoardLimits,
-    Command,
-    Fault,
-    GetBoard,
-    GetInfo,
-    GetMode,
-    GetPattern,
-    GetScan,
-    HeldMode,
-    HeldPattern,
-    HeldScan,
-    Hello,
-    Info,
-    Message,
-    Ping,
-    Result,
-    SetBaud,
-    SetFormat,
-    Stop,
-    type_byte,
-)
+from tomoskin.board.source.settings import Configuration, ScanSettings, Timing, choose_periods
 from tomoskin.core import DriveSamples, Event, Frame, SourceError
 from tomoskin.model.pattern import Scan
 
-_ANSWERED: dict[type[Message], type[Command]] = {
-    HeldScan: GetScan,
-    HeldPattern: GetPattern,
-    HeldMode: GetMode,
+_ANSWERED: dict[type[wire.Message], type[wire.Command]] = {
+    wire.HeldScan: wire.GetScan,
+    wire.HeldPattern: wire.GetPattern,
+    wire.HeldMode: wire.GetMode,
 }
 """What each answer of what a board holds was asked by."""
 
@@ -97,9 +73,9 @@ class ProtocolSession:
         self.drives = Assembler(self.frames, len(scan.drives), asked=settings.singly)
         self.commands = CommandQueue(timing, now, where)
         self.stage = Stage.WAITING
-        self.info: Info | None = None
-        self.board: BoardLimits | None = None
-        self._met: tuple[Info, ScanSettings] | None = None
+        self.info: wire.Info | None = None
+        self.board: wire.BoardLimits | None = None
+        self._met: tuple[wire.Info, ScanSettings] | None = None
         self.is_silent = False
         self._overdue = False
         self._silence = max(timing.silence, 4 * self.configuration.scan_time)
@@ -115,24 +91,24 @@ class ProtocolSession:
             f"messages arrive damaged: the board is set up again at the slower rate of {rate:,} Bd",
         )
 
-    def receive(self, message: Message, now: float) -> list[Received]:
+    def receive(self, message: wire.Message, now: float) -> list[Received]:
         """Act on a message from the board."""
         self._overdue = False
         match message:
             case Frame() | DriveSamples():
                 return self._samples(message, now)
-            case Hello():
+            case wire.Hello():
                 return self._hello(message, now)
-            case Info():
+            case wire.Info():
                 self._info(message, now)
-            case BoardLimits():
+            case wire.BoardLimits():
                 self._limits(message, now)
-            case HeldScan() | HeldPattern() | HeldMode():
+            case wire.HeldScan() | wire.HeldPattern() | wire.HeldMode():
                 return self._held(message, now)
-            case Ack():
+            case wire.Ack():
                 return self._ack(message, now)
-            case Fault():
-                text = SCHEMA.enums["fault"].sentence(message.code)
+            case wire.Fault():
+                text = wire.SCHEMA.enums["fault"].sentence(message.code)
                 return [Event(now, "fault", f"the board has switched its current off: {text}")]
         return []
 
@@ -144,7 +120,7 @@ class ProtocolSession:
         if self.stage is not Stage.RUNNING:
             return []
         if now >= self.commands.last_sent + self._timing.ping:
-            self.commands.send(Ping(0), now)
+            self.commands.send(wire.Ping(0), now)
         if self.is_silent or now < self._last_frame + self._silence:
             return []
         if not self._overdue:  # a busy host may not have read yet what has come
@@ -169,8 +145,8 @@ class ProtocolSession:
         self.stage = Stage.SETTING_UP
         self.info = self.board = self._met = None
         self.frames.close()
-        change = () if at is None else (Stop(0), SetBaud(0, at))
-        self.commands.restart((*change, GetInfo(0), Stop(0)), now)
+        change = () if at is None else (wire.Stop(0), wire.SetBaud(0, at))
+        self.commands.restart((*change, wire.GetInfo(0), wire.Stop(0)), now)
 
     def _answered(self, now: float) -> list[Received]:
         """The pending command has been answered: what follows."""
@@ -212,7 +188,7 @@ class ProtocolSession:
         self._set_up(now)
         return self.drives.say_whole(now)
 
-    def _hello(self, hello: Hello, now: float) -> list[Received]:
+    def _hello(self, hello: wire.Hello, now: float) -> list[Received]:
         check_version(hello, self._where)
         if self.stage is Stage.SETTING_UP and self.info is None:
             return []
@@ -228,9 +204,9 @@ class ProtocolSession:
         text = "the board was reset or missed the heartbeat: it is set up again"
         return [Event(now, "reset", text)] if was_running else []
 
-    def _info(self, info: Info, now: float) -> None:
+    def _info(self, info: wire.Info, now: float) -> None:
         pending = self.commands.pending
-        if isinstance(pending, GetInfo) and info.request == pending.request:
+        if isinstance(pending, wire.GetInfo) and info.request == pending.request:
             check_version(info, self._where)
             fitted = fit_board(info, self._scan, self._settings, self._where)
             if info.minor < BOARDS_SINCE:  # that is all that it says of itself
@@ -238,12 +214,12 @@ class ProtocolSession:
                 self.commands.add(self.configuration.commands(info.minor))
             else:
                 self._met = info, fitted
-                self.commands.add((GetBoard(0),))
+                self.commands.add((wire.GetBoard(0),))
             self._answered(now)
 
-    def _limits(self, board: BoardLimits, now: float) -> None:
+    def _limits(self, board: wire.BoardLimits, now: float) -> None:
         pending = self.commands.pending
-        asked = isinstance(pending, GetBoard) and board.request == pending.request
+        asked = isinstance(pending, wire.GetBoard) and board.request == pending.request
         if not asked or self._met is None:
             return
         info, fitted = self._met
@@ -254,14 +230,16 @@ class ProtocolSession:
         self.commands.add(self.configuration.commands(info.minor))
         self._answered(now)
 
-    def _held(self, held: HeldScan | HeldPattern | HeldMode, now: float) -> list[Received]:
+    def _held(
+        self, held: wire.HeldScan | wire.HeldPattern | wire.HeldMode, now: float
+    ) -> list[Received]:
         pending = self.commands.pending
         if not isinstance(pending, _ANSWERED[type(held)]) or held.request != pending.request:
             return []
         check_held(held, self.configuration.behind(pending), self._where)
         return self._answered(now)
 
-    def _ack(self, ack: Ack, now: float) -> list[Received]:
+    def _ack(self, ack: wire.Ack, now: float) -> list[Received]:
         pending = self.commands.pending
         if self.is_silent and pending is None:
             # It hears the heartbeat but does not scan: its HELLO or FAULT was lost.
@@ -270,15 +248,19 @@ class ProtocolSession:
             return [Event(now, "reset", "the board answers but does not scan: it is set up again")]
         if pending is None or ack.request != pending.request:
             return []
-        if ack.command != type_byte(type(pending)):
+        if ack.command != wire.type_byte(type(pending)):
             return []
-        if ack.result is Result.OK and isinstance(pending, _QUESTIONS):
+        if ack.result is wire.Result.OK and isinstance(pending, _QUESTIONS):
             return []  # no answer to a question
-        return self._answered(now) if ack.result is Result.OK else self._refused(ack, pending, now)
+        return (
+            self._answered(now)
+            if ack.result is wire.Result.OK
+            else self._refused(ack, pending, now)
+        )
 
-    def _refused(self, ack: Ack, command: Command, now: float) -> list[Received]:
+    def _refused(self, ack: wire.Ack, command: wire.Command, now: float) -> list[Received]:
         """The board has refused the pending command: goes on without it where that is possible."""
-        if isinstance(command, SetFormat) and self.drives.unsaid:
+        if isinstance(command, wire.SetFormat) and self.drives.unsaid:
             return self._go_whole(now)
         raise SourceError(
             f"the board refused {type(command).__name__}: {_reason(ack, command)}",
@@ -286,24 +268,122 @@ class ProtocolSession:
         )
 
 
-_QUESTIONS = (GetBoard, *_ANSWERED.values())
+_QUESTIONS = (wire.GetBoard, *_ANSWERED.values())
 
 
-def _reason(ack: Ack, refused: Command) -> str:
+def _reason(ack: wire.Ack, refused: wire.Command) -> str:
     """Why: the field of a value that is out of range by its name, with what the protocol allows."""
-    number = type_byte(type(refused))
-    message = next(message for message in SCHEMA.messages if message.type == number)
-    if ack.result is not Result.BAD_VALUE or ack.detail >= len(message.fields):
-        return f"{SCHEMA.enums['result'].sentence(ack.result)} ({ack.detail})"
+    number = wire.type_byte(type(refused))
+    message = next(message for message in wire.SCHEMA.messages if message.type == number)
+    if ack.result is not wire.Result.BAD_VALUE or ack.detail >= len(message.fields):
+        return f"{wire.SCHEMA.enums['result'].sentence(ack.result)} ({ack.detail})"
     field = message.fields[ack.detail]
     value = f"{getattr(refused, field.name)} {field.unit}".strip()
     return f"{field.name} of {value} is out of range ({field.text})"
 
 
-def _introduction(info: Info, board: BoardLimits | None, configuration: Configuration) -> str:
+def _introduction(
+    info: wire.Info, board: wire.BoardLimits | None, configuration: Configuration
+) -> str:
     firmware = ".".join(map(str, info.firmware))
     name = f"{board.text} " if board else ""
     return (
         f"board {name}{info.unique_id.hex()}, firmware {firmware}, "
         f"{info.channels} channels, scans configuration {configuration.identity:04x}"
+    )
+
+
+_MODULUS = 2**32
+
+Received = Frame | DriveSamples | Event
+"""What comes from a board: scans, drives of them where these are sent one by one, and events."""
+
+
+class Assembler:
+    """Passes drives on at once, and behind the last of a full turn its frame.
+
+    A drive that is late, doubled, or of another scan is left out and counted, as a frame is. A turn
+    that lacks a drive makes no frame and is counted as lost.
+
+    ``broken`` is how many full turns in a row have lacked a drive; ``unsaid`` whether drives are
+    asked for, none has come yet, and nobody has been told so.
+    """
+
+    def __init__(self, frames: SequenceFilter, n_drives: int, *, asked: bool = True) -> None:
+        """``frames`` is the filter that drives and frames go through."""
+        self._frames, self._n_drives = frames, n_drives
+        self.unsaid = asked
+        self.forget()
+
+    def say_whole(self, now: float) -> list[Received]:
+        """Scans come whole though drives were asked for: an event says so once."""
+        unsaid, self.unsaid = self.unsaid, False
+        text = "the board sends whole scans only: a touch shows at the end of its first scan"
+        return [Event(now, "whole-scans", text)] if unsaid else []
+
+    def forget(self) -> None:
+        """What comes next does not follow what came before."""
+        self.broken = 0
+        self._last: DriveSamples | None = None
+        self._turn: list[DriveSamples] | None = None
+        """The drives of a full turn that lacks none so far."""
+
+    def take(self, drive: DriveSamples) -> list[Received]:
+        """The drive and the frame that it completes, or nothing; and an event if some is wrong."""
+        events = self._frames.refuse(drive)
+        if events is not None:
+            return [*events]
+        last, counters = self._last, self._frames.counters
+        ahead = (drive.sequence - last.sequence) % _MODULUS if last else 1
+        if last and ahead == 0 and _head(drive) != _head(last):
+            counters.foreign += 1
+            self._turn = None
+            return []
+        if last and (ahead >= _MODULUS // 2 or (ahead == 0 and drive.place <= last.place)):
+            counters.stale += 1
+            return []
+        self._last = drive
+        items: list[Received] = []
+        if last is None or ahead:
+            items += self._begin(drive, last)
+        elif drive.place > last.place + 1:
+            self._turn = None
+        return items + self._complete(drive)
+
+    def _begin(self, drive: DriveSamples, last: DriveSamples | None) -> list[Event]:
+        """A turn begins after that of ``last``, with its first drive or a later one."""
+        whole = self._turn is not None and len(self._turn) == self._n_drives
+        if last and not whole:
+            self.broken += 1
+        self._turn = None if drive.place else []
+        return self._frames.reach(drive)
+
+    def _complete(self, drive: DriveSamples) -> list[Received]:
+        """The drive, and the frame if it is the last one of a turn that lacks none."""
+        if self._turn is None:
+            return [drive]
+        self._turn.append(drive)
+        if drive.place < self._n_drives - 1:
+            return [drive]
+        self.broken = 0
+        return [drive, *self._frames.take(_frame(self._turn))]
+
+
+def _head(drive: DriveSamples) -> tuple[int, int]:
+    """What all drives of a turn have in common."""
+    return drive.flags, drive.drops
+
+
+def _frame(turn: list[DriveSamples]) -> Frame:
+    """The frame of a full turn: that which a board sends whole."""
+    first, sums = turn[0], [drive.sums for drive in turn if drive.sums is not None]
+    return Frame(
+        sequence=first.sequence,
+        ticks=first.ticks,
+        host_time=turn[-1].host_time,
+        configuration=first.configuration,
+        flags=first.flags,
+        drops=first.drops,
+        samples=np.concatenate([drive.samples for drive in turn]),
+        sums=np.concatenate(sums) if sums else None,
     )

@@ -1,13 +1,15 @@
-"""What a link asks of a board, and how long it waits for it."""
+"""What a link asks of a board, as the commands that set it there, and how long it waits for it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Self
 
+from tomoskin.board import wire
 from tomoskin.board.source.boards import BOARDS, DEFAULT_BOARD, board_named
-from tomoskin.board.wire import BoardLimits, Format
 from tomoskin.core import SourceError
+from tomoskin.model.pattern import Scan
 
 if TYPE_CHECKING:
     from tomoskin.model.skin import Skin
@@ -68,12 +70,12 @@ class ScanSettings:
             raise SourceError(f"expected a prescaler of {PRESCALERS}, got {self.prescaler}")
 
     @property
-    def format(self) -> Format:
+    def format(self) -> wire.Format:
         """How samples are sent: one conversion of ten bits is shorter on the line when packed."""
         packs = self.oversampling == 1 and self.adc_bits == _PACKED_BITS
         if self.singly:
-            return Format.DRIVES_PACKED if packs else Format.DRIVES
-        return Format.PACKED if packs else Format.SIXTEEN
+            return wire.Format.DRIVES_PACKED if packs else wire.Format.DRIVES
+        return wire.Format.PACKED if packs else wire.Format.SIXTEEN
 
     def on_board(self, adc_bits: int) -> Self | None:
         """The settings that give samples of the same scale on a converter of ``adc_bits``.
@@ -134,7 +136,7 @@ def scan_time(
     n_drives: int,
     n_samples: int,
     settings: ScanSettings,
-    board: BoardLimits | None = None,
+    board: wire.BoardLimits | None = None,
     periods: int = 0,
 ) -> float:
     """Seconds of one scan on ``board``; without one, on the slowest that there is.
@@ -154,7 +156,7 @@ def scan_time(
 
 
 def half_time(
-    board: BoardLimits, settings: ScanSettings, periods: int, channels: int, tick_rate: float
+    board: wire.BoardLimits, settings: ScanSettings, periods: int, channels: int, tick_rate: float
 ) -> int:
     """ns that half a period takes at least; the firmware works it out in the same way.
 
@@ -169,7 +171,7 @@ def half_time(
 
 
 def chop_limit(
-    board: BoardLimits, settings: ScanSettings, periods: int, channels: int, tick_rate: float
+    board: wire.BoardLimits, settings: ScanSettings, periods: int, channels: int, tick_rate: float
 ) -> int:
     """Hz: the highest frequency that the board can do with so many periods a drive."""
     half = half_time(board, settings, periods, channels, tick_rate)
@@ -177,7 +179,7 @@ def chop_limit(
 
 
 def choose_periods(
-    board: BoardLimits, settings: ScanSettings, channels: int, tick_rate: float, where: str
+    board: wire.BoardLimits, settings: ScanSettings, channels: int, tick_rate: float, where: str
 ) -> int:
     """The fewest periods a drive with which the board can do ``settings``; 0 for a direct drive.
 
@@ -216,3 +218,115 @@ def choose_periods(
             hint="lower [drive] chop_frequency, or [readout] settling if the skin settles faster",
         )
     return next(periods for periods in possible if wanted <= limits[periods])
+
+
+_FORMATS_SINCE = 1
+"""The minor version that brought formats and reading back."""
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """Identity and commands; request ids are filled in when a command is sent.
+
+    The identity is a checksum of ``scan`` and ``patterns``, never 0: the same scan has the same
+    identity on every host, and frames of another scan are recognised. ``scan_time`` is that of the
+    board, s, or before one is known that of the slowest.
+    """
+
+    identity: int
+    scan: wire.SetScan
+    patterns: tuple[wire.SetPattern, ...]
+    format: wire.SetFormat
+    n_samples: int
+    scan_time: float
+    mode: wire.SetMode | None = None
+    """None: the drive is direct, as SET_SCAN leaves it."""
+
+    def commands(self, minor: int) -> tuple[wire.Command, ...]:
+        """What sets it on a board of protocol 1.``minor``, reads it back, and starts it."""
+        start = wire.Start(0, self.identity)
+        if minor < _FORMATS_SINCE:
+            return (self.scan, *self.patterns, start)
+        read_back = (wire.GetPattern(0, pattern.first) for pattern in self.patterns)
+        mode, held = ((self.mode,), (wire.GetMode(0),)) if self.mode else ((), ())
+        settings = (self.scan, *self.patterns, self.format, *mode)
+        return (*settings, wire.GetScan(0), *read_back, *held, start)
+
+    @property
+    def singly(self) -> bool:
+        """Whether it asks for each drive in a message of its own."""
+        return self.format.format in (wire.Format.DRIVES, wire.Format.DRIVES_PACKED)
+
+    @cached_property
+    def channels(self) -> tuple[int, ...]:
+        """How many channels each drive reads."""
+        drives = (drive for pattern in self.patterns for drive in pattern.drives)
+        return tuple(drive.mask.bit_count() for drive in drives)
+
+    def behind(self, question: wire.Command) -> tuple[wire.Command, ...]:
+        """The commands that set what a GET_SCAN, GET_PATTERN or GET_MODE asks for."""
+        if isinstance(question, wire.GetMode):
+            return (self.mode,) if self.mode else ()
+        if isinstance(question, wire.GetPattern):
+            return tuple(pattern for pattern in self.patterns if pattern.first == question.first)
+        return (self.scan, self.format)
+
+    def on_board(
+        self, fitted: ScanSettings, board: wire.BoardLimits | None = None, periods: int = 0
+    ) -> Self:
+        """The same scan as a ``board`` with another converter does it: under the same identity.
+
+        ``periods`` of each alternating drive.
+        """
+        return replace(
+            self,
+            scan=replace(self.scan, oversampling=fitted.oversampling),
+            format=replace(self.format, format=fitted.format),
+            mode=self.mode and replace(self.mode, periods=periods),
+            scan_time=scan_time(self.scan.n_drives, self.n_samples, fitted, board, periods),
+        )
+
+    @classmethod
+    def of(cls, scan: Scan, settings: ScanSettings) -> Self:
+        """Timing, and drives in chunks."""
+        announce = wire.SetScan(
+            request=0,
+            configuration=0,
+            n_drives=len(scan.drives),
+            settling=round(settings.settling * 1e6),
+            dead_time=round(settings.dead_time * 1e6),
+            oversampling=settings.oversampling,
+            prescaler=settings.prescaler,
+            current_limit=round(settings.current_limit * 1e6),
+        )
+        chunks = _chunks(scan)
+        packed = b"".join(map(wire.encode_payload, chunks))
+        content = wire.encode_payload(announce) + packed
+        mode = None
+        if settings.chop_frequency:
+            mode = wire.SetMode(0, 0, wire.DriveMode.CHOPPED, settings.chop_frequency, 0)
+        content += wire.encode_payload(mode) if mode else b""
+        identity = wire.crc16(content) or 1
+        return cls(
+            identity,
+            replace(announce, configuration=identity),
+            tuple(replace(chunk, configuration=identity) for chunk in chunks),
+            wire.SetFormat(0, identity, settings.format),
+            scan.n_samples,
+            scan_time(len(scan.drives), scan.n_samples, settings),
+            mode and replace(mode, configuration=identity),
+        )
+
+
+def _chunks(scan: Scan) -> list[wire.SetPattern]:
+    drives = [
+        wire.Drive(source, sink, mask)
+        for (source, sink), mask in zip(scan.drives.tolist(), scan.masks.tolist(), strict=True)
+    ]
+    empty = len(wire.encode_payload(wire.SetPattern(0, 0, 0, ())))
+    size = len(wire.encode_payload(wire.SetPattern(0, 0, 0, (wire.Drive(0, 0, 0),)))) - empty
+    most = (wire.SCHEMA.to_device_bytes - 2 - empty) // size
+    return [
+        wire.SetPattern(0, 0, first, tuple(drives[first : first + most]))
+        for first in range(0, len(drives), most)
+    ]

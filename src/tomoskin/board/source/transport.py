@@ -3,7 +3,9 @@ asking a board without a link."""
 
 from __future__ import annotations
 
+import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from importlib.metadata import entry_points
@@ -14,8 +16,6 @@ from tomoskin.core import SourceError, meant
 
 if TYPE_CHECKING:
     from tomoskin.model.skin import Skin
-import threading
-from collections import deque
 
 M = TypeVar("M", bound=Message)
 

@@ -8,7 +8,6 @@ from tomoskin.files.exports.curves import (
 )
 from tomoskin.files.exports.display import Display as Display
 from tomoskin.files.exports.export import Export as Export
-from tomoskin.files.exports.matlab_file import write_matlab as write_matlab
 from tomoskin.files.exports.picture import (
     FILMS as FILMS,
     MOST_PANELS as MOST_PANELS,
@@ -25,15 +24,5 @@ from tomoskin.files.exports.session_export import (
     export_touches as export_touches,
     omitted as omitted,
 )
-from tomoskin.files.exports.session_table import (
-    write_csv as write_csv,
-    write_hdf5 as write_hdf5,
-    write_parquet as write_parquet,
-    write_touches as write_touches,
-)
-from tomoskin.files.exports.vtu import (
-    series_files as series_files,
-    write_series as write_series,
-    write_vtu as write_vtu,
-)
-from tomoskin.files.imports import write_interchange as write_interchange
+from tomoskin.files.exports.session_table import write_touches as write_touches
+from tomoskin.files.exports.vtu import series_files as series_files, write_vtu as write_vtu

@@ -16,6 +16,9 @@ HEARTBEAT = 1.0
 IMAGE_PERIOD = 0.1
 """Seconds between two images, by host time."""
 
+WAITING = "waiting for the first frame"
+"""What is wrong before it has come."""
+
 LOST = frozenset({"source-lost", "no-answer", "silent", "fault", "reset"})
 """Kinds of events after which no frame comes until the board is well again."""
 
@@ -43,8 +46,9 @@ class Reporter:
 
     A touch that begins or ends is sent at once, and so is whether touches are valid; what they do
     meanwhile every ``period`` s. Of frames without touches one a second is sent: who listens can
-    tell a skin that nothing touches from one that is silent. A lost source has one last message,
-    that touches are not valid, and a report once a second.
+    tell a skin that nothing touches from one that is silent. Before the first frame it is said
+    that touches are not valid, at once and then once a second. A lost source has one last message
+    of that, and a report once a second.
 
     Parameters
     ----------
@@ -84,14 +88,18 @@ class Reporter:
             replace(last, host_time=now, scanned=math.nan, scan_time=math.nan, latency=None)
         )
 
-    def still_lost(self) -> Contacts | None:
-        """A report of a source that is lost; None of one that is not."""
-        if not self._is_lost or self._newest is None:
+    def silent(self) -> Contacts | None:
+        """A report before the first frame, and of a source that is lost; None while frames come."""
+        newest, clock = self._newest, self.stream.clock
+        if not self._is_lost and (newest is None or newest.sequence < 0):
+            if clock is None:  # a recording is ready
+                return None
+            waiting = self._paced(without_frame(self.stream, WAITING, clock()))
+            return replace(waiting, is_due=True, reports=True)
+        if not self._is_lost or newest is None:
             return None
-        now = self._now(self._newest.host_time)
-        return replace(
-            self._paced(replace(self._newest, host_time=now, scanned=math.nan)), reports=True
-        )
+        now = self._now(newest.host_time)
+        return replace(self._paced(replace(newest, host_time=now, scanned=math.nan)), reports=True)
 
     def repeat(self) -> None:
         """Send what comes next whatever was sent before, since somebody new listens."""

@@ -154,7 +154,8 @@ class ContainerReader:
             raise DataError(
                 "is not an MCAP file",
                 where=self.where,
-                hint="convert recordings of other programs first: tomoskin session import",
+                hint="convert a recording of another program by tomoskin session import; "
+                "tomoskin image reads voltages of .npz and .csv",
             )
         end = self.size - _FOOTER_BYTES - len(MAGIC)
         tail = self._read(end, _FOOTER_BYTES + len(MAGIC))

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
+import socket
+import stat
 import threading
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from tomoskin.core import Event, SinkError, encode_json, needed
-from tomoskin.files.messages import (
-    Contacts,
-    Item,
-    Naming,
-    Stream,
-    grid_message,
-    log_message,
-    scene_message,
-    time_of,
-)
+from tomoskin.files import messages
 from tomoskin.files.session import schema_of
 from tomoskin.run.sinks.sink import Sink, port_of
 
@@ -45,7 +41,7 @@ _robots_lock = threading.Lock()
 class FoxgloveSink(Sink):
     """Serves ``ws://host:port`` by Foxglove's SDK; what nobody has subscribed to is not made."""
 
-    naming = Naming("")
+    naming = messages.Naming("")
 
     def __init__(self, host: str, port: int) -> None:
         self.name = f"foxglove at ws://{host}:{port}"
@@ -54,7 +50,7 @@ class FoxgloveSink(Sink):
         self._server: _Server | None = None
         self._channels: dict[str, Any] = {}
 
-    def open(self, stream: Stream) -> None:
+    def open(self, stream: messages.Stream) -> None:
         """Begin to serve the channels of one skin."""
         sdk, self._stream = self._sdk, stream
         self._server = self._joined(stream)
@@ -68,24 +64,24 @@ class FoxgloveSink(Sink):
                 context=self._server.context,
             )
 
-    def publish(self, item: Item) -> None:
+    def publish(self, item: messages.Item) -> None:
         """Send the messages of ``item``."""
-        now = self._stream.log_time(time_of(item))
+        now = self._stream.log_time(messages.time_of(item))
         for event in (item,) if isinstance(item, Event) else item.events:
-            self._send("/events", log_message(event, now), now)
+            self._send("/events", messages.log_message(event, now), now)
         if isinstance(item, Event):
             return
         if item.is_due:
             self._send("/touches", item.content(), now)
         self._show(item, now)
 
-    def _show(self, contacts: Contacts, now: int) -> None:
+    def _show(self, contacts: messages.Contacts, now: int) -> None:
         """The touches in space, as often as the image, and where there are none for good."""
         pixels, image = self._stream.pixels, contacts.image
         if image is not None or contacts.voltages is None:
-            self._send("/scene", scene_message(contacts.touches, now), now)
+            self._send("/scene", messages.scene_message(contacts.touches, now), now)
         if image is not None and pixels is not None and self._channels["/image"].has_sinks():
-            self._send("/image", grid_message(image, pixels, contacts.host_time, now), now)
+            self._send("/image", messages.grid_message(image, pixels, contacts.host_time, now), now)
 
     def close(self) -> None:
         """Close the channels, and with the last skin the server."""
@@ -103,7 +99,7 @@ class FoxgloveSink(Sink):
                 del _robots[self._address]
         server.server.stop()
 
-    def _joined(self, stream: Stream) -> _Server:
+    def _joined(self, stream: messages.Stream) -> _Server:
         """The server of the robot, or one of its own."""
         if stream.place is None:
             return self._begun(f"tomoskin, {stream.source}")
@@ -123,12 +119,28 @@ class FoxgloveSink(Sink):
             server = self._sdk.start_server(name=name, context=context, host=host, port=port)
         except RuntimeError as error:
             raise SinkError(str(error), where=self.name, hint="choose another port") from error
+        _send_at_once(port)
         return _Server(context, server)
 
     def _send(self, topic: str, content: Mapping[str, Any], now: int) -> None:
         channel = self._channels[topic]
         if channel.has_sinks():
             channel.log(encode_json(content), log_time=now)
+
+
+def _send_at_once(port: int) -> None:
+    """Let connections to a server of this process send each message when it is made.
+
+    The SDK has no option for that, and as a rule a message waits until the one before it has been
+    acknowledged, 40 ms. Connections have it from the socket that they come to.
+    """
+    with contextlib.suppress(OSError):  # a system that does not show what is open
+        for number in [int(path.name) for path in Path("/dev/fd").iterdir()]:
+            with contextlib.suppress(OSError):  # closed meanwhile
+                if stat.S_ISSOCK(os.fstat(number).st_mode):
+                    with socket.socket(fileno=os.dup(number)) as one:
+                        if one.type == socket.SOCK_STREAM and one.getsockname()[1:2] == (port,):
+                            one.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
 
 def open_foxglove(argument: str) -> FoxgloveSink:

@@ -14,7 +14,7 @@ from typing import Any
 from mcap.reader import make_reader
 
 from tomoskin.core import DataError, SinkError, SkinError, needed
-from tomoskin.run.sinks.ros2_node import ros_domain, struct_of
+from tomoskin.run.sinks.ros2 import ros_domain, struct_of
 from tomoskin.run.sinks.sink import options_of
 
 MAX_AGE = 0.5

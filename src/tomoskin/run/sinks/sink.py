@@ -7,7 +7,7 @@ import logging
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 
 from tomoskin.core import Capacity, Consumer, Event, Say, SinkError, TomoskinError, Worker, meant
 from tomoskin.files.messages import Item, Naming, Reporter, Stream
@@ -64,7 +64,8 @@ def make_sink(spec: str) -> Sink:
     Raises
     ------
     SinkError
-        When there is no sink of that name, its argument is none, or its package is missing.
+        When there is no sink of that name, its argument is none, or its package is missing or
+        makes no sink.
     """
     name, _, argument = spec.partition(":")
     entries = tuple(entry_points(group=GROUP, name=name))
@@ -73,8 +74,24 @@ def make_sink(spec: str) -> Sink:
             f'there is no sink "{name}"{meant(name, sink_names())}',
             hint=f"sinks: {', '.join(sink_names()) or 'none'}",
         )
-    sink: Sink = entries[0].load()(argument)
+    entry = entries[0]
+    try:
+        sink = entry.load()(argument)
+    except TomoskinError:
+        raise
+    except Exception as error:
+        raise _faulty(entry, f"{type(error).__name__}: {error}") from error
+    if not isinstance(sink, Sink) or not isinstance(getattr(sink, "name", None), str):
+        raise _faulty(entry, f"expected a Sink with a name, got {sink!r}")
     return sink
+
+
+def _faulty(entry: EntryPoint, why: str) -> SinkError:
+    return SinkError(
+        f"cannot be made: {why}",
+        where=f"sink {entry.name}",
+        hint=f"it is {entry.value}, which its own package has to mend",
+    )
 
 
 def port_of(text: str, where: str) -> int:
@@ -159,6 +176,7 @@ class SinkConsumer(Consumer):
         self.ready = "; ".join(filter(None, ("takes results", self._sink.hint)))
         self.trouble = ""
         self._reporter.repeat()
+        self.tend()
 
     def take(self, item: FrameResult | Event) -> None:
         """Send it; and of an event that the source is lost what that means for touches."""
@@ -171,8 +189,8 @@ class SinkConsumer(Consumer):
         self._delay = _FIRST_DELAY
 
     def tend(self) -> None:
-        """Report that the source is still lost, where it is."""
-        if (report := self._reporter.still_lost()) is not None:
+        """Report that no frame has come, or that the source is lost, where it is so."""
+        if (report := self._reporter.silent()) is not None:
             self._sink.publish(report)
 
     def close(self) -> None:
@@ -182,7 +200,8 @@ class SinkConsumer(Consumer):
 
     def handle_failure(self, error: Exception) -> float:
         """Say so once; it is opened again after a pause that doubles."""
-        before, self.trouble = self.trouble, f"is not reachable: {_why(error)}"
+        how = "is not reachable" if isinstance(error, (OSError, TomoskinError)) else "fails"
+        before, self.trouble = self.trouble, f"{how}: {_why(error)}"
         if self.trouble != before:
             text = f"{self.name} {self.trouble}"
             _log.warning("%s", text)

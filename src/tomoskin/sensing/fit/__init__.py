@@ -9,11 +9,11 @@ from tomoskin.sensing.fit.bounds import (
 )
 from tomoskin.sensing.fit.drive_evidence import (
     DriveEvidence as DriveEvidence,
+    DriveFilter as DriveFilter,
     Initiation as Initiation,
+    MovingTouch as MovingTouch,
     Onset as Onset,
 )
-from tomoskin.sensing.fit.drive_filter import DriveFilter as DriveFilter, MovingTouch as MovingTouch
-from tomoskin.sensing.fit.drive_view import DriveView as DriveView, NoiseKey as NoiseKey
 from tomoskin.sensing.fit.finder import SpotFinder as SpotFinder
 from tomoskin.sensing.fit.noise import (
     Whitener as Whitener,
@@ -23,6 +23,7 @@ from tomoskin.sensing.fit.noise import (
     row_covariance as row_covariance,
 )
 from tomoskin.sensing.fit.policy import EXHAUSTIVE as EXHAUSTIVE, LIVE as LIVE, Pace as Pace
+from tomoskin.sensing.fit.sight import DriveView as DriveView, NoiseKey as NoiseKey
 from tomoskin.sensing.fit.spot import Response as Response, Spots as Spots, spots_of as spots_of
 from tomoskin.sensing.fit.spot_fit import SpotPrior as SpotPrior
 from tomoskin.sensing.fit.spot_model import SpotModel as SpotModel

@@ -27,16 +27,7 @@ from scipy.spatial import cKDTree
 
 from tomoskin.core import Arrays, FloatArray, IntArray, finished, reach
 from tomoskin.model.forward import State
-from tomoskin.sensing.fit.spot import (
-    CONTENT,
-    FILLING,
-    LOG_RADIUS,
-    N_PARAMETERS,
-    PROFILE,
-    REACH,
-    Response,
-    profile,
-)
+from tomoskin.sensing.fit import spot
 from tomoskin.sensing.fit.spot_fit import SpotPrior
 from tomoskin.sensing.fit.table import ResponseTable
 
@@ -73,7 +64,7 @@ class Interaction:
     between: NDArray[np.float32]
 
     @classmethod
-    def making(cls, response: Response) -> Generator[None, None, Self]:
+    def making(cls, response: spot.Response) -> Generator[None, None, Self]:
         """Some ten milliseconds of work for a mesh of 1,500 cells, a piece between two yields."""
         state = response.state
         mesh, sigma = state.model.mesh, np.asarray(state.conductivity)
@@ -114,10 +105,10 @@ class Interaction:
 
     def _heights(self, spots: FloatArray) -> FloatArray:
         """(k, p) change of the logarithm of the conductivity of each patch by each spot."""
-        square = np.exp(2 * spots[:, LOG_RADIUS]) + self.spread
+        square = np.exp(2 * spots[:, spot.LOG_RADIUS]) + self.spread
         away = self.centres - spots[:, None, :2]
-        far = np.einsum("kpd,kpd->kp", away, away) / (REACH**2 * square[:, None])
-        return profile(far) * (spots[:, CONTENT] / (FILLING * square))[:, None]
+        far = np.einsum("kpd,kpd->kp", away, away) / (spot.REACH**2 * square[:, None])
+        return spot.profile(far) * (spots[:, spot.CONTENT] / (spot.FILLING * square))[:, None]
 
 
 def _patches(centroids: FloatArray, volumes: FloatArray) -> tuple[IntArray, FloatArray, FloatArray]:
@@ -198,7 +189,7 @@ class Certificate:
     moved: float = 0.0
 
     @classmethod
-    def of(cls, response: Response, table: ResponseTable, prior: SpotPrior) -> Self:
+    def of(cls, response: spot.Response, table: ResponseTable, prior: SpotPrior) -> Self:
         """By solving the exact model for some spots, alone and in pairs."""
         random = np.random.default_rng(_SEED)
         spots = drawn_spots(random, response, prior, table.sign, _SPOTS)
@@ -231,7 +222,7 @@ class Certificate:
         }
 
     def adapted(
-        self, response: Response, table: ResponseTable
+        self, response: spot.Response, table: ResponseTable
     ) -> Generator[None, None, Certificate]:
         """That of the ``table`` of ``response``, another sheet on the same mesh, a piece between
         two yields."""
@@ -274,7 +265,7 @@ class Rim:
     spacing: float
 
     @classmethod
-    def of(cls, response: Response, prior: SpotPrior) -> Self:
+    def of(cls, response: spot.Response, prior: SpotPrior) -> Self:
         """Corners and middles of the facets at the rim."""
         mesh = response.spots.mesh
         ends = mesh.points[mesh.boundary]
@@ -294,7 +285,9 @@ class Rim:
     def like(self, spots: FloatArray) -> FloatArray:
         """(k, 2) see :attr:`Certificate.like`, of spots (k, 4)."""
         away, _ = self.tree.query(spots[:, :2])
-        return np.column_stack([away / self.radius, spots[:, LOG_RADIUS] - np.log(self.radius)])
+        return np.column_stack(
+            [away / self.radius, spots[:, spot.LOG_RADIUS] - np.log(self.radius)]
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -317,7 +310,7 @@ class Reduced:
 
     @classmethod
     def making(
-        cls, response: Response, certificate: Certificate, prior: SpotPrior
+        cls, response: spot.Response, certificate: Certificate, prior: SpotPrior
     ) -> Generator[None, None, Self]:
         """For a sheet, a piece between two yields."""
         interaction = yield from Interaction.making(response)
@@ -338,7 +331,7 @@ class Reduced:
         """The same in the native engine; None where that does not run."""
         core = self.interaction.state.model.engine.core
         return core and core.Reduced(
-            profile=PROFILE,
+            profile=spot.PROFILE,
             interaction=self.interaction,
             certificate=self.certificate,
             rim=self.rim.tree.data,
@@ -348,19 +341,19 @@ class Reduced:
 
 
 def drawn_spots(
-    random: np.random.Generator, response: Response, prior: SpotPrior, sign: str, count: int
+    random: np.random.Generator, response: spot.Response, prior: SpotPrior, sign: str, count: int
 ) -> FloatArray:
     """(count, 4) spots all over the sheet, as large as the prior has them."""
     centroids = response.spots.mesh.centroids
-    spots = np.empty((count, N_PARAMETERS))
+    spots = np.empty((count, spot.N_PARAMETERS))
     spots[:, :2] = centroids[random.integers(len(centroids), size=count)]
     deviations = random.standard_normal(count).clip(-2.0, 2.0)
     log_radius = np.log(prior.radius) + prior.spread * deviations
     depth = random.uniform(*_DEPTHS, count)
     if sign != "increase":
         depth *= -1.0 if sign == "decrease" else random.choice([-1.0, 1.0], count)
-    spots[:, LOG_RADIUS] = log_radius
-    spots[:, CONTENT] = FILLING * np.exp(2 * log_radius) * depth
+    spots[:, spot.LOG_RADIUS] = log_radius
+    spots[:, spot.CONTENT] = spot.FILLING * np.exp(2 * log_radius) * depth
     return spots
 
 
@@ -371,7 +364,7 @@ def _pairs(random: np.random.Generator, spots: FloatArray, apart: float) -> IntA
     return np.asarray(pairs[away > apart][:_PAIRS])
 
 
-def _exact(response: Response, sets: FloatArray) -> FloatArray:
+def _exact(response: spot.Response, sets: FloatArray) -> FloatArray:
     """(n, n_meas) V by sets of spots (n, k, 4)."""
     changes = []
     for spots in sets:

@@ -13,21 +13,12 @@ import numpy as np
 from tomoskin.core import Detection, FloatArray, reach
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.skin import Skin
-from tomoskin.sensing.fit.drive_view import CellDiscs, DriveView
+from tomoskin.sensing.fit import policy as decisions
 from tomoskin.sensing.fit.expectation import Expectation, ResidualResponse
 from tomoskin.sensing.fit.hypotheses import CommonModeJump, Explained, Jumps, Rival, challenged
-from tomoskin.sensing.fit.policy import (
-    EXHAUSTIVE,
-    DetectionPolicy,
-    Pace,
-    are_distinct,
-    favours,
-    is_weak,
-    rises_beside,
-)
 from tomoskin.sensing.fit.problem import Matched, Problem
 from tomoskin.sensing.fit.selection import ForwardSelection, SpotDetections, judged
-from tomoskin.sensing.fit.sight import Sight
+from tomoskin.sensing.fit.sight import CellDiscs, DriveView, Sight
 from tomoskin.sensing.fit.spot import CONTENT, LOG_RADIUS, N_PARAMETERS
 from tomoskin.sensing.fit.spot_fit import Deficit
 from tomoskin.sensing.fit.spot_model import SpotModel
@@ -77,9 +68,9 @@ class SpotFinder:
         noise: FloatArray,
         gain: float = 1.0,
         *,
-        pace: Pace = EXHAUSTIVE,
+        pace: decisions.Pace = decisions.EXHAUSTIVE,
     ) -> None:
-        self._model, self._policy = model, DetectionPolicy.of(skin.touch, pace)
+        self._model, self._policy = model, decisions.DetectionPolicy.of(skin.touch, pace)
         self._rim = model.reduced.rim
         self._reach, self._unrest = pace.reach, 1.0
         self._wanders = np.diag(np.square([self._reach, self._reach, _SWELLS]))
@@ -209,7 +200,7 @@ class SpotFinder:
         if policy.pace.joint and sign != policy.sign:  # presses may look like a rise between them
             own = replace(selection, problem=replace(problem, sign=policy.sign))
             pressed = judged(own, own.explained(self._before))
-            if not favours(problem.gain(pressed.fit, detected.fit)):
+            if not decisions.favours(problem.gain(pressed.fit, detected.fit)):
                 detected = pressed
         rival: Rival | None = None
         if self._reach and sign != "both" and len(detected.fit.spots):
@@ -218,8 +209,8 @@ class SpotFinder:
         if self.watch.puzzled(problem, detected.fit):
             reach("both signs")
             both = self._anew(selection, len(detected.fit.spots) + 1)
-            rises = rises_beside(policy, detected.fit, both.fit, both.ratio)
-            if rises and favours(problem.gain(detected.fit, both.fit)):
+            rises = decisions.rises_beside(policy, detected.fit, both.fit, both.ratio)
+            if rises and decisions.favours(problem.gain(detected.fit, both.fit)):
                 detected = both
         return detected, rival
 
@@ -262,7 +253,9 @@ class SpotFinder:
         # a touch is told against the untouched skin
         content += self._residual.beneath(x, y, radius)
         spread = detected.covariance[4 * k : 4 * k + 2, 4 * k : 4 * k + 2]
-        weak = is_weak(self._policy, ratio, float(detected.fresh[k]), float(detected.beside[k]))
+        weak = decisions.is_weak(
+            self._policy, ratio, float(detected.fresh[k]), float(detected.beside[k])
+        )
         detection = self.view.shown(
             np.array([x, y, log_radius, content]), spread + self._rim.doubt(x, y, radius), ratio
         )
@@ -277,13 +270,13 @@ def joined(detected: SpotDetections) -> SpotDetections:
         for j in range(i + 1, len(places)):
             x, y = (one - other for one, other in zip(places[i], places[j], strict=True))
             both = sum(variance[4 * k] + variance[4 * k + 1] for k in (i, j))
-            if are_distinct(x * x + y * y, 2 * both):  # no direction has more than all
+            if decisions.are_distinct(x * x + y * y, 2 * both):  # no direction has more than all
                 continue
             away = np.array([x, y])
             pick = [4 * i, 4 * i + 1, 4 * j, 4 * j + 1]
             block = detected.covariance[np.ix_(pick, pick)]
             turn = np.concatenate([away, -away])
-            if not are_distinct((away @ away) ** 2, turn @ block @ turn):
+            if not decisions.are_distinct((away @ away) ** 2, turn @ block @ turn):
                 return joined(_merged(detected, i, j))
     return detected
 

@@ -17,18 +17,8 @@ from functools import cached_property
 import numpy as np
 
 from tomoskin.core import FloatArray
+from tomoskin.sensing.fit import policy as decisions
 from tomoskin.sensing.fit.expectation import Expectation, newcomers
-from tomoskin.sensing.fit.policy import (
-    ELSEWHERE,
-    SUDDEN,
-    SURE,
-    DetectionPolicy,
-    begins_rival,
-    drops_rival,
-    elects_rival,
-    is_no_jump,
-    may_have_jumped,
-)
 from tomoskin.sensing.fit.problem import Problem
 from tomoskin.sensing.fit.selection import ForwardSelection, SpotDetections, judged
 from tomoskin.sensing.fit.spot_fit import Fit
@@ -68,14 +58,14 @@ def challenged(
         odds = rival.odds + gain - policy.against(found.fit, fit)
     else:
         proposed, gain = _proposed(selection, found.fit)
-        if proposed is None or not begins_rival(gain):
+        if proposed is None or not decisions.begins_rival(gain):
             return found, None
         fit, odds = proposed, gain - policy.against(found.fit, proposed) - policy.pace.rare
-    if drops_rival(odds):
+    if decisions.drops_rival(odds):
         return found, None
     fit = replace(fit, known=newcomers(len(fit.spots)))  # of what was found
     detected = judged(selection, fit)
-    if elects_rival(policy, found.fit, selection.ratios(fit).min(), odds):
+    if decisions.elects_rival(policy, found.fit, selection.ratios(fit).min(), odds):
         return detected, None
     return found, Rival(detected, odds)
 
@@ -111,7 +101,7 @@ def _beside_expected(selection: ForwardSelection, found: Fit) -> Fit | None:
     """One spot beside those that are expected, where these may have left their places in vain."""
     expected = selection.problem.expected
     goes_on = len(found.spots) == len(expected.spots)
-    if not goes_on or expected.away(found.spots, found.known) < ELSEWHERE:
+    if not goes_on or expected.away(found.spots, found.known) < decisions.ELSEWHERE:
         return None
     known = tuple(range(len(expected.spots)))
     return selection.proposed(
@@ -219,7 +209,7 @@ class CommonModeJump:
         What it has jumped by, in deviations of a jump.
     """
 
-    odds: float = -SUDDEN
+    odds: float = -decisions.SUDDEN
     proven: int = 0
     rest: float = 0.0
     jumped: bool = False
@@ -229,7 +219,7 @@ class CommonModeJump:
         self,
         usual: Problem,
         jumps: Jumps,
-        policy: DetectionPolicy,
+        policy: decisions.DetectionPolicy,
         explain: Callable[[Problem], Explained],
     ) -> tuple[Explained, CommonModeJump]:
         """What explains a frame, ``usual`` or with ``jumps``."""
@@ -246,21 +236,21 @@ class CommonModeJump:
             return explained, CommonModeJump(proven=count, rest=rest) if count else _NONE
         other = explain(jumps.free(usual))
         beside, size = jumps.along(other[0].fit.residual)
-        if is_no_jump(policy, beside, other[0].fit):
+        if decisions.is_no_jump(policy, beside, other[0].fit):
             return explained, CommonModeJump(proven=count, rest=rest)
         gain = usual.gain(other[0].fit, fit)
-        odds = self.odds + float(np.clip(gain, -2 * SURE, 2 * SURE))
+        odds = self.odds + float(np.clip(gain, -2 * decisions.SURE, 2 * decisions.SURE))
         if odds > 0:
-            proven = count if odds > SURE else min(self.proven, count)
+            proven = count if odds > decisions.SURE else min(self.proven, count)
             return explained, CommonModeJump(odds, proven, rest)
-        return other, CommonModeJump(odds, jumped=odds < -SURE, size=size)
+        return other, CommonModeJump(odds, jumped=odds < -decisions.SURE, size=size)
 
     def _is_clear(
-        self, usual: Problem, fit: Fit, rest: float, jumps: Jumps, policy: DetectionPolicy
+        self, usual: Problem, fit: Fit, rest: float, jumps: Jumps, policy: decisions.DetectionPolicy
     ) -> bool:
         """Whether no jump explains the frame as the touches of a ``fit`` do, which leave ``rest``
         deviations along it: as much as before, and they stand out whatever the jump."""
-        if may_have_jumped(policy, abs(rest - self.rest), fit):
+        if decisions.may_have_jumped(policy, abs(rest - self.rest), fit):
             return False
         if len(fit.spots) <= self.proven:
             return True
@@ -268,10 +258,12 @@ class CommonModeJump:
         again = free.refined(fit.spots, fit.deficit, _STEPS, fit.known)
         return bool(free.solver.standing(free.left, again).min() > policy.least**2)
 
-    def _after_jump(self, jumps: Jumps, fit: Fit, policy: DetectionPolicy) -> CommonModeJump:
+    def _after_jump(
+        self, jumps: Jumps, fit: Fit, policy: decisions.DetectionPolicy
+    ) -> CommonModeJump:
         """After a further frame: over where the common mode is as it was, and nothing touches."""
         rest, size = jumps.along(fit.residual)
-        if is_no_jump(policy, rest) and not len(fit.spots):
+        if decisions.is_no_jump(policy, rest) and not len(fit.spots):
             return _NONE
         return replace(self, size=max(self.size, size, key=abs))
 

@@ -241,9 +241,11 @@ class Spots:
     def footprints(self, points: FloatArray, radius: float) -> Footprints:
         """Of spots at ``points`` (n, 2) m, of ``radius`` m."""
         reach = REACH * radius
-        near = cKDTree(self.mesh.centroids).query_ball_point(points, reach + self._margin.max())
-        starts = np.cumsum([0, *(len(own) for own in near)])
-        cells = np.array([cell for own in near for cell in sorted(own)], dtype=np.int64)
+        near = cKDTree(self.mesh.centroids).query_ball_point(
+            points, reach + self._margin.max(), return_sorted=True
+        )
+        starts = np.cumsum([0, *map(len, near)])
+        cells = np.concatenate([np.zeros(0), *near]).astype(np.int64)
         offset = self._points[cells] - np.repeat(points, np.diff(starts), axis=0)[:, None]
         square = np.einsum("cqd,cqd->cq", offset, offset) / reach**2
         height, fall, way = _shapes(square)

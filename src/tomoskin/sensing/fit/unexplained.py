@@ -6,18 +6,8 @@ import numpy as np
 
 from tomoskin.core import FloatArray
 from tomoskin.model.pattern import Pattern
+from tomoskin.sensing.fit import policy as decisions
 from tomoskin.sensing.fit.excess import Channels, Excess, Gauge
-from tomoskin.sensing.fit.policy import (
-    DetectionPolicy,
-    is_like_touch,
-    leaves_much,
-    lifted,
-    looks_again,
-    may_be_found,
-    may_be_lifted,
-    may_be_noise,
-    stands_as_rise,
-)
 from tomoskin.sensing.fit.problem import Matched, Problem, Solver
 from tomoskin.sensing.fit.spot import CONTENT
 from tomoskin.sensing.fit.spot_fit import Fit
@@ -46,7 +36,7 @@ class FrameWatch:
         Whether the newest frames show a change of the sign that touches do not have.
     """
 
-    def __init__(self, pattern: Pattern, policy: DetectionPolicy) -> None:
+    def __init__(self, pattern: Pattern, policy: decisions.DetectionPolicy) -> None:
         self.channels = Channels.of(pattern)
         self.excess = Excess.none(self.channels)
         self.like_touch = self.rises = False
@@ -80,11 +70,13 @@ class FrameWatch:
         policy = self._policy
         if policy.sign == "both" or self._lifted is not None:
             return "both"
-        if len(self._before) or not may_be_lifted(policy, problem.square, len(problem.seen.full)):
+        if len(self._before) or not decisions.may_be_lifted(
+            policy, problem.square, len(problem.seen.full)
+        ):
             return policy.sign
         ratio, content = matched.ratios(problem.solver, problem.nothing(), "both")
         best = int(ratio.argmax())
-        return "both" if lifted(policy, ratio[best], content[best]) else policy.sign
+        return "both" if decisions.lifted(policy, ratio[best], content[best]) else policy.sign
 
     def puzzled(self, problem: Problem, fit: Fit) -> bool:
         """Whether touches leave so much of a frame unexplained that some of it may be of the sign
@@ -97,22 +89,22 @@ class FrameWatch:
             return False
         if len(fit.spots) > len(self._before) + 1:
             return True
-        if not leaves_much(self._policy, fit):
+        if not decisions.leaves_much(self._policy, fit):
             return False
         self._astray = True
         if not self._in_vain and problem.reach:  # as a rule it is a touch that began in the scan
             return False
-        return looks_again(self._in_vain)
+        return decisions.looks_again(self._in_vain)
 
     def unexplained(self, solver: Solver, fit: Fit, matched: Matched) -> float:
         """Variance of what is left of a frame before which there was no touch for long.
 
         1 where it is not beyond chance, or where further touches may still be found in it.
         """
-        if not may_be_noise(fit, self._age):
+        if not decisions.may_be_noise(fit, self._age):
             return 1.0
         ratio, _ = matched.ratios(solver, fit, self._policy.sign)
-        goes_on = len(fit.spots) > len(self._before) and may_be_found(fit, ratio.max())
+        goes_on = len(fit.spots) > len(self._before) and decisions.may_be_found(fit, ratio.max())
         return 1.0 if goes_on else fit.misfit / fit.degrees
 
     def end(self, solver: Solver, fit: Fit, matched: Matched, times: float) -> None:
@@ -125,11 +117,11 @@ class FrameWatch:
             spots = fit.spots[wrong]
             self._lifted = spots[np.abs(spots[:, CONTENT]).argmax(), :2]
         self._raised = 0 if self._lifted is None else self._raised + 1
-        self.rises = stands_as_rise(self._raised)
+        self.rises = decisions.stands_as_rise(self._raised)
         self.like_touch = bool(len(fit.spots))
         if fit.beyond > 0 and not self.like_touch:
             ratio, _ = matched.ratios(solver, fit, "both")
-            self.like_touch = is_like_touch(self._policy, fit, ratio.max())
+            self.like_touch = decisions.is_like_touch(self._policy, fit, ratio.max())
 
     @property
     def problem(self) -> str | None:

@@ -19,7 +19,6 @@ from tomoskin.sensing.signal.difference import (
     in_phase as in_phase,
 )
 from tomoskin.sensing.signal.evidence import Reciprocity as Reciprocity
-from tomoskin.sensing.signal.headroom import Headroom as Headroom
 from tomoskin.sensing.signal.health import (
     ElectrodeHealth as ElectrodeHealth,
     Health as Health,
@@ -27,5 +26,9 @@ from tomoskin.sensing.signal.health import (
 )
 from tomoskin.sensing.signal.load_ring import LoadRing as LoadRing
 from tomoskin.sensing.signal.monitor import Monitor as Monitor
-from tomoskin.sensing.signal.readout import FIGURES as FIGURES, Readout as Readout
+from tomoskin.sensing.signal.readout import (
+    FIGURES as FIGURES,
+    Headroom as Headroom,
+    Readout as Readout,
+)
 from tomoskin.sensing.signal.recording import Recording as Recording, frame_times as frame_times

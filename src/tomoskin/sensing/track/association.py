@@ -10,16 +10,7 @@ from typing import NamedTuple, Self
 from scipy.optimize import linear_sum_assignment
 
 from tomoskin.core import Detection
-from tomoskin.sensing.track.motion import (
-    TrackObservation,
-    TrackSettings,
-    TrackState,
-    begin,
-    distance,
-    observe,
-    predict,
-    update,
-)
+from tomoskin.sensing.track import motion
 from tomoskin.sensing.track.policy import APART, EXCHANGED, GATE, JUMP, STRENGTH, confirmed, missed
 from tomoskin.sensing.track.position import ELSEWHERE, NOISE, TouchStrength, log_content
 from tomoskin.sensing.track.trace import Alone, Trace, TrackClock, sign_of
@@ -38,7 +29,7 @@ class ObservedDetection(NamedTuple):
     """A detection as it is compared: ``content`` is a logarithm."""
 
     detection: Detection
-    position: TrackObservation
+    position: motion.TrackObservation
     sign: float
     content: float
 
@@ -62,15 +53,15 @@ class FrameOfTouches:
     observed: Sequence[ObservedDetection]
     strongest: float
     clock: TrackClock
-    settings: TrackSettings
+    settings: motion.TrackSettings
 
     @classmethod
     def of(
-        cls, detections: Sequence[Detection], clock: TrackClock, settings: TrackSettings
+        cls, detections: Sequence[Detection], clock: TrackClock, settings: motion.TrackSettings
     ) -> Self:
         """The frame of detections in any order."""
         observed = [
-            ObservedDetection(d, observe(d, settings), sign_of(d), log_content(d))
+            ObservedDetection(d, motion.observe(d, settings), sign_of(d), log_content(d))
             for d in detections
         ]
         strongest = max([d.snr for d in detections if not math.isnan(d.snr)], default=0.0)
@@ -97,7 +88,7 @@ def associate(traces: Sequence[Trace], frame: FrameOfTouches) -> Association:
     settings, observed = frame.settings, frame.observed
     moving = 0.0 if settings.still else min(frame.clock.passed, _PAUSE)
     for trace in traces:
-        trace.ahead = predict(trace.state, moving, settings)
+        trace.ahead = motion.predict(trace.state, moving, settings)
     if not traces or not observed:
         return Association({}, frozenset(), ())
     cost = [_costs(trace, observed) for trace in traces]
@@ -134,7 +125,9 @@ def follow(traces: Sequence[Trace], association: Association, frame: FrameOfTouc
         if i in association.jumped:  # its region has changed: it has not moved
             trace.change(clock.now)
         anew = settings.still or i in association.jumped
-        trace.state = begin(position, settings) if anew else update(trace.ahead, position)
+        trace.state = (
+            motion.begin(position, settings) if anew else motion.update(trace.ahead, position)
+        )
         strongest = frame.strongest if reported > trace.reported else 0.0
         trace.odds = confirmed(trace.odds, detection, settings.snr, strongest, clock.passed)
 
@@ -147,7 +140,7 @@ def _costs(trace: Trace, observed: Sequence[ObservedDetection]) -> list[float]:
     there = math.log1p(math.exp(-trace.odds))
     costs = []
     for _, position, sign, content in observed:
-        far, area = distance(state, position)
+        far, area = motion.distance(state, position)
         if far > GATE or sign != trace.sign:
             costs.append(_LIMIT)
             continue
@@ -172,7 +165,7 @@ def _jumps(
         nearest = math.inf
         if index not in taken and sign == own.sign:
             away = (
-                distance(middle, position)[0] + _unlike(both, min(content, both.mean))
+                motion.distance(middle, position)[0] + _unlike(both, min(content, both.mean))
                 for middle, both in others
             )
             nearest = min(away, default=math.inf)
@@ -187,7 +180,7 @@ def _unlike(strength: TouchStrength, content: float) -> float:
     return (content - strength.mean) ** 2 / (strength.variance + NOISE**2 + ELSEWHERE**2)
 
 
-def _between(one: Trace, other: Trace) -> TrackState:
+def _between(one: Trace, other: Trace) -> motion.TrackState:
     """Where the middle of their contents is; its velocity is not needed."""
     share = 1 / (1 + math.exp(other.strength.mean - one.strength.mean))
     rest = 1 - share

@@ -6,26 +6,19 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from tomoskin.core import Detection, Touch
-from tomoskin.sensing.track import policy
+from tomoskin.sensing.track import merging, policy
 from tomoskin.sensing.track.association import FrameOfTouches, ObservedDetection, associate, follow
 from tomoskin.sensing.track.identity import IdentityLedger
-from tomoskin.sensing.track.merging import (
-    divide,
-    merge,
-    met_by,
-    origin_of,
-    sibling_of,
-    weigh_meetings,
-)
 from tomoskin.sensing.track.motion import SlideCorrection, TrackSettings, begin
-from tomoskin.sensing.track.residual import ResidualResponses, is_residual
 from tomoskin.sensing.track.trace import (
     Alone,
     Happening,
     MergedFinger,
+    ResidualResponses,
     TouchEvent,
     Trace,
     TrackClock,
+    is_residual,
 )
 
 
@@ -103,7 +96,7 @@ class Tracker:
         fresh = len(found.pairs) < len(frame.observed)
         beside = {m.key: t.alone(now) for t in traces if fresh and t.reported for m in t.members}
         follow(traces, found, frame)
-        weigh_meetings(traces)
+        merging.weigh_meetings(traces)
         for index, observed in enumerate(frame.observed):
             detection = observed.detection
             if index in found.pairs or not policy.may_begin(detection, self.settings.snr):
@@ -132,7 +125,7 @@ class Tracker:
         clock = self._clock
         trace = Trace(detection, state, clock.now, clock.host, odds, [MergedFinger(self._keys)])
         trace.beside = beside
-        sibling = sibling_of(trace, self.traces)
+        sibling = merging.sibling_of(trace, self.traces)
         if sibling is not None:  # its strength has not faded: some of it was the newcomer's
             sibling.change(clock.now)
         self.traces.append(trace)
@@ -161,7 +154,7 @@ class Tracker:
         if self.residuals.explain(trace.detection, self._clock.now, self.traces):
             self.traces.remove(trace)
             return
-        origin = origin_of(trace, self.traces)
+        origin = merging.origin_of(trace, self.traces)
         if origin is None:
             self._report_onset(trace)
         elif origin.missing is not None:  # its region is gone, and this is one of those it was
@@ -177,7 +170,7 @@ class Tracker:
 
     def _split(self, carrier: Trace, branch: Trace) -> None:
         """Divide the fingers of ``carrier``."""
-        for one, other, odds in divide(carrier, branch, self._clock.now):
+        for one, other, odds in merging.divide(carrier, branch, self._clock.now):
             self.ledger.exchange(one, other, odds)
         branch.reported = True
         for trace in (carrier, branch):
@@ -187,11 +180,11 @@ class Tracker:
 
     def _lose(self, trace: Trace) -> None:
         """Of one that is missing: it has met another, or has been lifted, or is waited for."""
-        odds, carrier = met_by(trace, self.traces)
+        odds, carrier = merging.met_by(trace, self.traces)
         over = self.settings.still or policy.is_deleted(trace.odds)
         if carrier is not None and policy.has_met(odds, deleted=over):
             self.traces.remove(trace)
-            merge(carrier, trace, self._clock.now)
+            merging.merge(carrier, trace, self._clock.now)
             self._report("merge", carrier)
         elif over:
             self._end(trace)

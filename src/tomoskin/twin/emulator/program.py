@@ -197,5 +197,9 @@ def make_firmware(needed: Sequence[str], packages: str, *arguments: str) -> None
     with build_alone():
         made = run_tool(["make", "--silent", "-C", FOLDER, *arguments], _LONGEST)
     if made.returncode:
-        lines = [line for line in made.stderr.splitlines() if "error" in line] or ["make failed"]
-        raise SourceError(f"the build failed: {lines[0]}", where="firmware", hint=hint)
+        lines = [line for line in made.stderr.splitlines() if "error" in line or "***" in line]
+        raise SourceError(
+            f"the build failed: {lines[0] if lines else made.stderr}",
+            where="firmware",
+            hint=f"make -C firmware {' '.join(arguments)} says all",
+        )
