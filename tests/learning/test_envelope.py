@@ -98,9 +98,7 @@ def test_a_locator_that_knows_its_pattern_uses_it() -> None:
         ([1, 0], (-1, 1), "with x and y exchanged and y of the other sign:"),
     ],
 )
-def test_labels_on_other_axes_are_said(
-    axes: list[int], signs: tuple[int, int], words: str
-) -> None:
+def test_labels_on_other_axes_are_said(axes: list[int], signs: tuple[int, int], words: str) -> None:
     skin = Skin.load("textile-disc-8")
     locator = Locator.fit(*_on(skin, axes, signs), skin=skin)
     assert words in label_doubts(locator, skin)

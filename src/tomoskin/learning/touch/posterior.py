@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 from typing import Self
 
@@ -210,6 +211,15 @@ class Estimates:
         Such frames are of a skin that has changed, of another skin, or of no single touch.
         """
         return np.asarray(np.maximum(strangeness - self.strange, 0.0) / _DOUBTS)
+
+    @cached_property
+    def least_known(self) -> FloatArray:
+        """(2,) place of the grid at which a press would change the maps most.
+
+        Its answers have the largest prior variance over the noise: the expected information
+        ½ Σ log(1 + signal / noise) (MacKay 1992).
+        """
+        return np.asarray(self.grid[int(self.likelihood.volume.argmax())])
 
 
 def _folds(positions: FloatArray) -> list[BoolArray]:
