@@ -199,8 +199,7 @@ def _untouched(name: str) -> Iterator[dict[str, Any]]:
         progress(f"{name}, {case}")
         pipeline = Pipeline(prepared, reference_frames=NEEDED)
         board = NoisyBoard(prepared, CASES[case], SEEDS[0])
-        drives, told = prepared.scan.sample_drive, 0
-        before = False
+        drives, told, before = prepared.scan.sample_drive, 0, False
         for frame in board.frames(NEEDED + UNTOUCHED):
             for drive in range(len(prepared.scan.drives)):
                 head = frame.sequence, frame.ticks, frame.host_time, 1, 0, 0, 0, drive, drive

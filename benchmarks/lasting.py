@@ -20,7 +20,7 @@ SEED = 11
 """Nothing here was chosen on it."""
 
 CASES = (("textile-disc-8", "image"), ("textile-disc-8", "fit"), ("textile-disc-16", "fit"))
-FORCES = (3.0, 8.0)
+FORCES, RADIUS, SPREAD = (3.0, 8.0), 0.012, 0.05
 HOUR, LEAD, AFTER = 3600.0, 30.0, 60.0
 """Seconds held, before and after."""
 
@@ -29,8 +29,6 @@ SETTLING = "40 ms"
 
 WARMING = 5.0
 """K by which the sheet warms up in the hour, beside its own wandering: 0.38 % of all a kelvin."""
-
-RADIUS, SPREAD = 0.012, 0.05
 
 
 def run() -> Iterator[Report]:

@@ -20,14 +20,13 @@ from tomoskin.imaging import (
     figures,
     noise_figure,
 )
-from tomoskin.imaging.choice.alpha_choice import crossing
+from tomoskin.imaging.choice import where_it_falls
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.skin import Skin
 
 SKINS = ("textile-disc-8", "textile-disc-16", "textile-square-16", "tank-16")
 FIGURES = (1.0, 1.5)  # below 1.2 no NOSER of the tank has one
 CELLS, TRAINED_ON, TESTED_ON = 900, 3600, 6000
-WHY = {"rule": "noise-figure", "reason": "as large as GREIT's", "label": "noise figure"}
 
 
 def run() -> Iterator[Report]:
@@ -75,7 +74,7 @@ def _pair(name: str, figure: float) -> list[dict[str, Any]]:
     rows = [_row(name, "greit", trained, taken)]
     try:
         level = trained.noise_figure
-        chosen = crossing(spectrum, reached, level, rising=False, hints=("", ""), **WHY)
+        chosen = where_it_falls(spectrum.alphas[::8], reached, level, "")
     except ModelError:
         return [*rows, {"skin": name, "operator": "noser: no alpha"}]
     noser = figures(spectrum.operator(chosen.alpha), targets)

@@ -18,8 +18,8 @@ from report import Report, recordings, table
 from tomoskin import Skin
 from tomoskin.core import FloatArray
 from tomoskin.files.imports import read_recording
-from tomoskin.files.imports.open_eit import rows_of
 from tomoskin.files.imports.tables import touches_drive, voltages_of
+from tomoskin.files.imports.text_logs import rows_of
 from tomoskin.model.mesh import Mesh
 from tomoskin.pipeline import prepare, reconstruct
 from tomoskin.sensing.signal import Recording

@@ -19,8 +19,7 @@ from tomoskin.twin import Press, SteppedSkin, TwinSettings
 SEEDS = (41, 42)
 """Nothing was chosen on them; 31 to 33 are there to choose on."""
 
-PRESSES = 200
-FORCES, RADII = (3.0, 9.0), (6e-3, 10e-3)
+PRESSES, FORCES, RADII = 200, (3.0, 9.0), (6e-3, 10e-3)
 HELD, PAUSE, RAMP = 2.0, 2.0, 0.1
 SETTLED, GONE = 0.3, 1.2
 """Seconds from the full force on after which a touch must stand, and from the release on after

@@ -18,7 +18,7 @@ import pytest
 
 from conftest import missing
 from tomoskin import __version__
-from tomoskin.twin.emulator.uf2 import check_boot
+from twin.emulator.pico import check_boot
 
 pytestmark = pytest.mark.slow  # make release looks at the same
 
@@ -83,7 +83,7 @@ def test_the_firmware_of_both_boards_is_in_both(wheel: list[str], sdist: list[st
             if name.endswith(".hex"):
                 assert archive.read(name).splitlines()[-1] == b":00000001FF"  # it is whole
             else:
-                check_boot(archive.read(name), name)
+                check_boot(archive.read(name))
 
 
 def test_every_file_of_the_library_is_in_it(wheel: list[str]) -> None:

@@ -65,12 +65,9 @@ def test_with_a_recording_every_rule_chooses(
         )
     )
     assert list(found["rules"]) == list(RULES)
-    # the L-curve of so few frames may have no corner, and says so
-    for rule, row in found["rules"].items():
+    for row in found["rules"].values():
         assert row["reason"]
-        assert row["alpha"] is None or 1e-4 < row["alpha"] < 10
-        assert row["alpha"] is not None or rule == "l-curve"
-    assert "6 labelled presses" in found["rules"]["labelled"]["reason"]
+        assert 1e-4 < row["alpha"] < 10
     assert found["condition"] > 10
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert picture.stat().st_size > 20_000
@@ -82,7 +79,6 @@ def test_without_a_recording_the_noise_is_predicted(tomoskin: Command) -> None:
     lines = {line.split()[0]: line for line in text.splitlines()[2:]}
     assert list(lines) == list(RULES)
     assert float(lines["light-touch"].split()[1]) > 0.01
-    assert "no frame of a touched skin" in lines["l-curve"]
 
 
 def test_the_picture_of_rules_without_a_recording(tomoskin: Command, tmp_path: Path) -> None:
@@ -91,28 +87,24 @@ def test_the_picture_of_rules_without_a_recording(tomoskin: Command, tmp_path: P
     assert picture.stat().st_size > 10_000
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (("--rule", "l-curve"), "there is no frame of a touched skin"),
-        (("--recording", "none.npz"), "none.npz"),
-    ],
-)
-def test_refusals(tomoskin: Command, arguments: tuple[str, ...], message: str) -> None:
-    code, _, err = tomoskin("skin", "alpha", "textile-disc-8", *arguments)
+def test_a_recording_that_is_not_there(tomoskin: Command) -> None:
+    code, _, err = tomoskin("skin", "alpha", "textile-disc-8", "--recording", "none.npz")
     assert code == 1
-    assert message in err
+    assert "none.npz" in err
 
 
 def test_a_rule_that_was_probably_meant_is_named(tomoskin: Command) -> None:
-    for rule, says in (("elbow", "expected a rule among light-touch"), ("lcurve", '"l-curve"?')):
+    for rule, says in (
+        ("elbow", "expected a rule among light-touch"),
+        ("noisefigure", '"noise-figure"?'),
+    ):
         code, _, err = tomoskin("skin", "alpha", "textile-disc-8", "--rule", rule)
         assert code == 2
         assert says in " ".join(err.replace("│", " ").split())
 
 
 @pytest.mark.parametrize(
-    ("alpha", "rule"), [("0.08", "hand"), ("auto", "model-error"), ("l-curve", "l-curve")]
+    ("alpha", "rule"), [("0.08", "hand"), ("auto", "model-error"), ("noise-figure", "noise-figure")]
 )
 def test_image_says_alpha_and_what_chose_it(
     tomoskin: Command, recording: Path, alpha: str, rule: str
@@ -141,13 +133,3 @@ def test_an_alpha_that_cannot_be_meant(tomoskin: Command, recording: Path, alpha
     code, _, err = tomoskin("image", recording, f"--alpha={alpha}")
     assert code == 2
     assert "--alpha" in err
-
-
-def test_labels_that_are_missing(tomoskin: Command, recording: Path, tmp_path: Path) -> None:
-    with np.load(recording) as whole:
-        arrays = {name: whole[name] for name in ("voltages", "drive", "measure")}
-    bare = tmp_path / "bare.npz"
-    np.savez(bare, **arrays)
-    code, _, err = tomoskin("image", bare, "--alpha", "labelled")
-    assert code == 1
-    assert "no frame has a label that says where" in err

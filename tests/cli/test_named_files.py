@@ -24,7 +24,7 @@ from tomoskin.cli.image import WRITERS as IMAGE_WRITERS
 from tomoskin.cli.named_files import RECORDING, ForceFlag, Otherwise, Reads, Writes
 from tomoskin.cli.session import EXPORTS
 from tomoskin.core import RECORDING as SESSION_ENDINGS, OutputError
-from tomoskin.core.outputs import MAGIC
+from tomoskin.core.user_files import MAGIC
 from tomoskin.files.exports import WRITERS as EXPORT_WRITERS
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.skin import Skin

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-import tomoskin.core.inputs
+import tomoskin.core.user_files
 from tomoskin.core import DataError
 from tomoskin.core.archive import load_arrays
 from tomoskin.files.imports import read_recording
@@ -150,10 +150,10 @@ def test_a_compression_of_the_future(tmp_path: Path) -> None:
 
 
 def test_a_bomb_is_refused_unopened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(tomoskin.core.inputs, "machine_memory", lambda: 3600)
+    monkeypatch.setattr(tomoskin.core.user_files, "machine_memory", lambda: 3600)
     message = refused(tmp_path / "x.npz", whole())  # 80 numbers, and 80 that are bytes in the file
     assert "takes 0.0 GiB, more than a quarter of this machine's 0.0 GiB" in message
-    monkeypatch.setattr(tomoskin.core.inputs, "machine_memory", lambda: 5120)
+    monkeypatch.setattr(tomoskin.core.user_files, "machine_memory", lambda: 5120)
     assert load_arrays(tmp_path / "x.npz")["drive"].shape == (40, 2)
 
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from tomoskin.core import RECORDING, Output, OutputError, check_outputs
-from tomoskin.core.outputs import MAGIC, is_same_file
+from tomoskin.core.user_files import MAGIC, is_same_file
 
 NAMES = st.text("abAB.", min_size=1, max_size=4).filter(lambda name: name.strip("."))
 

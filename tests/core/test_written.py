@@ -15,7 +15,8 @@ import pytest
 from files.session.runs import SKIN, write_all
 from tomoskin import core
 from tomoskin.core import DataError, OutputError, write_text, written
-from tomoskin.files import exports
+from tomoskin.files import exports, imports
+from tomoskin.files.exports import matlab_file, vtu
 from tomoskin.files.session import SessionReader
 from tomoskin.model.pattern import Pattern
 from tomoskin.run.labelled_frames import write_whole
@@ -127,16 +128,16 @@ WRITERS: dict[str, Callable[..., None]] = {
     "x.toml": writes(core.write_text, "text"),
     "x.npz": writes(core.save_arrays, {"a": np.ones(2)}),
     "whole.npz": writes(write_whole, {"a": np.ones(2)}),
-    "interchange.npz": writes(exports.write_interchange, recording),
+    "interchange.npz": writes(imports.write_interchange, recording),
     "touches.csv": writes(exports.write_touches, ()),
     "merit.csv": writes(exports.write_merit_table, {}),
     "curves.png": writes(exports.write_choices, "none", ()),
     "x.vtu": writes(exports.write_vtu, SKIN.mesh, {}),
-    "x.pvd": writes(exports.write_series, SKIN.mesh, ()),
-    "x.mat": writes(exports.write_matlab, recording, 1.0, 8),
+    "x.pvd": writes(vtu.write_series, SKIN.mesh, ()),
+    "x.mat": writes(matlab_file.write_matlab, recording, 1.0, 8),
     "x.gif": lambda path, _, **options: exports.FILMS[".gif"](path, frames(), 10.0, **options),
     "x.csv": of_session(exports.WRITERS[".csv"]),
-    "x.parquet": of_session(exports.write_parquet),
+    "x.parquet": of_session(exports.WRITERS[".parquet"]),
     "x.h5": of_session(exports.WRITERS[".h5"]),
 }
 
@@ -165,17 +166,17 @@ def test_a_series_asks_for_its_parts_too(tmp_path: Path) -> None:
     part.write_text("mine")
     (tmp_path / "xy_000001.vtu").write_text("another's")
     with pytest.raises(OutputError, match=r"x_000002\.vtu: exists already"):
-        exports.write_series(tmp_path / "x.pvd", mesh, iter(moments))
+        vtu.write_series(tmp_path / "x.pvd", mesh, iter(moments))
 
     def broken() -> Iterator[tuple[float, np.ndarray]]:
         yield from moments
         raise DataError("half-way")
 
     with pytest.raises(DataError, match="half-way"):
-        exports.write_series(tmp_path / "x.pvd", mesh, broken(), overwrite=True)
+        vtu.write_series(tmp_path / "x.pvd", mesh, broken(), overwrite=True)
     assert part.read_text() == "mine"
     assert len(list(tmp_path.iterdir())) == 2
-    assert exports.write_series(tmp_path / "x.pvd", mesh, moments, overwrite=True) == 2
+    assert vtu.write_series(tmp_path / "x.pvd", mesh, moments, overwrite=True) == 2
     assert part.read_text().startswith("<?xml")
     assert len(list(tmp_path.iterdir())) == 4
 

@@ -12,7 +12,7 @@ from shapes import box, disc, patched
 from tomoskin.core import DataError, FloatArray, ModelError
 from tomoskin.imaging import AbsoluteImaging, Observation, homogeneous
 from tomoskin.imaging.iterative.newton import Descent, Goal, descend, minimiser
-from tomoskin.imaging.iterative.unknowns import Cells, Joint, Unknowns, others
+from tomoskin.imaging.iterative.unknowns import Joint, LinearMap, Unknowns, others
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.pattern import Pattern
@@ -176,7 +176,9 @@ def test_jacobian_is_the_derivative_by_every_unknown(contacts: Any) -> None:
     mesh = coarse(300)
     model = ForwardModel(mesh, pattern(), impedance())
     rows = np.random.default_rng(0).standard_normal((7, pattern().n_meas))
-    unknowns = Unknowns(model, Cells(len(mesh.cells)), 2.0, contacts, rows)
+    unknowns = Unknowns(
+        model, LinearMap.of_cells(len(mesh.cells), len(mesh.cells)), 2.0, contacts, rows
+    )
     rng = np.random.default_rng(1)
     x, step = 0.3 * rng.standard_normal((2, unknowns.size))
     h = 1e-5

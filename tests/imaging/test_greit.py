@@ -13,7 +13,7 @@ from golden import mismatch
 from shapes import box, disc, patched
 from tomoskin.core import DataError, FloatArray, ModelError
 from tomoskin.imaging import Greit, Merit, OneStep, Targets, along, figures
-from tomoskin.imaging.trained.targets import Balls
+from tomoskin.imaging.trained.merit import Balls
 from tomoskin.imaging.trained.trainer import DESIRED_RADIUS
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import ElectrodeArc, Mesh, Rectangle, triangulate

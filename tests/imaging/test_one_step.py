@@ -44,7 +44,7 @@ def by_the_book(jacobian: FloatArray, w: FloatArray, q: FloatArray, alpha: float
 @pytest.mark.parametrize("weighted", [False, True])
 def test_matrix_is_that_of_the_formula(prior: str, kind: str, weighted: bool) -> None:
     state = model().at(sigma())
-    v, jacobian = state.solution.voltages, state.jacobian
+    v, jacobian = state.voltages, state.jacobian
     w = np.ones(len(v))
     if kind == "normalised":
         jacobian, w = jacobian / np.abs(v)[:, None], v**2

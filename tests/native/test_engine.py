@@ -82,17 +82,17 @@ def test_the_engines_agree(
     sigma = np.random.default_rng(1).uniform(0.3, 3.0, len(mesh.cells))
     states = [model.at(sigma * (1.0 + 0.4j) if is_complex else sigma) for model in both]
     for name in ("electrode_potentials", "potentials"):
-        assert_same(*(getattr(state.solution, name) for state in states))
-    voltages = (state.solution.voltages for state in states)
-    assert_same(*voltages, scale=states[1].solution.electrode_potentials)
-    assert_same(*(state.solution.basis for state in states))
+        assert_same(*(getattr(state, name) for state in states))
+    voltages = (state.voltages for state in states)
+    assert_same(*voltages, scale=states[1].electrode_potentials)
+    assert_same(*(state.basis for state in states))
     for name in ("gradient", "jacobian"):
         assert_same(*(getattr(state, name) for state in states))
     # the drop of potential across a contact is a difference of nearly equal numbers
     native, scipy = (state.contact_jacobian for state in states)
     np.testing.assert_allclose(native, scipy, rtol=0, atol=1e-10 * np.abs(scipy).max())
     for state in states:
-        assert state.solution.residual < 1e-12
+        assert state.residual < 1e-12
 
 
 def test_the_engines_agree_on_tensors_and_local_updates(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,10 +11,10 @@ import pytest
 from golden import mismatch
 from run.board import AS_TAKEN
 from tomoskin.core import DataError
-from tomoskin.imaging import Evidence, Spectrum, choose
+from tomoskin.imaging import Spectrum, choose
 from tomoskin.model.pattern import Pattern
 from tomoskin.model.skin import Skin
-from tomoskin.pipeline import Prepared, prepare, reconstruct, recorded_frames
+from tomoskin.pipeline import Prepared, prepare, reconstruct
 from tomoskin.sensing.signal import Recording, Reference
 
 SKINS = {
@@ -101,20 +101,6 @@ def test_rows_that_a_frame_lacks_do_not_count_in_it() -> None:
         assert mismatch(image, prepared.operator.without(rows)(data).values) < 1e-4
 
 
-def test_rules_see_only_frames_that_are_whole() -> None:
-    prepared = prepare(SKINS["plain"])
-    broken = touched(prepared, 6)
-    broken[[1, 4], [7, 9]] = np.nan
-    whole = np.delete(broken, [1, 4], axis=0)
-    found, expected = (
-        recorded_frames(prepared, recording(prepared.pattern, v, is_change=True), None).evidence()
-        for v in (broken, whole)
-    )
-    assert found.frames is not None
-    assert len(found.frames) == 4
-    assert np.array_equal(found.frames, expected.frames)
-
-
 @pytest.mark.parametrize("rule", [None, "model-error", "noise-figure"])
 def test_alpha_is_chosen_without_the_dead_rows(rule: str | None) -> None:
     """As on a skin whose pattern never had them."""
@@ -125,16 +111,10 @@ def test_alpha_is_chosen_without_the_dead_rows(rule: str | None) -> None:
     values[:, :9] = np.nan
     found = reconstruct(prepared, recording(prepared.pattern, values), idle, rule=rule)
     left = prepared.problem.without(np.arange(9))
-    evidence = Evidence(
-        noise=Reference.of(idle[:, 9:]).noise, frames=(values - idle.mean(0))[:, 9:]
-    )
-    expected = choose(Spectrum.of(left), rule or "light-touch", evidence)
+    noise = Reference.of(idle[:, 9:]).noise
+    expected = choose(Spectrum.of(left), rule or "light-touch", noise)
     assert found.choice.alpha == pytest.approx(expected.alpha, rel=1e-9)
-    whole = choose(
-        Spectrum.of(prepared.problem),
-        "light-touch",
-        Evidence(noise=Reference.of(idle).noise),
-    )
+    whole = choose(Spectrum.of(prepared.problem), "light-touch", Reference.of(idle).noise)
     if rule is None:
         assert abs(np.log(found.choice.alpha / whole.alpha)) > 0.01
 

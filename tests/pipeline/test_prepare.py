@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tomoskin.core import DataError, Detection, ModelError, SkinError
-from tomoskin.imaging import Evidence, Greit, OneStep
+from tomoskin.imaging import Greit, OneStep
 from tomoskin.learning import FORCE, AmountModel, LabelledPresses
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Mesh
@@ -54,7 +54,7 @@ def test_a_greit_skin_is_prepared_with_the_trained_operator() -> None:
 def test_a_rule_cannot_choose_the_alpha_of_a_method_without_one() -> None:
     prepared = prepare(Skin.load("tank-16").altered({"mesh": {"cells": 600}}))
     with pytest.raises(ModelError, match=r'method "one-step".*"greit"'):
-        tuned_by_rule(prepared, "l-curve", Evidence())
+        tuned_by_rule(prepared, "noise-figure", None)
     with pytest.raises(SkinError, match=r"needs method"):
         prepared.skin.altered({"inverse": {"alpha": 0.1}})
 

@@ -10,7 +10,6 @@ import pytest
 from golden import mismatch
 from run.board import AS_TAKEN, pressed, samples_of
 from tomoskin.core import Frame, ModelError
-from tomoskin.imaging import Evidence
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Pipeline, prepare
 from tomoskin.pipeline.rest import tune, tuned, tuned_by_rule
@@ -151,7 +150,7 @@ def test_the_same_frames_give_the_same_pictures(auto, idle_samples):
 
 
 def test_by_rule(auto):
-    evidence = Evidence(noise=auto.predicted_noise())
-    assert tuned_by_rule(auto, "noise-figure", evidence).choice.rule == "noise-figure"
+    noise = auto.predicted_noise()
+    assert tuned_by_rule(auto, "noise-figure", noise).choice.rule == "noise-figure"
     with pytest.raises(ModelError, match="expected a rule among"):
-        tuned_by_rule(auto, "best", evidence)
+        tuned_by_rule(auto, "best", noise)

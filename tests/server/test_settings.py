@@ -13,7 +13,7 @@ import pytest
 from run.board import Board
 from run.test_runner import PATIENCE, Watch
 from tomoskin.core import PatternError, reach
-from tomoskin.core.outputs import MAGIC
+from tomoskin.core.user_files import MAGIC
 from tomoskin.files.session import SessionReader, replayed
 from tomoskin.model.pattern import named
 from tomoskin.pipeline import prepare

@@ -16,7 +16,8 @@ from tomoskin.core import TomoskinError, meant
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from tomoskin.imaging import AlphaChoice, Evidence, Spectrum
+    from tomoskin.core import FloatArray
+    from tomoskin.imaging import AlphaChoice, Spectrum
     from tomoskin.pipeline import Prepared
 
 Outcome = tuple[str, "AlphaChoice | TomoskinError"]
@@ -27,7 +28,7 @@ def alpha(
     skin: SkinArgument,
     recording: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Frames that the criteria use."),
+        typer.Option(metavar="FILE", help="Frames that tell the noise."),
         Reads(),
     ] = None,
     reference: ReferenceOption = None,
@@ -41,12 +42,12 @@ def alpha(
     force: ForceFlag = False,
     json: JsonFlag = False,
 ) -> None:
-    """Show what each criterion chooses for alpha; with a recording, by its noise, frames and
-    labels."""
+    """Show what each criterion chooses for alpha; with a recording, by its noise; and draw
+    the Picard plot of its frames."""
     from tomoskin.files.exports import write_choices
     from tomoskin.imaging import RULES, AlphaChoice, Spectrum, picard
     from tomoskin.model.skin import Skin
-    from tomoskin.pipeline import prepare
+    from tomoskin.pipeline import prepare, recorded_frames
 
     if rule is not None and rule not in RULES:
         raise typer.BadParameter(
@@ -55,15 +56,21 @@ def alpha(
         )
     prepared = prepare(Skin.load(skin))
     given = None if recording is None else Recorded.of(recording, skin, reference)
-    prepared, evidence = _evidence(prepared, given, frames)
+    noise: FloatArray | None = prepared.predicted_noise()
+    changes = None
+    if given is not None:
+        some = given.data.part(*frame_range(given.data, frames))
+        changes = recorded_frames(prepared, some, given.idle)
+        prepared, noise = changes.prepared, changes.noise
     spectrum = Spectrum.of(prepared.problem)
-    outcomes = [(name, _outcome(spectrum, name, evidence)) for name in ([rule] if rule else RULES)]
+    outcomes = [(name, _outcome(spectrum, name, noise)) for name in ([rule] if rule else RULES)]
     if rule and isinstance(outcomes[0][1], TomoskinError):
         raise outcomes[0][1]
     if out is not None:
         predicted = None
-        if evidence.frames is not None:
-            predicted = picard(spectrum, evidence.frames, evidence.noise)
+        if changes is not None:
+            whole = changes.differences[~changes.missing.any(axis=1)]
+            predicted = picard(spectrum, whole, noise)
         choices = [choice for _, choice in outcomes if isinstance(choice, AlphaChoice)]
         title = f"alpha of {prepared.skin.name}"
         write_choices(out, title, choices, predicted, overwrite=force)
@@ -77,28 +84,13 @@ def alpha(
     tell(document, _lines(prepared, spectrum, outcomes), json=json)
 
 
-def _evidence(
-    prepared: Prepared, given: Recorded | None, frames: str | None
-) -> tuple[Prepared, Evidence]:
-    """What the recording says, and the skin without the rows that are dead in it.
-
-    Without a recording: the noise that the read-out predicts.
-    """
-    from tomoskin.imaging import Evidence
-    from tomoskin.pipeline import recorded_frames
-
-    if given is None:
-        return prepared, Evidence(noise=prepared.predicted_noise())
-    some = given.data.part(*frame_range(given.data, frames))
-    changes = recorded_frames(prepared, some, given.idle)
-    return changes.prepared, changes.evidence()
-
-
-def _outcome(spectrum: Spectrum, rule: str, evidence: Evidence) -> AlphaChoice | TomoskinError:
+def _outcome(
+    spectrum: Spectrum, rule: str, noise: FloatArray | None
+) -> AlphaChoice | TomoskinError:
     from tomoskin.imaging import choose
 
     try:
-        return choose(spectrum, rule, evidence)
+        return choose(spectrum, rule, noise)
     except TomoskinError as error:
         return error
 

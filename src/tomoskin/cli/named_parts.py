@@ -217,7 +217,7 @@ def reconstructed(
             if session.skin.pattern().identity == prepared.pattern.identity:
                 if rule is not None:
                     known = recorded_frames(prepared, recording, idle)
-                    choice = tuned_by_rule(known.prepared, rule, known.evidence()).choice
+                    choice = tuned_by_rule(known.prepared, rule, known.noise).choice
                     prepared = with_choice(prepared, choice)
                 return reconstruct_session(
                     prepared,

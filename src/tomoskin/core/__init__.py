@@ -17,25 +17,24 @@ from tomoskin.core.errors import (
     TomoskinError as TomoskinError,
     WireError as WireError,
     meant as meant,
+    meant_or_known as meant_or_known,
 )
-from tomoskin.core.inputs import (
-    check_fits as check_fits,
-    check_is_file as check_is_file,
-    most_bytes as most_bytes,
-    open_input as open_input,
-)
-from tomoskin.core.outputs import (
+from tomoskin.core.stages import finished as finished, reach as reach, watch_stages as watch_stages
+from tomoskin.core.units import DIMENSIONS as DIMENSIONS, parse_quantity as parse_quantity
+from tomoskin.core.user_files import (
     MAGIC as MAGIC,
     RECORDING as RECORDING,
     Output as Output,
     StrPath as StrPath,
+    check_fits as check_fits,
+    check_is_file as check_is_file,
     check_outputs as check_outputs,
     disk_refusals as disk_refusals,
+    most_bytes as most_bytes,
+    open_input as open_input,
     write_text as write_text,
     written as written,
 )
-from tomoskin.core.stages import finished as finished, reach as reach, watch_stages as watch_stages
-from tomoskin.core.units import DIMENSIONS as DIMENSIONS, parse_quantity as parse_quantity
 
 if TYPE_CHECKING:
     from tomoskin.core.archive import (
@@ -46,8 +45,10 @@ if TYPE_CHECKING:
         kept as kept,
         load_arrays as load_arrays,
         numbers as numbers,
+        numeric as numeric,
         pack_arrays as pack_arrays,
         real_numbers as real_numbers,
+        refuse_first as refuse_first,
         save_arrays as save_arrays,
         unpack_arrays as unpack_arrays,
         whole_number as whole_number,

@@ -18,10 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 from platformdirs import user_cache_path
 
-from tomoskin.core.errors import EMPTY, DataError
-from tomoskin.core.inputs import check_fits, open_input
-from tomoskin.core.outputs import StrPath, written
+from tomoskin.core.errors import EMPTY, DataError, TomoskinError
 from tomoskin.core.records import FloatArray, IntArray
+from tomoskin.core.user_files import StrPath, check_fits, open_input, written
 
 _UNREADABLE = (
     ValueError,
@@ -152,11 +151,36 @@ MOST_ELECTRODES = 1024
 """More are taken for damage of a file."""
 
 
+def numeric(
+    value: Any, error: type[TomoskinError], what: str = "", where: str = "", *, real: bool = False
+) -> NDArray[Any]:
+    """``value`` as an array of numbers, or an ``error`` that says ``what`` they should be."""
+    numbers = "real numbers" if real else "numbers"
+    try:
+        array = np.asarray(value)
+    except ValueError as cause:
+        raise error("expected rows of equal length, got different lengths", where=where) from cause
+    if array.dtype.kind not in ("biuf" if real else "biufc"):
+        raise error(f"expected {numbers}{what}, got {array.dtype}", where=where)
+    return array
+
+
+def refuse_first(
+    bad: NDArray[np.bool_] | np.bool_,
+    values: NDArray[Any],
+    expected: str,
+    place: str,
+    error: type[TomoskinError],
+) -> None:
+    """Raise an ``error`` for the first of ``values`` that is ``bad``, (n,), at that ``place``."""
+    if bad.any():
+        first = int(np.argmax(bad))
+        raise error(f"expected {expected}, got {values[first].tolist()}", where=f"{place} {first}")
+
+
 def numbers(arrays: Arrays, key: str, source: str) -> NDArray[Any]:
     """Array ``key`` as float64, or complex128 where it is complex."""
-    array = arrays[key]
-    if array.dtype.kind not in "biufc":
-        raise DataError(f"expected numbers in {key}, got {array.dtype}", where=source)
+    array = numeric(arrays[key], DataError, f" in {key}", source)
     return array.astype(np.complex128 if array.dtype.kind == "c" else np.float64, copy=False)
 
 
@@ -183,12 +207,8 @@ def electrode_table(arrays: Arrays, key: str, source: str) -> IntArray:
     if table.ndim != 2 or table.shape[1] != 2:
         raise DataError(f"expected {key} of shape (n_meas, 2), got {table.shape}", where=source)
     good = (table >= 0) & (table < MOST_ELECTRODES) & (table == np.round(table))
-    if not good.all():
-        row = int(np.argmin(good.all(axis=1)))
-        raise DataError(
-            f"expected whole electrode numbers from 0 (E1), got {table[row].tolist()}",
-            where=f"{source}, {key} row {row}",
-        )
+    whole = "whole electrode numbers from 0 (E1)"
+    refuse_first(~good.all(axis=1), table, whole, f"{source}, {key} row", DataError)
     return table.astype(np.int64)
 
 

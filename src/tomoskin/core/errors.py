@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from difflib import get_close_matches
+from typing import TypeVar
 
 EMPTY = "is an empty file"
 """What is wrong with such a file, whatever it should hold."""
@@ -13,6 +14,15 @@ def meant(given: str, known: Iterable[str]) -> str:
     """A question after the one of the ``known`` words that was probably meant; "" for none."""
     close = get_close_matches(given, list(known), n=1)
     return f'; did you mean "{close[0]}"?' if close else ""
+
+
+def meant_or_known(given: str, known: Iterable[str], what: str = "known") -> str:
+    """A hint: the one of the ``known`` words that was probably meant, else all of them."""
+    words = list(known)
+    return meant(given, words).removeprefix("; ") or f"{what}: {', '.join(words)}"
+
+
+E = TypeVar("E", bound="TomoskinError")
 
 
 class TomoskinError(Exception):
@@ -39,6 +49,11 @@ class TomoskinError(Exception):
         where = f"{self.where}: " if self.where else ""
         advice = f" ({self.hint})" if self.hint else ""
         return f"{where}{self.message}{advice}"
+
+    def within(self, place: str, kind: type[E]) -> E:
+        """The same as an error of that ``kind``, of something in ``place``."""
+        where = f"{place}, {self.where}" if self.where else place
+        return kind(self.message, where=where, hint=self.hint)
 
 
 class SkinError(TomoskinError):

@@ -76,17 +76,14 @@ def _products(one: NDArray[Any], other: NDArray[Any]) -> FloatArray:
 
 
 def _check_pair(operator: Operator, problem: LinearProblem) -> None:
-    one, other = operator.model, problem.model
-    same = (
-        one.mesh.identity == other.mesh.identity
-        and one.pattern.identity == other.pattern.identity
-        and operator.difference == problem.difference
+    one, other = (
+        (part.model.mesh.identity, part.model.pattern.identity, part.difference)
+        for part in (operator, problem)
     )
-    if not same:
+    if one != other:
         raise ModelError(
             "expected operator and problem of one mesh, pattern and kind of difference, got "
-            f"{one.mesh.identity}, {one.pattern.identity}, {operator.difference} and "
-            f"{other.mesh.identity}, {other.pattern.identity}, {problem.difference}"
+            f"{', '.join(one)} and {', '.join(other)}"
         )
 
 

@@ -311,7 +311,7 @@ class Calibration(Generic[M]):
     skin_name: str = ""
 
     def write(self, path: StrPath, *, overwrite: bool = False) -> None:
-        """Write the file; raises as :func:`tomoskin.core.outputs` does."""
+        """Write the file; raises as :func:`tomoskin.core.user_files` does."""
         save_arrays(path, self._arrays(), overwrite=overwrite)
 
     def encode(self) -> bytes:

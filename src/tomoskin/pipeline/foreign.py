@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray
-from tomoskin.imaging import AlphaChoice, Evidence, Greit, Spectrum, for_recording
+from tomoskin.imaging import AlphaChoice, Greit, Spectrum, for_recording
 from tomoskin.model.pattern import Pattern
 from tomoskin.model.skin import InverseSettings
 from tomoskin.pipeline.prepare import Prepared
@@ -59,10 +59,10 @@ def tuned_by_file(prepared: Prepared, reference: Reference | None, frames: Float
     if prepared.light_touch is None:
         return prepared
     problem = prepared.problem.weighed(inverse.record("prior"), _weights(prepared, reference))
-    evidence = Evidence()
-    if reference is not None and reference.noise_is_known and frames.any():
-        evidence = Evidence(prepared.difference_noise(reference), frames)
-    choice = for_recording(Spectrum.of(problem), evidence)
+    noise = None
+    if reference is not None and reference.noise_is_known:
+        noise = prepared.difference_noise(reference)
+    choice = for_recording(Spectrum.of(problem), noise, frames)
     return with_choice(replace(prepared, problem=problem), choice)
 
 

@@ -58,7 +58,7 @@ def guess_skin(recording: Recording) -> str:
     resistance = agreement.size * _RESISTANCE
     if not _VOLTS[0] < resistance < _VOLTS[1]:
         resistance = _RESISTANCE
-    potential = float(np.abs(state.solution.electrode_potentials).max()) * resistance / _RESISTANCE
+    potential = float(np.abs(state.electrode_potentials).max()) * resistance / _RESISTANCE
     head = [f"A round sheet agrees with the untouched frame by {abs(agreement.cosine):.3f} (of 1)."]
     if abs(agreement.cosine) < DOUBTED:
         head.append(

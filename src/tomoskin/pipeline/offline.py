@@ -200,7 +200,7 @@ def reconstruct(
         _check_follows(recording, idle)
     setting = setting or (Setting() if recording.timed else ALONE)
     if rule is not None:
-        prepared = tuned_by_rule(prepared, rule, recorded.evidence())
+        prepared = tuned_by_rule(prepared, rule, recorded.noise)
     elif not recording.board_known:
         prepared = tuned_by_file(prepared, recorded.reference, recorded.differences)
     pipeline = Pipeline(

@@ -171,16 +171,12 @@ class Pipeline:
         """Take one frame whose voltages are known already: what :meth:`push` does with counts."""
         if isinstance(self._state, Following):
             return self._state.push(measured)
-        return self._collect(self._state, measured)
-
-    def _collect(self, state: Collecting, measured: Voltages) -> FrameResult:
-        given = self._given
-        rest = state.push(measured)
-        if rest is not None:
-            reach("reference")
-            self._state = Following.from_rest(given, rest, self._tracker, self._setting)
-            return self._state.first(measured)
-        return FrameResult.at_rest(measured, given.no_image, given.operator.reference)
+        given, rest = self._given, self._state.push(measured)
+        if rest is None:
+            return FrameResult.at_rest(measured, given.no_image, given.operator.reference)
+        reach("reference")
+        self._state = Following.from_rest(given, rest, self._tracker, self._setting)
+        return self._state.first(measured)
 
     def _new_tracker(self) -> Tracker:
         return Tracker(TrackSettings(self._given.skin.touch.snr, still=self._setting.alone))

@@ -9,8 +9,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import DataError, FloatArray, Image, IntArray
-from tomoskin.imaging import MOST_EXCLUDED, Evidence
+from tomoskin.core import DataError, FloatArray, IntArray
+from tomoskin.imaging import MOST_EXCLUDED
 from tomoskin.model.pattern import Pattern
 from tomoskin.pipeline.conditioning import MOST_NUISANCE
 from tomoskin.pipeline.foreign import open_electrodes
@@ -119,25 +119,12 @@ class RecordedFrames:
             dv = difference(dv, self.reference.mean, self.prepared.operator.difference)
         return np.where(self.missing, 0.0, dv)
 
-    def evidence(self) -> Evidence:
-        """What the recording tells a parameter-choice criterion; complete frames only."""
-        noise, complete = None, ~self.missing.any(axis=1)
-        labels = self.recording.labels
-        if self.reference is not None and self.reference.noise_is_known:
-            noise = self.prepared.difference_noise(self.reference)
-        return Evidence(
-            noise=noise,
-            frames=self.differences[complete],
-            places=None if labels is None else labels[self.first :][complete],
-            locate=self._located,
-        )
-
-    def _located(self, image: FloatArray) -> FloatArray:
-        """(k, 2) m, where regions of an image (n_cells,) are."""
-        prepared = self.prepared
-        shown = Image(image, prepared.operator.unit, prepared.mesh.identity)
-        centres = [(detection.x, detection.y) for detection in prepared.segmenter(shown)]
-        return np.array(centres).reshape(-1, 2)
+    @property
+    def noise(self) -> FloatArray | None:
+        """(n_meas,) deviation of difference data; None where the recording does not tell it."""
+        if self.reference is None or not self.reference.noise_is_known:
+            return None
+        return self.prepared.difference_noise(self.reference)
 
 
 def recorded_frames(prepared: Prepared, recording: Recording, idle: Idle) -> RecordedFrames:

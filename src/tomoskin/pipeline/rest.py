@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, ModelError, Voltages
-from tomoskin.imaging import AlphaChoice, Assembly, Evidence, Spectrum, choose
+from tomoskin.imaging import AlphaChoice, Spectrum, choose
 from tomoskin.pipeline.frame_result import NO_AGREEMENT, ModelAgreement
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.sensing.signal import Reference
@@ -148,13 +148,10 @@ def _tune_image(prepared: Prepared, reference: Reference) -> Steps:
         return
     yield None
     spectrum = prepared.light_touch.spectrum
-    assembly = Assembly(spectrum, choice.alpha)
     rows = max(int(_STEP / len(noise) ** 2), 1)
-    while not assembly.done:
-        assembly.advance(rows)
-        yield None
+    operator = yield from spectrum.operator_in_pieces(choice.alpha, rows)
     reason = f"{choice.reason}, measured on {reference.n_frames} idle frames"
-    yield prepared.with_alpha(replace(choice, reason=reason), spectrum, assembly.operator())
+    yield prepared.with_alpha(replace(choice, reason=reason), spectrum, operator)
 
 
 def _tune_sheet(prepared: Prepared, reference: Reference, excluded: Mask | None) -> Steps:
@@ -169,7 +166,7 @@ def _tune_sheet(prepared: Prepared, reference: Reference, excluded: Mask | None)
         yield replace(prepared, spots=fitted)
 
 
-def tuned_by_rule(prepared: Prepared, rule: str, evidence: Evidence) -> Prepared:
+def tuned_by_rule(prepared: Prepared, rule: str, noise: FloatArray | None) -> Prepared:
     """The skin prepared anew with the alpha of the named rule.
 
     Raises
@@ -177,7 +174,7 @@ def tuned_by_rule(prepared: Prepared, rule: str, evidence: Evidence) -> Prepared
     ModelError
         When the rule is not known or finds no alpha, or the method has none.
     DataError
-        When the evidence lacks what the rule needs.
+        When the rule needs the noise of difference data, and it is not known.
     """
     if prepared.skin.inverse.method != "one-step":
         raise ModelError(
@@ -186,7 +183,7 @@ def tuned_by_rule(prepared: Prepared, rule: str, evidence: Evidence) -> Prepared
             where=prepared.skin.name,
             hint="leave out the rule, or change the method in the skin's [inverse]",
         )
-    return with_choice(prepared, choose(Spectrum.of(prepared.problem), rule, evidence))
+    return with_choice(prepared, choose(Spectrum.of(prepared.problem), rule, noise))
 
 
 def with_choice(prepared: Prepared, choice: AlphaChoice) -> Prepared:

@@ -9,17 +9,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from tomoskin.core import Capacity, Frame, Mark, MarkedFrame, Worker
+from tomoskin.files import session
 from tomoskin.files.messages import epoch, raster
-from tomoskin.files.session import (
-    BoardInfo,
-    MessageLog,
-    RawRead,
-    Recorder,
-    RunMessage,
-    RunSettings,
-    SessionWriter,
-    Truth,
-)
 from tomoskin.pipeline import REFERENCE_FRAMES, FrameResult, Prepared
 
 _KEPT = 3 * REFERENCE_FRAMES
@@ -134,13 +125,13 @@ class Recordings:
     ) -> None:
         self._prepared, self._say, self._clock = prepared, say, clock
         self._numbered = numbered
-        self._current: Worker[Recorder] | None = None
-        self._awaiting: Worker[Recorder] | None = None
+        self._current: Worker[session.Recorder] | None = None
+        self._awaiting: Worker[session.Recorder] | None = None
         self._pre_roll = PreRoll()
         self._again: tuple[Marked, ...] = ()
         self._touches_before = 0
-        self._info: BoardInfo | None = None
-        self._truth = Truth(0.0, ())
+        self._info: session.BoardInfo | None = None
+        self._truth = session.Truth(0.0, ())
         self._source = ""
 
     @property
@@ -154,7 +145,7 @@ class Recordings:
         """The newest frames in which nothing touched."""
         return self._pre_roll.untouched
 
-    def begin(self, path: Path, log: MessageLog | None = None) -> Future[None]:
+    def begin(self, path: Path, log: session.MessageLog | None = None) -> Future[None]:
         """Record from the next bytes on, and end what was being recorded.
 
         ``log``: where it goes, instead of a file of its own. Done when the file has been made;
@@ -188,19 +179,19 @@ class Recordings:
         if self._current:
             self._current.put(self._settings())
 
-    def put(self, message: RunMessage) -> None:
+    def put(self, message: session.RunMessage) -> None:
         """Have it recorded, and remember what a new recording needs; events from any thread."""
         match message:
-            case RawRead() if self._awaiting is not None:
+            case session.RawRead() if self._awaiting is not None:
                 self._head()
             case MarkedFrame():
                 number = self._numbered() if message.mark & Mark.REFERENCE else 0
                 self._pre_roll.frame(message.frame, message.mark, number)
             case FrameResult():
                 self._pre_roll.result(message)
-            case BoardInfo():
+            case session.BoardInfo():
                 self._info = message
-            case Truth():
+            case session.Truth():
                 self._truth = message
         if (current := self._current) is not None:
             current.put(message)
@@ -221,7 +212,7 @@ class Recordings:
         now = self._clock()
         frames, self._touches_before, again = self._pre_roll.begin(self._numbered())
         worker.put(self._settings())
-        worker.put(Truth(now, self._truth.presses, self._truth.bends))
+        worker.put(session.Truth(now, self._truth.presses, self._truth.bends))
         for frame, mark in frames:
             worker.put(MarkedFrame(frame, mark | Mark.EARLIER))
         if self._info is not None:
@@ -230,8 +221,8 @@ class Recordings:
         self._current, self._awaiting = worker, None  # in this order: `path` is read meanwhile
         self._say("recording", f"recording to {worker.consumer.path}")
 
-    def _settings(self) -> RunSettings:
-        return RunSettings(
+    def _settings(self) -> session.RunSettings:
+        return session.RunSettings(
             self._clock(),
             {
                 "source": self._source,
@@ -242,13 +233,13 @@ class Recordings:
 
 
 def _worker(
-    path: Path, prepared: Prepared, start: float, say: Say, log: MessageLog | None
-) -> Worker[Recorder]:
-    def make() -> SessionWriter:
-        session = SessionWriter(path, prepared.skin, epoch=epoch(), start=start, log=log)
+    path: Path, prepared: Prepared, start: float, say: Say, log: session.MessageLog | None
+) -> Worker[session.Recorder]:
+    def make() -> session.SessionWriter:
+        writer = session.SessionWriter(path, prepared.skin, epoch=epoch(), start=start, log=log)
         for calibration in prepared.calibrations.values():
-            session.attach(calibration.kind.attachment, "application/zip", calibration.encode())
-        return session
+            writer.attach(calibration.kind.attachment, "application/zip", calibration.encode())
+        return writer
 
-    recorder = Recorder(path, make, raster(prepared), say)
+    recorder = session.Recorder(path, make, raster(prepared), say)
     return Worker(recorder, Capacity(MOST_WAITING, "oldest"), say)

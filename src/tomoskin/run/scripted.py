@@ -8,6 +8,7 @@ from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
+from tomoskin import twin
 from tomoskin.board.source import Configuration, Link, ScanSettings
 from tomoskin.core import DataError, Event, Frame, Mark, StrPath, VirtualClock
 from tomoskin.files.session import Advance, SessionWriter, no_report
@@ -15,22 +16,6 @@ from tomoskin.model.pattern import Scan
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import REFERENCE_FRAMES
 from tomoskin.run.twin_control import described
-from tomoskin.twin import (
-    Disturbance,
-    Line,
-    LineSettings,
-    Probe,
-    Script,
-    TwinSettings,
-    TwinTransport,
-    bent,
-    bent_truth,
-    check_script,
-    disturbed,
-    make_twin,
-    pressed,
-    reboots,
-)
 
 _EMPTY_READ = 0.5
 
@@ -45,7 +30,7 @@ class Simulated:
 
 
 def simulate(
-    script: Script,
+    script: twin.Script,
     skin: Skin,
     out: StrPath,
     *,
@@ -75,9 +60,9 @@ def simulate(
         When the board cannot be brought to scan any more, for all the script's faults.
     """
     out = Path(out)
-    check_script(script, skin)
+    twin.check_script(script, skin)
     chosen = script.seed if seed is None else seed
-    settings = TwinSettings.preset(script.preset or skin.twin.preset, chosen)
+    settings = twin.TwinSettings.preset(script.preset or skin.twin.preset, chosen)
     with threadpool_limits(1), SessionWriter(out, skin) as writer:
         return _Run(script, skin, settings, writer).to_the_end(advance)
 
@@ -85,31 +70,31 @@ def simulate(
 class _Wired:
     """A transport whose bytes go over the script's line."""
 
-    def __init__(self, twin: TwinTransport, seed: int) -> None:
-        self.name, self.line, self._twin = twin.name, Line(LineSettings(), seed), twin
-        self.write, self.close = twin.write, twin.close
+    def __init__(self, board: twin.TwinTransport, seed: int) -> None:
+        self.name, self.line, self._board = board.name, twin.Line(twin.LineSettings(), seed), board
+        self.write, self.close = board.write, board.close
 
     def read(self, timeout: float) -> bytes:
         """What arrives of the twin's next bytes."""
-        return self.line.carry(self._twin.read(timeout))
+        return self.line.carry(self._board.read(timeout))
 
 
 class _Run:
     """One run of a script: a clock, a twin, and the link to it."""
 
     def __init__(
-        self, script: Script, skin: Skin, settings: TwinSettings, writer: SessionWriter
+        self, script: twin.Script, skin: Skin, settings: twin.TwinSettings, writer: SessionWriter
     ) -> None:
         self._script, self._settings, self._writer = script, settings, writer
         self._clock = VirtualClock()
-        self._twin = make_twin(skin, settings, self._clock)
-        self._wire = _Wired(self._twin, settings.seed)
+        self._board = twin.make_twin(skin, settings, self._clock)
+        self._wire = _Wired(self._board, settings.seed)
         self._scan, self._asked = Scan.of(skin.pattern()), ScanSettings.of(skin)
         self._frame_time = Configuration.of(self._scan, self._asked).scan_time
         contact = settings.contact
         self._friction = {"slide": contact.friction, "roll": contact.rolling_friction}
-        self._truth: tuple[tuple[Probe, ...], list[dict[str, float | str]]] = ((), [])
-        self._disturbance = Disturbance()
+        self._truth: tuple[tuple[twin.Probe, ...], list[dict[str, float | str]]] = ((), [])
+        self._disturbance = twin.Disturbance()
         self._marks = sorted(script.marks, key=lambda mark: mark.given.at)
         self._frames = 0
 
@@ -151,33 +136,33 @@ class _Run:
         half = self._frame_time / 2
         middle = begin + time + half
         bends = self._script.bends
-        self._twin.electronics.follow(
+        self._board.electronics.follow(
             lambda since: self._pressed(time + since),
-            (lambda since: bent(bends, time + since)) if bends else None,
+            (lambda since: twin.bent(bends, time + since)) if bends else None,
         )
-        truth = self._pressed(time + half), bent_truth(bends, time + half)
+        truth = self._pressed(time + half), twin.bent_truth(bends, time + half)
         if truth != self._truth:
             self._truth = truth
             self._writer.truth(middle, list(map(described, truth[0])), truth[1])
-        self._disturb(disturbed(self._script.faults, time))
-        if reboots(self._script.faults, last, time):
-            self._twin.reboot()
+        self._disturb(twin.disturbed(self._script.faults, time))
+        if twin.reboots(self._script.faults, last, time):
+            self._board.reboot()
         while self._marks and begin + self._marks[0].given.at < middle:
             self._writer.note(middle, self._marks.pop(0).given.text)
 
-    def _pressed(self, time: float) -> tuple[Probe, ...]:
-        return pressed(self._script.presses, time, self._friction)
+    def _pressed(self, time: float) -> tuple[twin.Probe, ...]:
+        return twin.pressed(self._script.presses, time, self._friction)
 
-    def _disturb(self, now: Disturbance) -> None:
+    def _disturb(self, now: twin.Disturbance) -> None:
         before, self._disturbance = self._disturbance, now
         if now == before:
             return
-        self._twin.set_faults(now.faults)
-        self._twin.sheet.warm(now.warmer - before.warmer)
+        self._board.set_faults(now.faults)
+        self._board.sheet.warm(now.warmer - before.warmer)
         self._wire.line.settings = now.line
         own = self._settings.electronics
         noise = own.noise if now.noise is None else now.noise
-        self._twin.electronics.settings = replace(own, noise=noise)
+        self._board.electronics.settings = replace(own, noise=noise)
 
     def _take(self, link: Link) -> None:
         for item in link.poll(_EMPTY_READ):
@@ -188,7 +173,7 @@ class _Run:
                 self._writer.event(item)
 
 
-def _idle_frames(script: Script, frame_time: float) -> int:
+def _idle_frames(script: twin.Script, frame_time: float) -> int:
     """Whole frames before anything presses or breaks, of at most what a live reference takes."""
     starts = [press.start for press in script.presses]
     starts += [bend.start for bend in script.bends]
@@ -197,7 +182,7 @@ def _idle_frames(script: Script, frame_time: float) -> int:
     return max(1, min(REFERENCE_FRAMES, int(quiet / frame_time)))
 
 
-def _described(script: Script, settings: TwinSettings, idle: int) -> dict[str, object]:
+def _described(script: twin.Script, settings: twin.TwinSettings, idle: int) -> dict[str, object]:
     return {
         "command": "simulate",
         "script": script.name,

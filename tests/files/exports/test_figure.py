@@ -30,7 +30,7 @@ def test_nothing_touches_the_edge(tmp_path: Path, panels: int) -> None:
     sheet = [Panel(f"frame {i}", mesh.centroids[:, 0], ()) for i in range(panels)]
     write_picture(tmp_path / "sheet.png", mesh, sheet, "S")
     x = np.geomspace(1e-3, 1.0, 20)
-    curve = Curve(x, 1.0 + np.log(x) ** 2, "alpha", "error", 10)
+    curve = Curve(x, 1.0 + np.log(x) ** 2, "error", 10)
     choices = [AlphaChoice(0.1, "light-touch", "for a test", curve) for _ in range(panels)]
     write_choices(tmp_path / "curves.png", "alpha of a test", choices)
     assert outside(tmp_path / "sheet.png") == 1.0

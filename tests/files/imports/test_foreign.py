@@ -122,7 +122,7 @@ def test_a_damaged_matlab_file_is_refused(tmp_path):
 @pytest.mark.parametrize("kind", [float, np.uint8])
 def test_a_matlab_bomb_is_refused(tmp_path, monkeypatch, kind):
     """By what its numbers become in memory: MATLAB keeps small ones as bytes."""
-    monkeypatch.setattr("tomoskin.core.inputs.machine_memory", lambda: 31_000_000)
+    monkeypatch.setattr("tomoskin.core.user_files.machine_memory", lambda: 31_000_000)
     path = tmp_path / "bomb.mat"
     savemat(path, {"vi": np.zeros((1000, 1000), kind)}, do_compression=True)
     assert path.stat().st_size < 50_000
@@ -132,7 +132,7 @@ def test_a_matlab_bomb_is_refused(tmp_path, monkeypatch, kind):
 
 def test_a_table_that_outgrows_memory_is_refused(tmp_path, monkeypatch):
     """Eight bytes of memory for each two of text."""
-    monkeypatch.setattr("tomoskin.core.inputs.machine_memory", lambda: 200_000)
+    monkeypatch.setattr("tomoskin.core.user_files.machine_memory", lambda: 200_000)
     path = tmp_path / "zeros.csv"
     path.write_text("v_1_0_2_3,v_1_0_3_4\n" + 5000 * "0,0\n")
     with pytest.raises(DataError, match="more than a quarter of this machine's"):

@@ -81,7 +81,7 @@ def test_a_jacobian_costs_no_solve_more(model) -> None:
 def test_a_state_shares_what_it_has(model) -> None:
     state = model.at(1.0)
     for _ in range(2):
-        assert state.solution.voltages.shape == state.jacobian.shape[:1]
+        assert state.voltages.shape == state.jacobian.shape[:1]
     assert model.engine.asked["factorise"] == model.engine.asked["jacobian"] == 1
     assert model.engine.asked["columns"] == 7
 

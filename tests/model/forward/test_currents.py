@@ -48,11 +48,11 @@ def test_a_drive_is_the_sum_of_pairs(kind: str) -> None:
     expected = scale[:, None] * summed(by_pair.contact_jacobian)
     assert by_current.contact_jacobian == pytest.approx(expected, rel=1e-9, abs=1e-12)
     potentials = current[:, None] * CURRENTS @ by_pair.transfer_resistance
-    assert by_current.solution.electrode_potentials == pytest.approx(potentials, rel=1e-9)
+    assert by_current.electrode_potentials == pytest.approx(potentials, rel=1e-9)
     if kind == "real":  # the power of a drive is turned to heat in cells and contacts
         heat = np.einsum("ke,ke->k", current[:, None] * CURRENTS, potentials)
-        assert (by_current.solution.power.sum(axis=1) < heat).all()
-        assert (by_current.solution.power.sum(axis=1) > 0.1 * heat).all()
+        assert (by_current.power.sum(axis=1) < heat).all()
+        assert (by_current.power.sum(axis=1) > 0.1 * heat).all()
     if kind != "tensor":
         change, weights = RNG.standard_normal((2, len(sigma))), RNG.standard_normal(len(scale))
         assert by_current.jvp(change) == pytest.approx(change @ by_current.jacobian.T, rel=1e-9)

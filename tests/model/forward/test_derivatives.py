@@ -200,13 +200,13 @@ def test_movement_is_refused_where_it_is_not_known(order: int, kind: Any) -> Non
 def driven_voltages(state: State) -> NDArray[Any]:
     """(n_drive,) V between source and sink of each drive."""
     drives, rows = state.model.pattern.drives, np.arange(state.model.pattern.n_drive)
-    potentials = state.solution.electrode_potentials
+    potentials = state.electrode_potentials
     return np.asarray(potentials[rows, drives[:, 0]] - potentials[rows, drives[:, 1]])
 
 
 def contact_power(state: State) -> NDArray[Any]:
     """(n_drive,) W in all contacts: Re(1/z) ∫ |u − U|², u linear on each facet."""
-    mesh, solution, total = state.model.mesh, state.solution, 0.0
+    mesh, solution, total = state.model.mesh, state, 0.0
     for e, facets in enumerate(mesh.electrodes):
         drop = solution.potentials[:, facets] - solution.electrode_potentials[:, e, None, None]
         k = facets.shape[1]
@@ -223,9 +223,9 @@ def test_power_in_cells_and_contacts_is_what_the_source_gives(
     forward = model(mesh, turn=turn)
     state = forward.at(kind(mesh, turn))
     given = (forward.current * driven_voltages(state)).real
-    assert state.solution.power.shape == (forward.pattern.n_drive, len(mesh.cells))
-    assert (state.solution.power > 0).all()
-    assert mismatch(state.solution.power.sum(axis=1) + contact_power(state), given) < 1e-10
+    assert state.power.shape == (forward.pattern.n_drive, len(mesh.cells))
+    assert (state.power > 0).all()
+    assert mismatch(state.power.sum(axis=1) + contact_power(state), given) < 1e-10
 
 
 @pytest.mark.parametrize("kind", [scalar, tensor])
@@ -235,5 +235,5 @@ def test_power_of_quadratic_elements(mesh: Mesh, kind: Any) -> None:
     pattern = Pattern.from_tables(drives, drives, len(mesh.electrodes))
     state = ForwardModel(mesh, pattern, 0.01, 0.3, order=2).at(kind(mesh, 1.0))
     in_contacts = 0.3 * state.contact_jacobian.sum(axis=1) * 0.01
-    given = 0.3 * state.solution.voltages
-    assert mismatch(state.solution.power.sum(axis=1) + in_contacts, given) < 1e-10
+    given = 0.3 * state.voltages
+    assert mismatch(state.power.sum(axis=1) + in_contacts, given) < 1e-10

@@ -46,7 +46,7 @@ def corner_state(n: int, order: int) -> State:
 
 
 def corner_errors(order: int) -> list[float]:
-    found = [corner_state(n, order).solution.voltages[0] for n in (2, 4, 8, 16)]
+    found = [corner_state(n, order).voltages[0] for n in (2, 4, 8, 16)]
     return [1 - v / CORNER.resistance for v in found]
 
 
@@ -62,7 +62,7 @@ def test_voltage_with_electrodes_on_whole_sides() -> None:
 def field_errors(state: State) -> tuple[float, float]:
     """L² and H¹ norms of the error of the potential, V·m and V, by quadrature of degree 4."""
     mesh, element = state.model.mesh, state.model.assembly.element
-    nodal = state.solution.basis[element.cells, 0]
+    nodal = state.basis[element.cells, 0]
     place, weight = triangle_rule(3)
     corner = mesh.points[mesh.cells]
     where = np.einsum("qk,nkd->nqd", place, corner)

@@ -132,9 +132,9 @@ def test_voltages_scale_with_each_drives_current() -> None:
     unit = ForwardModel(mesh, PATTERN, Z).at(1.0)
     driven = ForwardModel(mesh, PATTERN, Z, current).at(1.0)
     per_row = current[PATTERN.drive_index]
-    assert mismatch(driven.solution.voltages, per_row * unit.solution.voltages) < 1e-13
+    assert mismatch(driven.voltages, per_row * unit.voltages) < 1e-13
     assert mismatch(driven.jacobian, per_row[:, None] * unit.jacobian) < 1e-13
-    assert mismatch(driven.solution.potentials, current[:, None] * unit.solution.potentials) < 1e-13
+    assert mismatch(driven.potentials, current[:, None] * unit.potentials) < 1e-13
 
 
 def test_one_conductivity_is_that_of_every_cell() -> None:
@@ -146,9 +146,9 @@ def test_one_conductivity_is_that_of_every_cell() -> None:
 
 def test_complex_path_equals_real_path(model: ForwardModel, sigma: FloatArray) -> None:
     real, imaginary = model.at(sigma), model.at(sigma.astype(complex))
-    assert np.iscomplexobj(imaginary.solution.voltages)
-    assert not np.iscomplexobj(real.solution.voltages)
-    assert mismatch(imaginary.solution.voltages, real.solution.voltages) < 1e-11
+    assert np.iscomplexobj(imaginary.voltages)
+    assert not np.iscomplexobj(real.voltages)
+    assert mismatch(imaginary.voltages, real.voltages) < 1e-11
     assert mismatch(imaginary.jacobian, real.jacobian) < 1e-11
 
 
@@ -206,8 +206,8 @@ def test_conductivity_and_contact_derivatives_add_up_to_the_voltage(
     )
     from_contact = contact.solve(sigma).voltages.imag / h
     total = state.jacobian @ sigma + from_contact
-    assert mismatch(total, -state.solution.voltages) < 1e-10
-    assert np.abs(from_contact).max() > 1e-3 * np.abs(state.solution.voltages).max()
+    assert mismatch(total, -state.voltages) < 1e-10
+    assert np.abs(from_contact).max() > 1e-3 * np.abs(state.voltages).max()
 
 
 def test_orientation_of_cells_and_facets_does_not_matter(
@@ -218,7 +218,7 @@ def test_orientation_of_cells_and_facets_does_not_matter(
     electrodes = tuple(rng.permuted(e, axis=1) for e in mesh.electrodes)
     turned = altered(model, Mesh(mesh.points, cells, electrodes)).at(sigma)
     expected = model.at(sigma)
-    assert mismatch(turned.solution.voltages, expected.solution.voltages) < 1e-11
+    assert mismatch(turned.voltages, expected.voltages) < 1e-11
     assert mismatch(turned.jacobian, expected.jacobian) < 1e-11
 
 
@@ -230,9 +230,9 @@ def test_numbering_does_not_matter(model: ForwardModel, sigma: FloatArray) -> No
     electrodes = tuple(new[e] for e in mesh.electrodes)
     moved = altered(model, Mesh(mesh.points[old], new[mesh.cells][order], electrodes))
     got, expected = moved.at(sigma[order]), model.at(sigma)
-    assert mismatch(got.solution.voltages, expected.solution.voltages) < 1e-11
+    assert mismatch(got.voltages, expected.voltages) < 1e-11
     assert mismatch(got.jacobian, expected.jacobian[:, order]) < 1e-11
-    assert mismatch(got.solution.potentials, expected.solution.potentials[:, old]) < 1e-11
+    assert mismatch(got.potentials, expected.potentials[:, old]) < 1e-11
 
 
 def altered(model: ForwardModel, mesh: Mesh) -> ForwardModel:
@@ -262,9 +262,9 @@ def test_potentials_obey_the_maximum_principle(model: ForwardModel, sigma: Float
 def test_shapes_and_what_a_state_shares() -> None:
     model = ForwardModel(plane(), PATTERN, Z)
     state = model.at(1.0)
-    assert state.solution.voltages.shape == (PATTERN.n_meas,)
-    assert state.solution.electrode_potentials.shape == (PATTERN.n_drive, N)
-    assert state.solution.potentials.shape == (PATTERN.n_drive, len(model.mesh.points))
+    assert state.voltages.shape == (PATTERN.n_meas,)
+    assert state.electrode_potentials.shape == (PATTERN.n_drive, N)
+    assert state.potentials.shape == (PATTERN.n_drive, len(model.mesh.points))
     assert state.jacobian.shape == (PATTERN.n_meas, len(model.mesh.cells))
-    assert state.solution.potentials is state.solution.potentials
+    assert state.potentials is state.potentials
     assert np.array_equal(model.jacobian(1.0), state.jacobian)

@@ -58,10 +58,10 @@ def test_a_rolled_strip_equals_the_flat_one(turns: float, order: int) -> None:
     sigma = np.random.default_rng(0).uniform(0.5, 2, len(flat.cells))
     pattern = Pattern.adjacent(4, include_driven=True)
     got, expected = (ForwardModel(m, pattern, Z, order=order).at(sigma) for m in (rolled, flat))
-    assert mismatch(got.solution.voltages, expected.solution.voltages) < 1e-10
-    assert mismatch(got.solution.potentials, expected.solution.potentials) < 1e-10
+    assert mismatch(got.voltages, expected.voltages) < 1e-10
+    assert mismatch(got.potentials, expected.potentials) < 1e-10
     assert mismatch(got.jacobian, expected.jacobian) < 1e-10
-    assert mismatch(got.solution.power, expected.solution.power) < 1e-10
+    assert mismatch(got.power, expected.power) < 1e-10
     assert mismatch(got.contact_jacobian, expected.contact_jacobian) < 1e-10
 
 

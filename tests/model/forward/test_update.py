@@ -92,7 +92,7 @@ def test_transfer_resistance_stays_symmetric_and_centred(mesh: Mesh) -> None:
 def test_nothing_touched_is_the_base_state() -> None:
     base = state(disc())
     for cells in (list[int](), np.zeros(0, dtype=int)):
-        assert np.array_equal(base.local.voltages(cells, []), base.solution.voltages)
+        assert np.array_equal(base.local.voltages(cells, []), base.voltages)
 
 
 def test_the_order_of_calls_and_of_cells_does_not_matter() -> None:
@@ -104,7 +104,7 @@ def test_the_order_of_calls_and_of_cells_does_not_matter() -> None:
     for cells, expected in zip(touches[::-1], first[::-1], strict=True):
         turned = again.local.voltages(cells[::-1], np.full(len(cells), 0.1))
         assert mismatch(turned, expected) < 1e-12
-    assert np.array_equal(base.solution.voltages, state(mesh).solution.voltages)
+    assert np.array_equal(base.voltages, state(mesh).voltages)
 
 
 def spread(mesh: Mesh, count: int) -> list[tuple[IntArray, FloatArray]]:
@@ -183,7 +183,7 @@ def test_columns_are_computed_once() -> None:
         base.local.voltages(cells, np.full(len(cells), factor))
     base.local.voltages(cells[:5], np.full(5, 3.0))
     # one solve of the basis, one of the touched nodes
-    assert counted.asked == [7, len(np.unique(mesh.cells[cells]))]
+    assert sorted(counted.asked) == sorted([7, len(np.unique(mesh.cells[cells]))])
 
 
 class Counted:

@@ -113,7 +113,7 @@ def test_identity_tells_meshes_apart() -> None:
         ({"electrodes": ()}, "expected at least one electrode"),
         ({"electrodes": (np.empty((0, 2)),)}, "E1: expected facets"),
         ({"electrodes": ([[0, 1]], [[0, 1, 2]])}, "E2: expected facets"),
-        ({"electrodes": ([[0, 1]], [[2, 7]])}, "E2: expected points from 0 to 3"),
+        ({"electrodes": ([[0, 1]], [[2, 7]])}, "E2, facet 0: expected points from 0 to 3"),
         ({"electrodes": ([[0, 1]], [[0, 2]])}, r"E2: facet \[0, 2\] is not on the bound"),
         (
             {"electrodes": ([[0, 1]], [[1, 0]])},

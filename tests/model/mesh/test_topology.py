@@ -13,7 +13,7 @@ from scipy.stats import ortho_group, special_ortho_group
 
 from tomoskin.core import FloatArray, IntArray
 from tomoskin.model.mesh import simplex_measure
-from tomoskin.model.mesh.triangles import boundary_facets, facets, neighbour_pairs
+from tomoskin.model.mesh.triangles import boundary_facets, facets, paired_facets
 
 dimensions = st.sampled_from([2, 3])
 seeds = st.integers(0, 10_000)
@@ -87,13 +87,13 @@ def test_every_facet_with_its_owner(dimension: int, seed: int) -> None:
 def test_neighbours_and_boundary(dimension: int, seed: int) -> None:
     _, cells = cloud(dimension, seed)
     table = owners(cells)
-    pairs = {tuple(sorted(p)) for p in neighbour_pairs(cells).tolist()}
+    pairs = {tuple(sorted(p)) for p in paired_facets(cells)[0].tolist()}
     assert pairs == {tuple(v) for v in table.values() if len(v) == 2}
-    assert len(neighbour_pairs(cells)) == len(pairs)
+    assert len(paired_facets(cells)[0]) == len(pairs)
     boundary = [tuple(f) for f in boundary_facets(cells).tolist()]
     assert sorted(boundary) == sorted(k for k, v in table.items() if len(v) == 1)
 
 
 def test_one_cell_has_no_neighbour() -> None:
-    assert neighbour_pairs(np.array([[0, 1, 2]])).shape == (0, 2)
+    assert paired_facets(np.array([[0, 1, 2]]))[0].shape == (0, 2)
     assert len(boundary_facets(np.array([[0, 1, 2, 3]]))) == 4

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import struct
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -98,3 +99,19 @@ def events_of(link: Link, *kinds: str) -> Event:
             if isinstance(item, Event) and item.kind in kinds:
                 return item
     raise AssertionError(f"no event {kinds}")
+
+
+def check_boot(image: bytes) -> None:
+    """Fail unless the boot ROM would run ``image``, by the checksum of its second stage."""
+    (held,) = struct.unpack_from("<I", image, 252)
+    assert held == boot_checksum(image[:252]), "correct the last word of firmware/pico/boot2.S"
+
+
+def boot_checksum(stage: bytes) -> int:
+    """CRC-32 as the boot ROM has it: 0x04C11DB7, not reflected, from 0xFFFFFFFF."""
+    crc = 0xFFFFFFFF
+    for byte in stage:
+        crc ^= byte << 24
+        for _ in range(8):
+            crc = (crc << 1 ^ (0x04C11DB7 if crc >> 31 else 0)) & 0xFFFFFFFF
+    return crc

@@ -41,9 +41,8 @@ from tomoskin.pipeline import prepare
 from tomoskin.run import Runner
 from tomoskin.twin import TwinSettings, TwinSkin
 from tomoskin.twin.emulator.board_process import BoardProcess, SkinMemory
-from tomoskin.twin.emulator.program import PicoPrograms
+from tomoskin.twin.emulator.program import PicoPrograms, pack_uf2
 from tomoskin.twin.emulator.source import front_of, open_emulator
-from tomoskin.twin.emulator.uf2 import pack_uf2
 from twin.emulator.faulty import BoardFaults
 from twin.emulator.pico import CURRENT, PATIENCE, Pico, events_of, frames_of, powered, star
 

@@ -63,7 +63,7 @@ def _draw(ax: Axes, choice: AlphaChoice, curve: Curve) -> None:
         ax.set_yscale("log")
         ax.set_ylim(top=min(1.2 * curve.y.max(), _MOST * y))
     title = f"{choice.rule}: alpha = {choice.alpha:.3g}"
-    dress(ax, title, curve.x_label, curve.y_label)
+    dress(ax, title, "alpha", curve.label)
 
 
 def _draw_picard(ax: Axes, picard: Picard) -> None:

@@ -12,7 +12,6 @@ import csv
 import re
 from array import array
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -73,16 +72,16 @@ def parse(lines: Iterable[str], source: str) -> Recording:
         name: _real(table[:, n], name, source) for n, name in enumerate(header) if n not in used
     }
     has_place = "x_m" in by_name and "y_m" in by_name
-    recording = voltages_of(
+    return voltages_of(
         source,
         table[:, used],
         (electrodes[:, :2], electrodes[:, 2:]),
         time=by_name.get("time_s"),
         labels=np.column_stack([by_name["x_m"], by_name["y_m"]]) if has_place else None,
         is_change=kinds == {"dv"},
+        idle=_idle(by_name["idle"], source) if "idle" in by_name else 1,
+        board_known=OWN in by_name,
     )
-    idle = _idle(by_name["idle"], source) if "idle" in by_name else 1
-    return replace(recording, idle=idle, board_known=OWN in by_name)
 
 
 def column_names(drive: IntArray, measure: IntArray) -> list[str]:
@@ -130,7 +129,7 @@ def _real(values: NDArray[Any], name: str, source: str) -> FloatArray:
 
 def _values(rows: Iterator[list[str]], header: list[str], source: str) -> NDArray[Any]:
     """The numbers of all lines, one after another: complex where one of them is."""
-    values, imaginary, most = array("d"), array("d"), most_bytes()
+    values, most = array("d"), most_bytes()
     for number, row in enumerate(rows, start=2):
         if not row:
             continue
@@ -141,15 +140,13 @@ def _values(rows: Iterator[list[str]], header: list[str], source: str) -> NDArra
                 hint="a decimal comma splits a field in two",
             )
         where = f"{source}, line {number}"
-        line = [_number(text, name, where) for text, name in zip(row, header, strict=True)]
-        if not imaginary and any(isinstance(value, complex) for value in line):
-            imaginary.frombytes(bytes(values.itemsize * len(values)))
-        if imaginary or any(isinstance(value, complex) for value in line):
-            imaginary.extend(value.imag for value in line)
-        values.extend(value.real for value in line)
+        for text, name in zip(row, header, strict=True):
+            value = _number(text, name, where)
+            values.extend((value.real, value.imag))
         if values.itemsize * len(values) > most:
             check_fits(values.itemsize * len(values), source)
-    return np.asarray(values) + 1j * np.asarray(imaginary) if imaginary else np.asarray(values)
+    table = np.asarray(values).view(np.complex128)
+    return table if table.imag.any() else table.real
 
 
 def _number(text: str, name: str, where: str) -> float | complex:

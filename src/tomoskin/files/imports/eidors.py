@@ -12,14 +12,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import issparse
 
-from tomoskin.core import DataError, FloatArray, IntArray
+from tomoskin.core import DataError, FloatArray, IntArray, numeric
 from tomoskin.files.imports.interchange import OWN
 from tomoskin.files.imports.tables import drives_of, pairs_of, voltages_of
 from tomoskin.sensing.signal import Recording
@@ -59,17 +58,16 @@ def parse(variables: Mapping[str, Any], source: str) -> Recording:
         )
     reference = _read(variables, _REFERENCE, select, len(drive), source)
     idle = _numbers(variables, "idle", ())
-    is_count = idle is not None and idle in range(1, len(voltages) + 1)
-    recording = voltages_of(
+    return voltages_of(
         source,
         voltages,
         (drive, measure),
         time=_numbers(variables, "time_s", (len(voltages),)),
         reference=None if reference is None else reference[0],
         labels=_numbers(variables, "xy_m", (len(voltages), 2)),
+        idle=int(idle) if idle is not None and idle in range(1, len(voltages) + 1) else 1,
+        board_known=OWN in variables,
     )
-    recording = replace(recording, board_known=OWN in variables)
-    return replace(recording, idle=int(idle)) if is_count and idle is not None else recording
 
 
 def _stimulation(variables: Any) -> list[Mapping[str, Any]] | None:
@@ -142,7 +140,5 @@ def _numbers(variables: Mapping[str, Any], name: str, shape: tuple[int, ...]) ->
 
 def _dense(value: Any, where: str) -> NDArray[Any]:
     sparse: Any = value
-    array = np.asarray(sparse.toarray() if issparse(value) else value)
-    if array.dtype.kind not in "biufc":
-        raise DataError(f"expected numbers, got {array.dtype}", where=where)
+    array = numeric(sparse.toarray() if issparse(value) else value, DataError, where=where)
     return array.astype(np.complex128 if array.dtype.kind == "c" else np.float64, copy=False)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import islice
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -14,25 +14,35 @@ from tomoskin.core import EMPTY, MAGIC, Arrays, DataError, StrPath, load_arrays,
 from tomoskin.files.imports import (
     csv_table,
     eidors,
-    eit_kit,
-    eskin,
     interchange,
-    ktc,
-    open_eit,
-    pyeit_arrays,
+    matrices,
     sciospec,
-    serial_log,
     sixteen,
+    text_logs,
 )
 from tomoskin.files.imports.matlab import is_matlab, load_matlab
-from tomoskin.files.imports.text_log import bytes_lines, text_lines
+from tomoskin.files.imports.text_logs import bytes_lines, text_lines
 from tomoskin.files.session import read_session
 from tomoskin.sensing.signal import Recording
 
-ARRAY_FORMATS = (interchange, sixteen, eskin, ktc, pyeit_arrays)
-"""Modules of formats: ``detects`` recognises one by its arrays, ``parse`` reads it."""
+Format = tuple[Callable[[Any], bool], Callable[[Any, str], Recording]]
 
-TEXT_FORMATS = (csv_table, open_eit, eit_kit, sciospec, serial_log)
+ARRAY_FORMATS: tuple[Format, ...] = (
+    (interchange.detects, interchange.parse),
+    (sixteen.detects, sixteen.parse),
+    (matrices.is_eskin, matrices.read_eskin),
+    (matrices.is_ktc, matrices.read_ktc),
+    (matrices.is_pyeit, matrices.read_pyeit),
+)
+"""What recognises a format by its arrays, and what reads it."""
+
+TEXT_FORMATS: tuple[Format, ...] = (
+    (csv_table.detects, csv_table.parse),
+    (text_logs.is_open_eit, text_logs.read_open_eit),
+    (text_logs.is_eit_kit, text_logs.read_eit_kit),
+    (sciospec.detects, sciospec.parse),
+    (text_logs.is_serial_log, text_logs.read_serial_log),
+)
 """The same for text, by its first lines."""
 
 _HEAD = 128
@@ -128,11 +138,11 @@ def _from_text(head: bytes, path: Path) -> Recording:
 
 
 def _parsed(
-    formats: tuple[ModuleType, ...], head: object, content: object, source: str
+    formats: tuple[Format, ...], head: object, content: object, source: str
 ) -> Recording | None:
     """What the first of the ``formats`` that knows the ``head`` makes of the content."""
-    reader = next((one for one in formats if one.detects(head)), None)
-    return None if reader is None else reader.parse(content, source)
+    reader = next((parse for detects, parse in formats if detects(head)), None)
+    return None if reader is None else reader(content, source)
 
 
 def _beginning(path: Path) -> bytes:

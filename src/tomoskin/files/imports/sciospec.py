@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from tomoskin.core import DataError, IntArray
 from tomoskin.files.imports.tables import neighbours, scan_of, voltages_of
-from tomoskin.files.imports.text_log import numbers_in
+from tomoskin.files.imports.text_logs import numbers_in
 from tomoskin.sensing.signal import Recording
 
 _CHANNELS = "MeasurementChannels:"

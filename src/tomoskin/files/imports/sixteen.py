@@ -27,6 +27,7 @@ from tomoskin.core import (
     electrode_table,
     numbers,
     real_numbers,
+    refuse_first,
 )
 from tomoskin.files.imports.tables import voltages_of
 from tomoskin.sensing.signal import Recording, frame_times
@@ -140,12 +141,8 @@ def _times(arrays: Arrays, n: int, source: str) -> FloatArray | None:
 def _electrodes(arrays: Arrays, key: str, source: str) -> IntArray:
     table = electrode_table(arrays, key, source)
     _check_shape(table, (_N * _N, 2), key, source)
-    if table.max() >= _N:
-        row = int(np.argmax(table.max(axis=1)))
-        raise DataError(
-            f"expected electrodes from 0 (E1) to {_N - 1}, got {table[row].tolist()}",
-            where=f"{source}, {key} row {row}",
-        )
+    most = f"electrodes from 0 (E1) to {_N - 1}"
+    refuse_first(table.max(axis=1) >= _N, table, most, f"{source}, {key} row", DataError)
     return table
 
 

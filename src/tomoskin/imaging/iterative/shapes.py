@@ -22,12 +22,12 @@ from scipy.special import expit, ndtr
 from tomoskin.core import FloatArray, IntArray, ModelError
 from tomoskin.imaging.iterative.absolute import Absolute, medium
 from tomoskin.imaging.iterative.newton import Goal, descend
-from tomoskin.imaging.iterative.observation import Observation
 from tomoskin.imaging.iterative.unknowns import (
     BACKGROUND_SPREAD,
     Contacts,
     Joint,
     ModelPoint,
+    Observation,
     others,
 )
 from tomoskin.model.forward import ForwardModel

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
-from tomoskin.core import DataError, FloatArray, ModelError
+from tomoskin.core import DataError, FloatArray, ModelError, refuse_first
 from tomoskin.imaging.linear.operator import Operator
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.pattern import Pattern
@@ -258,7 +258,6 @@ def _weights(value: ArrayLike, n_meas: int) -> FloatArray:
     weights = np.asarray(value, dtype=np.float64)
     if weights.shape != (n_meas,):
         raise ModelError(f"expected weights of shape ({n_meas},), got {weights.shape}")
-    if not (np.isfinite(weights).all() and (weights > 0).all()):
-        row = int(np.argmin(np.isfinite(weights) & (weights > 0)))
-        raise ModelError(f"expected weights above 0, got {weights[row]}", where=f"row {row}")
+    bad = ~(np.isfinite(weights) & (weights > 0))
+    refuse_first(bad, weights, "weights above 0", "row", ModelError)
     return weights

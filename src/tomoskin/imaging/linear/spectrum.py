@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Self
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh, qr, solve_triangular
 
-from tomoskin.core import FloatArray, ModelError
+from tomoskin.core import FloatArray, ModelError, finished
 from tomoskin.imaging.linear.linear_problem import LinearProblem
 from tomoskin.imaging.linear.operator import Operator
 
@@ -31,7 +32,7 @@ class Spectrum:
     """Modes of W^½JQ⁻¹JᴴW^½ = U diag(λ) Uᴴ: data and images that go with each other.
 
     Data dv have coefficients β = UᴴW^½dv; the image is Σ bᵢ gᵢ βᵢ with gᵢ = 1/(λᵢ + α²). So a
-    new alpha costs one product, and residual, seminorm and noise cost next to nothing. The
+    new alpha costs one product, and its noise next to nothing. The
     images that Q does not weigh are modes of their own, with λ = ∞ and g = 1 (the standard form
     of Eldén 1982); the others are orthogonal to what the data tell of these.
 
@@ -111,27 +112,27 @@ class Spectrum:
 
     def filters(self, alpha: float) -> FloatArray:
         """(n_meas,) filter factors λ/(λ + α²): the part of each coefficient that is believed."""
-        return 1.0 - _complement(self, alpha)
+        return 1.0 - np.where(np.isfinite(self.values), alpha**2 * self.gains(alpha), 0.0)
 
     def operator(self, alpha: float) -> Operator:
         """The operator of ``alpha``, the same as ``problem.operator(alpha)``, by one product."""
-        return _operator(self, alpha, np.asarray(self.modes @ _filtered(self, alpha)))
+        return finished(self.operator_in_pieces(alpha, len(self.modes)))
+
+    def operator_in_pieces(self, alpha: float, rows: int) -> Generator[None, None, Operator]:
+        """Make the operator of ``alpha``, so many of its rows at a time."""
+        filtered = self.gains(alpha)[:, None] * self.analysis
+        matrix = np.empty_like(self.modes)
+        for start in range(0, len(matrix), rows):
+            piece = slice(start, start + rows)
+            np.matmul(self.modes[piece], filtered, out=matrix[piece])
+            yield
+        weighed = np.isfinite(self.values)
+        precision = self.analysis[weighed].conj().T @ filtered[weighed]
+        return self.problem.operator_of(matrix, precision)
 
     def coefficients(self, dv: NDArray[Any]) -> NDArray[Any]:
         """(…, n_meas) β of difference data (…, n_meas)."""
         return np.asarray(dv @ self.analysis.T)
-
-    def residual(self, alpha: float, dv: NDArray[Any]) -> FloatArray:
-        """(…,) ‖dv − Jx‖_W of the images x of data (…, n_meas)."""
-        unexplained = _complement(self, alpha) * self.coefficients(dv)
-        return np.asarray(np.linalg.norm(unexplained, axis=-1))
-
-    def seminorm(self, alpha: float, dv: NDArray[Any]) -> FloatArray:
-        """(…,) √(xᴴQx) of the images x of data (…, n_meas)."""
-        weighed = np.isfinite(self.values)
-        scale = self.gains(alpha)[weighed] * np.sqrt(self.values[weighed])
-        weight = scale * self.coefficients(dv)[..., weighed]
-        return np.asarray(np.linalg.norm(weight, axis=-1))
 
     def noise_coefficients(self, noise: FloatArray) -> NDArray[Any]:
         """(n_meas, n_meas) covariance of β for independent ``noise`` (n_meas,) of the data."""
@@ -149,23 +150,6 @@ class Spectrum:
         """(n_meas, n_meas) ∫bᵢ*bⱼ over the sheet."""
         volumes = self.problem.model.mesh.volumes
         return np.asarray((self.modes.conj().T * volumes) @ self.modes)
-
-
-def _complement(spectrum: Spectrum, alpha: float) -> FloatArray:
-    """1 − filter factor, without loss of digits."""
-    return np.where(np.isfinite(spectrum.values), alpha**2 * spectrum.gains(alpha), 0.0)
-
-
-def _filtered(spectrum: Spectrum, alpha: float) -> NDArray[Any]:
-    """(n_meas, n_meas) difference data → filtered coefficients; modes times it is R."""
-    return np.asarray(spectrum.gains(alpha)[:, None] * spectrum.analysis)
-
-
-def _operator(spectrum: Spectrum, alpha: float, matrix: NDArray[Any]) -> Operator:
-    """The operator of ``alpha``, given its ``matrix``."""
-    weighed = np.isfinite(spectrum.values)
-    precision = spectrum.analysis[weighed].conj().T @ _filtered(spectrum, alpha)[weighed]
-    return spectrum.problem.operator_of(matrix, precision)
 
 
 def _eigen(system: NDArray[Any]) -> tuple[FloatArray, NDArray[Any]]:
@@ -186,29 +170,3 @@ def _free_part(
             hint="choose another prior, or a pattern that is sensitive to the whole mesh",
         )
     return basis[:, :k], basis[:, k:], upper[:k]
-
-
-class Assembly:
-    """The operator of ``alpha`` from a spectrum, some of its rows at a time."""
-
-    def __init__(self, spectrum: Spectrum, alpha: float) -> None:
-        self._spectrum = spectrum
-        self._alpha = alpha
-        self._filtered = _filtered(spectrum, alpha)
-        self._matrix = np.empty_like(spectrum.modes)
-        self._made = 0
-
-    @property
-    def done(self) -> bool:
-        """Whether the operator is complete."""
-        return self._made == len(self._matrix)
-
-    def advance(self, rows: int) -> None:
-        """Make the next ``rows`` rows, or as many as there are still to make."""
-        piece = slice(self._made, min(self._made + rows, len(self._matrix)))
-        np.matmul(self._spectrum.modes[piece], self._filtered, out=self._matrix[piece])
-        self._made = piece.stop
-
-    def operator(self) -> Operator:
-        """The operator, once it is :attr:`done`."""
-        return _operator(self._spectrum, self._alpha, self._matrix)

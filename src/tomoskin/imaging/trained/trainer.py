@@ -19,10 +19,9 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import brentq
 from scipy.sparse import csr_array
 
-from tomoskin.core import FloatArray, ModelError
+from tomoskin.core import FloatArray, ModelError, refuse_first
 from tomoskin.imaging.linear.operator import Operator
-from tomoskin.imaging.trained.merit import noise_figure
-from tomoskin.imaging.trained.targets import Balls, Targets, centre_of
+from tomoskin.imaging.trained.merit import Balls, Targets, centre_of, deviations, noise_figure
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Mesh
 
@@ -77,12 +76,8 @@ class Trainer:
         """Set up for targets, noise, one deviation or (n_meas,), and the ``radius`` that targets
         are to be shown with. Raises ModelError."""
         data = (training.dv / training.amount[:, None]).T
-        sd = np.asarray(noise, dtype=np.float64)
-        if sd.shape not in ((), (len(data),)):
-            raise ModelError(f"expected noise of shape ({len(data)},), got {sd.shape}")
-        sd = np.broadcast_to(sd, (len(data),))
-        if not (np.isfinite(sd).all() and (sd > 0).all()):
-            raise ModelError(f"expected finite noise above 0, got {sd.min():g} to {sd.max():g}")
+        sd = deviations(noise, len(data), ModelError)
+        refuse_first(~(sd > 0), sd, "noise above 0", "row", ModelError)
         scaled = sd * np.sqrt(((data / sd[:, None]) ** 2).sum() / len(sd))
         centre = int(np.linalg.norm(training.places - centre_of(mesh), axis=1).argmin())
         desired = desired_images(mesh, training.places, radius)

@@ -10,4 +10,3 @@ from tomoskin.model.forward.model import (
     State as State,
     Terminals as Terminals,
 )
-from tomoskin.model.forward.solution import Solution as Solution

@@ -9,7 +9,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from tomoskin.core import IntArray, ModelError
+from tomoskin.core import IntArray, ModelError, numeric, refuse_first
 from tomoskin.model.mesh import Mesh
 
 _SYMMETRY = 1e-10
@@ -27,7 +27,7 @@ def checked_conductivity(value: ArrayLike, mesh: Mesh) -> NDArray[Any]:
         finite or (a tensor) not symmetric. On a curved sheet a tensor acts in the sheet only, and
         must be positive there; with a metric it is in each cell's frame (``Mesh.corners``).
     """
-    raw = numbers(value, "conductivity")
+    raw = numeric(value, ModelError, " as conductivity")
     n, d = len(mesh.cells), mesh.points.shape[1]
     if raw.shape not in ((), (n,), (n, d, d)):
         raise ModelError(
@@ -40,27 +40,8 @@ def checked_conductivity(value: ArrayLike, mesh: Mesh) -> NDArray[Any]:
         sigma = np.full(n, sigma)
     if not (sigma.real.min(initial=1.0) > 0 and np.isfinite(sigma).all()):
         bad = ~(np.isfinite(sigma) & (sigma.real > 0))
-        _refuse_first(bad, sigma, "a positive finite conductivity")
+        refuse_first(bad, sigma, "a positive finite conductivity", "cell", ModelError)
     return sigma
-
-
-def numbers(value: ArrayLike, name: str) -> NDArray[Any]:
-    """``value`` as an array of numbers.
-
-    Raises
-    ------
-    ModelError
-        For anything else: text, nothing, rows of unequal length.
-    """
-    try:
-        raw = np.asarray(value)
-    except ValueError as error:
-        raise ModelError(
-            f"expected rows of equal length as {name}, got different lengths"
-        ) from error
-    if raw.dtype.kind not in "biufc":
-        raise ModelError(f"expected numbers as {name}, got {raw.dtype}")
-    return raw
 
 
 def number_type(raw: NDArray[Any]) -> type[np.floating[Any] | np.complexfloating[Any, Any]]:
@@ -69,17 +50,15 @@ def number_type(raw: NDArray[Any]) -> type[np.floating[Any] | np.complexfloating
 
 
 def _checked_tensor(sigma: NDArray[Any], mesh: Mesh) -> NDArray[Any]:
-    _refuse_first(~np.isfinite(sigma).all(axis=(1, 2)), sigma, "a finite conductivity")
+    infinite = ~np.isfinite(sigma).all(axis=(1, 2))
+    refuse_first(infinite, sigma, "a finite conductivity", "cell", ModelError)
     skew = np.abs(sigma - sigma.swapaxes(1, 2)).max(axis=(1, 2))
-    _refuse_first(
-        skew > _SYMMETRY * np.abs(sigma).max(axis=(1, 2)), sigma, "a symmetric conductivity tensor"
-    )
+    skewed = skew > _SYMMETRY * np.abs(sigma).max(axis=(1, 2))
+    refuse_first(skewed, sigma, "a symmetric conductivity tensor", "cell", ModelError)
     principal = np.linalg.eigvalsh(_in_sheet(sigma.real, mesh))
-    _refuse_first(
-        principal[:, 0] <= _DEFINITE * np.abs(principal[:, -1]),
-        sigma,
-        "a conductivity tensor that is positive definite",
-    )
+    indefinite = principal[:, 0] <= _DEFINITE * np.abs(principal[:, -1])
+    positive = "a conductivity tensor that is positive definite"
+    refuse_first(indefinite, sigma, positive, "cell", ModelError)
     return sigma
 
 
@@ -88,12 +67,6 @@ def _in_sheet(sigma: NDArray[Any], mesh: Mesh) -> NDArray[Any]:
     corner = mesh.corners
     basis, _ = np.linalg.qr((corner[:, 1:] - corner[:, :1]).swapaxes(1, 2))
     return np.asarray(basis.swapaxes(1, 2) @ sigma @ basis)
-
-
-def _refuse_first(bad: NDArray[np.bool_], sigma: NDArray[Any], expected: str) -> None:
-    if bad.any():
-        cell = int(np.argmax(bad))
-        raise ModelError(f"expected {expected}, got {sigma[cell].tolist()}", where=f"cell {cell}")
 
 
 Touch = tuple[ArrayLike, ArrayLike]
@@ -143,36 +116,26 @@ class Touches:
         within = slice(starts[0], starts[-1])
         return Touches(starts - starts[0], self.cells[within], self.conductivity[within])
 
-    def fault(self, n_cells: int) -> ModelError | None:
-        """Return what is wrong with them, on a mesh of ``n_cells``; nothing where all is well."""
+    def check(self, n_cells: int) -> None:
+        """Raise ModelError for a wrong cell or conductivity, on a mesh of ``n_cells``."""
         for number in range(len(self)):
             cells, sigma = self[number]
-            touch = f"touch {number}, " if len(self) > 1 else ""
-            outside = (cells < 0) | (cells >= n_cells)
-            if outside.any():
-                bad = cells[np.argmax(outside)]
-                return ModelError(
-                    f"expected cells from 0 to {n_cells - 1}, got {bad}", where=f"{touch}cell {bad}"
-                )
-            good = np.isfinite(sigma) & (sigma.real > 0)
-            if not good.all():
-                bad = int(np.argmin(good))
-                return ModelError(
-                    f"expected a positive finite conductivity, got {sigma[bad]}",
-                    where=f"{touch}cell {cells[bad]}",
-                )
             order = np.sort(cells)
-            twice = order[1:] == order[:-1]
-            if twice.any():
-                bad = order[np.argmax(twice)]
-                return ModelError(
-                    "expected each cell once, got it twice", where=f"{touch}cell {bad}"
-                )
-        return None
+            for bad, message, values in (
+                ((cells < 0) | (cells >= n_cells), f"cells from 0 to {n_cells - 1}", cells),
+                (~(np.isfinite(sigma) & (sigma.real > 0)), "a positive finite conductivity", sigma),
+                (np.isin(cells, order[1:][order[1:] == order[:-1]]), "each cell once", cells),
+            ):
+                if bad.any():
+                    first = int(np.argmax(bad))
+                    touch = f"touch {number}, " if len(self) > 1 else ""
+                    where = f"{touch}cell {cells[first]}"
+                    raise ModelError(f"expected {message}, got {values[first]}", where=where)
 
 
 def _arrays(cells: ArrayLike, conductivity: ArrayLike) -> tuple[IntArray, NDArray[Any]]:
-    index, sigma = numbers(cells, "cells"), numbers(conductivity, "conductivity")
+    index = numeric(cells, ModelError, " as cells")
+    sigma = numeric(conductivity, ModelError, " as conductivity")
     if not index.size:
         index = index.astype(np.int64)
     if index.dtype.kind not in "iu" or index.ndim != 1 or sigma.shape != index.shape:

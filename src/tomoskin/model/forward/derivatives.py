@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tomoskin.core import FloatArray, IntArray, ModelError
-from tomoskin.model.forward.assembly import electrode_forms
-from tomoskin.model.forward.element import barycentric_gradients
+from tomoskin.model.forward.assembly import barycentric_gradients, electrode_forms
 from tomoskin.model.forward.solution import Solution
 from tomoskin.model.pattern import Pattern
 

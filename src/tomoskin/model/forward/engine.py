@@ -207,8 +207,7 @@ class Patches:
             positive, or a singular system.
         """
         touches, base = Touches(starts, cells, conductivity), self._base
-        if touches.fault(len(base.cells)) is not None:
-            raise ValueError("a cell or conductivity is out of range")
+        touches.check(len(base.cells))
         shape = (len(touches), *base.grounded.shape)
         kind = np.result_type(base.fields, conductivity)
         grounded, lost = np.empty(shape, kind), np.zeros(shape, kind)

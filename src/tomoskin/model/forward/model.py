@@ -13,14 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from tomoskin.core import FloatArray, ModelError
 from tomoskin.model.forward import derivatives
 from tomoskin.model.forward.arguments import checked_conductivity
-from tomoskin.model.forward.engine import Compressed, Factor, singular
-from tomoskin.model.forward.solution import (
-    Solution,
-    checked_voltages,
-    error_of_drives,
-    solve_checked,
-)
-from tomoskin.model.forward.system import System
+from tomoskin.model.forward.engine import singular
+from tomoskin.model.forward.solution import Solution, System
 from tomoskin.model.forward.update import LocalUpdate
 
 
@@ -50,14 +44,16 @@ class ForwardModel(System):
         """Return the model at a conductivity, S or S/m.
 
         One number for all cells, (n_cells,), or a symmetric tensor per cell (n_cells, d, d) in
-        the mesh's coordinates. Ask the state for ``solution``, ``jacobian`` and more: the
+        the mesh's coordinates. Ask the state for ``voltages``, ``jacobian`` and more: the
         factorisation is shared between them.
         """
         return State(self, checked_conductivity(conductivity, self.mesh))
 
-    def solve(self, conductivity: ArrayLike) -> Solution:
-        """Voltages and potentials; see :meth:`at`."""
-        return self.at(conductivity).solution
+    def solve(self, conductivity: ArrayLike) -> State:
+        """The same, with voltages and potentials at once; see :meth:`at`."""
+        state = self.at(conductivity)
+        _ = state.voltages  # which raises where there are none
+        return state
 
     def solve_many(self, conductivities: ArrayLike) -> NDArray[Any]:
         """(…, n_meas) V of many conductivities (…, n_cells), one per cell each; see :meth:`at`."""
@@ -105,52 +101,10 @@ class ForwardModel(System):
 
 
 @dataclass(frozen=True, eq=False)
-class State:
-    """A forward model at a conductivity, (n_cells,) or a tensor per cell (n_cells, d, d).
-
-    Everything follows from one basis: the fields of 1 A into each electrode and out at the last.
-    """
+class State(Solution):
+    """A forward model at a conductivity, (n_cells,) or a tensor per cell (n_cells, d, d)."""
 
     model: ForwardModel
-    conductivity: NDArray[Any]
-
-    @cached_property
-    def factor(self) -> Factor:
-        """The system matrix, factorised."""
-        return self.model.factorise(self._matrix.values)
-
-    @cached_property
-    def _matrix(self) -> Compressed:
-        return self.model.assembly.matrix(self.conductivity, self.model.contacts)
-
-    @cached_property
-    def solution(self) -> Solution:
-        """Voltages and potentials for every drive of the pattern."""
-        model, matrix, assembly = self.model, self._matrix, self.model.assembly
-        electrodes = np.arange(assembly.n_points, assembly.n_unknowns)
-        basis, lost, largest = solve_checked(self.factor, matrix.values, electrodes)
-        voltages = checked_voltages(
-            model,
-            basis[assembly.n_points :],
-            lost,
-            sharper=lambda: error_of_drives(model, matrix.matrix, basis),
-        )
-        return Solution(model, self.conductivity, basis, voltages, largest)
-
-    @property
-    def voltages(self) -> NDArray[Any]:
-        """The voltages (n_meas,) of the pattern, in V."""
-        return self.solution.voltages
-
-    @property
-    def transfer_resistance(self) -> NDArray[Any]:
-        """(n_electrodes, n_electrodes) Ω; see :attr:`Solution.transfer_resistance`."""
-        return self.solution.transfer_resistance
-
-    @property
-    def gradient(self) -> NDArray[Any]:
-        """(n_electrodes, d·q, n_cells): scaled gradient of each basis field, see Element."""
-        return self.solution.gradient
 
     @cached_property
     def jacobian(self) -> NDArray[Any]:
@@ -159,14 +113,14 @@ class State:
         −I ∫ ∇u_drive · ∇u_measure over each cell (Polydorides & Lionheart 2002): the fields of
         1 A through the driven and the measured pair.
         """
-        return derivatives.by_conductivity(self.solution)
+        return derivatives.by_conductivity(self)
 
     def jvp(self, change: ArrayLike) -> NDArray[Any]:
         """(…, n_meas) V: the jacobian times changes of conductivity (…, n_cells), S or S/m.
 
         Without the jacobian, by the fields of the solution. Raises ModelError for tensors.
         """
-        return derivatives.along(self.solution, change)
+        return derivatives.along(self, change)
 
     def vjp(self, weights: ArrayLike) -> NDArray[Any]:
         """(…, n_cells): weights (…, n_meas) of the measurements times the jacobian.
@@ -174,12 +128,12 @@ class State:
         It is the gradient of Σ weights · voltages. Nothing is conjugated: for a real misfit of
         complex voltages give the conjugate of the residual. Raises ModelError for tensors.
         """
-        return derivatives.against(self.solution, weights)
+        return derivatives.against(self, weights)
 
     @cached_property
     def contact_jacobian(self) -> NDArray[Any]:
         """(n_meas, n_electrodes): derivative by each contact impedance, V per Ω·m (or Ω·m²)."""
-        return derivatives.by_contact_impedance(self.solution)
+        return derivatives.by_contact_impedance(self)
 
     @cached_property
     def movement_jacobian(self) -> NDArray[Any]:
@@ -189,17 +143,12 @@ class State:
         and all others stay (Soleimani, Gómez-Laberge & Adler 2006); only for scalar
         conductivity and elements of order 1.
         """
-        return derivatives.by_movement(self.solution)
+        return derivatives.by_movement(self)
 
     @cached_property
     def local(self) -> LocalUpdate:
         """Exact voltages when few cells change, without a new factorisation."""
-        model = self.model
-        return LocalUpdate(
-            self.solution,
-            columns=self.factor.columns,
-            factorise=lambda changed: State(model, changed).solution.basis,
-        )
+        return LocalUpdate(self)
 
 
 class Terminals:

@@ -1,4 +1,5 @@
-"""What a solve gives: the fields of one conductivity, and all that is a product of them."""
+"""What is prepared once for a mesh, a pattern and contacts, all but the conductivity; and what a
+solve gives: the fields of one conductivity, and all that is a product of them."""
 
 from __future__ import annotations
 
@@ -8,36 +9,129 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import csr_array
 
-from tomoskin.core import FloatArray, IntArray
-from tomoskin.model.forward.engine import Factor, singular
-from tomoskin.model.forward.system import System
+from tomoskin.core import FloatArray, IntArray, ModelError, numeric
+from tomoskin.model.forward.arguments import number_type
+from tomoskin.model.forward.assembly import Element, SystemAssembly, gradient_operator
+from tomoskin.model.forward.engine import Compressed, Factor, Factorise, singular
+from tomoskin.model.forward.engine_choice import choose_engine
+from tomoskin.model.mesh import Mesh
+from tomoskin.model.pattern import Pattern, signed
+
+
+class System:
+    """The equations of the complete electrode model; parameters as of :class:`ForwardModel`."""
+
+    def __init__(
+        self,
+        mesh: Mesh,
+        pattern: Pattern,
+        contact_impedance: ArrayLike,
+        current: ArrayLike = 1.0,
+        *,
+        order: int = 1,
+    ) -> None:
+        if len(mesh.electrodes) != pattern.n_electrodes:
+            raise ModelError(
+                f"the mesh has {len(mesh.electrodes)} electrodes and "
+                f"the pattern {pattern.n_electrodes}"
+            )
+        self.mesh = mesh
+        self.pattern = pattern
+        self.contact_impedance = _impedance(contact_impedance, pattern.n_electrodes)
+        self.current = _current(current, pattern.n_drive)
+        self.most_current = float(np.abs(self.drive_currents).sum(axis=1).max() / 2.0)
+        self.order = order
+        self.engine = choose_engine()
+        self.assembly = SystemAssembly.of(Element.of(mesh, order))
+
+    @cached_property
+    def gradient(self) -> csr_array:
+        """Nodal potentials → scaled gradients, (d·q·n_cells, n_nodes); see Element."""
+        return gradient_operator(self.assembly.element)
+
+    @cached_property
+    def factorise(self) -> Factorise:
+        """Factorises system matrices; their structure is analysed once."""
+        return self.engine.analyse(self.assembly.indptr, self.assembly.indices)
+
+    @cached_property
+    def contacts(self) -> NDArray[Any]:
+        """What the contacts add to the values of the system matrix."""
+        return self.assembly.contacts(self.contact_impedance)
+
+    @cached_property
+    def by_drive(self) -> tuple[IntArray, IntArray]:
+        """Measurements in the order of their drives, and where in it each drive begins."""
+        index = self.pattern.drive_index
+        order = np.argsort(index, kind="stable")
+        return order, np.flatnonzero(np.diff(index[order], prepend=-1))
+
+    def voltages(self, transfer_resistance: NDArray[Any]) -> NDArray[Any]:
+        """(…, n_meas) V of the pattern, from (…, n_electrodes, n_electrodes) Ω."""
+        if self.pattern.spread:
+            potentials = transfer_resistance @ self.drive_currents.T
+            drive, (plus, minus) = self.pattern.drive_index, self.pattern.measure.T
+            return np.asarray(potentials[..., plus, drive] - potentials[..., minus, drive])
+        entries, current = self._entries
+        *many, n, _ = transfer_resistance.shape
+        r = transfer_resistance.reshape(*many, n * n).take(entries, axis=-1)
+        driven_plus = r[..., 0, :] - r[..., 1, :]
+        driven_minus = r[..., 2, :] - r[..., 3, :]
+        return np.asarray(current * (driven_plus - driven_minus))
+
+    @cached_property
+    def drive_currents(self) -> FloatArray:
+        """(n_drive, n_electrodes) A into every electrode."""
+        return self.current[:, None] * self.pattern.currents
+
+    @cached_property
+    def readers(self) -> FloatArray:
+        """(n_meas, n_electrodes) 1 at plus and −1 at minus of each measurement."""
+        return signed(self.pattern.measure, self.pattern.n_electrodes)
+
+    @cached_property
+    def _entries(self) -> tuple[IntArray, FloatArray]:
+        """(4, n_meas) entries of a flat transfer resistance, and each measurement's current."""
+        (source, sink), (plus, minus) = self.pattern.drive.T, self.pattern.measure.T
+        n = self.pattern.n_electrodes
+        entries = [plus * n + source, plus * n + sink, minus * n + source, minus * n + sink]
+        return np.stack(entries), self.current[self.pattern.drive_index]
+
+
+def _impedance(value: ArrayLike, n: int) -> NDArray[Any]:
+    raw = numeric(value, ModelError, " as contact impedance")
+    if raw.shape not in ((), (n,)):
+        raise ModelError(f"expected one contact impedance or {n}, got shape {raw.shape}")
+    z = np.broadcast_to(raw, (n,)).astype(number_type(raw))
+    good = np.isfinite(z) & (z.real > 0)
+    if not good.all():
+        electrode = int(np.argmin(good))
+        raise ModelError(
+            f"expected a positive contact impedance, got {z[electrode]}",
+            where=f"E{electrode + 1}",
+        )
+    return z
+
+
+def _current(value: ArrayLike, n_drive: int) -> FloatArray:
+    raw = numeric(value, ModelError, " as current")
+    if raw.shape not in ((), (n_drive,)):
+        raise ModelError(f"expected one current or {n_drive}, got shape {raw.shape}")
+    if raw.dtype.kind == "c":
+        raise ModelError("expected real currents, got complex ones")
+    if not (np.isfinite(raw).all() and (raw != 0).all()):
+        raise ModelError(f"expected currents other than zero, got {raw.tolist()}")
+    return np.array(np.broadcast_to(raw, (n_drive,)), dtype=np.float64)
+
 
 MOST_RESIDUAL = 1e-6
 """A relative residual above this means that the matrix was singular to working precision."""
 
 _FLOOR = 1e-12
 """Voltages that are zero by symmetry are right to this part of √(R_drive · R_measure)."""
-
-
-def solve_checked(
-    factor: Factor, values: NDArray[Any], rows: IntArray
-) -> tuple[NDArray[Any], NDArray[Any], float]:
-    """Columns X (n_unknowns, n_rows) of the inverse of the matrix A with these values.
-
-    And what the residual costs, Xᵀ (E − A X) with E the columns of the identity; and its largest
-    entry.
-
-    Raises
-    ------
-    ModelError
-        When the residual shows that the matrix is singular to working precision.
-    """
-    columns, lost, largest = factor.checked_columns(values, rows)
-    if not largest < MOST_RESIDUAL:
-        raise singular()
-    return columns, lost, largest
 
 
 def checked_voltages(
@@ -128,28 +222,59 @@ def error_of_drives(model: System, matrix: Any, basis: NDArray[Any]) -> NDArray[
 class Solution:
     """Potentials and voltages for one conductivity; complex where σ or z is.
 
-    What is more than the voltages is computed when it is asked for, once.
+    Everything follows from one basis, and is computed when it is asked for, once.
 
     Attributes
     ----------
     model
-        What was solved.
+        What is solved.
     conductivity
         (n_cells,), or a tensor per cell (n_cells, d, d), S or S/m.
-    basis
-        (n_unknowns, n_electrodes − 1) V/A: fields of 1 A into each electrode and out at the last,
-        which is at zero.
-    voltages
-        (n_meas,) V, in the pattern's order.
-    residual
-        Largest relative residual of the linear solves.
     """
 
     model: System
     conductivity: NDArray[Any]
-    basis: NDArray[Any]
-    voltages: NDArray[Any]
-    residual: float
+
+    @cached_property
+    def factor(self) -> Factor:
+        """The system matrix, factorised."""
+        return self.model.factorise(self._matrix.values)
+
+    @cached_property
+    def _matrix(self) -> Compressed:
+        return self.model.assembly.matrix(self.conductivity, self.model.contacts)
+
+    @cached_property
+    def _solved(self) -> tuple[NDArray[Any], NDArray[Any], float]:
+        """Basis, voltages and residual; ModelError where rounding has spoilt them."""
+        model, matrix, assembly = self.model, self._matrix, self.model.assembly
+        electrodes = np.arange(assembly.n_points, assembly.n_unknowns)
+        basis, lost, largest = self.factor.checked_columns(matrix.values, electrodes)
+        if not largest < MOST_RESIDUAL:
+            raise singular()
+        voltages = checked_voltages(
+            model,
+            basis[assembly.n_points :],
+            lost,
+            sharper=lambda: error_of_drives(model, matrix.matrix, basis),
+        )
+        return basis, voltages, largest
+
+    @property
+    def basis(self) -> NDArray[Any]:
+        """(n_unknowns, n_electrodes − 1) V/A: fields of 1 A into each electrode and out at the
+        last, which is at zero."""
+        return self._solved[0]
+
+    @property
+    def voltages(self) -> NDArray[Any]:
+        """(n_meas,) V, in the pattern's order."""
+        return self._solved[1]
+
+    @property
+    def residual(self) -> float:
+        """Largest relative residual of the linear solves."""
+        return self._solved[2]
 
     @cached_property
     def transfer_resistance(self) -> NDArray[Any]:

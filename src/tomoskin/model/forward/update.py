@@ -17,7 +17,7 @@ patch, which is the same formula.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
@@ -45,22 +45,11 @@ class LocalUpdate:
     Parameters
     ----------
     base
-        The state that changes; nothing is computed yet.
-    columns
-        Nodes (n,) → columns of the base system's inverse (n_unknowns, n), by its factor.
-    factorise
-        The basis of another conductivity, (n_cells,), by a factor of its own.
+        The state that changes.
     """
 
-    def __init__(
-        self,
-        base: Solution,
-        *,
-        columns: Callable[[IntArray], NDArray[Any]],
-        factorise: Callable[[NDArray[Any]], NDArray[Any]],
-    ) -> None:
-        self._model, self._conductivity, self._basis = base.model, base.conductivity, base.basis
-        self._columns, self._factorise = columns, factorise
+    def __init__(self, base: Solution) -> None:
+        self._base, self._model, self._conductivity = base, base.model, base.conductivity
         self._stored = np.zeros(base.model.assembly.n_points, dtype=bool)
 
     def warm_up(self, cells: ArrayLike | None = None) -> None:
@@ -106,7 +95,7 @@ class LocalUpdate:
         """Transfer resistance against the ground electrode, and what rounding may cost it."""
         if self._conductivity.ndim > 1:
             raise ModelError("a local update needs a scalar conductivity")
-        joined = Touches.of(touches, self._basis.dtype)
+        joined = Touches.of(touches, self._base.basis.dtype)
         if len(joined.cells) <= MOST_CELLS or np.diff(joined.starts).max() <= MOST_CELLS:
             return self._by_patches(joined)
         if len(joined) > 1:
@@ -117,12 +106,11 @@ class LocalUpdate:
 
     def _factorised(self, touch: Touches) -> tuple[NDArray[Any], NDArray[Any]]:
         """Results of a large patch; the new state checks its own voltages."""
-        if fault := touch.fault(len(self._conductivity)):
-            raise fault
+        touch.check(len(self._conductivity))
         kind = np.result_type(self._conductivity, touch.conductivity)
         changed = self._conductivity.astype(kind)
         changed[touch.cells] = touch.conductivity
-        grounded = self._factorise(changed)[self._model.assembly.n_points :]
+        grounded = Solution(self._model, changed).basis[self._model.assembly.n_points :]
         return grounded[None], np.zeros_like(grounded)[None]
 
     def _by_patches(self, touches: Touches) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -135,7 +123,8 @@ class LocalUpdate:
                 self._need(missing)
                 grounded, lost, missing = self._patches.change(*arrays)
         except ValueError as error:
-            raise touches.fault(len(self._conductivity)) or singular() from error
+            touches.check(len(self._conductivity))
+            raise singular() from error
         return grounded, lost
 
     def _by_halves(self, touches: Touches) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -147,7 +136,7 @@ class LocalUpdate:
 
     @cached_property
     def _patches(self) -> Patches:
-        element, basis = self._model.assembly.element, self._basis
+        element, basis = self._model.assembly.element, self._base.basis
         held = np.zeros(element.n_nodes, dtype=bool)
         for facets in element.facets:
             held[facets] = True
@@ -162,7 +151,7 @@ class LocalUpdate:
         return self._model.engine.patches(base)
 
     def _size(self, n_columns: int) -> int:
-        return n_columns * self._model.assembly.n_points * self._basis.itemsize
+        return n_columns * self._model.assembly.n_points * self._base.basis.itemsize
 
     def _need(self, missing: IntArray) -> None:
         """Compute the columns of nodes; where the store is full, empty it for the next attempt."""
@@ -171,6 +160,6 @@ class LocalUpdate:
             self._patches.forget()
             self._stored[:] = False
             return
-        columns = self._columns(missing)
+        columns = self._base.factor.columns(missing)
         self._patches.keep(missing, columns[: self._model.assembly.n_points])
         self._stored[missing] = True

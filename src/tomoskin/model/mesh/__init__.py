@@ -2,16 +2,23 @@
 
 from tomoskin.model.mesh.boundary import ElectrodeArc as ElectrodeArc, check_arcs as check_arcs
 from tomoskin.model.mesh.draped import Draped as Draped
-from tomoskin.model.mesh.extrude import extrude as extrude
-from tomoskin.model.mesh.mesh import Mesh as Mesh, MeshFile as MeshFile
-from tomoskin.model.mesh.outline import Disc as Disc, Ellipse as Ellipse, Outline as Outline
-from tomoskin.model.mesh.patch import (
+from tomoskin.model.mesh.extrude import (
     FacePatch as FacePatch,
     Patch as Patch,
     WallPatch as WallPatch,
+    extrude as extrude,
     ring as ring,
 )
-from tomoskin.model.mesh.polygon import Polygon as Polygon, Rectangle as Rectangle
+from tomoskin.model.mesh.mesh import Mesh as Mesh, MeshFile as MeshFile
+from tomoskin.model.mesh.outline import Disc as Disc, Ellipse as Ellipse, Outline as Outline
+from tomoskin.model.mesh.polygon import (
+    Polygon as Polygon,
+    Rectangle as Rectangle,
+    centroid as centroid,
+    inside as inside,
+    off_segment as off_segment,
+    signed_area as signed_area,
+)
 from tomoskin.model.mesh.surface import (
     Cap as Cap,
     Plane as Plane,

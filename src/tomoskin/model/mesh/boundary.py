@@ -90,14 +90,15 @@ def check_arcs(outline: Outline, arcs: Sequence[ElectrodeArc]) -> None:
     if not arcs:
         raise GeometryError("expected at least one electrode, got none")
     for number, arc in enumerate(arcs):
-        _check_width(outline, arc, f"E{number + 1}")
+        check_width(outline, arc, f"E{number + 1}")
     order = sorted(range(len(arcs)), key=lambda i: arcs[i].start % outline.length)
     for this, following in zip(order, [*order[1:], order[0]], strict=True):
         if this != following:
             _check_gap(outline, arcs, this, following)
 
 
-def _check_width(outline: Outline, arc: ElectrodeArc, where: str) -> None:
+def check_width(outline: Outline, arc: ElectrodeArc, where: str) -> None:
+    """Raise GeometryError where an arc is none, or longer than the outline."""
     if not (math.isfinite(arc.start) and math.isfinite(arc.end)):
         raise GeometryError(
             f"expected finite arclengths, got {arc.start} to {arc.end} m", where=where

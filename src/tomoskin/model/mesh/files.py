@@ -13,14 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tomoskin.core import (
-    DataError,
-    FloatArray,
-    GeometryError,
-    IntArray,
-    check_is_file,
-    install_hint,
-)
+from tomoskin.core import FloatArray, GeometryError, IntArray, check_is_file, install_hint
 from tomoskin.model.mesh.triangles import boundary_facets
 
 READERS = {
@@ -39,12 +32,6 @@ _LARGEST = 50_000_000
 """Bytes that a mesh file may have; a million triangles of a .stl take so many."""
 
 _CORNERS = {"vertex": 1, "line": 2, "triangle": 3, "tetra": 4}
-
-
-def at_source(error: GeometryError, source: str) -> GeometryError:
-    """The error with the file that it is about."""
-    where = f"{source}, {error.where}" if error.where else source
-    return GeometryError(error.message, where=where, hint=error.hint)
 
 
 def parsed(file: Path) -> Any:
@@ -90,10 +77,7 @@ def _scene(collada: Any, file: Path) -> Any:
 
 
 def _check_readable(file: Path) -> None:
-    try:
-        check_is_file(file)
-    except DataError as error:
-        raise GeometryError(error.message, where=error.where, hint=error.hint) from error
+    check_is_file(file, GeometryError)
     if file.stat().st_size > _LARGEST:
         raise GeometryError(
             f"is too large for a mesh ({file.stat().st_size / 1e6:.0f} MB, at most "
@@ -101,17 +85,6 @@ def _check_readable(file: Path) -> None:
             where=str(file),
             hint="simplify it first; cells of a millimetre are fine enough",
         )
-
-
-def check_repeats(cells: IntArray) -> None:
-    """Raise GeometryError that names a cell with the corners of an earlier one."""
-    ordered = np.sort(cells, axis=1)
-    _, first, which = np.unique(ordered, axis=0, return_index=True, return_inverse=True)
-    earlier = first[which.reshape(-1)]
-    again = earlier < np.arange(len(cells))
-    if again.any():
-        cell = int(np.argmax(again))
-        raise GeometryError(f"repeats cell {earlier[cell]}", where=f"cell {cell}")
 
 
 def renumbered(number: IntArray, facets: IntArray, where: str) -> IntArray:
@@ -164,11 +137,21 @@ def points_of(raw: Any, cells: IntArray, scale: float) -> tuple[FloatArray, floa
 
 
 def groups_of(raw: Any, corners: int) -> dict[str, IntArray]:
-    """Name → (n, corners) facets, for all groups that hold any."""
+    """Name → (n, corners) facets, for all groups that hold any: cell sets, where gmsh 4.1 has its
+    named physical groups; those of gmsh by name, or number where they have none; and marks."""
+    physical = {
+        int(number): name
+        for name, (number, dimension) in raw.field_data.items()
+        if dimension == corners - 1
+    }
     parts: dict[str, list[IntArray]] = {}
-    for source in (_sets, _physical, _marked):
+    for source in (
+        _sets(raw, corners),
+        _by_number(raw, "gmsh:physical", corners, lambda n: physical.get(n, str(n))),
+        _by_number(raw, MARKER, corners, "E{}".format),
+    ):
         groups: dict[str, list[IntArray]] = {}
-        for name, facets in source(raw, corners):
+        for name, facets in source:
             groups.setdefault(name, []).append(facets)
         parts = {**groups, **parts}  # what is a set already is not read twice
     joined = {name: np.concatenate(tables).astype(np.int64) for name, tables in parts.items()}
@@ -176,37 +159,20 @@ def groups_of(raw: Any, corners: int) -> dict[str, IntArray]:
 
 
 def _sets(raw: Any, corners: int) -> Iterator[tuple[str, IntArray]]:
-    """Cell sets; gmsh 4.1 has its named physical groups here."""
     for name, members in raw.cell_sets.items():
         for block, chosen in zip(raw.cells, members, strict=True):
             if not name.startswith("gmsh:") and chosen is not None and _fits(block, corners):
                 yield name, block.data[np.asarray(chosen, dtype=np.int64)]
 
 
-def _physical(raw: Any, corners: int) -> Iterator[tuple[str, IntArray]]:
-    """gmsh's physical groups, by name, or by number where they have none."""
-    names = {
-        int(number): name
-        for name, (number, dimension) in raw.field_data.items()
-        if dimension == corners - 1
-    }
-    for number, facets in _by_number(raw, "gmsh:physical", corners):
-        yield names.get(number, str(number)), facets
-
-
-def _marked(raw: Any, corners: int) -> Iterator[tuple[str, IntArray]]:
-    for number, facets in _by_number(raw, MARKER, corners):
-        yield f"E{number}", facets
-
-
-def _by_number(raw: Any, key: str, corners: int) -> Iterator[tuple[int, IntArray]]:
-    if key not in raw.cell_data:
-        return
-    for block, values in zip(raw.cells, raw.cell_data[key], strict=True):
+def _by_number(
+    raw: Any, key: str, corners: int, name: Callable[[int], str]
+) -> Iterator[tuple[str, IntArray]]:
+    for block, values in zip(raw.cells, raw.cell_data.get(key, ()), strict=False):
         if _fits(block, corners):
             numbers = np.asarray(values).reshape(-1)
             for number in np.unique(numbers[numbers > 0]).tolist():
-                yield int(number), block.data[numbers == number]
+                yield name(int(number)), block.data[numbers == number]
 
 
 def _fits(block: Any, corners: int) -> bool:

@@ -1,8 +1,10 @@
-"""The mesh: points, simplices, and the boundary facets that are electrodes."""
+"""The mesh, immutable: cells with electrode facets, their measures and neighbours; the pixels of a
+raster over it; and what a file of one holds."""
 
 from __future__ import annotations
 
 import hashlib
+import math
 from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
@@ -11,21 +13,132 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from tomoskin.core import FloatArray, GeometryError, IntArray, PixelMap
-from tomoskin.model.mesh.check import check_mesh, checked_metric
+from tomoskin.core import FloatArray, GeometryError, IntArray, PixelMap, numeric
 from tomoskin.model.mesh.files import (
     Electrodes,
-    at_source,
     cells_of,
-    check_repeats,
     choose,
     groups_of,
     parsed,
     points_of,
     renumbered,
 )
-from tomoskin.model.mesh.pixels import pixel_map, step_for
-from tomoskin.model.mesh.triangles import boundary_facets, neighbour_pairs, owners, simplex_measure
+from tomoskin.model.mesh.triangles import (
+    boundary_facets,
+    check_mesh,
+    checked_metric,
+    owners,
+    paired_facets,
+    simplex_measure,
+)
+
+MOST_PIXELS = 1 << 26
+_EDGE = 1e-12
+"""A barycentric coordinate this far below zero is rounding: the pixel lies on the edge."""
+
+
+def pixel_map(
+    points: FloatArray,
+    cells: IntArray,
+    mesh_id: str,
+    *,
+    step: float,
+    height: float | None = None,
+) -> PixelMap:
+    """Square pixels of side ``step`` m over the extent in x and y, each with its cell.
+
+    A pixel belongs to the cell that its centre lies in, on an edge to the one of lower number.
+    Triangles lie in the plane; of tetrahedra the slice z = ``height`` m is taken.
+
+    Raises
+    ------
+    GeometryError
+        For a curved sheet, a height that is missing, not wanted or outside, or a step that is
+        not above 0 or makes more than ``MOST_PIXELS`` pixels.
+    """
+    height = _checked_height(points, cells, height)
+    x, y = _raster(points[np.unique(cells)][:, :2], step)
+    corner = points[cells]
+    touched = np.arange(len(cells))
+    if height is not None:
+        span = corner[:, :, 2]
+        touched = np.flatnonzero((span.min(axis=1) <= height) & (span.max(axis=1) >= height))
+        corner = corner[touched]
+    cell, column, row = _candidates(corner[:, :, :2], x, y, step)
+    position = np.column_stack([x[column], y[row]])
+    if height is not None:
+        position = np.column_stack([position, np.full(len(position), height)])
+    inside = _inside(corner, cell, position)
+    owner = np.full((len(y), len(x)), len(cells))
+    np.minimum.at(owner, (row[inside], column[inside]), touched[cell[inside]])
+    owner[owner == len(cells)] = -1
+    return PixelMap(owner, x, y, mesh_id)
+
+
+def step_for(points: FloatArray, cells: IntArray, count: int) -> float:
+    """Side of a pixel, m, when ``count`` of them span the longer extent. Raises GeometryError."""
+    if count < 1:
+        raise GeometryError(f"expected at least 1 pixel, got {count}")
+    return float(np.ptp(points[np.unique(cells)][:, :2], axis=0).max()) / count
+
+
+def _checked_height(points: FloatArray, cells: IntArray, height: float | None) -> float | None:
+    flat = cells.shape[1] == 3
+    if flat and points.shape[1] == 3:
+        raise GeometryError(
+            "a curved sheet has no pixels in the plane", hint="draw its cells, or flatten it first"
+        )
+    if flat and height is not None:
+        raise GeometryError(f"expected no height for a sheet in the plane, got {height:g} m")
+    if flat:
+        return None
+    low, high = points[:, 2].min(), points[:, 2].max()
+    if height is None:
+        raise GeometryError(
+            "expected the height of a slice through the volume, got none", hint="pass z, in m"
+        )
+    if not low <= height <= high:
+        raise GeometryError(f"expected a height from {low:g} to {high:g} m, got {height:g} m")
+    return height
+
+
+def _raster(points: FloatArray, step: float) -> tuple[FloatArray, FloatArray]:
+    """Centres of the columns from left to right and of the rows from top to bottom."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    if not (math.isfinite(step) and step > 0):
+        raise GeometryError(f"expected a pixel size above 0 m, got {step:g} m")
+    exact = (high - low) / step
+    if exact[0] * exact[1] > MOST_PIXELS:
+        raise GeometryError(f"pixels of {step:g} m would be more than {MOST_PIXELS} pixels in all")
+    n = np.maximum(1, np.ceil(exact - 1e-9)).astype(int)
+    start = (low + high) / 2 - step * (n - 1) / 2
+    x, y = (start[axis] + step * np.arange(n[axis]) for axis in (0, 1))
+    return x, y[::-1].copy()
+
+
+def _candidates(
+    corner: FloatArray, x: FloatArray, y: FloatArray, step: float
+) -> tuple[IntArray, IntArray, IntArray]:
+    """Cell, column and row of every pixel in the box around each cell."""
+    low, high = corner.min(axis=1), corner.max(axis=1)
+    slack = 1e-9 * step
+    left = np.searchsorted(x, low[:, 0] - slack)
+    right = np.searchsorted(x, high[:, 0] + slack, side="right")
+    top = np.searchsorted(-y, -high[:, 1] - slack)
+    bottom = np.searchsorted(-y, -low[:, 1] + slack, side="right")
+    wide, tall = right - left, bottom - top
+    cell = np.repeat(np.arange(len(corner)), wide * tall)
+    first = np.repeat(np.cumsum(wide * tall) - wide * tall, wide * tall)
+    down, across = np.divmod(np.arange(len(cell)) - first, np.maximum(wide, 1)[cell])
+    return cell, left[cell] + across, top[cell] + down
+
+
+def _inside(corner: FloatArray, cell: IntArray, position: FloatArray) -> NDArray[np.bool_]:
+    """(n,) bool: whether ``position`` (n, d) lies in its ``cell``, by barycentric coordinates."""
+    edges = (corner[:, 1:] - corner[:, :1]).swapaxes(1, 2)
+    to_barycentric = np.linalg.inv(edges)
+    share = np.einsum("nij,nj->ni", to_barycentric[cell], position - corner[cell, 0])
+    return np.asarray((share >= -_EDGE).all(axis=1) & (share.sum(axis=1) <= 1 + _EDGE))
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +240,7 @@ class Mesh:
     @cached_property
     def neighbours(self) -> IntArray:
         """(n_pairs, 2) cells that share a facet, each pair once."""
-        return neighbour_pairs(self.cells)
+        return paired_facets(self.cells)[0]
 
     @cached_property
     def boundary(self) -> IntArray:
@@ -194,7 +307,7 @@ class MeshFile:
             points, height = points_of(raw, cells, scale)
             groups = groups_of(raw, cells.shape[1] - 1)
         except GeometryError as error:
-            raise at_source(error, str(file)) from error
+            raise error.within(str(file), GeometryError) from error
         return cls(points, cells, groups, str(file), height)
 
     @property
@@ -206,7 +319,6 @@ class MeshFile:
     def mesh(self, electrodes: Electrodes = None) -> Mesh:
         """Return the mesh with those electrodes. Raises GeometryError."""
         try:
-            check_repeats(self.cells)
             facets = choose(self.points, self.cells, self.groups, electrodes)
             used, compact = np.unique(self.cells, return_inverse=True)
             number = np.full(len(self.points), -1)
@@ -214,20 +326,13 @@ class MeshFile:
             tables = [renumbered(number, f, f"E{i}") for i, f in enumerate(facets, 1)]
             return Mesh(self.points[used], compact.reshape(self.cells.shape), tuple(tables))
         except GeometryError as error:
-            raise at_source(error, self.source) from error
+            raise error.within(self.source, GeometryError) from error
 
 
 def _frozen(value: object, dtype: DTypeLike, where: str) -> NDArray[Any]:
-    try:
-        raw = np.array(value)
-    except ValueError as error:
-        raise GeometryError(
-            "expected rows of equal length, got different lengths", where=where
-        ) from error
+    raw = numeric(value, GeometryError, where=where, real=True)
     if raw.ndim != 2:
         raise GeometryError(f"expected a table with two axes, got shape {raw.shape}", where=where)
-    if raw.dtype.kind not in "iuf":
-        raise GeometryError(f"expected real numbers, got {raw.dtype}", where=where)
     with np.errstate(invalid="ignore"):
         array = raw.astype(dtype)
     if array.dtype.kind == "i" and not np.array_equal(array, raw):

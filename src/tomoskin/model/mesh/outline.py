@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from abc import abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
@@ -22,12 +21,10 @@ class Outline(Protocol):
     """
 
     @property
-    @abstractmethod
     def length(self) -> float:
         """The length of the closed curve, in m."""
 
     @property
-    @abstractmethod
     def area(self) -> float:
         """The area inside the curve, in m²."""
 
@@ -41,19 +38,15 @@ class Outline(Protocol):
         """(k,) arclengths at which the direction jumps, ascending, m. A curve has none."""
         return np.zeros(0)
 
-    @abstractmethod
     def point(self, s: ArrayLike) -> FloatArray:
         """(n, 2) points at arclengths ``s``, m."""
 
-    @abstractmethod
     def contains(self, xy: ArrayLike) -> NDArray[np.bool_]:
         """(n,) True where a point of ``xy`` (n, 2) lies inside."""
 
-    @abstractmethod
     def nearest(self, xy: ArrayLike) -> FloatArray:
         """(n,) arclengths of the rim points that are nearest to ``xy`` (n, 2)."""
 
-    @abstractmethod
     def toward(self, angle: float) -> float:
         """Arclength where the ray from ``centre`` leaves the sheet for good.
 

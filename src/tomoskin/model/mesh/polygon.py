@@ -16,6 +16,8 @@ from tomoskin.model.mesh.triangles import check_finite
 _TOUCH = 1e-9
 """Two points nearer than this fraction of the polygon's size count as one."""
 
+_TINY = np.finfo(float).tiny
+
 
 @dataclass(frozen=True, eq=False)
 class Polygon(Outline):
@@ -35,7 +37,7 @@ class Polygon(Outline):
         """Check the vertices, order them counter-clockwise and freeze them."""
         given = np.array(self.vertices, dtype=float)
         check_simple(given)
-        if _signed_area(given) < 0:
+        if signed_area(given) < 0:
             given = np.roll(given[::-1], 1, axis=0)
         given.flags.writeable = False
         object.__setattr__(self, "vertices", given)
@@ -48,16 +50,12 @@ class Polygon(Outline):
     @cached_property
     def area(self) -> float:
         """The area inside the polygon, in m²."""
-        return _signed_area(self.vertices)
+        return signed_area(self.vertices)
 
     @cached_property
     def centre(self) -> FloatArray:
         """(2,) centroid of the area, m."""
-        origin = self.vertices.mean(axis=0)
-        a = self.vertices - origin
-        b = np.roll(a, -1, axis=0)
-        cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-        return np.asarray(origin + ((a + b) * cross[:, None]).sum(axis=0) / (3 * cross.sum()))
+        return centroid(self.vertices)
 
     @cached_property
     def corners(self) -> FloatArray:
@@ -154,7 +152,17 @@ def inside(ring: FloatArray, xy: FloatArray) -> NDArray[np.bool_]:
     return result
 
 
-def _signed_area(vertices: FloatArray) -> float:
+def centroid(vertices: FloatArray) -> FloatArray:
+    """(2,) centroid of the area inside a polygon's ``vertices`` (n, 2)."""
+    origin = vertices.mean(axis=0)
+    a = vertices - origin
+    b = np.roll(a, -1, axis=0)
+    cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    return np.asarray(origin + ((a + b) * cross[:, None]).sum(axis=0) / (3 * cross.sum()))
+
+
+def signed_area(vertices: FloatArray) -> float:
+    """The area inside a polygon, below 0 where the ``vertices`` (n, 2) run clockwise."""
     a = vertices - vertices.mean(axis=0)
     b = np.roll(a, -1, axis=0)
     return float((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum() / 2)
@@ -229,5 +237,7 @@ def _side(a: FloatArray, b: FloatArray, p: FloatArray) -> FloatArray:
 def off_segment(p: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:
     """Distance from points ``p`` to segments ``ab``."""
     step = b - a
-    along = np.clip(((p - a) * step).sum(axis=-1) / (step**2).sum(axis=-1), 0.0, 1.0)
+    along = np.clip(
+        ((p - a) * step).sum(axis=-1) / np.maximum((step**2).sum(axis=-1), _TINY), 0.0, 1.0
+    )
     return np.asarray(np.linalg.norm(p - a - along[..., None] * step, axis=-1))

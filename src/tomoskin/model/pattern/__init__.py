@@ -1,6 +1,5 @@
 """Drive and measurement tables: THE order of the rows, shared by firmware, decoder and Jacobian."""
 
-from tomoskin.model.pattern.match import match_rows as match_rows, sum_rows as sum_rows
 from tomoskin.model.pattern.pattern import (
     NAMED as NAMED,
     Pattern as Pattern,
@@ -10,4 +9,4 @@ from tomoskin.model.pattern.pattern import (
     signed as signed,
     undirected as undirected,
 )
-from tomoskin.model.pattern.scan import Scan as Scan
+from tomoskin.model.pattern.rows import Scan as Scan, match_rows as match_rows, sum_rows as sum_rows

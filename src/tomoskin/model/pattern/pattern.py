@@ -11,7 +11,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tomoskin.core import FloatArray, IntArray, PatternError, meant
+from tomoskin.core import FloatArray, IntArray, PatternError, meant, refuse_first
 
 _BALANCE = 1e-3
 """Currents of a drive sum to zero, up to this part of the largest of them."""
@@ -71,12 +71,8 @@ class Pattern:
                 f"got {len(self.drive_index)}"
             )
         outside = (self.drive_index < 0) | (self.drive_index >= len(self.drives))
-        if outside.any():
-            row = int(np.argmax(outside))
-            raise PatternError(
-                f"expected a drive from 0 to {len(self.drives) - 1}, got {self.drive_index[row]}",
-                where=f"measurement row {row}",
-            )
+        drives = f"a drive from 0 to {len(self.drives) - 1}"
+        refuse_first(outside, self.drive_index, drives, "measurement row", PatternError)
         _check_unique(self)
 
     @classmethod
@@ -313,12 +309,7 @@ def _check_pairs(pairs: IntArray, n: int, kind: str, ends: tuple[str, str]) -> N
     if pairs.ndim != 2 or pairs.shape[1] != 2 or not len(pairs):
         raise PatternError(f"expected a {kind} table of shape (rows, 2), got {pairs.shape}")
     outside = ((pairs < 0) | (pairs >= n)).any(axis=1)
-    if outside.any():
-        row = int(np.argmax(outside))
-        raise PatternError(
-            f"expected electrodes from 0 (E1) to {n - 1}, got {pairs[row].tolist()}",
-            where=f"{kind} row {row}",
-        )
+    refuse_first(outside, pairs, f"electrodes from 0 (E1) to {n - 1}", f"{kind} row", PatternError)
     same = pairs[:, 0] == pairs[:, 1]
     if same.any():
         row = int(np.argmax(same))

@@ -20,7 +20,7 @@ from scipy.sparse import csc_array, csr_array, diags_array
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
-from tomoskin.core import FloatArray, ModelError
+from tomoskin.core import FloatArray, ModelError, refuse_first
 
 _ZERO = 1e-12
 """An eigenvalue, pivot or row sum below this part of the largest one is zero."""
@@ -58,12 +58,8 @@ class Diagonal:
 
     def __post_init__(self) -> None:
         """Refuse an entry that is not positive."""
-        if not (self.matrix > 0).all():
-            cell = int(np.argmin(self.matrix > 0))
-            raise ModelError(
-                f"expected a positive diagonal, got {self.matrix[cell]}",
-                where=f"prior, cell {cell}",
-            )
+        bad = ~(self.matrix > 0)
+        refuse_first(bad, self.matrix, "a positive diagonal", "prior, cell", ModelError)
 
     @property
     def free(self) -> FloatArray:

@@ -1,6 +1,6 @@
 """Skins on a robot: which there are, and where on its links they lie."""
 
-from tomoskin.model.robot.pose import (
+from tomoskin.model.robot.link_shapes import (
     Pose as Pose,
     pose_numbers as pose_numbers,
     quaternion as quaternion,

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from tomoskin.core import FloatArray, SkinError, StrPath
 from tomoskin.model.mesh import Surface
-from tomoskin.model.robot.pose import Pose
+from tomoskin.model.robot.link_shapes import Pose
 from tomoskin.model.robot.urdf import Positions, Urdf
 from tomoskin.model.section import (
     OneOrMore,

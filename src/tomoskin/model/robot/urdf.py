@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Container
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Self
 from xml.etree import ElementTree
@@ -12,17 +11,17 @@ from xml.etree import ElementTree
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tomoskin.core import FloatArray, GeometryError, SkinError, StrPath, needed
+from tomoskin.core import FloatArray, GeometryError, SkinError, StrPath, meant_or_known, needed
 from tomoskin.model.robot.link_shapes import (
     MOST_TRIANGLES,
     LinkShape,
+    Pose,
     name_of,
     numbers_of,
     origin_of,
     read_shapes,
     thinned,
 )
-from tomoskin.model.robot.pose import Pose
 from tomoskin.model.skin import read_text
 
 _LARGEST = 20_000_000
@@ -143,13 +142,8 @@ class Urdf:
     def check_link(self, link: str, where: str) -> None:
         """Raise SkinError where there is no such link, with the one that may have been meant."""
         if link not in self.links:
-            close = get_close_matches(link, self.links, n=1)
-            known = ", ".join(self.links[:20])
-            raise SkinError(
-                f'there is no link "{link}" in {self.source}',
-                where=where,
-                hint=f'did you mean "{close[0]}"?' if close else f"its links: {known}",
-            )
+            hint = meant_or_known(link, self.links[:20], "its links")
+            raise SkinError(f'there is no link "{link}" in {self.source}', where=where, hint=hint)
 
     @property
     def root(self) -> str:
@@ -169,16 +163,7 @@ class Urdf:
 
     def poses(self, positions: Positions | None = None) -> dict[str, Pose]:
         """Those of all links, in the order of the file, as :meth:`pose` has each."""
-        poses = {self.root: Pose()}
-
-        def pose(link: str) -> Pose:
-            if link not in poses:
-                joint = self.joints[link]
-                own = joint.moved(positions) if positions else joint.pose
-                poses[link] = pose(joint.parent) @ own
-            return poses[link]
-
-        return {link: pose(link) for link in self.links}
+        return {link: self.pose(link, positions) for link in self.links}
 
     @property
     def meshes(self) -> dict[str, Pose]:

@@ -8,10 +8,9 @@ import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, dataclass, field, fields, replace
-from difflib import get_close_matches
 from typing import Any, ClassVar, Self, TypeVar, dataclass_transform
 
-from tomoskin.core import SkinError
+from tomoskin.core import SkinError, meant_or_known
 from tomoskin.model.section.kinds import ValueKind, literal, show
 
 T = TypeVar("T")
@@ -296,6 +295,5 @@ def check_names(given: Iterable[str], known: list[str], what: str, where: str) -
     """Raise SkinError for a name that is not ``known``, with the one that may have been meant."""
     for name in given:
         if name not in known:
-            close = get_close_matches(name, known, n=1)
-            guess = f'did you mean "{close[0]}"?' if close else f"known: {', '.join(known)}"
-            raise SkinError(f'unknown {what} "{name}"', where=where, hint=guess)
+            hint = meant_or_known(name, known)
+            raise SkinError(f'unknown {what} "{name}"', where=where, hint=hint)

@@ -123,8 +123,7 @@ def located(place: str) -> Iterator[None]:
     try:
         yield
     except (GeometryError, PatternError) as error:
-        where = f"{place}, {error.where}" if error.where else place
-        raise SkinError(error.message, where=where, hint=error.hint) from error
+        raise error.within(place, SkinError) from error
 
 
 def check_readout(readout: ReadoutSettings, source: str) -> None:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from difflib import get_close_matches
 from importlib.resources import files
 from os import PathLike, fspath
 from pathlib import Path
 
-from tomoskin.core import EMPTY, SkinError, StrPath
+from tomoskin.core import EMPTY, SkinError, StrPath, meant, open_input
 
 BUILT_IN = "built-in"
 """Source of the skins that come with tomoskin."""
@@ -35,18 +34,15 @@ def skin_text(skin: str | PathLike[str]) -> tuple[str, str]:
     try:
         return read_text(path, "a skin file", _LARGEST), str(path)
     except SkinError as error:
-        raise _missing(path) if isinstance(error.__cause__, FileNotFoundError) else error from None
-
-
-def _missing(path: Path) -> SkinError:
-    names = built_in_names()
-    close = get_close_matches(str(path), names, n=1)
-    guess = f'did you mean "{close[0]}"? ' if close else ""
-    return SkinError(
-        "there is no such file, and no built-in skin of that name",
-        where=str(path),
-        hint=f"{guess}built-in skins: {', '.join(names)}",
-    )
+        if error.message != "there is no such file":
+            raise
+        names = built_in_names()
+        guess = meant(str(path), names).removeprefix("; ")
+        raise SkinError(
+            "there is no such file, and no built-in skin of that name",
+            where=str(path),
+            hint=f"{guess} built-in skins: {', '.join(names)}".strip(),
+        ) from None
 
 
 def read_text(path: StrPath, what: str, most: int = 10_000_000) -> str:
@@ -54,20 +50,17 @@ def read_text(path: StrPath, what: str, most: int = 10_000_000) -> str:
 
     Raises SkinError for what is no such file, and what cannot be read as text.
     """
-    path = Path(path)
     where = str(path)
+    with open_input(path, error=SkinError) as file:
+        data = file.read(most + 1)
+    if len(data) > most:
+        raise SkinError(f"is too large for {what} (over {most / 1e6:g} MB)", where=where)
     try:
-        if path.exists() and not path.is_file():
-            raise SkinError(f"is a folder or device, not {what}", where=where)
-        if path.stat().st_size > most:
-            raise SkinError(f"is too large for {what} (over {most / 1e6:g} MB)", where=where)
-        if not (text := path.read_bytes().decode("utf-8-sig")).strip():
-            raise SkinError(EMPTY, where=where)
-        return text
+        text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise SkinError(
             f"is not a text file (byte {error.start} is not UTF-8)", where=where
         ) from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise SkinError(f"cannot be read: {reason}", where=where[:80]) from error
+    if not text.strip():
+        raise SkinError(EMPTY, where=where)
+    return text

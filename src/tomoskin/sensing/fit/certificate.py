@@ -277,8 +277,10 @@ class Rim:
     def doubt(self, x: float, y: float, radius: float) -> FloatArray:
         """(2, 2) m² by which a press near the rim is misplaced towards the middle or away from it,
         since the sheet yields there in another way than a round spot does."""
-        away, nearest = self.tree.query((x, y))
-        out = np.asarray(self.tree.data[nearest]) - (x, y)
+        every = self.tree.data - (x, y)  # of a single spot faster than by the tree
+        square = every[:, 0] ** 2 + every[:, 1] ** 2
+        nearest = int(square.argmin())
+        away, out = math.sqrt(square[nearest]), every[nearest]
         variance = (_RIM * self.spacing * math.exp(-((away / radius) ** 2))) ** 2
         return np.asarray(variance / max(away * away, 1e-12) * np.outer(out, out))
 

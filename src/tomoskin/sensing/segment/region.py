@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
 from tomoskin.core import DataError, FloatArray
+from tomoskin.model.mesh import centroid, inside, off_segment, signed_area
 from tomoskin.model.skin import Skin
 
 _POSITIONS = 1500
@@ -57,7 +58,7 @@ class Region:
                 where="xy",
             ) from error
         corners = xy[hull.vertices]
-        middle = _centroid(corners)
+        middle = centroid(corners)
         return cls(middle + (1 + _BEYOND * len(xy) ** (-2 / 3)) * (corners - middle))
 
     @classmethod
@@ -65,7 +66,7 @@ class Region:
         """The polygon; DataError unless it has three finite corners that enclose something."""
         good = outline.ndim == 2 and outline.shape[1:] == (2,) and len(outline) >= 3
         good = good and bool((np.abs(outline) <= cls.FARTHEST).all())
-        if not good or not abs(_area(outline)) > 0:
+        if not good or not abs(signed_area(outline)) > 0:
             raise DataError(
                 "expected an outline of at least three corners around an area, "
                 f"got shape {outline.shape}"
@@ -75,12 +76,12 @@ class Region:
     @cached_property
     def centre(self) -> FloatArray:
         """(2,) m, the centroid of the polygon."""
-        return _centroid(self.outline)
+        return centroid(self.outline)
 
     @cached_property
     def unit(self) -> float:
         """Radius of the disc of the same area, m."""
-        return float(np.sqrt(abs(_area(self.outline)) / np.pi))
+        return float(np.sqrt(abs(signed_area(self.outline)) / np.pi))
 
     def scaled(self, xy: FloatArray) -> FloatArray:
         """Positions (n, 2) m in the locator's own unit."""
@@ -92,21 +93,12 @@ class Region:
 
     def holds(self, xy: FloatArray) -> NDArray[np.bool_]:
         """(n,) whether the positions (n, 2) m are inside, by the even-odd rule."""
-        a, b = self.outline, np.roll(self.outline, -1, axis=0)
-        x, y = xy[:, 0, None], xy[:, 1, None]
-        crosses = (a[:, 1] > y) != (b[:, 1] > y)
-        rise = np.where(crosses, b[:, 1] - a[:, 1], 1.0)
-        beside = x < (b[:, 0] - a[:, 0]) * (y - a[:, 1]) / rise + a[:, 0]
-        return np.asarray((crosses & beside).sum(axis=1) % 2 == 1)
+        return inside(self.outline, xy)
 
     def beyond(self, xy: FloatArray) -> FloatArray:
         """(n,) m by which the positions (n, 2) m lie outside the outline; 0 for those inside."""
-        start = self.outline
-        side = np.roll(start, -1, axis=0) - start
-        away = xy[:, None] - start
-        along = (away * side).sum(axis=2) / np.maximum((side**2).sum(axis=1), np.finfo(float).tiny)
-        nearest = away - np.clip(along, 0, 1)[:, :, None] * side
-        distance = np.linalg.norm(nearest, axis=2).min(axis=1)
+        ends = np.roll(self.outline, -1, axis=0)
+        distance = off_segment(xy[:, None], self.outline, ends).min(axis=1)
         return np.where(self.holds(xy), 0.0, distance)
 
     @cached_property
@@ -129,15 +121,3 @@ def hexagonal_grid(points: FloatArray, step: float) -> FloatArray:
     across, up = np.meshgrid(x, y)
     across[1::2] += step / 2
     return np.column_stack([across.ravel(), up.ravel()])
-
-
-def _area(corners: FloatArray) -> float:
-    x, y = corners.T
-    return float(0.5 * (x * np.roll(y, -1) - np.roll(x, -1) * y).sum())
-
-
-def _centroid(corners: FloatArray) -> FloatArray:
-    x, y = (corners - corners[0]).T
-    cross = x * np.roll(y, -1) - np.roll(x, -1) * y
-    sums = [((v + np.roll(v, -1)) * cross).sum() for v in (x, y)]
-    return np.asarray(corners[0] + np.array(sums) / (3 * cross.sum()))

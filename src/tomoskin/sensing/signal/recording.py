@@ -202,8 +202,7 @@ class Recording:
         try:
             match = match_own(pattern, once.drive, once.measure)
         except PatternError as error:
-            where = f"{self.source}, {error.where}" if error.where else self.source
-            raise PatternError(error.message, where=where, hint=error.hint) from error
+            raise error.within(self.source, PatternError) from error
         reference = once.reference
         summed = f"{len(self.drive)} rows with drives of several electrodes were summed to pairs"
         return replace(

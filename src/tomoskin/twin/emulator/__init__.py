@@ -6,8 +6,10 @@ from tomoskin.twin.emulator.flash import (
     say_board as say_board,
     say_identity as say_identity,
     sense_resistor as sense_resistor,
+    settings_uf2 as settings_uf2,
     write_firmware as write_firmware,
     write_identity as write_identity,
+    write_uf2 as write_uf2,
 )
 from tomoskin.twin.emulator.program import build_firmware as build_firmware
 from tomoskin.twin.emulator.source import (
@@ -15,4 +17,3 @@ from tomoskin.twin.emulator.source import (
     emulate_board as emulate_board,
     emulate_load as emulate_load,
 )
-from tomoskin.twin.emulator.uf2 import settings_uf2 as settings_uf2, write_uf2 as write_uf2

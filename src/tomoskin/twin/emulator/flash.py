@@ -1,18 +1,87 @@
-"""What is written into a board: its firmware, and by avrdude what the board is."""
+"""What is written into a board: its firmware, by avrdude or as UF2 through the boot drive of a
+Pico, and by avrdude what the board is."""
 
 from __future__ import annotations
 
+import os
 import shutil
+import struct
 import subprocess
 import tempfile
+from collections.abc import Iterable
 from pathlib import Path
 
 from tomoskin.board.source import BOARDS_SINCE, BoardRecord, Exchange, SerialTransport, Transport
 from tomoskin.board.wire import BoardLimits, GetBoard, GetInfo, Info
-from tomoskin.core import SourceError
+from tomoskin.core import SourceError, StrPath
 from tomoskin.twin.emulator.board_process import BoardIdentity
-from tomoskin.twin.emulator.program import firmware_image, run_tool
-from tomoskin.twin.emulator.uf2 import find_boot_drive, uf2_of, write_uf2
+from tomoskin.twin.emulator.program import FLASH, PAGE, firmware_image, pack_uf2, run_tool
+
+_SETTINGS = 0x1FF000
+"""Where the flash's last sector begins: ``firmware/pico/flash.c``."""
+
+_MOUNTS = ("/media", "/run/media", "/Volumes", "/mnt")
+_ABOUT, _WRITTEN = "INFO_UF2.TXT", "tomoskin.uf2"
+_DEPTHS = (_ABOUT, f"*/{_ABOUT}", f"*/*/{_ABOUT}")
+_BOOTSEL = "hold BOOTSEL while you plug the Pico in: it shows itself as a drive, RPI-RP2"
+
+
+def settings_uf2(current: float) -> bytes:
+    """The UF2 that says what a Pico's current limiter is set to, A; its firmware stays."""
+    page = struct.pack("<I", round(current * 1e6)).ljust(PAGE, b"\xff")
+    return pack_uf2(page, FLASH + _SETTINGS)
+
+
+def write_uf2(uf2: bytes, drive: StrPath) -> None:
+    """Write ``uf2`` to the boot ``drive`` of a Pico; SourceError when it is another's."""
+    drive = Path(drive)
+    about = drive / _ABOUT
+    board = _board_of(about)
+    if "RP2" not in board:
+        raise SourceError(
+            f"expected the boot drive of a Pico (Board-ID RPI-RP2), found {board or 'none'}",
+            where=str(drive),
+            hint=_BOOTSEL,
+        )
+    try:
+        part = drive / _WRITTEN  # the board takes it as it comes, and nothing is there before
+        with part.open("wb") as file:
+            file.write(uf2)
+            file.flush()
+            os.fsync(file.fileno())
+    except OSError as error:
+        raise SourceError(f"could not write: {error}", where=str(drive), hint=_BOOTSEL) from None
+
+
+def find_boot_drive(roots: Iterable[StrPath] | None = None) -> Path:
+    """The boot drive of the only Pico that waits for its firmware.
+
+    Raises
+    ------
+    SourceError
+        When there is none, or more than one.
+    """
+    tops = [Path(root) for root in (_MOUNTS if roots is None else roots)]
+    folders = [about.parent for top in tops for depth in _DEPTHS for about in top.glob(depth)]
+    drives = [drive for drive in folders if "RP2" in _board_of(drive / _ABOUT)]
+    if len(drives) != 1:
+        names = ", ".join(map(str, drives)) or "none"
+        raise SourceError(
+            f"expected one boot drive of a Pico, found {names}",
+            where="firmware flash",
+            hint=f"{_BOOTSEL}; or name where it is mounted",
+        )
+    return drives[0]
+
+
+def _board_of(about: Path) -> str:
+    """What a boot drive calls its board; empty where it is none."""
+    try:
+        lines = about.read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        return ""
+    return next((line.partition(":")[2].strip() for line in lines if "Board-ID" in line), "")
+
 
 _REFERENCE = 1.225
 """V across the board's sense resistor."""
@@ -51,7 +120,7 @@ def write_firmware(record: BoardRecord, channels: int, place: str | None) -> str
     """
     if record.flash == "uf2":
         drive = find_boot_drive() if place is None else Path(place)
-        write_uf2(uf2_of(firmware_image(record, channels)), drive)
+        write_uf2(pack_uf2(firmware_image(record, channels).read_bytes()), drive)
         return str(drive)
     if record.flash != "avrdude" or place is None:
         raise SourceError(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import fcntl
 import os
 import shutil
+import struct
 import subprocess
 import sys
 import tty
@@ -17,7 +18,6 @@ from typing import IO
 from tomoskin.board.source import BOARDS, BoardRecord, FirmwareFiles
 from tomoskin.core import SourceError, written
 from tomoskin.twin.emulator.board_process import BoardPrograms
-from tomoskin.twin.emulator.uf2 import uf2_of
 
 FOLDER = Path(__file__).resolve().parents[4] / "firmware"
 """Where the sources are, in a checkout."""
@@ -26,6 +26,20 @@ IMAGES = Path(__file__).parent / "images"
 """Where a wheel has the firmware, built: ``tomoskin-8.hex`` for a board with 8 channels."""
 
 BUILD = FOLDER.parent / "build" / "firmware"
+RP2040 = 0xE48BFF56
+"""The family that the RP2040's boot ROM asks for."""
+
+FLASH = 0x10000000
+"""Where the flash lies in the RP2040's address space."""
+
+_HEAD = struct.Struct("<8I")
+_MAGIC = (0x0A324655, 0x9E5D5157)
+_END = struct.pack("<I", 0x0AB16F30)
+_HAS_FAMILY = 0x2000
+_BLOCK = 512
+PAGE = 256
+"""Bytes of flash in a block."""
+
 _NODE_EMULATOR = FOLDER / "pico" / "emulator" / "main.mjs"
 _NODE_SET_UP = FOLDER.parent / "scripts" / "pico.py"
 _LONGEST = 300.0
@@ -117,6 +131,17 @@ _EMULATORS: dict[str, Callable[[Path], BoardPrograms]] = {
 """What makes an emulator ready, by the name that a board's record gives it."""
 
 
+def pack_uf2(image: bytes, address: int = FLASH) -> bytes:
+    """The UF2 that puts ``image`` at ``address``."""
+    pages = [image[at : at + PAGE] for at in range(0, len(image), PAGE)]
+    return b"".join(
+        _HEAD.pack(*_MAGIC, _HAS_FAMILY, address + PAGE * k, PAGE, k, len(pages), RP2040)
+        + page.ljust(_BLOCK - _HEAD.size - len(_END), b"\0")
+        + _END
+        for k, page in enumerate(pages)
+    )
+
+
 def build_firmware(record: BoardRecord, channels: int) -> Path:
     """The firmware of a board with ``channels``, built if it is not up to date; SourceError.
 
@@ -127,7 +152,7 @@ def build_firmware(record: BoardRecord, channels: int) -> Path:
     program = BUILD / files.program.format(channels)
     if record.flash != "uf2":
         return program
-    data, uf2 = uf2_of(program), program.with_suffix(".uf2")
+    data, uf2 = pack_uf2(program.read_bytes()), program.with_suffix(".uf2")
     if not uf2.is_file() or uf2.read_bytes() != data:
         with written(uf2, overwrite=True) as part:
             part.write_bytes(data)

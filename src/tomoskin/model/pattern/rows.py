@@ -1,10 +1,10 @@
-"""Foreign measurement rows brought into a pattern's order and sign."""
+"""The scan, what a board samples so that every row of a pattern can be formed from it; and foreign
+measurement rows brought into a pattern's order and sign."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,10 +12,80 @@ from numpy.typing import ArrayLike, NDArray
 from tomoskin.core import FloatArray, IntArray, PatternError
 from tomoskin.model.pattern.pattern import Pattern, check_drives, drive_table
 
+_MOST = 32
+"""Electrodes that a mask has bits for."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scan:
+    """Per drive, the electrodes whose potential is sampled, in ascending order.
+
+    A frame's samples are drive-major: all electrodes of drive 0, then of drive 1, and so on.
+
+    Attributes
+    ----------
+    drives
+        (n_drive, 2) source, sink.
+    masks
+        (n_drive,) bit e set where electrode e is sampled under that drive.
+    sample_drive, sample_electrode
+        (n_samples,) drive and electrode of each sample.
+    plus, minus
+        (n_meas,) sample that each row of the pattern adds, and the one it subtracts.
+    """
+
+    drives: IntArray
+    masks: NDArray[np.uint32]
+    sample_drive: IntArray
+    sample_electrode: IntArray
+    plus: IntArray
+    minus: IntArray
+
+    @classmethod
+    def of(cls, pattern: Pattern) -> Self:
+        """Smallest scan that holds every row of ``pattern``.
+
+        Raises PatternError when there are more electrodes than a mask has bits, or a drive is a
+        current into many of them.
+        """
+        if pattern.spread:
+            raise PatternError("a board drives a pair at a time, not several electrodes")
+        n = pattern.n_electrodes
+        if n > _MOST:
+            raise PatternError(f"expected at most {_MOST} electrodes to scan, got {n}")
+        read = np.zeros((pattern.n_drive, n), dtype=bool)
+        read[pattern.drive_index[:, None], pattern.measure] = True
+        sample_drive, sample_electrode = np.nonzero(read)
+        number = np.full(read.shape, -1)
+        number[read] = np.arange(len(sample_drive))
+        masks = (read * (np.uint32(1) << np.arange(n, dtype=np.uint32))).sum(axis=1)
+        return cls(
+            drives=pattern.drives,
+            masks=masks.astype(np.uint32),
+            sample_drive=sample_drive,
+            sample_electrode=sample_electrode,
+            plus=number[pattern.drive_index, pattern.measure[:, 0]],
+            minus=number[pattern.drive_index, pattern.measure[:, 1]],
+        )
+
+    @property
+    def n_samples(self) -> int:
+        """Number of samples in a frame."""
+        return len(self.sample_drive)
+
+
 _LISTED = 5
 
 _SPAN = 1e-3
 """Currents combine into a drive to within this part of it; weaker parts of them do not count."""
+
+
+_FORMS = (
+    (((0, 1, 2, 3), 1.0),),
+    (((1, 0, 2, 3), -1.0), ((0, 1, 3, 2), -1.0), ((1, 0, 3, 2), 1.0)),
+    (((2, 3, 0, 1), 1.0), ((3, 2, 0, 1), -1.0), ((2, 3, 1, 0), -1.0), ((3, 2, 1, 0), 1.0)),
+)
+"""Orders of a row's ends and signs: as itself, with pairs reversed, as its reciprocal."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,11 +119,12 @@ def match_rows(pattern: Pattern, drive: ArrayLike, measure: ArrayLike) -> RowMat
     """
     foreign = Pattern.from_tables(drive, measure)
     table: dict[tuple[int, ...], tuple[int, float]] = {}
-    for row, (d, m) in enumerate(_rows(foreign)):
-        key, sign = _canonical(d, m)
-        table.setdefault(key, (row, sign))
-        table.setdefault(_as_it_stands(d, m), (row, 1.0))
-    located = [_find(table, d, m) for d, m in _rows(pattern)]
+    for forms in _FORMS:
+        for row, ends in enumerate(np.hstack([foreign.drive, foreign.measure]).tolist()):
+            for order, sign in forms:
+                table.setdefault(tuple(ends[end] for end in order), (row, sign))
+    wanted = np.hstack([pattern.drive, pattern.measure]).tolist()
+    located = [table.get(tuple(row)) for row in wanted]
     missing = [row for row, hit in enumerate(located) if hit is None]
     if missing:
         raise PatternError(
@@ -123,30 +194,6 @@ def sum_rows(pattern: Pattern, currents: ArrayLike, measure: ArrayLike) -> RowSu
 def _way(pairs: IntArray) -> FloatArray:
     """(n,) 1 where a pair ascends, else −1."""
     return np.where(pairs[:, 0] < pairs[:, 1], 1.0, -1.0)
-
-
-def _rows(pattern: Pattern) -> Iterator[tuple[list[int], list[int]]]:
-    return zip(pattern.drive.tolist(), pattern.measure.tolist(), strict=True)
-
-
-def _canonical(d: list[int], m: list[int]) -> tuple[tuple[int, ...], float]:
-    sign = (1.0 if d[0] < d[1] else -1.0) * (1.0 if m[0] < m[1] else -1.0)
-    return (min(d), max(d), min(m), max(m)), sign
-
-
-def _as_it_stands(d: list[int], m: list[int]) -> tuple[int, ...]:
-    return (-1, *d, *m)
-
-
-def _find(
-    table: dict[tuple[int, ...], tuple[int, float]], d: list[int], m: list[int]
-) -> tuple[int, float] | None:
-    itself = table.get(_as_it_stands(d, m))
-    if itself is not None:
-        return itself
-    key, sign = _canonical(d, m)
-    hit = table.get(key) or table.get(key[2:] + key[:2])
-    return None if hit is None else (hit[0], hit[1] * sign)
 
 
 def _describe(pattern: Pattern, missing: list[int]) -> str:

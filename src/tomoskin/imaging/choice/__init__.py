@@ -1,1 +1,0 @@
-"""Parameter choice: which alpha, by which criterion, and why."""
