@@ -157,7 +157,7 @@ class ChannelMaps:
         """
         some = np.arange(0, features.shape[1], max(features.shape[1] // _TELL, 1))
 
-        def of_some(length: float) -> Self:
+        def of_some(length: float) -> ChannelMaps:
             basis = Basis.of(Likeness(length), positions)
             return cls._of(basis, positions, features[:, some], envelope.of_rows(some))
 
@@ -183,8 +183,8 @@ class ChannelMaps:
             along = (pull[:, None] @ axes)[:, 0]
             spread = np.broadcast_to(np.maximum(weights, 0.0), along.shape) + ratios[:, :, None]
         else:  # nothing is chosen: the root of the inverse is found much sooner
-            gram[:, *np.diag_indices(gram.shape[1])] += ratio[:, None]
-            axes = np.linalg.inv(np.linalg.cholesky(gram)).transpose(0, 2, 1)
+            noisy = gram + ratio[:, None, None] * np.eye(gram.shape[1])
+            axes = np.linalg.inv(np.linalg.cholesky(noisy)).transpose(0, 2, 1)
             along = (pull[:, None] @ axes)[:, 0]
             spread = np.ones((1, *along.shape))
         total = (about**2).sum(axis=1)
