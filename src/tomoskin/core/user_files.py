@@ -237,17 +237,19 @@ def _settle(part: Path, target: Path) -> None:
         part.chmod(stat.S_IMODE(target.stat().st_mode))
 
 
-def check_is_file(path: StrPath, error: type[TomoskinError] = DataError) -> None:
+def check_is_file(
+    path: StrPath, error: type[TomoskinError] = DataError, what: str = "a file"
+) -> None:
     """Raise ``error`` where ``path`` is no ordinary file: a pipe or a device may never end."""
     path = Path(path)
     try:
         if not path.exists():
             raise error("there is no such file", where=str(path))
         if path.is_dir():
-            raise error("is a folder, not a file", where=str(path))
+            raise error(f"is a folder, not {what}", where=str(path))
         if not path.is_file():
             raise error(
-                "is a pipe or a device, not a file",
+                f"is a pipe or a device, not {what}",
                 where=str(path),
                 hint="copy what comes out of it into a file",
             )
@@ -257,16 +259,19 @@ def check_is_file(path: StrPath, error: type[TomoskinError] = DataError) -> None
 
 
 def open_input(
-    path: StrPath, buffering: int = -1, error: type[TomoskinError] = DataError
+    path: StrPath,
+    buffering: int = -1,
+    error: type[TomoskinError] = DataError,
+    what: str = "a file",
 ) -> BinaryIO:
-    """An ordinary file, open for reading bytes.
+    """An ordinary file, open for reading bytes; ``what`` it should be is said in errors.
 
     Raises
     ------
     TomoskinError
         Of the kind ``error``, when it is missing, a folder, a pipe or a device, or unreadable.
     """
-    check_is_file(path, error)
+    check_is_file(path, error, what)
     try:
         return Path(path).open("rb", buffering=buffering)
     except OSError as cause:

@@ -12,6 +12,7 @@ import csv
 import re
 from array import array
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -72,16 +73,16 @@ def parse(lines: Iterable[str], source: str) -> Recording:
         name: _real(table[:, n], name, source) for n, name in enumerate(header) if n not in used
     }
     has_place = "x_m" in by_name and "y_m" in by_name
-    return voltages_of(
+    recording = voltages_of(
         source,
         table[:, used],
         (electrodes[:, :2], electrodes[:, 2:]),
         time=by_name.get("time_s"),
         labels=np.column_stack([by_name["x_m"], by_name["y_m"]]) if has_place else None,
         is_change=kinds == {"dv"},
-        idle=_idle(by_name["idle"], source) if "idle" in by_name else 1,
-        board_known=OWN in by_name,
     )
+    idle = _idle(by_name["idle"], source) if "idle" in by_name else 1
+    return replace(recording, idle=idle, board_known=OWN in by_name)
 
 
 def column_names(drive: IntArray, measure: IntArray) -> list[str]:

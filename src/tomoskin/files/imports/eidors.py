@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -58,13 +59,16 @@ def parse(variables: Mapping[str, Any], source: str) -> Recording:
         )
     reference = _read(variables, _REFERENCE, select, len(drive), source)
     idle = _numbers(variables, "idle", ())
-    return voltages_of(
+    recording = voltages_of(
         source,
         voltages,
         (drive, measure),
         time=_numbers(variables, "time_s", (len(voltages),)),
         reference=None if reference is None else reference[0],
         labels=_numbers(variables, "xy_m", (len(voltages), 2)),
+    )
+    return replace(
+        recording,
         idle=int(idle) if idle is not None and idle in range(1, len(voltages) + 1) else 1,
         board_known=OWN in variables,
     )

@@ -9,6 +9,7 @@ frames.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -50,7 +51,7 @@ def parse(arrays: Arrays, source: str) -> Recording:
         raise DataError("holds both voltages and dv", where=source, hint="keep one of them")
     key = "voltages" if "voltages" in arrays else "dv"
     drive, measure = _drives(arrays, source), electrode_table(arrays, "measure", source)
-    return voltages_of(
+    recording = voltages_of(
         source,
         np.atleast_2d(numbers(arrays, key, source)),
         (drive, measure),
@@ -58,9 +59,9 @@ def parse(arrays: Arrays, source: str) -> Recording:
         reference=numbers(arrays, "reference", source) if "reference" in arrays else None,
         labels=real_numbers(arrays, "xy_m", source) if "xy_m" in arrays else None,
         is_change=key == "dv",
-        idle=whole_number(arrays, "idle", source) if "idle" in arrays else 1,
-        board_known=OWN in arrays,
     )
+    idle = whole_number(arrays, "idle", source) if "idle" in arrays else 1
+    return replace(recording, idle=idle, board_known=OWN in arrays)
 
 
 def _drives(arrays: Arrays, source: str) -> NDArray[Any]:

@@ -23,8 +23,6 @@ def voltages_of(
     labels: FloatArray | None = None,
     is_change: bool = False,
     notes: Sequence[str] = (),
-    idle: int = 1,
-    board_known: bool = False,
 ) -> Recording:
     """A recording of voltages (n_frames, n_rows), or their change; ``rows``: drive and measure.
 
@@ -42,8 +40,7 @@ def voltages_of(
         source=source,
         notes=tuple(notes),
         timed=time is not None,
-        idle=idle,
-        board_known=board_known,
+        board_known=False,
     )
 
 

@@ -51,7 +51,7 @@ def read_text(path: StrPath, what: str, most: int = 10_000_000) -> str:
     Raises SkinError for what is no such file, and what cannot be read as text.
     """
     where = str(path)
-    with open_input(path, error=SkinError) as file:
+    with open_input(path, error=SkinError, what=what) as file:
         data = file.read(most + 1)
     if len(data) > most:
         raise SkinError(f"is too large for {what} (over {most / 1e6:g} MB)", where=where)
