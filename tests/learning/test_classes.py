@@ -242,6 +242,19 @@ def test_ten_labels_mend_a_session_that_cannot_be_aligned() -> None:
     assert abs(answers.probability.mean() - hit(answers.flags, asked)) < 0.1
 
 
+def test_what_is_said_after_ten_labels_is_right_as_often() -> None:
+    """A day that has little in common with the one before, and whose classes are well apart."""
+    flags, asked = random_flags(300, 6, 0), random_flags(150, 6, 1)
+    known = Classifier.fit(sheet(0, flags), flags)
+    for seed in range(3):
+        today = np.roll(sheet(2 + seed, asked, size=0.7), 7, axis=1)
+        some = np.full(asked.shape, np.nan)
+        some[:10] = asked[:10]
+        answers = known.in_session(today, some).predict(today[10:])
+        right = hit(answers.flags, asked[10:])
+        assert answers.rejected.all() or abs(answers.probability.mean() - right) < 0.1
+
+
 def test_classes_of_which_one_holds_are_named_by_labels() -> None:
     flags, _ = one_of(150, 0)
     known = Classifier.fit(sheet(0, flags), [NAMES[k] for k in flags.argmax(axis=1)])

@@ -6,13 +6,15 @@ import numpy as np
 import pytest
 
 from learning.labelled import RADIUS, Floats, places
-from tomoskin import Locator, Pattern
+from tomoskin import Locator, Pattern, Skin
+from tomoskin.learning import label_doubts
 from tomoskin.learning.touch.per_channel import (
     ChannelMaps,
     Envelope,
     likeliest_envelope,
     rings,
 )
+from tomoskin.sensing.segment import Region
 
 PATTERN = Pattern.adjacent(8)
 ROUND = np.column_stack(
@@ -85,3 +87,41 @@ def test_a_locator_that_knows_its_pattern_uses_it() -> None:
             told = Locator.fit(dv, xy, pattern=pattern).predict(others)[0]
             missed[k] += np.linalg.norm(told - there, axis=1).mean()
     assert missed[0] < 0.99 * missed[1]
+
+
+@pytest.mark.parametrize(
+    ("axes", "signs", "words"),
+    [
+        ([0, 1], (1, 1), ""),
+        ([1, 0], (1, 1), "with x and y exchanged:"),
+        ([0, 1], (1, -1), "with y of the other sign:"),
+        ([1, 0], (-1, 1), "with x and y exchanged and y of the other sign:"),
+    ],
+)
+def test_labels_on_other_axes_are_said(axes: list[int], signs: tuple[int, int], words: str) -> None:
+    skin = Skin.load("textile-disc-8")
+    locator = Locator.fit(*_on(skin, axes, signs), skin=skin)
+    assert words in label_doubts(locator, skin)
+    assert bool(label_doubts(locator, skin)) == bool(words)
+
+
+def test_labels_in_another_unit_are_said() -> None:
+    skin = Skin.load("textile-disc-8")
+    dv, xy = _on(skin, [0, 1], (1, 1))
+    inches = Locator.fit(dv, xy / 25.4, skin=skin)
+    assert "inches" in label_doubts(inches, skin)
+
+
+def test_presses_that_do_not_tell_where_the_electrodes_are_doubt_no_label() -> None:
+    skin = Skin.load("textile-disc-8")
+    dv, xy = answers(30, 3, Envelope())
+    xy *= Region.of(skin).unit / RADIUS
+    assert label_doubts(Locator.fit(dv, xy, skin=skin), skin) == ""
+
+
+def _on(skin: Skin, axes: list[int], signs: tuple[int, int]) -> tuple[Floats, Floats]:
+    """Presses on a skin whose labels are on other axes."""
+    region = Region.of(skin)
+    rim = Envelope.of(skin.pattern(), region.scaled(skin.electrode_centres))
+    dv, xy = answers(30, 3, rim)
+    return dv, (region.unit / RADIUS * xy)[:, axes] * signs

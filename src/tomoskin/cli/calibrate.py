@@ -125,7 +125,7 @@ def touch(
     ] = False,
 ) -> LearningOutcome:
     """Learn where a touch is from presses at known positions."""
-    from tomoskin.learning import TOUCH, Locator
+    from tomoskin.learning import TOUCH, Locator, label_doubts
 
     if unlabelled and not onto:
         raise DataError(
@@ -149,6 +149,8 @@ def touch(
     added = _added(calibration.model, frames, dv, xy)
     older = old.model if old is not None and not unlabelled else None
     facts = touch_facts(calibration.model, added, older)
+    if given.skin is not None and (doubts := label_doubts(calibration.model, given.skin)):
+        remark(f"{given.path}: {doubts}")
     if facts["is_guess"]:
         remark(
             f"{given.path}: the data hardly depend on the position. Presses left out have a mean "

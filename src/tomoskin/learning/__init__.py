@@ -52,6 +52,7 @@ from tomoskin.learning.touch.calibration_health import (
     CalibrationHealth as CalibrationHealth,
     LeftOut as LeftOut,
     growth_of_errors as growth_of_errors,
+    label_doubts as label_doubts,
     worse as worse,
 )
 from tomoskin.learning.touch.located_touch import TOUCH as TOUCH

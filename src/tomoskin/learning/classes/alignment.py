@@ -8,10 +8,11 @@ is checked here; a few labels settle the names.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
+from scipy.special import bdtr
 
 from tomoskin.core import FloatArray, IntArray
 from tomoskin.learning.classes.mixture import Mixture, posterior
@@ -26,8 +27,9 @@ _PRIOR_FRAMES = (1.0, 0.01)
 """Frames that the templates found without labels count as beside the labelled ones, as tried."""
 
 _DRAWS = 3
-_CONTRADICTED = 0.25
-"""Part of the labels of a flag that the fit may contradict beyond what it expects."""
+_BY_CHANCE, _HONEST = 0.05, 0.1
+"""Probability below which it is no chance that so few labels agree with a fit, and by how much less
+than it expects may be right."""
 
 _LIKELY_SAME = 0.1
 """What the likeness of two templates counts beside labels that agree with each other."""
@@ -42,8 +44,8 @@ class Alignment:
     holds
         Whether what is said of its frames can be believed.
     reliability
-        Expected part of the frames whose combination is right, 0 to 1: median of sessions drawn
-        from what was fitted, as many frames each (parametric bootstrap).
+        Expected part of the frames whose combination is right, 0 to 1: what the fit says of them,
+        less its optimism.
     grown
         Size of the templates against those learnt before.
     reasons
@@ -79,11 +81,12 @@ def aligned(
     """
     fitted = _fitted(prior, x, numbers)
     labelled = numbers >= 0
+    reliability = _reliability(prior, fitted, x, int(labelled.sum()))
     if labelled.any():
-        reasons = _contradictions(fitted.adapted(x, np.full(len(x), -1)), x, numbers)
+        free = fitted.adapted(x, np.full(len(x), -1))
+        reasons = _contradictions(free, x[labelled], numbers[labelled], reliability)
     else:
         reasons = _doubts(prior, fitted, rest)
-    reliability = _reliability(prior, fitted, len(x), int(labelled.sum()))
     if reliability < _RELIABLE:
         reasons = (*reasons, f"only {reliability:.0%} of {len(x)} such frames would be right")
     return fitted, Alignment(not reasons, reliability, _size(fitted) / _size(prior), reasons)
@@ -92,20 +95,23 @@ def aligned(
 def _fitted(prior: Mixture, x: FloatArray, numbers: IntArray) -> Mixture:
     """``prior`` fitted to frames x (n, d), of which ``numbers`` (n,) names some, −1 the others.
 
-    Labels name what was found without them, and each template is tried as they alone give it: one
-    that has changed much is not found from where it was. The likeliest of these fits is taken.
+    Labels name what was found without them, and each template is tried as they alone give it, all
+    of them with the noise of ``prior`` too: those that have changed much are not found from where
+    they were, nor in the noise of a wrong fit. The likeliest of these fits is taken.
     """
     unnamed = prior.moved_to(x).adapted(x, np.full(len(x), -1))
     labelled = numbers >= 0
     if not labelled.any():
         return unnamed
     named = _named(prior, unnamed, x[labelled], numbers[labelled])
-    starts = [named, *_from_labels(named, x[labelled], numbers[labelled])]
+    starts = [named, *_from_labels(named, prior, x[labelled], numbers[labelled])]
     fits = [start.adapted(x, numbers) for start in starts]
     return max(fits, key=lambda fit: fit.log_likelihood(x, numbers))
 
 
-def _from_labels(named: Mixture, x: FloatArray, numbers: IntArray) -> Iterator[Mixture]:
+def _from_labels(
+    named: Mixture, prior: Mixture, x: FloatArray, numbers: IntArray
+) -> Iterator[Mixture]:
     """``named`` with one of its templates, or all, as labelled frames x (n, d) have them."""
     design = named.table[numbers] - named.table[numbers].mean(axis=0)
     if not named.exclusive:
@@ -121,7 +127,8 @@ def _from_labels(named: Mixture, x: FloatArray, numbers: IntArray) -> Iterator[M
     for frames in _PRIOR_FRAMES:
         weigh = design.T @ design + frames * np.eye(design.shape[1])
         pull = design.T @ (x - x.mean(axis=0)) + frames * named.templates[1:]
-        yield named.about(x, numbers, np.linalg.solve(weigh, pull))
+        made = named.about(x, numbers, np.linalg.solve(weigh, pull))
+        yield from (made, replace(made, covariance=prior.covariance))
 
 
 def _doubts(prior: Mixture, fitted: Mixture, rest: FloatArray | None) -> tuple[str, ...]:
@@ -184,32 +191,33 @@ def _named(prior: Mixture, fitted: Mixture, x: FloatArray, numbers: IntArray) ->
     return fitted.renamed(order, np.where(agree[order, np.arange(len(order))] < 0, -1.0, 1.0))
 
 
-def _contradictions(free: Mixture, x: FloatArray, numbers: IntArray) -> tuple[str, ...]:
-    """What speaks against a fit ``free`` of the labels that it began with.
-
-    Flags count that are wrong more often than the fit itself expects.
-    """
-    labelled = numbers >= 0
-    said = posterior(free.distances(x[labelled])) @ free.table
-    wrong = (said > 0.5) != (free.table[numbers[labelled]] > 0.5)
-    beyond = (wrong - np.minimum(said, 1 - said)).mean(axis=0)
-    lost = int((beyond > _CONTRADICTED).sum())
-    return (f"{lost} of {len(beyond)} flags contradict the labels",) if lost else ()
+def _contradictions(
+    free: Mixture, x: FloatArray, numbers: IntArray, reliability: float
+) -> tuple[str, ...]:
+    """What labels ``numbers`` (n,) of frames x (n, d) say against a fit ``free`` of them that began
+    with them: that fewer agree than its ``reliability`` allows."""
+    agree = int((free.distances(x).argmin(axis=1) == numbers).sum())
+    if bdtr(agree, len(x), reliability - _HONEST) > _BY_CHANCE:
+        return ()
+    return (f"{len(x) - agree} of {len(x)} labels contradict the other frames",)
 
 
-def _reliability(prior: Mixture, fitted: Mixture, n: int, labels: int) -> float:
-    """Median part of n frames that would be right, were ``fitted`` true and ``prior`` known.
+def _reliability(prior: Mixture, fitted: Mixture, x: FloatArray, labels: int) -> float:
+    """Expected part of frames x (n, d) that are right: what ``fitted`` says, less its optimism.
 
-    Frames are drawn from ``fitted`` and fitted as the session was, so many with ``labels``
-    (parametric bootstrap: Efron & Tibshirani 1993); seeds are fixed, so that a file gives the
-    same again.
+    That is by how much more is said than is right of sessions that are drawn from ``fitted`` and
+    fitted as this one was, with so many ``labels`` (median; parametric bootstrap: Efron &
+    Tibshirani 1993, 10.6). Seeds are fixed, so that a file gives the same again.
     """
     root = np.linalg.cholesky(fitted.covariance)
-    right = []
+    optimism = []
     for seed in range(_DRAWS):
         rng = np.random.default_rng(seed)
-        truth = rng.integers(0, len(fitted.table), n)
-        x = fitted.means[truth] + rng.normal(size=(n, len(root))) @ root.T
-        again = _fitted(prior, x, np.where(np.arange(n) < labels, truth, -1))
-        right.append(float((again.distances(x).argmin(axis=1) == truth)[labels:].mean()))
-    return float(np.median(right))
+        truth = rng.integers(0, len(fitted.table), len(x))
+        drawn = fitted.means[truth] + rng.normal(size=x.shape) @ root.T
+        again = _fitted(prior, drawn, np.where(np.arange(len(x)) < labels, truth, -1))
+        weights = posterior(again.distances(drawn))[labels:]
+        right = weights.argmax(axis=1) == truth[labels:]
+        optimism.append(float((weights.max(axis=1) - right).mean()))
+    said = float(posterior(fitted.distances(x)).max(axis=1).mean())
+    return float(np.clip(said - np.median(optimism), 0.0, 1.0))

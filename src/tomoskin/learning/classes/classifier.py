@@ -169,19 +169,13 @@ class Classifier:
             sharpness = min(self.sharpness, _tempered(fitted.distances(x), alignment.reliability))
             return replace(made, sharpness=sharpness, alignment=alignment)
         before = type(self).learn(older, self.skin_id)
-        better = max((before, made), key=lambda known: known._flags_right(newest))
-        return replace(better, examples=self.examples, alignment=alignment)
+        return replace(before, examples=self.examples, alignment=alignment)
 
     def _with(self, mixture: Mixture, dv: FloatArray, usual: FloatArray) -> Self:
         """With a mixture fitted to frames (n, n_meas); ``usual`` (m,) strangeness of known ones."""
         strange = _compared(self.subspace, mixture, dv)[1]
         limit = self.limit * max(float(np.median(strange) / np.median(usual)), 1.0)
         return replace(self, mixture=mixture, limit=limit)
-
-    def _flags_right(self, examples: Examples) -> float:
-        """Part of the flags of labelled examples that are told, 0 where none has a label."""
-        some = examples.part(examples.labelled)
-        return float((self.predict(some.dv).flags == some.flags).mean()) if len(some) else 0.0
 
     def _rest(self) -> FloatArray | None:
         """(1, d) an untouched frame of the newest session; None where that has had flags set."""

@@ -4,13 +4,17 @@ what labelled presses say of a fit."""
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import compress, product
 from typing import Self
 
 import numpy as np
 
 from tomoskin.core import Detection, FloatArray
-from tomoskin.learning.touch.locator import Locator
+from tomoskin.learning.touch.locator import SHARED, Locator
+from tomoskin.learning.touch.per_channel import SURE, Envelope, evidence_of
 from tomoskin.learning.touch.presses import equally_hard
+from tomoskin.model.skin import Skin
+from tomoskin.sensing.segment import Region
 
 STRANGE = 1.5
 """How many times worse than its own presses frames may fit a calibration unsaid."""
@@ -181,6 +185,47 @@ def worse(growth: float) -> str:
     return (
         f"since the newer presses were added, the older ones are missed {growth:.1f} times as far: "
         "the newer ones do not fit with them"
+    )
+
+
+_TINY = 0.12
+"""Part of the sheet's extent below which labels are of another unit: ten of it make one of ours, or
+twenty-five."""
+
+_AXES = ("x and y exchanged", "x of the other sign", "y of the other sign")
+
+
+def label_doubts(locator: Locator, skin: Skin) -> str:
+    """What speaks for another unit or other axes of the labels than the ``skin`` has, in words.
+
+    Rows answer most strongly near their electrodes, so that presses tell where these are.
+    """
+    xy, outline = locator.presses.xy, Region.of(skin).outline
+    covered = float(np.ptp(xy, axis=0).max())
+    if covered < _TINY * np.ptp(outline, axis=0).max():
+        return (
+            f"all labels lie within {1e3 * covered:.1f} mm of each other, on a skin of "
+            f"{1e3 * np.ptp(outline, axis=0).max():.0f} mm: are they in inches or centimetres? "
+            "Give them in metres"
+        )
+    features, region = locator.features, locator.region
+    if locator.pattern is None or len(features.rows) > SHARED:
+        return ""
+    rim = Envelope.of(locator.pattern, region.scaled(skin.electrode_centres))
+    near, data = rim.of_rows(features.rows), features(locator.presses.dv)
+
+    def evidence(turned: tuple[bool, ...], envelope: Envelope = near) -> float:
+        labels = (xy[:, ::-1] if turned[0] else xy) * np.where(turned[1:], -1, 1)
+        return evidence_of(envelope, region.scaled(labels), data)
+
+    own, *others = product((False, True), repeat=3)
+    best = max(others, key=evidence)
+    if evidence(best) < SURE + max(evidence(own), evidence(own, Envelope())):
+        return ""
+    changes = " and ".join(compress(_AXES, best))
+    return (
+        f"the labels fit the electrodes of this skin better with {changes}: check the axes of the "
+        "labels, and [electrodes] first and order in the skin file"
     )
 
 

@@ -33,7 +33,7 @@ _STEPS = 4
 _PLACES = 600
 """Positions in the grid; what is between them is their mean."""
 
-_SHARED = 256
+SHARED = 256
 """Measurements above which it is not asked where their electrodes are: so many tell enough."""
 
 _MISSING = 2.0
@@ -157,7 +157,7 @@ class Locator:
         data = features(presses.dv)
         progress(0, _STEPS)
         envelope = Envelope()
-        if origin[0] is not None and len(features.rows) <= _SHARED:
+        if origin[0] is not None and len(features.rows) <= SHARED:
             around = rings(origin[0], region.scaled(region.outline))
             of_rows = (ring.of_rows(features.rows) for ring in around)
             envelope = likeliest_envelope(of_rows, positions, data)

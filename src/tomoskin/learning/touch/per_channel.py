@@ -32,7 +32,7 @@ noPattern, radial and cam09_05, 10, 25 and 60 presses."""
 _TRIED_ON, _NOISE = 30, 0.1
 """Presses by which the ring is found, and noise over signal of a row there."""
 
-_SURE = float(np.log(2 * _TURNS))
+SURE = float(np.log(2 * _TURNS))
 """Log marginal likelihood by which a ring must explain the presses better than none does: so many
 are tried."""
 
@@ -47,6 +47,11 @@ class Envelope:
     """
 
     electrodes: FloatArray | None = None
+
+    @classmethod
+    def of(cls, pattern: Pattern, rim: FloatArray) -> Self:
+        """Of the rows of a pattern whose electrodes are at ``rim`` (n, 2), in radii."""
+        return cls(_OUTSIDE * rim[np.hstack([pattern.drive, pattern.measure])])
 
     def __call__(self, positions: FloatArray) -> FloatArray:
         """(n, k) at ``positions`` (n, 2); (n, 1) of ones where nothing is known."""
@@ -69,43 +74,47 @@ def rings(pattern: Pattern, rim: FloatArray) -> Iterator[Envelope]:
 
     Where the first electrode stands, and which way round the others go, is for the presses to tell.
     """
-    table = np.hstack([pattern.drive, pattern.measure])
     closed = np.vstack([rim, rim[:1]])
     along = np.append(0.0, np.linalg.norm(np.diff(closed, axis=0), axis=1).cumsum())
     for first in np.arange(_TURNS) / _TURNS:
         for way in (1, -1):
             at = (first + way * np.arange(pattern.n_electrodes) / pattern.n_electrodes) % 1.0
             ring = [np.interp(at * along[-1], along, axis) for axis in closed.T]
-            yield Envelope(_OUTSIDE * np.column_stack(ring)[table])
+            yield Envelope.of(pattern, np.column_stack(ring))
 
 
 def likeliest_envelope(
     envelopes: Iterator[Envelope], positions: FloatArray, features: FloatArray
 ) -> Envelope:
     """The envelope of the largest marginal likelihood; none, unless one explains much more."""
+    none = Envelope()
+    likely = {one: evidence_of(one, positions, features) for one in (none, *envelopes)}
+    best = max(likely, key=lambda envelope: likely[envelope])
+    return best if likely[best] > likely[none] + SURE else none
+
+
+def evidence_of(envelope: Envelope, positions: FloatArray, features: FloatArray) -> float:
+    """Log marginal likelihood of some presses at ``positions`` (n, 2), up to a constant of their
+    ``features`` (n, k)."""
     some = np.unique(np.linspace(0, len(positions) - 1, _TRIED_ON).astype(int))
     near = Likeness(LENGTHS[len(LENGTHS) // 2])(positions[some], positions[some])
     about = (features[some] - features[some].mean(axis=0)).T
-    none = Envelope()
-
-    def evidence(envelope: Envelope) -> float:
-        size = envelope(positions[some]).T
-        prior = size[:, :, None] * near * size[:, None, :] + _NOISE * np.eye(len(some))
-        root = np.linalg.cholesky(prior)
-        white = np.linalg.solve(root, about[:, :, None])[:, :, 0]
-        logs = np.log((white**2).mean(axis=1) + _FLOOR) * len(some)
-        determinant = 2 * np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1)
-        return -0.5 * float((logs + determinant).sum())
-
-    likely = {envelope: evidence(envelope) for envelope in (none, *envelopes)}
-    best = max(likely, key=lambda envelope: likely[envelope])
-    return best if likely[best] > likely[none] + _SURE else none
+    size = envelope(positions[some]).T
+    prior = size[:, :, None] * near * size[:, None, :] + _NOISE * np.eye(len(some))
+    root = np.linalg.cholesky(prior)
+    white = np.linalg.solve(root, about[:, :, None])[:, :, 0]
+    logs = np.log((white**2).mean(axis=1) + _FLOOR) * len(some)
+    determinant = 2 * np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1)
+    return -0.5 * float((logs + determinant).sum())
 
 
 _RATIOS = np.array([0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0])
 """Noise over signal of a row, as tried."""
 
 _FLOOR = 1e-9
+
+_TELL = 48
+"""Rows that tell the length scale of all."""
 
 _FREEDOM = 4.0
 """Degrees of freedom of one row's error: a press may be told wrong by a few rows."""
@@ -143,12 +152,16 @@ class ChannelMaps:
     def of(cls, positions: FloatArray, features: FloatArray, envelope: Envelope) -> Self:
         """Maps for ``features`` (n, k) of presses at ``positions`` (n, 2).
 
-        The length scale of all rows, and the noise of each, are those of the largest evidence.
+        The length scale, of some rows for all, and the noise of each are those of the largest
+        evidence.
         """
-        return climbed(
-            lambda length: cls._of(Basis.of(Likeness(length), positions), positions, features,
-                                   envelope)
-        )  # fmt: skip
+        some = np.arange(0, features.shape[1], max(features.shape[1] // _TELL, 1))
+
+        def of_some(length: float) -> ChannelMaps:
+            basis = Basis.of(Likeness(length), positions)
+            return cls._of(basis, positions, features[:, some], envelope.of_rows(some))
+
+        return cls._of(climbed(of_some).basis, positions, features, envelope)
 
     @classmethod
     def _of(
@@ -163,11 +176,18 @@ class ChannelMaps:
         about = (features - mean).T
         design = envelope(positions).T[:, :, None] * basis(positions)
         pull = (about[:, None] @ design)[:, 0]
-        weights, axes = np.linalg.eigh(design.transpose(0, 2, 1) @ design)
-        along, total = (pull[:, None] @ axes)[:, 0], (about**2).sum(axis=1)
-        weights = np.maximum(weights, 0.0)
+        gram = design.transpose(0, 2, 1) @ design
         ratios = _RATIOS[:, None] if ratio is None else ratio[None]
-        spread = np.broadcast_to(weights, along.shape) + ratios[:, :, None]
+        if ratio is None or len(gram) == 1:
+            weights, axes = np.linalg.eigh(gram)
+            along = (pull[:, None] @ axes)[:, 0]
+            spread = np.broadcast_to(np.maximum(weights, 0.0), along.shape) + ratios[:, :, None]
+        else:  # nothing is chosen: the root of the inverse is found much sooner
+            noisy = gram + ratio[:, None, None] * np.eye(gram.shape[1])
+            axes = np.linalg.inv(np.linalg.cholesky(noisy)).transpose(0, 2, 1)
+            along = (pull[:, None] @ axes)[:, 0]
+            spread = np.ones((1, *along.shape))
+        total = (about**2).sum(axis=1)
         square = (total - (along**2 / spread).sum(axis=2)) / ratios
         size = np.maximum(square, 0.0) / n + _FLOOR
         logs = np.log(spread / ratios[:, :, None]).sum(axis=2) + n * np.log(ratios * size)
@@ -186,7 +206,8 @@ class ChannelMaps:
         """Mean and variance, both (g, k), of the features of a press at ``positions`` (g, 2)."""
         values, envelope = self.basis(positions), self.envelope(positions)
         mean = self.mean + envelope * (values @ self.weights.T)
-        known = ((values @ self.axes) ** 2 @ (1 / self.spread)[:, :, None])[:, :, 0].T
+        along = values.astype(_SINGLE) @ self.axes.astype(_SINGLE)
+        known = (along**2 @ (1 / self.spread.astype(_SINGLE))[:, :, None])[:, :, 0].T
         unknown = self.basis.likeness.variance - (values**2).sum(axis=1, keepdims=True)
         prior = np.maximum(unknown, 0.0) + self.ratio * known
         return mean, self.size * np.maximum(envelope**2 * prior + self.ratio, _FLOOR)
