@@ -161,7 +161,7 @@ def test_a_function_writes_over_what_it_is_told_to(tmp_path: Path, whole: Path, 
 
 def test_a_series_asks_for_its_parts_too(tmp_path: Path) -> None:
     mesh = SKIN.mesh()
-    moments = [(0.1 * k, np.zeros(len(mesh.cells))) for k in range(2)]
+    moments = [(0.1 * k, {"change": np.zeros(len(mesh.cells))}) for k in range(2)]
     part = tmp_path / "x_000002.vtu"
     part.write_text("mine")
     (tmp_path / "xy_000001.vtu").write_text("another's")

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import csv
 import json
+from dataclasses import replace
+from types import SimpleNamespace
 from xml.etree import ElementTree as Xml
 
 import h5py
@@ -13,9 +15,10 @@ import pytest
 from PIL import Image
 from scipy.io import loadmat
 
-from files.session.runs import SKIN, frame_of, put, write_all
-from tomoskin.core import DataError
+from files.session.runs import SKIN, TOUCH, frame_of, put, write_all
+from tomoskin.core import Amount, DataError
 from tomoskin.files.exports import FILMS
+from tomoskin.files.exports.session_export import fields_of
 from tomoskin.files.imports import read_recording
 from tomoskin.files.session import SessionReader, SessionWriter
 from tomoskin.files.session.scanned import MOST_FRAMES
@@ -151,6 +154,36 @@ def test_a_series_of_meshes(export):
     for file in files:
         piece = Xml.parse(file).getroot().find(".//Piece")
         assert int(piece.get("NumberOfCells")) == len(SKIN.mesh().cells)
+        names = [array.get("Name") for array in piece.findall("CellData/DataArray")]
+        assert names == ["change"]  # no depth is calibrated, so there is no dent
+
+
+def test_a_series_holds_the_dent_of_touches_with_depths():
+    """And nothing where one has none."""
+    skin = SKIN.altered({"surface": {"layer": "3 mm"}})
+    mesh = skin.mesh()
+    deep = replace(TOUCH.detection, x=0.02, y=0.0, depth=Amount(1e-3, 0.8e-3, 1.2e-3))
+    result = SimpleNamespace(image=SimpleNamespace(values=np.zeros(len(mesh.cells))))
+
+    def names(detection, skin, calibrations):
+        result.touches = (replace(TOUCH, detection=detection),)
+        job = SimpleNamespace(
+            session=SimpleNamespace(skin=skin),
+            prepared=SimpleNamespace(mesh=mesh, calibrations=calibrations),
+        )
+        return fields_of(job, result)
+
+    fields = names(deep, skin, {"depth": None})
+    assert list(fields) == ["change", "deflection_m", "deflection_sd_m"]
+    lowest = mesh.centroids[fields["deflection_m"].argmax()]
+    assert np.hypot(*(lowest - (0.02, 0.0))) < 0.01
+    assert fields["deflection_m"].max() == pytest.approx(1e-3, rel=0.02)
+    for case in (
+        (TOUCH.detection, skin, {"depth": None}),
+        (deep, SKIN, {"depth": None}),
+        (deep, skin, {}),
+    ):
+        assert list(names(*case)) == ["change"]
 
 
 def test_pictures_of_the_map(export):

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tomoskin.core import StrPath
+from tomoskin.core import FloatArray, StrPath
 from tomoskin.files.exports.export import Export
 from tomoskin.files.exports.lerobot import write_lerobot
 from tomoskin.files.exports.matlab_file import write_matlab
@@ -24,9 +24,10 @@ from tomoskin.files.session import (
     recording_of,
     session_touches,
 )
+from tomoskin.learning import DEPTH, dent_map
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.skin import Skin
-from tomoskin.pipeline import colour_limit
+from tomoskin.pipeline import FrameResult, colour_limit
 from tomoskin.sensing.track import measured_in
 
 
@@ -40,9 +41,19 @@ def _matlab(job: Export, path: StrPath) -> None:
 
 
 def _series(job: Export, path: StrPath) -> None:
-    moments = ((result.host_time, result.image.values) for result in job.images())
+    moments = ((result.host_time, fields_of(job, result)) for result in job.images())
     listing = Path(path).with_suffix(".pvd")
     write_series(listing, job.prepared.mesh, moments, overwrite=job.overwrite)
+
+
+def fields_of(job: Export, result: FrameResult) -> dict[str, FloatArray]:
+    """The image, and the dent of touches whose depths a calibration tells."""
+    fields, (skin, mesh) = {"change": result.image.values}, (job.session.skin, job.prepared.mesh)
+    if DEPTH.name in job.prepared.calibrations and skin.layer is not None:
+        touches = [touch.detection for touch in result.touches]
+        if (dent := dent_map(touches, mesh.centroids[:, :2], skin.layer)) is not None:
+            fields |= {"deflection_m": dent.deflection, "deflection_sd_m": dent.deviation}
+    return fields
 
 
 def _film(job: Export, path: StrPath) -> None:

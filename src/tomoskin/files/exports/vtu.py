@@ -49,24 +49,24 @@ def series_files(path: StrPath) -> list[Path]:
 def write_series(
     path: StrPath,
     mesh: Mesh,
-    moments: Iterable[tuple[float, FloatArray]],
+    moments: Iterable[tuple[float, Mapping[str, FloatArray]]],
     *,
     overwrite: bool = False,
 ) -> int:
-    """Write ``path`` (.pvd) and the files beside it, one a (time s, values (n_cells,)).
+    """Write ``path`` (.pvd) and the files beside it, one a (time s, fields, each (n_cells,)).
 
-    Returns the number of them; the field is called ``change``. All appear at the end, ``path``
-    last. Raises as :func:`written` does, for each of :func:`series_files`.
+    Returns the number of them. All appear at the end, ``path`` last. Raises as :func:`written`
+    does, for each of :func:`series_files`.
     """
     path = Path(path)
     check_outputs(map(Output, series_files(path)), overwrite=overwrite)
     entries, count = [], 0
     with ExitStack() as files:
         target = files.enter_context(written(path, overwrite=overwrite))
-        for count, (time, values) in enumerate(moments, start=1):
+        for count, (time, fields) in enumerate(moments, start=1):
             name = f"{path.stem}_{count:06d}.vtu"
             part = files.enter_context(written(path.with_name(name), overwrite=overwrite))
-            write_vtu(part, mesh, {"change": values}, overwrite=True)
+            write_vtu(part, mesh, fields, overwrite=True)
             entries.append(f'<DataSet timestep="{time:.6f}" part="0" file={quoteattr(name)} />')
         target.write_text(_SERIES.format("".join(entries)), encoding="utf-8")
     return count
