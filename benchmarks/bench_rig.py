@@ -62,11 +62,7 @@ class Rig:
         return self._scans.frame(self.number, time)
 
     def push(
-        self,
-        pipeline: Pipeline,
-        count: int,
-        presses: Iterable[Press] = (),
-        faults: Faults = NONE,
+        self, pipeline: Pipeline, count: int, presses: Iterable[Press] = (), faults: Faults = NONE
     ) -> list[FrameResult]:
         """What a pipeline makes of the next ``count`` frames."""
         results = [pipeline.push(self.frame(presses, faults)) for _ in range(count)]

@@ -61,17 +61,10 @@ def _pressed(electrodes: int, foam: float, *, named: bool) -> dict[str, Any]:
     if named:
         skin = skin.altered({"surface": {"layer": f"{1e3 * foam:g} mm"}})
     given = TwinSettings.preset("textile", SEED)
-    given = replace(
-        given,
-        contact=replace(given.contact, thickness=foam),
-        material=replace(given.material, thickness=foam),
-    )
-    twin, random, away, inside = (
-        SteppedSkin(prepare(skin), given),
-        np.random.default_rng(SEED),
-        [],
-        0,
-    )
+    soft = {k: replace(getattr(given, k), thickness=foam) for k in ("contact", "material")}
+    given, random = replace(given, **soft), np.random.default_rng(SEED)
+    twin = SteppedSkin(prepare(skin), given)
+    away, inside = [], 0
     for trial in range(PRESSES):
         twin.reset(SEED + trial)
         (press,) = drawn(random, 1)

@@ -51,10 +51,7 @@ def run(data: Path | None) -> Iterator[Report]:
     yield table(
         "six flags at once, from one batch to the other: part of the frames with all six right",
         (
-            {
-                "batches": f"{a} to {b}",
-                "untouched frames": "all" if smooth else "the one before",
-            }
+            {"batches": f"{a} to {b}", "untouched frames": "all" if smooth else "the one before"}
             | _transfer(*both)
             for (a, b, smooth), both in batches.items()
         ),

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize
@@ -16,7 +16,7 @@ from scipy.spatial.distance import cdist
 from bench_rig import evenly, far_apart, gap
 from report import Floats, Report, available, table
 from tomoskin.core import Detection
-from tomoskin.learning import AmountModel, AmountProcess, LabelledPresses
+from tomoskin.learning import AmountModel, AmountProcess, LabelledPresses, dent_map
 from tomoskin.twin import Press, TwinSettings
 from touch_lab import TwinLab
 
@@ -47,6 +47,7 @@ MOST = TwinSettings.preset("textile").contact.lock * 3e-3
 
 LABELLED, STAGES = 20, (0.5, 1.0, 0.5)
 HELD_OUT, PAIRS, LOOP = 20, 10, (0.2, 0.5, 0.8, 1.0, 0.8, 0.5, 0.2)
+DENTS, MAPS = {331: 6e-3, 332: 10e-3, 333: 14e-3, 334: 20e-3}, 4
 FRAMES, BETWEEN, APART, NEAR = 5, 0.1, 0.06, 0.025
 
 FOLDS = (2, 5)
@@ -81,6 +82,12 @@ def run(data: Path | None) -> Iterator[Report]:
         "3 mm thick and gives way by 1.2 at most",
         "tips: radii, one of which makes each press, taught and asked; the method knows none, and "
         "was chosen on seeds 11 to 13 and 31 to 33",
+    )
+    yield table(
+        "dents on the twin's textile, 16 electrodes",
+        (row for seed, radius in DENTS.items() for row in _dents(seed, radius)),
+        f"{MAPS} maps each of 0.3 to 1.1 mm; one tip a sheet, whose size is not given, seeds "
+        f"{', '.join(map(str, DENTS))}; without a map: rms of the dent; the dent: above 5 %",
     )
     folder = available(data, "eskin_fingertip8", "eskin_hydrogel_round")
     if folder is None:
@@ -171,27 +178,15 @@ def _nearest(found: Sequence[Detection], place: Floats) -> Detection | None:
     return min(near, key=lambda d: gap(d, place), default=None)
 
 
-@dataclass(frozen=True)
-class Weighed:
-    """Force over the true one, and whether the interval held it, of each press (n_presses, …)."""
+class Weighed(NamedTuple):
+    """Of all presses: mean relative error, part in the intervals, deviation over the spots of each
+    press's mean ratio, how many were not found, ms of a frame."""
 
-    ratio: Floats
-    held: Floats
+    error: float
+    inside: float
+    variation: float
     missed: int
     cost: float
-
-    @property
-    def error(self) -> float:
-        return float(np.nanmean(np.abs(self.ratio - 1)))
-
-    @property
-    def inside(self) -> float:
-        return float(np.nanmean(self.held))
-
-    @property
-    def variation(self) -> float:
-        """Over the spots: deviation of each press's mean ratio."""
-        return float(np.nanstd(np.nanmean(self.ratio, axis=1)))
 
 
 def calibrated(scale: Scale, labelled: int = LABELLED) -> AmountModel:
@@ -227,10 +222,33 @@ def _weighed(scale: Scale, model: AmountModel, count: int, presses: int) -> Weig
             for k, amount in zip(seen, amounts, strict=True):
                 ratio[number, k, step] = amount.value / stage[k].amount
                 held[number, k, step] = amount.low <= stage[k].amount <= amount.high
-    missed = int(np.isnan(ratio).sum())
-    return Weighed(
-        ratio.reshape(-1, len(LOOP)), held.reshape(-1, len(LOOP)), missed, np.median(taken)
-    )
+    ratio = ratio.reshape(-1, len(LOOP))
+    wrong, spots = np.abs(ratio - 1), np.nanmean(ratio, axis=1)
+    missed, cost = int(np.isnan(ratio).sum()), float(np.median(taken))
+    return Weighed(np.nanmean(wrong), np.nanmean(held), np.nanstd(spots), missed, cost)
+
+
+def _dents(seed: int, radius: float) -> Iterator[dict[str, Any]]:
+    """Maps of one to three presses against the twin's own dents, on its mesh."""
+    scale = Scale(seed, (radius,), "depth", "layer 16")
+    model, sheet = calibrated(scale, LABELLED // 2), scale.lab.board.sheet
+    points, area = sheet.model.mesh.centroids, sheet.model.mesh.volumes
+    for count in (1, 2, 3):
+        figures = []
+        for number in range(MAPS):
+            tops, state = scale.random.uniform(0.3e-3, 1.1e-3, count), None
+            for now, stage in scale.pressed(tops, (0.3, 1.0), number):
+                found = [one.detection for one in stage if one.detection is not None]
+                amounts, state = model.read(state, found, now)
+            touches = [replace(d, depth=a) for d, a in zip(found, amounts, strict=True)]
+            dent, true = dent_map(touches, points, scale.lab.skin.layer), sheet.load[3]
+            off, deep = dent.deflection - true, area * (true > true.max() / 20)
+            held = np.abs(off) <= 1.64 * dent.deviation
+            sizes = [np.sqrt(np.average(v**2, weights=area)) / true.max() for v in (off, true)]
+            figures.append([*sizes, *(np.average(held, weights=w) for w in (area, deep))])
+        names = "rms of the greatest depth", "without a map", "within 1.64 sd", "in the dent alone"
+        parts = map(_percent, np.mean(figures, axis=0))
+        yield {"tip mm": 1e3 * radius, "presses": count} | dict(zip(names, parts, strict=True))
 
 
 def _twin(tips: Mapping[int, Tips], of: str, labelled: int = LABELLED) -> Iterator[dict[str, Any]]:

@@ -180,6 +180,7 @@ _SKINS: dict[str, tuple[str, dict[str, Any]]] = {
     "8": ("textile-disc-8", {}),
     "16": ("textile-disc-16", {}),
     "square 16": ("textile-square-16", {}),
+    "layer 16": ("textile-disc-16", {"surface": {"layer": "3 mm"}}),
     "cap 16": ("textile-disc-16", CAP),
 }
 

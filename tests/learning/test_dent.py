@@ -38,7 +38,8 @@ def test_the_fall_is_the_integral_over_waves():
         return np.arcsin(a / r) - np.trapezoid(mirrored * j0(q * r), q)
 
     for r in (0.012, 0.015, 0.02):
-        assert fall(np.array(r), a, t) == pytest.approx(deflection(r) / deflection(a), abs=1e-3)
+        expected = max(deflection(r) / deflection(a), 0.0)
+        assert fall(np.array(r), a, t) == pytest.approx(expected, abs=1e-3)
 
 
 def test_the_compliance_is_that_of_a_glued_layer():
