@@ -8,7 +8,7 @@ from tomoskin.learning.amount.amount_report import (
     least_known as least_known,
     report_of as report_of,
 )
-from tomoskin.learning.amount.dent import DentMap as DentMap, dent_map as dent_map
+from tomoskin.learning.amount.dent_map import DentMap as DentMap, dent_map as dent_map
 from tomoskin.learning.amount.labelled_presses import LabelledPresses as LabelledPresses
 from tomoskin.learning.amount.measurand import (
     MEASURED as MEASURED,

@@ -11,7 +11,7 @@ from scipy.special import j0
 
 from tomoskin.core import Amount, DataError, Detection
 from tomoskin.learning import dent_map
-from tomoskin.learning.amount.dent import fall
+from tomoskin.learning.amount.dent_map import fall
 
 TIP = (0.01, 0.0)
 DEPTH = Amount(1e-3, 0.8e-3, 1.2e-3)
