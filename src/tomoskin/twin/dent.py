@@ -239,8 +239,8 @@ def bulge_strain(depth: FloatArray, settings: ContactSettings, grid: Grid) -> Fl
     """(3, n, n) strain xx, yy, xy of a sheet that the body's face carries along as it bulges.
 
     Pressed by w, springs of length t would spread by β w/t in each direction, and a layer as its
-    elasticity says (:class:`BodySurface`). The face moves by the gradient field with that divergence, and
-    drags the sheet through its shear. Linear in the depth.
+    elasticity says (:class:`BodySurface`). The face moves by the gradient field with that
+    divergence, and drags the sheet through its shear. Linear in the depth.
     """
     qx, qy = grid.wave_numbers
     squared = qx**2 + qy**2
