@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from importlib.resources import files
+from pathlib import Path
 
 import msgspec
 import numpy as np
@@ -33,7 +34,7 @@ from tomoskin.twin import Board, ElectronicsSettings, Faults, SampleTable, TwinT
 from tomoskin.twin.circuit import line_potentials
 from tomoskin.twin.device import TwinDevice
 from tomoskin.twin.electronics import convert
-from tomoskin.twin.emulator import build_firmware
+from tomoskin.twin.emulator import build_firmware, program
 from tomoskin.twin.emulator.program import programs_of
 from tomoskin.twin.source import read_board
 
@@ -164,6 +165,15 @@ def test_what_it_has_not_is_said(third: BoardRecord) -> None:
         programs_of("third")
     with pytest.raises(SourceError, match=r'expected a board of mega, .*third, got "fourth"'):
         open_source("twin:board=fourth", Skin.load("textile-disc-8"))
+
+
+def test_a_build_that_makes_nothing_is_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(program, "BUILD", tmp_path)
+    monkeypatch.setattr(program, "_make", lambda *_: None)
+    with pytest.raises(SourceError, match=r"the rule .* made no .*elf"):
+        build_firmware(BOARDS["mega"], 8)
 
 
 @pytest.mark.usefixtures("third")

@@ -84,7 +84,7 @@ class ContactSettings:
 
     @property
     def shear_modulus(self) -> float:
-        """Of the body, Pa."""
+        """Shear modulus of the body, Pa."""
         return self.modulus / (2 * (1 + self.poisson))
 
     @property
@@ -114,7 +114,7 @@ class ContactSettings:
         return stiff if self.foundation == "winkler" else math.hypot(stiff, self.thickness / 2)
 
 
-class Face(NamedTuple):
+class BodySurface(NamedTuple):
     """What the face of a body does under waves of pressure and shear, wave by wave.
 
     Attributes
@@ -133,7 +133,7 @@ class Face(NamedTuple):
     across: FloatArray | float
 
     @classmethod
-    def of(cls, body: ContactSettings, squared: FloatArray) -> Face:
+    def of(cls, body: ContactSettings, squared: FloatArray) -> BodySurface:
         """Of waves with ``squared`` wave numbers, rad²/m².
 
         Springs side by side; or a layer glued to a stiff base and to the sheet. In a half-space
@@ -229,7 +229,7 @@ def solve_contact(probes: Sequence[Probe], settings: ContactSettings, grid: Grid
 
     The depth is the pressure p ≥ 0 on the faces times the body's compliance,
 
-        springs with a membrane: T∇²w − kw = −p;      a layer: see :class:`Face`,
+        springs with a membrane: T∇²w − kw = −p;      a layer: :class:`BodySurface`,
 
     and each face is w = travel − gap where it presses, w ≥ travel − gap elsewhere. Conjugate
     gradients on the pressure with the forces kept (Polonsky & Keer 1999, Wear 231, 206). The
@@ -345,5 +345,5 @@ def _spread(values: FloatArray, nodes: IntArray, shape: tuple[int, int]) -> Floa
 def _compliance(settings: ContactSettings, grid: Grid) -> Callable[[FloatArray], FloatArray]:
     """Pressure (n, n) Pa → depth (n, n) m."""
     qx, qy = grid.wave_numbers
-    give = Face.of(settings, qx**2 + qy**2).give
+    give = BodySurface.of(settings, qx**2 + qy**2).give
     return lambda p: np.asarray(irfft2(rfft2(p) * give, p.shape))

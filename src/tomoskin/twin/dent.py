@@ -15,7 +15,7 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 
 from tomoskin.core import FloatArray
 from tomoskin.model.forward import choose_engine
-from tomoskin.twin.contact import ContactSettings, Face, Grid, solve_contact
+from tomoskin.twin.contact import BodySurface, ContactSettings, Grid, solve_contact
 from tomoskin.twin.probe import Probe, Shape
 
 _NODES = 128
@@ -239,12 +239,12 @@ def bulge_strain(depth: FloatArray, settings: ContactSettings, grid: Grid) -> Fl
     """(3, n, n) strain xx, yy, xy of a sheet that the body's face carries along as it bulges.
 
     Pressed by w, springs of length t would spread by β w/t in each direction, and a layer as its
-    elasticity says (:class:`Face`). The face moves by the gradient field with that divergence, and
-    drags the sheet through its shear. Linear in the depth.
+    elasticity says (:class:`BodySurface`). The face moves by the gradient field with that
+    divergence, and drags the sheet through its shear. Linear in the depth.
     """
     qx, qy = grid.wave_numbers
     squared = qx**2 + qy**2
-    face = Face.of(settings, squared)
+    face = BodySurface.of(settings, squared)
     squared[0, 0] = 1.0
     spread = face.spread * rfft2(depth) / squared
     pull = [-1j * q * spread * face.along for q in (qx, qy)]
@@ -267,7 +267,7 @@ def _shift(fx: _Waves, fy: _Waves, settings: ContactSettings, grid: Grid) -> tup
     qx, qy = grid.wave_numbers
     squared = qx**2 + qy**2
     lame, shear = settings.lame
-    face = Face.of(settings, squared)
+    face = BodySurface.of(settings, squared)
     squared[0, 0] = 1.0
     across = face.across + shear * squared
     along = face.along + (lame + 2 * shear) * squared

@@ -78,3 +78,21 @@ def test_a_course_goes_on_in_time() -> None:
         course.read([["1 s", "1 mm"], ["1 s", "0 mm"]])
     with pytest.raises(ValueError, match="row 0, place: expected a length"):
         course.read([["1 s", 7]])
+
+
+def test_a_default_that_cannot_be_read_is_named() -> None:
+    with pytest.raises(ValueError, match=r'default of "How long\.": expected a length'):
+        key(_LENGTH, "How long.", default=0.02)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Bent:
+    radius: float = key(_LENGTH, "Of the bend.", default="9 mm")
+
+
+def test_a_word_may_not_bring_a_key_that_is_there() -> None:
+    with pytest.raises(TypeError, match="bent: radius is a key of Pipe already"):
+
+        class Pipe(Section, section="pipe"):
+            radius: float = key(_LENGTH, "Of the pipe.", default="5 mm")
+            form: str = key(Choice(("bent",)), "Which.", default="bent", options={"bent": _Bent()})

@@ -108,7 +108,10 @@ def key(
     metadata = {"key": declared}
     if declared.required and not (when or unless):
         return field(metadata=metadata)  # type: ignore[no-any-return]
-    value: Any = None if written is None else kind.read(written)
+    try:
+        value: Any = None if written is None else kind.read(written)
+    except ValueError as error:
+        raise ValueError(f'default of "{meaning}": {error}') from None
     return field(default=value, metadata=metadata)  # type: ignore[no-any-return]
 
 
@@ -216,6 +219,10 @@ def _add_parameters(cls: type[Section]) -> None:
         if declared is None or declared.options is None:
             continue
         for parameter, (default, words, own) in _parameters(declared.options).items():
+            if parameter in cls.__annotations__:
+                raise TypeError(
+                    f"{', '.join(words)}: {parameter} is a key of {cls.__name__} already"
+                )
             of = replace(own, when=declared.when, effective=(name, words))
             setattr(cls, parameter, field(default=default, metadata={"key": of}))
             annotations[parameter] = "Any"

@@ -150,6 +150,12 @@ def build_firmware(record: BoardRecord, channels: int) -> Path:
     files = _files(record)
     _make(record, files.make, channels)
     program = BUILD / files.program.format(channels)
+    if not program.is_file():
+        raise SourceError(
+            f"the rule {files.make} made no {program.name}",
+            where="firmware",
+            hint="the board.mk of the board says how it is made",
+        )
     if record.flash != "uf2":
         return program
     data, uf2 = pack_uf2(program.read_bytes()), program.with_suffix(".uf2")
