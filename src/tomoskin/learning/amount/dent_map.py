@@ -53,7 +53,7 @@ def fall(distance: FloatArray, radius: float, layer: float) -> FloatArray:
 
 
 def _mirrored(distance: FloatArray, radius: float, z: float) -> FloatArray:
-    """∫ e⁻ᵠᶻ sin(qa) J₀(qr)/q dq."""
+    """The part of a tip that is mirrored at depth ``z``: ∫ e⁻ᵠᶻ sin(qa) J₀(qr)/q dq."""
     spans = np.hypot(distance + radius, z) + np.hypot(distance - radius, z)
     return np.asarray(np.arcsin(np.minimum(2 * radius / spans, 1.0)))
 
