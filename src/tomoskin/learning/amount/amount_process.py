@@ -25,7 +25,9 @@ _COMPONENTS = {"change": 60, "pressed": 60, "rest": 10}
 
 _FEWEST = 20
 _WHERE = "labels of presses"
-_HALF = float(ndtri(0.95))
+HALF = float(ndtri(0.95))
+"""Deviations in half of a 90 % interval."""
+
 _RECENT, _LEAST = 8, 30
 """The last eighth of the presses, or so many, tell whether the skin has changed."""
 
@@ -151,7 +153,7 @@ class AmountProcess:
         data = _named(frames(before, n_meas), frames(during, n_meas))
         squares = {name: block.squares(block(data[name])) for name, block in self.blocks.items()}
         middle = self.process(squares)[:, 0]
-        half = _HALF * self.scale * self.process.deviation(squares)
+        half = HALF * self.scale * self.process.deviation(squares)
         return middle, middle - half, middle + half
 
 
@@ -162,4 +164,4 @@ def _named(rest: FloatArray, pressed: FloatArray) -> dict[str, FloatArray]:
 def _scale(away: FloatArray) -> float:
     """Of deviations, by how many of which (n,) each left-out press is missed."""
     last = away[-max(len(away) // _RECENT, _LEAST) :]
-    return max(nine_in_ten(away), nine_in_ten(last) / _CHANCE) / _HALF
+    return max(nine_in_ten(away), nine_in_ten(last) / _CHANCE) / HALF

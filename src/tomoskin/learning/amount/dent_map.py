@@ -8,9 +8,9 @@ from itertools import product
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import ndtri
 
 from tomoskin.core import Amount, DataError, Detection, FloatArray
+from tomoskin.learning.amount.amount_process import HALF
 
 TIP = 0.011, 0.35
 """Radius of a tip of which nothing is known, m, and deviation of its logarithm: 6 to 20 mm. A frame
@@ -20,7 +20,6 @@ _SPREAD = 4.0, 0.7
 """A sheet in tension carries a dent farther than its layer alone, as one so many times as thick
 would; and deviation of the logarithm of that. Assumed: neither tension nor modulus is known."""
 
-_HALF = float(ndtri(0.95))
 _NEAR = 1e-9
 
 
@@ -120,5 +119,5 @@ def _nodes(count: int) -> list[tuple[float, float]]:
 def _sd(depth: Amount) -> float:
     """Deviation of a depth by its 90 % interval; by the lower half where that has no end."""
     if math.isinf(depth.high):
-        return (depth.value - depth.low) / _HALF
-    return (depth.high - depth.low) / (2 * _HALF)
+        return (depth.value - depth.low) / HALF
+    return (depth.high - depth.low) / (2 * HALF)

@@ -201,11 +201,11 @@ def label_doubts(locator: Locator, skin: Skin) -> str:
     Rows answer most strongly near their electrodes, so that presses tell where these are.
     """
     xy, outline = locator.presses.xy, Region.of(skin).outline
-    covered = float(np.ptp(xy, axis=0).max())
-    if covered < _TINY * np.ptp(outline, axis=0).max():
+    covered, extent = (float(np.ptp(points, axis=0).max()) for points in (xy, outline))
+    if covered < _TINY * extent:
         return (
             f"all labels lie within {1e3 * covered:.1f} mm of each other, on a skin of "
-            f"{1e3 * np.ptp(outline, axis=0).max():.0f} mm: are they in inches or centimetres? "
+            f"{1e3 * extent:.0f} mm: are they in inches or centimetres? "
             "Give them in metres"
         )
     features, region = locator.features, locator.region
