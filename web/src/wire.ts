@@ -192,6 +192,12 @@ export interface UnresolvedMap {
   readonly problem: string;
 }
 
+/** Why frames hold no dent of touches, in words; "" where they do. */
+export interface DentNow {
+  readonly type: "dent";
+  readonly problem: string;
+}
+
 /** What happened in the recording that is played, at times from its first frame. */
 export interface PlayedTimeline {
   readonly type: "timeline";
@@ -588,6 +594,12 @@ export interface AskUnresolved {
   readonly type: "unresolved";
 }
 
+/** This page shows the dent of touches, or does not any more; it is answered what there is. */
+export interface ShowDent {
+  readonly type: "dent";
+  readonly on: boolean;
+}
+
 /** How long the page took of late from a frame's arrival to the end of drawing it, s. */
 export interface Painted {
   readonly type: "painted";
@@ -774,6 +786,7 @@ export type ServerMessage =
   | EventNote
   | Refusal
   | UnresolvedMap
+  | DentNow
   | PlayedTimeline
   | Files
   | Exported
@@ -806,6 +819,7 @@ export type PageRequest =
   | SetLoop
   | SetRecording
   | AskUnresolved
+  | ShowDent
   | Painted
   | SetSettings
   | UndoSettings
@@ -844,6 +858,7 @@ export const readHeader = (data: DataView, at: number) => ({
   nTruth: data.getUint16(at + 26, true),
   flags: data.getUint32(at + 28, true),
   latencyUs: data.getUint32(at + 32, true),
+  nDent: data.getUint32(at + 36, true),
 });
 
 export const TOUCH_BYTES = 64;
@@ -892,3 +907,5 @@ export const FLAGS = { ready: 1, noImage: 2, rowsLeftOut: 4, bent: 8 } as const;
 export const MAGIC = 0x314b5354;
 
 export const BEND_STATES = ["idle", "bend", "touch", "bend and touch", "unknown"] as const;
+
+export const DENT_STEP = 2e-06;

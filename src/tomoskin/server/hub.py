@@ -16,13 +16,15 @@ import numpy as np
 from tomoskin.board.source import Transport
 from tomoskin.core import DataError, GeometryError, TomoskinError, WireError
 from tomoskin.files.session import read_timeline
+from tomoskin.learning import DEPTH, DentMap, dent_map
 from tomoskin.model.skin import Skin
-from tomoskin.pipeline import Prepared, Unresolved, colour_limit
+from tomoskin.pipeline import FrameResult, Prepared, Unresolved, colour_limit
 from tomoskin.run import FILE_NAME, Runner, SetPresses, Snapshot, StrictRequest, commands
 from tomoskin.server import views
 from tomoskin.server.frames import encode_result
 from tomoskin.server.page_connection import Handler, Handlers, Host, Page, Tasks, during
 from tomoskin.server.page_messages import (
+    DentNow,
     EventNote,
     Message,
     PlayedTimeline,
@@ -30,7 +32,7 @@ from tomoskin.server.page_messages import (
     Scene,
     UnresolvedMap,
 )
-from tomoskin.server.requests import AskUnresolved, Painted, SetRecording
+from tomoskin.server.requests import AskUnresolved, Painted, SetRecording, ShowDent
 from tomoskin.twin import Probe
 
 
@@ -137,7 +139,9 @@ class Hub(Host):
         self._limit = colour_limit(runner.prepared)
         self._scene: Scene | None = None
         self._made: tuple[Snapshot, bytes] | None = None
+        self._dented: set[Page] = set()
         self.serve(run_handlers(runner, self.folder, self.tasks))
+        self.serve({ShowDent: self._show_dent}, farewell=self._dented.discard)
 
     def serve(
         self,
@@ -180,8 +184,28 @@ class Hub(Host):
         if shown is None:
             return None
         if self._made is None or self._made[0] is not shown:
-            self._made = shown, encode_result(shown.result, shown.truth, shown.latency)
+            dent = self._dent(shown.result) if self._dented else None
+            self._made = shown, encode_result(shown.result, shown.truth, shown.latency, dent)
         return self._made[1]
+
+    def _show_dent(self, page: Page, request: ShowDent) -> None:
+        """Send dents while a page shows them, and answer why there are none."""
+        prepared = self.runner.prepared
+        problem = ""
+        if DEPTH.name not in prepared.calibrations:
+            problem = "depths are uncalibrated: teach them in Set up, or choose a calibration there"
+        elif prepared.skin.layer is None:
+            problem = 'the skin file does not give the layer: add layer = "3 mm" to [surface]'
+        page.post(DentNow(problem=problem).json)
+        (self._dented.add if request.on else self._dented.discard)(page)
+        self._made = None
+
+    def _dent(self, result: FrameResult) -> DentMap | None:
+        """The dent of the touches; None where nothing touches, or depths are not known."""
+        layer, nodes = self.runner.prepared.skin.layer, self.runner.prepared.mesh.points
+        if layer is None or not result.touches:
+            return None
+        return dent_map([touch.detection for touch in result.touches], nodes[:, :2], layer)
 
     def note_sent(self, frame: bytes) -> None:
         """Note how long it took until a page's connection had ``frame``."""

@@ -221,6 +221,12 @@ class UnresolvedMap(Message, frozen=True, tag="unresolved"):
     problem: str
 
 
+class DentNow(Message, frozen=True, tag="dent"):
+    """Why frames hold no dent of touches, in words; "" where they do."""
+
+    problem: str
+
+
 class PlayedTimeline(Message, frozen=True, tag="timeline"):
     """What happened in the recording that is played, at times from its first frame."""
 
@@ -470,7 +476,7 @@ class RobotTouches(MessagePart, frozen=True):
 
 
 PAGE_MESSAGES = (
-    *(Scene, Scale, RunState, EventNote, Refusal, UnresolvedMap, PlayedTimeline),
+    *(Scene, Scale, RunState, EventNote, Refusal, UnresolvedMap, DentNow, PlayedTimeline),
     *(Files, Exported, Sources, Calibrations, FlowNow),
 )
 """What the page of one skin is sent, beside :data:`~.settings_messages.SETTINGS_MESSAGES`."""

@@ -60,6 +60,12 @@ class AskUnresolved(StrictRequest, frozen=True, tag="unresolved"):
     """The map of what the data cannot tell, with the electrodes and the alpha of the moment."""
 
 
+class ShowDent(StrictRequest, frozen=True, tag="dent"):
+    """This page shows the dent of touches, or does not any more; it is answered what there is."""
+
+    on: bool
+
+
 class Painted(StrictRequest, frozen=True, tag="painted"):
     """How long the page took of late from a frame's arrival to the end of drawing it, s."""
 
