@@ -16,15 +16,14 @@ import numpy as np
 from tomoskin.board.source import Transport
 from tomoskin.core import DataError, GeometryError, TomoskinError, WireError
 from tomoskin.files.session import read_timeline
-from tomoskin.learning import DEPTH, DentMap, dent_map
 from tomoskin.model.skin import Skin
-from tomoskin.pipeline import FrameResult, Prepared, Unresolved, colour_limit
+from tomoskin.pipeline import Prepared, Unresolved, colour_limit
 from tomoskin.run import FILE_NAME, Runner, SetPresses, Snapshot, StrictRequest, commands
 from tomoskin.server import views
+from tomoskin.server.dents import Dents
 from tomoskin.server.frames import encode_result
 from tomoskin.server.page_connection import Handler, Handlers, Host, Page, Tasks, during
 from tomoskin.server.page_messages import (
-    DentNow,
     EventNote,
     Message,
     PlayedTimeline,
@@ -32,7 +31,7 @@ from tomoskin.server.page_messages import (
     Scene,
     UnresolvedMap,
 )
-from tomoskin.server.requests import AskUnresolved, Painted, SetRecording, ShowDent
+from tomoskin.server.requests import AskUnresolved, Painted, SetRecording
 from tomoskin.twin import Probe
 
 
@@ -138,10 +137,10 @@ class Hub(Host):
         self._past: deque[EventNote] = deque(maxlen=_FIRST_EVENTS)
         self._limit = colour_limit(runner.prepared)
         self._scene: Scene | None = None
-        self._made: tuple[Snapshot, bytes] | None = None
-        self._dented: set[Page] = set()
+        self._made: tuple[Snapshot, bool, bytes] | None = None
+        self._dents = Dents(runner)
         self.serve(run_handlers(runner, self.folder, self.tasks))
-        self.serve({ShowDent: self._show_dent}, farewell=self._dented.discard)
+        self.serve(self._dents.handlers, farewell=self._dents.pages.discard)
 
     def serve(
         self,
@@ -183,33 +182,16 @@ class Hub(Host):
         shown = self.runner.newest
         if shown is None:
             return None
-        if self._made is None or self._made[0] is not shown:
-            dent = self._dent(shown.result) if self._dented else None
-            self._made = shown, encode_result(shown.result, shown.truth, shown.latency, dent)
-        return self._made[1]
-
-    def _show_dent(self, page: Page, request: ShowDent) -> None:
-        """Send dents while a page shows them, and answer why there are none."""
-        prepared = self.runner.prepared
-        problem = ""
-        if DEPTH.name not in prepared.calibrations:
-            problem = "depths are uncalibrated: teach them in Set up, or choose a calibration there"
-        elif prepared.skin.layer is None:
-            problem = 'the skin file does not give the layer: add layer = "3 mm" to [surface]'
-        page.post(DentNow(problem=problem).json)
-        (self._dented.add if request.on else self._dented.discard)(page)
-        self._made = None
-
-    def _dent(self, result: FrameResult) -> DentMap | None:
-        """The dent of the touches; None where nothing touches, or depths are not known."""
-        layer, nodes = self.runner.prepared.skin.layer, self.runner.prepared.mesh.points
-        if layer is None or not result.touches:
-            return None
-        return dent_map([touch.detection for touch in result.touches], nodes[:, :2], layer)
+        asked = bool(self._dents.pages)
+        if self._made is None or self._made[0] is not shown or self._made[1] is not asked:
+            dent = self._dents.of(shown.result) if asked else None
+            made = encode_result(shown.result, shown.truth, shown.latency, dent)
+            self._made = shown, asked, made
+        return self._made[2]
 
     def note_sent(self, frame: bytes) -> None:
         """Note how long it took until a page's connection had ``frame``."""
-        if self._made is not None and self._made[1] is frame:
+        if self._made is not None and self._made[2] is frame:
             self.runner.flow.latency.add_published(time.monotonic() - self._made[0].ready)
 
     def leave(self, page: Page, why: str = "") -> None:
