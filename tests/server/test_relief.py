@@ -10,8 +10,8 @@ import pytest
 
 from server.looks import look_in_both
 from server.serving import Site
+from server.test_amount_flow import PLACES, touch
 from server.test_play import Page
-from server.test_weigh_flow import PLACES, touch
 from server.watching import Watched
 from tomoskin.board.source import open_source
 from tomoskin.learning import DEPTH, AmountModel, LabelledPresses

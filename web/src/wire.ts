@@ -283,7 +283,7 @@ export interface Calibrations {
 /** The guided flow; ``kind`` null: none goes on. */
 export interface FlowNow {
   readonly type: "flow";
-  readonly kind: "force" | "mapping" | "rub" | "touch" | null;
+  readonly kind: "depth" | "force" | "mapping" | "rub" | "touch" | null;
   readonly paused: boolean;
   readonly phase: "hold" | "name" | "press" | "release" | "rest" | "rub" | "several";
   readonly dot: readonly [number, number] | null;
@@ -293,10 +293,10 @@ export interface FlowNow {
   readonly ready: boolean;
   readonly figures: Figures;
   readonly effort: "hard" | "softly" | null;
-  readonly weights: readonly string[];
-  readonly weight: WeightNow | null;
-  readonly asked: WeightNow | null;
-  readonly meant: WeightNow | null;
+  readonly labels: readonly string[];
+  readonly label: LabelNow | null;
+  readonly asked: LabelNow | null;
+  readonly meant: LabelNow | null;
   readonly rubbed: RubbedNow | null;
   readonly stage: string;
 }
@@ -316,11 +316,11 @@ export interface Figures {
   readonly remarks?: readonly string[];
 }
 
-/** A weight, in the unit in which it was given, in newtons, and in words. */
-export interface WeightNow {
+/** A weight or depth, in the unit in which it was given, in SI, and in words. */
+export interface LabelNow {
   readonly value: number;
-  readonly unit: "N" | "g" | "kg";
-  readonly newtons: number;
+  readonly unit: "N" | "g" | "kg" | "mm";
+  readonly si: number;
   readonly text: string;
 }
 
@@ -696,10 +696,10 @@ export interface Connect {
   readonly source: string;
 }
 
-/** Ask for presses: where the dot is, to learn touch or to find the channel mapping; with known weights, to learn forces; everywhere, to learn touch without labels. */
+/** Ask for presses: where the dot is, to learn touch or to find the channel mapping; with known weights or to known depths, to learn these; everywhere, to learn touch without labels. */
 export interface BeginFlow {
   readonly type: "flow_begin";
-  readonly kind: "force" | "mapping" | "rub" | "touch";
+  readonly kind: "depth" | "force" | "mapping" | "rub" | "touch";
 }
 
 /** This page shows the flow, or hides it: while no page shows it, it is paused. */
@@ -714,11 +714,11 @@ export interface DeletePress {
   readonly number?: number | null;
 }
 
-/** What lies on the skin, or comes next; ``sure``: an unusual weight is meant as it is said. */
-export interface SetWeight {
-  readonly type: "flow_weight";
+/** The weight or depth of a press, or the next; ``sure``: an unusual one is meant as it is said. */
+export interface SetLabel {
+  readonly type: "flow_label";
   readonly value: number;
-  readonly unit: "N" | "g" | "kg";
+  readonly unit: "N" | "g" | "kg" | "mm";
   readonly sure?: boolean;
 }
 
@@ -839,7 +839,7 @@ export type PageRequest =
   | BeginFlow
   | ShowFlow
   | DeletePress
-  | SetWeight
+  | SetLabel
   | AskPoint
   | LearnFlow
   | StopLearning

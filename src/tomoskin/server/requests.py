@@ -35,9 +35,9 @@ Stem = Annotated[str, Meta(pattern=rf"^{STEM}\Z")]
 
 Format = Literal["touches", "csv", "npz", "mat", "h5", "parquet", "png", "gif"]
 
-FlowKind = Literal["touch", "mapping", "force", "rub"]
+FlowKind = Literal["touch", "mapping", "force", "depth", "rub"]
 
-Unit = Literal["N", "g", "kg"]
+Unit = Literal["N", "g", "kg", "mm"]
 
 Calibrated = Literal["touch", "force", "depth"]
 """What a calibration that a page can choose is of."""
@@ -165,7 +165,7 @@ class Connect(StrictRequest, frozen=True, tag="connect"):
 
 class BeginFlow(StrictRequest, frozen=True, tag="flow_begin"):
     """Ask for presses: where the dot is, to learn touch or to find the channel mapping; with known
-    weights, to learn forces; everywhere, to learn touch without labels."""
+    weights or to known depths, to learn these; everywhere, to learn touch without labels."""
 
     kind: FlowKind
 
@@ -182,8 +182,8 @@ class DeletePress(StrictRequest, frozen=True, tag="flow_delete"):
     number: Annotated[int, Meta(ge=0, le=10_000)] | None = None
 
 
-class SetWeight(StrictRequest, frozen=True, tag="flow_weight"):
-    """What lies on the skin, or comes next; ``sure``: an unusual weight is meant as it is said.
+class SetLabel(StrictRequest, frozen=True, tag="flow_label"):
+    """The weight or depth of a press, or the next; ``sure``: an unusual one is meant as it is said.
 
     What a person types is judged by the flow, which says what is wrong with it.
     """
