@@ -24,7 +24,7 @@ _THINNER = 0.7e-3
 _FEWEST, _LIKELIER = 5, 3.0
 """Presses that a layer is found from; logarithm of how much likelier it must make them."""
 
-_STEPS, _WIDER, _MOVED = 8, 0.5, 0.02
+_STEPS, _WIDER, _MOVED = 6, 0.5, 0.02
 """Steps of a fit, and the most that one changes of a radius's logarithm, and of a place, m."""
 
 
@@ -57,34 +57,34 @@ def estimate_layer(
     """
     if len(dv) < _FEWEST:
         raise DataError(f"expected at least {_FEWEST} presses with one touch, got {len(dv)}")
-    tried = [*map(float, LAYERS), None]
+    tried, data = [None, *map(float, LAYERS[::-1])], noise(dv)
     logs = np.empty((len(tried), len(dv), 2))
     for row, layer in enumerate(tried):
         advance(row, len(tried))
         response, prior = Response(state, Profile.on(layer)), SpotPrior.of(state.model.mesh, layer)
-        logs[row] = [
-            _evidence(response, prior, noise(change), noise, spot)
-            for change, spot in zip(dv, spots, strict=True)
-        ]
+        fits = [_fitted(response, prior, noise, *each) for each in zip(data, spots, strict=True)]
+        logs[row], spots = [fit[:2] for fit in fits], np.array([fit[2] for fit in fits])
     evidence, misfit = logs.sum(axis=1).T
     evidence /= max(1.0, misfit.min() / len(dv) / len(noise.matrix))
-    if evidence[:-1].max() < evidence[-1] + _LIKELIER:
+    if evidence[1:].max() < evidence[0] + _LIKELIER:
         raise DataError(
             "these presses are as likely on no soft layer",
             hint="press harder, or more often, all over the skin",
         )
-    log = np.interp(np.log(_FINE), np.log(LAYERS), evidence[:-1])
+    log = np.interp(np.log(_FINE), np.log(LAYERS), evidence[:0:-1])
     part = np.cumsum(np.exp(log - log.max()))
     low, value, high = np.interp((0.05, 0.5, 0.95), part / part[-1], _FINE) + _THINNER
     return LayerEstimate(float(value), float(low), float(high))
 
 
-def _evidence(
-    response: Response, prior: SpotPrior, data: FloatArray, noise: Whitener, spot: FloatArray
-) -> tuple[float, float]:
-    """Logarithm of the evidence of one press, whose whitened change is ``data``; its misfit."""
+def _fitted(
+    response: Response, prior: SpotPrior, noise: Whitener, data: FloatArray, spot: FloatArray
+) -> tuple[float, float, FloatArray]:
+    """Logarithm of the evidence of one press, whose whitened change is ``data``; its misfit; and
+    its spot, from one about there."""
     middle, weights = np.array([*spot[:2], *prior.middle[2:]]), prior.weights
     deviations = np.array([[prior.directed], [prior.reshaped]])
+    spot, best = prior.held(spot[None], "both")[0], (math.inf, 0.0, 0.0, spot)
     for _ in range(_STEPS):
         change, slopes, nuisances = response.expanded(spot[None])
         unknown = noise(nuisances.T) * deviations
@@ -93,9 +93,11 @@ def _evidence(
         residual, slopes, held = data - noise(change), noise(slopes.T), weights * (spot - middle)
         normal = slopes @ inverse @ slopes.T + np.diag(weights**2)
         misfit = float(residual @ inverse @ residual)
+        cost = (misfit + held @ held) / 2
         volume = np.linalg.slogdet(size)[1] + np.linalg.slogdet(normal)[1]
-        log = np.log(weights[LOG_RADIUS:]).sum() - (misfit + held @ held + volume) / 2
+        log = float(np.log(weights[LOG_RADIUS:]).sum() - cost - volume / 2)
+        best = min(best, (cost, log, misfit, spot), key=lambda one: one[0])
         step = np.linalg.solve(normal, slopes @ inverse @ residual - weights * held)
         most = max(abs(step[LOG_RADIUS]) / _WIDER, math.hypot(*step[:2]) / _MOVED, 1.0)
         spot = prior.held((spot + step / most)[None], "both")[0]
-    return float(log), misfit
+    return best[1:]
