@@ -228,6 +228,10 @@ def test_a_script_that_cannot_be_meant(text: str, where: str, what: str) -> None
             ('2 "a" id: "a" already', "1 s to 3.4 s", "(two presses at once need different ids)"),
         ),
         (
+            changed('hold = "2 s"', 'hold = "9 s"'),
+            ('1 "a": expected it to end by 10 s, got 10.4 s (raise [script] duration)',),
+        ),
+        (
             changed('hold = "2 s"', 'hold = "5 ms"'),
             (
                 "hold: a stage of 5 ms",
