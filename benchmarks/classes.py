@@ -69,18 +69,21 @@ def run(data: Path | None) -> Iterator[Report]:
         "the same where more has changed: right, said, unknown",
         (row for name, both in smoothed.items() for row in _changed(folder, name, *both)),
         "against all untouched frames; seed 5 of gains, frames and labels",
+        across="batches",
     )
     yield table(
         "scrambled wires on the twin",
         _twin(),
         "rotation, mirroring, none to two swaps and polarity drawn at random, seeds 0 to "
         f"{TRIALS - 1}; textile preset, whose mesh and dents are not the model's",
+        across="presses",
     )
     yield table(
         "orientation of public skins",
         _real(data),
         f"presses drawn at random (seeds 0 to {REAL_TRIALS - 1}); right: within one electrode "
         "of the orientation that the sets' notes state, itself fitted to a few degrees",
+        across="presses",
     )
 
 
@@ -123,7 +126,7 @@ def _changed(folder: Path, name: str, old: Batch, new: Batch) -> Iterator[dict[s
     for what, (data, truth) in scenes.items():
         ways = zip(("as learnt", "no labels", "ten at random"), _honest(known, data, truth),
                    strict=True)  # fmt: skip
-        yield {"batches": name, "what has changed": what, **dict(ways)}
+        yield {"what has changed": what, "batches": name, **dict(ways)}
 
 
 def _honest(known: Classifier, dv: Floats, truth: Floats) -> Iterator[str]:
