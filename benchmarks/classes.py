@@ -214,16 +214,15 @@ def _twin() -> Iterator[dict[str, Any]]:
             }
 
 
-Solved = tuple[bool, bool, float]
+Solved = tuple[bool, bool]
 
 
 def _tally(solved: Sequence[Solved]) -> dict[str, Any]:
-    right, sure, seconds = (np.array(column) for column in zip(*solved, strict=True))
+    right, sure = (np.array(column) for column in zip(*solved, strict=True))
     return {
         "right": f"{right.mean():.0%}",
         "sure": f"{sure.mean():.0%}",
         "sure and wrong": int((sure & ~right).sum()),
-        "s": round(float(seconds.mean()), 1),
     }
 
 
@@ -249,11 +248,10 @@ def _solved(
     skin: Skin, scene: tuple[ChannelMapping, Floats, Floats, Floats], count: int, *, rest: bool
 ) -> Solved:
     wiring, dv, xy, reference = scene
-    start = time.process_time()
     found = solve_channel_mapping(
         dv[:count], xy[:count], skin, reference=reference if rest else None
     )
-    return found.mapping == wiring, found.sure, time.process_time() - start
+    return found.mapping == wiring, found.sure
 
 
 def _real(data: Path) -> Iterator[dict[str, Any]]:
@@ -267,10 +265,8 @@ def _real(data: Path) -> Iterator[dict[str, Any]]:
             solved = []
             for seed in range(REAL_TRIALS):
                 chosen = np.random.default_rng(seed).permutation(len(dv))[:count]
-                start = time.process_time()
                 told = solve_channel_mapping(dv[chosen], xy[chosen], skin)
-                taken = time.process_time() - start
-                solved.append((told.mapping.electrodes in near, told.sure, taken))
+                solved.append((told.mapping.electrodes in near, told.sure))
             yield {"set": name, "presses": count, **_tally(solved)}
 
 

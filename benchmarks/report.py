@@ -80,11 +80,11 @@ def joined(
     """Columns and rows with what is behind the column ``at`` in cells, and a note on those."""
     cells: dict[tuple[Any, ...], dict[str, str]] = {}
     for row in rows:
-        cell = ", ".join(map(str, row[at + 1 :]))
+        cell = "; ".join(map(str, row[at + 1 :]))
         cells.setdefault(row[:at], {})[f"{columns[at]}: {row[at]}"] = cell
     names = tuple(dict.fromkeys(name for some in cells.values() for name in some))
     lines = tuple((*case, *(some.get(name, "–") for name in names)) for case, some in cells.items())
-    return (*columns[:at], *names), lines, f"in each cell: {', '.join(columns[at + 1 :])}"
+    return (*columns[:at], *names), lines, f"in each cell: {'; '.join(columns[at + 1 :])}"
 
 
 def cell(value: float | None) -> str:

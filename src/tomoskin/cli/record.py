@@ -161,7 +161,11 @@ def _wait(runner: Runner, seconds: float | None, frames: int | None) -> None:
     elapsed = 0.0
     with Bar("recording") as bar:
         while (flow := runner.flow).out.recordings.path is not None:
-            shares = [(elapsed, seconds), (flow.out.recordings.frames, frames), *_played(flow.played)]
+            shares = [
+                (elapsed, seconds),
+                (flow.out.recordings.frames, frames),
+                *_played(flow.played),
+            ]
             limits = [(part, limit) for part, limit in shares if limit is not None]
             for part, limit in limits:
                 if part >= limit:

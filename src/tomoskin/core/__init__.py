@@ -34,6 +34,7 @@ from tomoskin.core.user_files import (
     most_bytes as most_bytes,
     open_input as open_input,
     read_refusals as read_refusals,
+    write_rows as write_rows,
     write_text as write_text,
     written as written,
 )

@@ -4,6 +4,7 @@ and how much of this machine's memory one may take."""
 
 from __future__ import annotations
 
+import csv
 import os
 import secrets
 import stat
@@ -183,7 +184,7 @@ def _is_recording(path: Path) -> bool:
 
 @contextmanager
 def read_refusals(path: StrPath, kind: type[TomoskinError] = DataError) -> Iterator[None]:
-    """What the disk refuses to read in the block is an error of that ``kind`` that names ``path``."""
+    """What the disk refuses to read in the block is an error of that ``kind``."""
     try:
         yield
     except OSError as error:
@@ -237,6 +238,15 @@ def write_text(path: StrPath, text: str, *, overwrite: bool = False) -> None:
     """Write ``text`` as UTF-8, complete or not at all; raises as :func:`written` does."""
     with written(path, overwrite=overwrite) as part:
         part.write_text(text, encoding="utf-8", newline="\n")
+
+
+def write_rows(path: StrPath, rows: Iterable[Iterable[object]], *, overwrite: bool = False) -> None:
+    """Write a CSV file, complete or not at all; raises as :func:`written` does."""
+    with (
+        written(path, overwrite=overwrite) as part,
+        part.open("w", newline="", encoding="utf-8") as file,
+    ):
+        csv.writer(file, lineterminator="\n").writerows(rows)
 
 
 def _settle(part: Path, target: Path) -> None:

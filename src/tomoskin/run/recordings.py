@@ -160,8 +160,7 @@ class Recordings:
         DataError where it cannot be.
         """
         self.end()
-        now = self._clock()
-        worker = self._awaiting = _worker(path, self._prepared, now, self._say, log, most)
+        worker = self._awaiting = self._worker(path, log, most)
         worker.start()
         return worker.opening
 
@@ -240,20 +239,16 @@ class Recordings:
             },
         )
 
+    def _worker(
+        self, path: Path, log: session.MessageLog | None, most: int | None
+    ) -> Worker[session.Recorder]:
+        prepared, start = self._prepared, self._clock()
 
-def _worker(
-    path: Path,
-    prepared: Prepared,
-    start: float,
-    say: Say,
-    log: session.MessageLog | None,
-    most: int | None,
-) -> Worker[session.Recorder]:
-    def make() -> session.SessionWriter:
-        writer = session.SessionWriter(path, prepared.skin, epoch=epoch(), start=start, log=log)
-        for calibration in prepared.calibrations.values():
-            writer.attach(calibration.kind.attachment, "application/zip", calibration.encode())
-        return writer
+        def make() -> session.SessionWriter:
+            writer = session.SessionWriter(path, prepared.skin, epoch=epoch(), start=start, log=log)
+            for calibration in prepared.calibrations.values():
+                writer.attach(calibration.kind.attachment, "application/zip", calibration.encode())
+            return writer
 
-    recorder = session.Recorder(path, make, raster(prepared), say, most)
-    return Worker(recorder, Capacity(MOST_WAITING, "oldest"), say)
+        recorder = session.Recorder(path, make, raster(prepared), self._say, most)
+        return Worker(recorder, Capacity(MOST_WAITING, "oldest"), self._say)
