@@ -17,14 +17,7 @@ import numpy as np
 import typer
 
 from tomoskin.cli.app import group
-from tomoskin.cli.calibrate_labels import (
-    ALONG_Y,
-    amounts,
-    bends,
-    class_examples,
-    hardest,
-    labelled_presses,
-)
+from tomoskin.cli.calibrate_labels import ALONG_Y, amounts, bends, class_examples, labelled_presses
 from tomoskin.cli.calibrate_reports import (
     class_facts,
     class_lines,
@@ -42,7 +35,6 @@ from tomoskin.core import DataError, FloatArray, write_text
 if TYPE_CHECKING:
     from tomoskin.core import IntArray
     from tomoskin.learning import Locator
-    from tomoskin.model.skin import Skin
 
 app = group("calibrate")
 
@@ -397,14 +389,16 @@ def bend(
     return LearningOutcome(BENDS.of(model, labelled.pattern, skin).write, facts, lines)
 
 
-_SkinOut = Annotated[
+_MappedOut = Annotated[
     Path,
-    typer.Option(metavar="NEW.toml", help="New skin file, with what was found."),
+    typer.Option(
+        metavar="MAPPED.toml", help="New skin file with the channel mapping that was found."
+    ),
     Writes(SKIN),
 ]
 
 
-@_kind("mapping", _TOUCHED, out=_SkinOut)
+@_kind("mapping", _TOUCHED, out=_MappedOut)
 def mapping(labelled: Recorded) -> LearningOutcome:
     """Find rotation, mirroring, swapped wires and polarity from some presses.
 
@@ -423,36 +417,13 @@ def mapping(labelled: Recorded) -> LearningOutcome:
     facts = mapping_facts(answer, skin, frames.tolist())
     lines = mapping_lines(facts)
     if answer.sure:
-        return LearningOutcome(_skin_file(answer.mapping.applied(skin)), facts, lines)
+        document = answer.mapping.applied(skin).to_toml()
+
+        def write(out: Path, *, overwrite: bool) -> None:
+            write_text(out, document, overwrite=overwrite)
+
+        return LearningOutcome(write, facts, lines)
     x, y = facts["next_press_mm"]
     hint = f"a further press is most useful at x {x:+.0f} mm, y {y:+.0f} mm"
     problem = DataError(answer.reason, where=str(labelled.path), hint=hint)
     return LearningOutcome(None, facts, lines, problem)
-
-
-def _skin_file(skin: Skin) -> Callable[..., None]:
-    return lambda out, *, overwrite: write_text(out, skin.to_toml(), overwrite=overwrite)
-
-
-@_kind("layer", "Frames of presses, one touch in each.", out=_SkinOut)
-def layer(labelled: Recorded) -> LearningOutcome:
-    """Find the thickness of the soft layer under the sheet from about ten presses, without labels.
-
-    The result is a skin file with the thickness. Learn positions, forces and depths after that.
-    """
-    from tomoskin.pipeline import layer_under, prepare, tuned_sheet
-
-    rest = labelled.rest
-    with Bar("preparing"):
-        prepared = prepare(labelled.drawn)
-        prepared = prepared if rest is None else tuned_sheet(prepared, rest)
-    with Bar("finding touches") as bar:
-        presses = hardest(reconstructed(labelled, prepared, None, bar))
-    with Bar("comparing thicknesses") as bar:
-        dv = labelled.dv[list(presses)]
-        found = layer_under(prepared, rest, dv, list(presses.values()), bar)
-    value, low, high = (float(f"{1e3 * one:.3g}") for one in found)
-    facts = {"presses": len(presses), "layer_mm": value, "low_mm": low, "high_mm": high}
-    line = f"{len(presses)} presses: the layer is {value:g} mm thick, {low:g} to {high:g} with 90 %"
-    soft = labelled.drawn.altered({"surface": {"layer": f"{value:g} mm"}})
-    return LearningOutcome(_skin_file(soft), facts, [line])

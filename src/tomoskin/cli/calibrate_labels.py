@@ -4,7 +4,7 @@ B-1, arrays of the file, and what the twin has noted in a session."""
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -149,9 +149,18 @@ def labelled_presses(
     """Touches of frames with one touch; a press is what one does at one spot until it is lifted."""
     from tomoskin.learning import LabelledPresses
 
-    rows = [(d, float(amount[f]), press, float(time[f])) for f, press, d in _alone(result)]
-    counts = [len(result.touches[k]) for k in np.flatnonzero(np.isfinite(amount[result.frames]))]
-    without, several = counts.count(0), sum(count > 1 for count in counts)
+    rows: list[tuple[Detection, float, int, float]] = []
+    without, several, number = 0, 0, 0
+    before: Touch | None = None
+    for frame, touches in zip(result.frames.tolist(), result.touches, strict=True):
+        labelled = bool(np.isfinite(amount[frame]))
+        without += labelled and not touches
+        several += labelled and len(touches) > 1
+        alone = touches[0] if len(touches) == 1 else None
+        if alone is not None:
+            number += before is None or not _goes_on(before, alone)
+            rows.append((alone.detection, float(amount[frame]), number, float(time[frame])))
+        before = alone
     if without or several:
         remark(
             f"{path}: of the frames with a {of.name}, {without} show no touch and {several} show "
@@ -160,25 +169,6 @@ def labelled_presses(
     detections, *labels = zip(*rows, strict=True) if rows else ((), (), (), ())
     labels_of, press, times = (np.array(column) for column in labels)
     return LabelledPresses.of(detections, labels_of, press, times, of.name)
-
-
-def _alone(result: Reconstruction) -> Iterator[tuple[int, int, Detection]]:
-    """Frame, number of the press, and detection of each frame with one touch."""
-    number, before = 0, None
-    for frame, touches in zip(result.frames.tolist(), result.touches, strict=True):
-        alone = touches[0] if len(touches) == 1 else None
-        if alone is not None:
-            number += before is None or not _goes_on(before, alone)
-            yield frame, number, alone.detection
-        before = alone
-
-
-def hardest(result: Reconstruction) -> dict[int, Detection]:
-    """By its frame, the detection of each press where it changes the sheet most."""
-    presses: dict[int, tuple[int, Detection]] = {}
-    for frame, number, detection in sorted(_alone(result), key=lambda one: abs(one[2].peak)):
-        presses[number] = frame, detection
-    return dict(presses.values())
 
 
 def _goes_on(before: Touch, touch: Touch) -> bool:

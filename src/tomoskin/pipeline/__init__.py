@@ -2,7 +2,6 @@
 
 from tomoskin.pipeline.drives import DriveResult as DriveResult
 from tomoskin.pipeline.finding import (
-    layer_under as layer_under,
     located_alone as located_alone,
     voltage_covariance as voltage_covariance,
 )
@@ -33,6 +32,5 @@ from tomoskin.pipeline.rest import (
     tuned as tuned,
     tuned_by_rule as tuned_by_rule,
     tuned_image as tuned_image,
-    tuned_sheet as tuned_sheet,
     with_choice as with_choice,
 )

@@ -2,29 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Generator
 from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
 
-from tomoskin.core import DataError, Detection, FloatArray, finished
+from tomoskin.core import Detection, FloatArray, finished
 from tomoskin.learning import FrameView, TouchFit
 from tomoskin.pipeline.frame_result import ModelAgreement
 from tomoskin.pipeline.frame_subspace import JUMP
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.sensing.fit import (
     EXHAUSTIVE,
-    LayerEstimate,
     Pace,
     SpotFinder,
     SpotModel,
-    Whitener,
     common_mode_variance,
-    estimate_layer,
     idle_covariance,
     measured_covariance,
-    spots_of,
 )
 from tomoskin.sensing.signal import Reference
 
@@ -265,28 +261,6 @@ def _voltage_covariance(
         step=step,
         oversampling=oversampling,
     )
-
-
-def layer_under(
-    prepared: Prepared,
-    rest: Reference | None,
-    dv: FloatArray,
-    presses: Sequence[Detection],
-    advance: Callable[[float, float], None],
-) -> LayerEstimate:
-    """The soft layer under the sheet, by the change (n_meas,) V of each press from ``rest``.
-
-    ``prepared`` is tuned to the sheet. Raises DataError as :func:`estimate_layer` does, and where
-    touches are not fitted on this skin.
-    """
-    if prepared.spots is None:
-        raise DataError('expected a skin whose touches are fitted: method = "fit" in [touch]')
-    gain = _voltage_ratio(prepared.spots, rest)
-    noise = Whitener.of(voltage_covariance(prepared, rest, gain) / gain**2)
-    radius = np.sqrt([press.area / np.pi for press in presses])
-    depth = np.log1p([press.peak / prepared.skin.conductivity for press in presses])
-    spots = spots_of(np.array([(press.x, press.y) for press in presses]), radius, depth)
-    return estimate_layer(prepared.spots.response.state, noise, dv / gain, spots, advance)
 
 
 def _noise(

@@ -15,10 +15,6 @@ from tomoskin.sensing.fit.drive_evidence import (
     Onset as Onset,
 )
 from tomoskin.sensing.fit.finder import SpotFinder as SpotFinder
-from tomoskin.sensing.fit.layer import (
-    LayerEstimate as LayerEstimate,
-    estimate_layer as estimate_layer,
-)
 from tomoskin.sensing.fit.noise import (
     Whitener as Whitener,
     common_mode_variance as common_mode_variance,
