@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, Self
 
 import numpy as np
@@ -17,7 +17,7 @@ import numpy as np
 from tomoskin.core import MEASURANDS, Detection, Event, FloatArray, Image, SkinError, Touch
 from tomoskin.files.messages.stream import Stream
 from tomoskin.model.mesh import Surface
-from tomoskin.model.robot import Place, Pose, quaternion
+from tomoskin.model.robot import NearLink, Place, Pose, quaternion
 from tomoskin.pipeline import FrameResult
 from tomoskin.sensing.track import TouchEvent
 
@@ -32,6 +32,15 @@ _DENT = 1e-4
 _ANY_TURN = math.pi**2 / 3
 """Variance of an angle of which nothing is known, rad²."""
 
+_ELLIPSE = np.array(
+    [
+        (r * math.cos(k * math.pi / 6), r * math.sin(k * math.pi / 6))
+        for r in (0, 1, 2)
+        for k in range(12)
+    ]
+)
+"""Points of an ellipse, in standard deviations along its axes: two are six in seven positions."""
+
 _UNCALIBRATED = {
     f"{name}{part}": value
     for name in MEASURANDS
@@ -42,9 +51,9 @@ _UNCALIBRATED = {
 Vector = tuple[float, ...]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class LinkPose:
-    """Where the link of a robot that a skin lies on was at some time.
+    """Where the link of a robot that a skin lies on was at some time, and what was near it.
 
     Attributes
     ----------
@@ -54,21 +63,33 @@ class LinkPose:
         Of the link in that frame; None where it is not known.
     problem
         Why it is not known, or None.
+    near
+        Looks at where the other links were: see :meth:`~tomoskin.model.robot.Place.near`.
     """
 
     root: str
     pose: Pose | None
     problem: str | None = None
+    near: Callable[[], NearLink | None] = field(default=lambda: None, repr=False)
 
     @classmethod
     def of(cls, place: Place | None, utc: float | None) -> Self | None:
         """At a time, s since 1970; None of a skin that lies on no link."""
         if place is None or place.urdf is None:
             return None
+        near = partial(place.near, utc)
         try:
-            return cls(place.urdf.root, place.in_root(utc))
+            return cls(place.urdf.root, place.in_root(utc), near=near)
         except SkinError as error:
-            return cls(place.urdf.root, None, str(error))
+            return cls(place.urdf.root, None, str(error), near)
+
+    @cached_property
+    def others(self) -> tuple[NearLink | None, str | None]:
+        """What tells whether another link was near; None where it is not known, and why."""
+        try:
+            return self.near(), None
+        except SkinError as error:
+            return None, str(error)
 
     def content(self) -> dict[str, Any]:
         """The pose and what is wrong with it, as plain values by name."""
@@ -132,6 +153,20 @@ class Contact:
         return tuple((pose.rotation @ self.normal).tolist()) if pose else None
 
     @property
+    def is_self(self) -> bool | None:
+        """Whether a link of the robot itself touches within the ellipse of the position.
+
+        None where that is not known.
+        """
+        near = self.link and self.link.others[0]
+        if not near:
+            return None
+        spread = self.covariance
+        values, vectors = np.linalg.eigh(np.zeros((3, 3)) if spread is None else spread)
+        axes = vectors * np.sqrt(np.maximum(values, 0.0))
+        return near(self.position + _ELLIPSE @ axes[:, 1:].T)  # the first is along the normal
+
+    @property
     def orientation(self) -> Vector:
         """X, y, z, w of the rotation to the axes."""
         return quaternion(self.axes)
@@ -185,6 +220,7 @@ class Contact:
         }
         if self.link is not None:
             content |= {"root_position": self.root_position, "root_normal": self.root_normal}
+            content |= {"self": self.is_self, "self_problem": self.link.others[1]}
         return content
 
     def _in_space(self, sheet: FloatArray) -> FloatArray:
@@ -256,7 +292,7 @@ class Contacts:
         """What ``result`` says of the skin; of a replay that is played: as if ``measured`` then."""
         valid = result.ready and result.has_image
         when = _when(result.scanned, result.host_time)
-        return cls(
+        contacts = cls(
             stream=stream,
             sequence=result.sequence,
             host_time=result.host_time,
@@ -274,6 +310,8 @@ class Contacts:
             noise=result.baseline.deviation if result.ready and result.baseline else None,
             measured=(math.nan if stream.replayed else when) if measured is None else measured,
         )
+        own = stream.place and stream.place.own
+        return contacts._without_self() if own and own.leaves_out else contacts
 
     def outdated(self, problem: str) -> Self:
         """The same, but no touches, which are not true any more, and why."""
@@ -281,6 +319,12 @@ class Contacts:
             self, valid=False, problem=problem, tracked=(), happened=(), voltages=None,
             reference=None, change=None, image=None,
         )  # fmt: skip
+
+    def _without_self(self) -> Self:
+        """The same without touches by the robot's own links, and what happened to them."""
+        happened = [e for e in self.happened if not self._in_space(e.touch).is_self]
+        tracked = [c.touch for c in self.touches if not c.is_self]
+        return replace(self, tracked=tuple(tracked), happened=tuple(happened))
 
     @property
     def age_s(self) -> float:
@@ -315,7 +359,10 @@ class Contacts:
     @cached_property
     def touches(self) -> tuple[Contact, ...]:
         """The touches in space, in the order of their identities."""
-        return tuple(Contact.of(t, self.stream.surface, self.link) for t in self.tracked)
+        return tuple(map(self._in_space, self.tracked))
+
+    def _in_space(self, touch: Touch) -> Contact:
+        return Contact.of(touch, self.stream.surface, self.link)
 
     @cached_property
     def link(self) -> LinkPose | None:
@@ -355,7 +402,7 @@ class Contacts:
         return [
             {"time_s": event.host_time, "event": event.kind}
             | self.header()
-            | Contact.of(event.touch, self.stream.surface, self.link).content()
+            | self._in_space(event.touch).content()
             for event in self.happened
         ]
 

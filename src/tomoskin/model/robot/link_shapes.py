@@ -60,6 +60,10 @@ class Pose:
         """(n, 3) m: points of the inner frame, in the outer one."""
         return np.asarray(points @ self.rotation.T + self.position)
 
+    def inside(self, points: FloatArray) -> FloatArray:
+        """(n, 3) m: points of the outer frame, in the inner one."""
+        return np.asarray((points - self.position) @ self.rotation)
+
     def __matmul__(self, inner: Pose) -> Pose:
         """A frame inside this one's inner frame, in this one's outer frame."""
         position = self.rotation @ inner.position + self.position
@@ -89,8 +93,8 @@ def quaternion(axes: ArrayLike) -> tuple[float, ...]:
 MOST_TRIANGLES = 20_000
 """Of all links together: what is finer is drawn more coarsely."""
 
-_AROUND, _UPWARDS = 32, 16
-"""Sides of a round shape."""
+_AROUND, _UPWARDS = 32, 8
+"""Sides of a round shape, and of the quarter of one."""
 
 
 def name_of(element: Element, where: str) -> str:
@@ -136,10 +140,11 @@ def rod(radius: float, length: float) -> FloatArray:
     return _turned(np.array([0, radius, radius, 0.0]), np.array([-half, -half, half, half]))
 
 
-def ball(radius: float) -> FloatArray:
-    """(n, 3, 3) m: a sphere about its middle."""
-    up = np.linspace(-np.pi / 2, np.pi / 2, _UPWARDS + 1)
-    return _turned(radius * np.cos(up), radius * np.sin(up))
+def capsule(radius: float, length: float = 0.0) -> FloatArray:
+    """(n, 3, 3) m: two half spheres with a cylinder of ``length`` between, about its middle."""
+    up = np.linspace(0.0, np.pi / 2, _UPWARDS + 1)
+    radii, heights = radius * np.cos(up), radius * np.sin(up) + length / 2
+    return _turned(np.append(radii[::-1], radii), np.append(-heights[::-1], heights))
 
 
 def mesh_file(path: str, scale: FloatArray, urdf: Path) -> FloatArray:
@@ -213,8 +218,10 @@ def _form(form: Element, where: str, urdf: Path) -> Callable[[], FloatArray] | N
             return partial(box, np.array(numbers("size", 3)))
         case "cylinder":
             return partial(rod, *numbers("radius", 1), *numbers("length", 1))
+        case "capsule":
+            return partial(capsule, *numbers("radius", 1), *numbers("length", 1))
         case "sphere":
-            return partial(ball, *numbers("radius", 1))
+            return partial(capsule, *numbers("radius", 1))
         case "mesh":
             scale = np.array(numbers("scale", 3, "1 1 1"))
             return partial(mesh_file, form.get("filename", ""), scale, urdf)

@@ -14,8 +14,10 @@ from numpy.typing import ArrayLike
 from tomoskin.core import FloatArray, SkinError, StrPath
 from tomoskin.model.mesh import Surface
 from tomoskin.model.robot.link_shapes import Pose
+from tomoskin.model.robot.self_contact import NearLink, OwnLinks
 from tomoskin.model.robot.urdf import Positions, Urdf
 from tomoskin.model.section import (
+    Choice,
     OneOrMore,
     Quantity,
     Row,
@@ -73,7 +75,7 @@ class Place:
     """Which of a robot's skins it is, and where: ``pose`` in the frame ``link``.
 
     ``link`` is "" where it is not known: coordinates are then the skin's own. ``urdf`` is the
-    robot's, and ``joints`` says how it stands.
+    robot's, ``joints`` says how it stands, and ``own`` which of its links can touch the skin.
     """
 
     name: str
@@ -81,6 +83,7 @@ class Place:
     pose: Pose = field(default_factory=Pose)
     urdf: Urdf | None = None
     joints: JointPositions | None = None
+    own: OwnLinks | None = None
 
     def moved(self, surface: Surface) -> Surface:
         """The skin's ``surface`` in the coordinates of the link."""
@@ -91,11 +94,30 @@ class Place:
 
         None where there is no link. Raises SkinError where the pose is not known.
         """
-        if self.urdf is None:
-            return None
-        if self.joints is None or utc is None:
-            return self.urdf.pose(self.link, _not_told)
-        return self.urdf.pose(self.link, self.joints(utc))
+        return None if self.urdf is None else self.urdf.pose(self.link, self._positions(utc))
+
+    @property
+    def unmarked(self) -> str:
+        """Which touches by the robot's own links cannot be told from others, and why; else ""."""
+        if self.own is None or not self.own.others:
+            return ""
+        if self.joints is None:
+            why = "no joint states are given"
+        elif unread := self.own.unread:
+            why = f"the shapes of {', '.join(unread)} cannot be read"
+        else:
+            return ""
+        return f"touches by the robot's own links are not marked: {why}"
+
+    def near(self, utc: float | None) -> NearLink | None:
+        """What tells of points whether another link of the robot was near at a time.
+
+        None where there is no link. Raises SkinError where the pose of one is not known.
+        """
+        return None if self.own is None else self.own.at(self._positions(utc))
+
+    def _positions(self, utc: float | None) -> Positions:
+        return _not_told if self.joints is None or utc is None else self.joints(utc)
 
 
 def _not_told(joint: str) -> float:
@@ -119,6 +141,19 @@ class RobotSection(Section, section="robot"):
         default=None,
         needs="urdf",
     )
+    self_contacts: str = key(
+        Choice(("mark", "leave-out")),
+        "What becomes of touches by the robot's own links.",
+        default="mark",
+        needs="joints",
+    )
+    self_margin: float = key(
+        Quantity("length", "mm", 0, 1000),
+        "How near the shape of a link has to be to the skin's surface to touch it: the thickness "
+        "of the sheet, and what shapes and poses are wrong by.",
+        default="5 mm",
+        needs="joints",
+    )
 
 
 class SkinSection(Section, section="skin", many=True):
@@ -138,6 +173,12 @@ class SkinSection(Section, section="skin", many=True):
     )
     angles: tuple[float, ...] | None = key(
         _RPY, "Angles about the link's fixed x, y and z, as in a URDF.", default=None, needs="link"
+    )
+    pressed_by: tuple[str, ...] = key(
+        OneOrMore(Text(200)),
+        "Links next to its own, held by a single joint, that can touch the skin too.",
+        default=None,
+        needs="link",
     )
     calibration: tuple[str, ...] = key(
         OneOrMore(_FILE), "Files from `tomoskin calibrate`, one of each kind.", default=None
@@ -216,7 +257,7 @@ class Robot:
         robot = RobotSection.read(tables.get("robot", {}), f"{source}: [robot]")
         urdf = None if robot.urdf is None else Urdf.read(Path(folder) / robot.urdf)
         each = SkinSection.each(tables, source)
-        skins = tuple(_placed(given, where, Path(folder), urdf) for given, where in each)
+        skins = tuple(_placed(given, where, Path(folder), urdf, robot) for given, where in each)
         if not 0 < len(skins) <= MOST_SKINS:
             raise SkinError(
                 f"expected 1 to {MOST_SKINS} sections [[skin]], got {len(skins)}", where=source
@@ -241,7 +282,9 @@ class Robot:
         return places[name]
 
     def moved_by(self, joints: JointPositions) -> Self:
-        """The same, whose skins know by ``joints`` where their links are."""
+        """The same, whose skins know by ``joints`` where the links are; meshes are read here."""
+        for skin in self.skins:
+            _ = skin.place.own and skin.place.own.hulls
         skins = (replace(s, place=replace(s.place, joints=joints)) for s in self.skins)
         return replace(self, skins=tuple(skins))
 
@@ -266,7 +309,9 @@ def add_skin(path: StrPath, given: Mapping[str, Any], urdf: str | None = None) -
     return "\n".join([text, "", "[[skin]]", *entry]) + "\n"
 
 
-def _placed(given: SkinSection, where: str, folder: Path, urdf: Urdf | None) -> PlacedSkin:
+def _placed(
+    given: SkinSection, where: str, folder: Path, urdf: Urdf | None, robot: RobotSection
+) -> PlacedSkin:
     for text, form, what in (
         (given.name, _NAME, "name of small letters, digits and _ that begins with a letter"),
         (given.board or "00", _BOARD, "unique id of hexadecimal digits, two a byte"),
@@ -275,10 +320,11 @@ def _placed(given: SkinSection, where: str, folder: Path, urdf: Urdf | None) -> 
             raise SkinError(f'expected a {what}, got "{text}"', where=where)
     if given.link is not None:
         _check_link(given.link, urdf, where)
+    own = _own_links(given, urdf, robot, where) if urdf and given.link else None
     zero = np.zeros(3)
     pose = Pose.of(given.position or zero, given.angles or zero)
     return PlacedSkin(
-        place=Place(given.name, given.link or "", pose, urdf if given.link else None),
+        place=Place(given.name, given.link or "", pose, urdf if given.link else None, own=own),
         skin=str(folder / given.skin) if given.skin.endswith(".toml") else given.skin,
         source=_from(folder, given.source),
         board=given.board,
@@ -302,6 +348,19 @@ def _check_link(link: str, urdf: Urdf | None, where: str) -> None:
             where=where,
             hint=f"rename it in {urdf.source}",
         )
+
+
+def _own_links(given: SkinSection, urdf: Urdf, robot: RobotSection, where: str) -> OwnLinks:
+    named = given.pressed_by or ()
+    for link in named:
+        urdf.check_link(link, f"{where} pressed_by")
+    return OwnLinks.of(
+        urdf,
+        given.link or "",
+        named=named,
+        margin=robot.self_margin,
+        leaves_out=robot.self_contacts == "leave-out",
+    )
 
 
 def _from(folder: Path, source: str) -> str:

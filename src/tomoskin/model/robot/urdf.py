@@ -165,20 +165,34 @@ class Urdf:
         """Those of all links, in the order of the file, as :meth:`pose` has each."""
         return {link: self.pose(link, positions) for link in self.links}
 
+    def body(self, link: str) -> str:
+        """The first link of the rigid body that ``link`` belongs to."""
+        while (joint := self.joints.get(link)) is not None and joint.kind in _STANDS:
+            link = joint.parent
+        return link
+
+    def hinged_to(self, link: str) -> frozenset[str]:
+        """First links of the rigid bodies that a single joint holds to that of ``link``."""
+        own = self.body(link)
+        ends = [{self.body(joint.parent), self.body(child)} for child, joint in self.joints.items()]
+        return frozenset().union(*(pair for pair in ends if own in pair)) - {own}
+
     @property
     def meshes(self) -> dict[str, Pose]:
         """Pose on its link of the first mesh of each link that has one."""
         return {s.link: s.pose for s in self.shapes[::-1] if s.is_mesh}
+
+    def shapes_of(self, link: str, kind: str) -> list[LinkShape]:
+        """Those of a link that are of the ``kind``, or all where none is."""
+        shapes = [s for s in self.shapes if s.link == link]
+        return [s for s in shapes if s.kind == kind] or shapes
 
     def solids(self) -> tuple[LinkSolid, ...]:
         """What is drawn of each link that has a shape: its visual parts, else those that collide.
 
         Mesh files are read here; one that cannot be is a problem of its link.
         """
-        drawn = []
-        for link in self.links:
-            shapes = [s for s in self.shapes if s.link == link]
-            drawn.append([s for s in shapes if s.kind == "visual"] or shapes)
+        drawn = [self.shapes_of(link, "visual") for link in self.links]
         most = MOST_TRIANGLES // max(1, sum(map(len, drawn)))
         return tuple(_solid(shapes, most) for shapes in drawn if shapes)
 
