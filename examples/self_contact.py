@@ -12,7 +12,7 @@ from __future__ import annotations
 import argparse
 import tempfile
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -38,13 +38,13 @@ ARM = """<robot name="arm"><link name="base"/>
 <joint name="elbow" type="revolute"><parent link="yoke"/><child link="sleeve"/>
   <axis xyz="0 1 0"/></joint>
 <joint name="reach" type="prismatic"><parent link="sleeve"/><child link="fore"/></joint></robot>"""
-ROBOT = f"""format = 1
+ROBOT = """format = 1
 [robot]
 urdf = "arm.urdf"
 joints = "states.mcap"
 [[skin]]
 name = "pad"
-skin = "{SKIN}"
+skin = "{skin}"
 link = "upper"
 position = ["0 mm", "0 mm", "30 mm"]
 """
@@ -68,6 +68,9 @@ REACH = 0.03
 """m from a press to the touch that it makes."""
 
 BEGUN = 1_700_000_000.0
+"""s since 1970 of the first frame: joint states are by the time of the day."""
+
+OWN, OTHER = "own", "other"
 
 
 def on_sheet(rng: np.random.Generator) -> FloatArray:
@@ -151,7 +154,8 @@ class Finger:
         if time > self.start + self.held:
             rng = self.rng
             self.start, self.held = time + rng.uniform(0.5, 2), rng.uniform(0.5, 2.5)
-            self.press = Press(*on_sheet(rng), rng.uniform(1.5, 6), rng.uniform(6e-3, 12e-3))
+            x, y = on_sheet(rng)
+            self.press = Press(x, y, rng.uniform(1.5, 6), rng.uniform(6e-3, 12e-3))
         if time < self.start:
             return ()
         if not arm.is_free(time, self.press):
@@ -160,47 +164,38 @@ class Finger:
         return (self.press,)
 
 
-def moments(
-    prepared: Prepared, robot: Robot, seed: int, seconds: float
-) -> Iterator[tuple[Contacts, list[Press], list[Press]]]:
-    """Contacts of each frame, and what pressed then or a moment before: the arm, and a finger."""
+Counts = Counter[tuple[str, bool | None]]
+"""Touches by whose they are, and by what they are marked as."""
+
+
+def counted(prepared: Prepared, robot: Robot, seed: int, seconds: float) -> Counts:
+    """Touches of all frames of a rig."""
     rng = np.random.default_rng(seed)
     twin = SteppedSkin(prepared, TwinSettings.preset(prepared.skin.twin.preset, seed))
     arm, finger, size = Arm(rng, seconds), Finger(rng), 0.008
     place = robot.moved_by(lambda utc: arm.joints(utc - BEGUN).__getitem__).skins[0].place
     stream = Stream.of(prepared, "twin", BEGUN, place)
-    recent: list[tuple[float, int, Press]] = []
-    while twin.result.host_time < seconds:
-        time = twin.result.host_time + twin.period / 2
-        own = arm.press(time, size)
+    recent: list[tuple[float, str, Press]] = []
+    counts: Counts = Counter()
+    assert twin.result is not None
+    while (time := twin.result.scanned + twin.period) < seconds:  # the middle of the next scan
+        own, other = arm.press(time, size), finger.at(time, arm)
         if not own:
             size = rng.uniform(5e-3, 12e-3)
-        pressed = own, finger.at(time, arm)
-        twin.step([*pressed[0], *pressed[1]])
-        recent = [(t, who, p) for t, who, p in recent if time - t < FADING]
-        recent += [(time, who, p) for who in (0, 1) for p in pressed[who]]
-        yield (
-            Contacts.of(stream, twin.result),
-            *([p for _, w, p in recent if w == who] for who in (0, 1)),
-        )
-
-
-def whose(touch: Touch, *pressed: Sequence[Press]) -> str:
-    """Which of the two made it; "" where it is neither's."""
-    place = np.array([touch.detection.x, touch.detection.y])
-    far = [min((np.hypot(*(place - (p.x, p.y))) for p in some), default=1.0) for some in pressed]
-    return "" if min(far) > REACH else ("own", "other")[int(np.argmin(far))]
-
-
-def counted(
-    prepared: Prepared, robot: Robot, seed: int, seconds: float
-) -> Counter[tuple[str, bool | None]]:
-    """Touches of all frames of a rig, by whose they are and what they are marked as."""
-    counts: Counter[tuple[str, bool | None]] = Counter()
-    for contacts, own, other in moments(prepared, robot, seed, seconds):
-        for contact in contacts.touches:
-            counts[whose(contact.touch, own, other), contact.is_self] += 1
+        twin.step([*own, *other])
+        recent = [moment for moment in recent if time - moment[0] < FADING]
+        recent += [(time, OWN, press) for press in own] + [(time, OTHER, press) for press in other]
+        for contact in Contacts.of(stream, twin.result).touches:
+            counts[whose(contact.touch, recent), contact.is_self] += 1
     return counts
+
+
+def whose(touch: Touch, recent: Sequence[tuple[float, str, Press]]) -> str:
+    """Which of those that press, or did a moment before, made a touch; "" where none did."""
+    place = np.array([touch.detection.x, touch.detection.y])
+    far = [(float(np.hypot(*(place - (p.x, p.y)))), who) for _, who, p in recent]
+    nearest, who = min(far, default=(REACH, ""))
+    return who if nearest < REACH else ""
 
 
 def main(arguments: Sequence[str] | None = None) -> dict[str, float]:
@@ -209,20 +204,20 @@ def main(arguments: Sequence[str] | None = None) -> dict[str, float]:
     parser.add_argument("--rigs", type=int, default=4, help="arms, each with a sheet of its own")
     parser.add_argument("--seconds", type=float, default=120, help="of each")
     parser.add_argument("--seed", type=int, default=1, help="of the first")
+    parser.add_argument("--skin", default=SKIN, help="on the upper arm")
     options = parser.parse_args(arguments)
-    prepared, counts = prepare(Skin.load(SKIN)), Counter[tuple[str, bool | None]]()
+    prepared, counts = prepare(Skin.load(options.skin)), Counts()
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / "arm.urdf").write_text(ARM)
-        (Path(folder) / "robot.toml").write_text(ROBOT)
+        (Path(folder) / "robot.toml").write_text(ROBOT.format(skin=options.skin))
         robot = Robot.load(Path(folder) / "robot.toml")
-        for seed in range(options.seed, options.seed + options.rigs):
-            counts += counted(prepared, robot, seed, options.seconds)
-    print(counts)
+    for seed in range(options.seed, options.seed + options.rigs):
+        counts += counted(prepared, robot, seed, options.seconds)
     found = {}
-    for who in ("own", "other"):
-        touches = sum(n for (w, _), n in counts.items() if w == who)
-        found[who] = float(touches)
-        found[f"{who}, marked"] = counts[who, True] / touches
+    for who in (OWN, OTHER):
+        marks = {mark: n for (made_by, mark), n in counts.items() if made_by == who}
+        found[who] = float(sum(marks.values()))
+        found[f"{who}, marked"] = marks.get(True, 0) / found[who]
     for name, value in found.items():
         print(f"{name:<14} {value:.4g}")
     return found

@@ -32,14 +32,9 @@ _DENT = 1e-4
 _ANY_TURN = math.pi**2 / 3
 """Variance of an angle of which nothing is known, rad²."""
 
-_ELLIPSE = np.array(
-    [
-        (r * math.cos(k * math.pi / 6), r * math.sin(k * math.pi / 6))
-        for r in (0, 1, 2)
-        for k in range(12)
-    ]
-)
-"""Points of an ellipse, in standard deviations along its axes: two are six in seven positions."""
+_AROUND = np.arange(12) * math.pi / 6
+_ELLIPSE = np.vstack([np.zeros(2), np.column_stack([np.cos(_AROUND), np.sin(_AROUND)])])
+"""The middle of an ellipse and points of it, in standard deviations along its axes."""
 
 _UNCALIBRATED = {
     f"{name}{part}": value
@@ -126,14 +121,18 @@ class Contact:
     link: LinkPose | None = field(default=None, repr=False)
 
     @classmethod
-    def of(cls, touch: Touch, surface: Surface, link: LinkPose | None = None) -> Self:
-        """Of a touch of the sheet that lies on ``surface``; plain numbers, which is faster."""
-        uv = [[touch.detection.x, touch.detection.y]]
-        slope = surface.jacobian(uv)[0]
-        along, up = map(_unit, slope.T.tolist())
-        normal = _unit(_cross(along, up))
-        x, y, z = surface.point(uv)[0].tolist()
-        return cls(touch, (x, y, z), (along, _cross(normal, along), normal), slope, link)
+    def each(
+        cls, touches: Sequence[Touch], surface: Surface, link: LinkPose | None = None
+    ) -> tuple[Self, ...]:
+        """Of touches of the sheet that lies on ``surface``; plain numbers, which is faster."""
+        if not touches:
+            return ()
+        uv = np.array([(touch.detection.x, touch.detection.y) for touch in touches])
+        places, slopes = surface.point(uv).tolist(), surface.jacobian(uv)
+        return tuple(
+            cls(touch, tuple(place), _axes(*slope.T.tolist()), slope, link)
+            for touch, place, slope in zip(touches, places, slopes, strict=True)
+        )
 
     @property
     def normal(self) -> Vector:
@@ -322,9 +321,10 @@ class Contacts:
 
     def _without_self(self) -> Self:
         """The same without touches by the robot's own links, and what happened to them."""
-        happened = [e for e in self.happened if not self._in_space(e.touch).is_self]
-        tracked = [c.touch for c in self.touches if not c.is_self]
-        return replace(self, tracked=tuple(tracked), happened=tuple(happened))
+        tracked = tuple(c.touch for c in self.touches if not c.is_self)
+        happened = zip(self.happened, self._changed, strict=True)
+        kept = tuple(event for event, contact in happened if not contact.is_self)
+        return replace(self, tracked=tracked, happened=kept)
 
     @property
     def age_s(self) -> float:
@@ -359,10 +359,12 @@ class Contacts:
     @cached_property
     def touches(self) -> tuple[Contact, ...]:
         """The touches in space, in the order of their identities."""
-        return tuple(map(self._in_space, self.tracked))
+        return Contact.each(self.tracked, self.stream.surface, self.link)
 
-    def _in_space(self, touch: Touch) -> Contact:
-        return Contact.of(touch, self.stream.surface, self.link)
+    @property
+    def _changed(self) -> tuple[Contact, ...]:
+        """Of each thing that happened the touch in space."""
+        return Contact.each([e.touch for e in self.happened], self.stream.surface, self.link)
 
     @cached_property
     def link(self) -> LinkPose | None:
@@ -400,10 +402,8 @@ class Contacts:
     def happenings(self) -> list[dict[str, Any]]:
         """Each thing that happened to a touch, with that touch, as plain values by name."""
         return [
-            {"time_s": event.host_time, "event": event.kind}
-            | self.header()
-            | self._in_space(event.touch).content()
-            for event in self.happened
+            {"time_s": event.host_time, "event": event.kind} | self.header() | contact.content()
+            for event, contact in zip(self.happened, self._changed, strict=True)
         ]
 
 
@@ -464,10 +464,17 @@ def event_content(stream: Stream, event: Event, *, of_frame: bool = False) -> di
 
 def _on_sheet(detection: Detection) -> FloatArray:
     """(2, 2) m², the covariance of a position on the sheet."""
-    variance = np.array([detection.sd_x**2, detection.sd_y**2])
-    if np.isfinite(variance).all():
-        return np.diag(variance) + detection.cov_xy * np.eye(2)[::-1]
-    return np.diag(np.where(np.isfinite(variance), variance, _ANYWHERE))
+    x, y, xy = detection.sd_x * detection.sd_x, detection.sd_y * detection.sd_y, detection.cov_xy
+    if not (math.isfinite(x) and math.isfinite(y)):
+        x, y, xy = x if math.isfinite(x) else _ANYWHERE, y if math.isfinite(y) else _ANYWHERE, 0.0
+    return np.array([[x, xy], [xy, y]])
+
+
+def _axes(along: Vector, up: Vector) -> tuple[Vector, Vector, Vector]:
+    """Unit vectors along the sheet's x, across it, and away from the body."""
+    along = _unit(along)
+    normal = _unit(_cross(along, _unit(up)))
+    return along, _cross(normal, along), normal
 
 
 def _cross(a: Vector, b: Vector) -> Vector:

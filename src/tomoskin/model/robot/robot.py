@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Self
@@ -14,7 +15,7 @@ from numpy.typing import ArrayLike
 from tomoskin.core import FloatArray, SkinError, StrPath
 from tomoskin.model.mesh import Surface
 from tomoskin.model.robot.link_shapes import Pose
-from tomoskin.model.robot.self_contact import NearLink, OwnLinks
+from tomoskin.model.robot.self_contact import LINGERS, NearLink, OwnLinks
 from tomoskin.model.robot.urdf import Positions, Urdf
 from tomoskin.model.section import (
     Choice,
@@ -110,11 +111,16 @@ class Place:
         return f"touches by the robot's own links are not marked: {why}"
 
     def near(self, utc: float | None) -> NearLink | None:
-        """What tells of points whether another link of the robot was near at a time.
+        """What tells of points whether another link of the robot was near, then or just before.
 
         None where there is no link. Raises SkinError where the pose of one is not known.
         """
-        return None if self.own is None else self.own.at(self._positions(utc))
+        if self.own is None:
+            return None
+        looks = [self.own.at(self._positions(utc))]
+        with suppress(SkinError):  # states that have only begun
+            looks.append(self.own.at(self._positions(utc and utc - LINGERS)))
+        return lambda points: any(look(points) for look in looks)
 
     def _positions(self, utc: float | None) -> Positions:
         return _not_told if self.joints is None or utc is None else self.joints(utc)

@@ -14,8 +14,51 @@ from tomoskin.core import FloatArray, GeometryError, SkinError
 from tomoskin.model.robot.link_shapes import LinkShape
 from tomoskin.model.robot.urdf import Positions, Urdf
 
+LINGERS = 0.1
+"""Seconds for which a touch goes on after a link has gone: some scans tell that it has ended."""
+
 NearLink = Callable[[FloatArray], bool]
 """Whether one of the points (n, 3) m, in the frame of a skin's link, is near another link."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Hull:
+    """The convex hull of a shape of a ``link``, in the frame of that.
+
+    Attributes
+    ----------
+    planes
+        (n, 4): a point p is within where ``plane[:3] @ p + plane[3]`` is negative for all.
+    middle, radius
+        m, of a sphere that holds it.
+    """
+
+    link: str
+    planes: FloatArray = field(repr=False)
+    middle: FloatArray
+    radius: float
+
+    @classmethod
+    def of(cls, shape: LinkShape) -> Self | None:
+        """That of a shape; None of a mesh that cannot be read, or is flat."""
+        try:
+            corners = shape.triangles().reshape(-1, 3)
+            planes = np.unique(ConvexHull(corners).equations.round(12), axis=0)
+        except (GeometryError, QhullError):
+            return None
+        middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
+        return cls(shape.link, planes, middle, np.linalg.norm(corners - middle, axis=1).max())
+
+    def is_near(self, points: FloatArray, margin: float) -> bool:
+        """Whether one of ``points`` (n, 3) m is within ``margin`` m of it.
+
+        The distance is that to the farthest plane: near an edge or a corner it is less than the
+        true one.
+        """
+        if np.linalg.norm(points - self.middle, axis=1).min() > self.radius + margin:
+            return False
+        distances = (points @ self.planes[:, :3].T + self.planes[:, 3]).max(axis=1)
+        return bool(distances.min() < margin)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,16 +111,15 @@ class OwnLinks:
         return cls(urdf, link, tuple(others), margin, leaves_out)
 
     @cached_property
-    def hulls(self) -> tuple[tuple[str, FloatArray], ...]:
-        """Links, and the planes (n, 4) of one of their shapes: a point p is within where
-        ``plane[:3] @ p + plane[3]`` is negative for all. Meshes are read here."""
+    def hulls(self) -> tuple[Hull, ...]:
+        """Those of the shapes of the others; meshes are read here."""
         shapes = [s for link in self.others for s in self.urdf.shapes_of(link, "collision")]
-        return tuple((s.link, planes) for s in shapes if (planes := _planes(s)) is not None)
+        return tuple(hull for hull in map(Hull.of, shapes) if hull is not None)
 
     @property
     def unread(self) -> tuple[str, ...]:
         """The links whose touches cannot be known, since no shape of theirs can be read."""
-        shaped = {link for link, _ in self.hulls}
+        shaped = {hull.link for hull in self.hulls}
         unread = (s.link for s in self.urdf.shapes if s.link in {*self.others} - shaped)
         return tuple(dict.fromkeys(unread))
 
@@ -88,28 +130,12 @@ class OwnLinks:
         """
         if not self.hulls:
             return lambda _: False
-        own = self.urdf.pose(self.link, positions)
-        poses = {link: self.urdf.pose(link, positions) for link, _ in self.hulls}
+        poses = self.urdf.poses(positions, (self.link, *(h.link for h in self.hulls)))
 
         def is_near(points: FloatArray) -> bool:
-            in_root = own(points)
+            in_root = poses[self.link](points)
             return any(
-                _distances(planes, poses[link].inside(in_root)).min() < self.margin
-                for link, planes in self.hulls
+                hull.is_near(poses[hull.link].inside(in_root), self.margin) for hull in self.hulls
             )
 
         return is_near
-
-
-def _planes(shape: LinkShape) -> FloatArray | None:
-    """(n, 4) of the convex hull of a shape; None of a mesh that cannot be read, or is flat."""
-    try:
-        hull = ConvexHull(shape.triangles().reshape(-1, 3))
-    except (GeometryError, QhullError):
-        return None
-    return np.unique(hull.equations.round(12), axis=0)
-
-
-def _distances(planes: FloatArray, points: FloatArray) -> FloatArray:
-    """(n,) m to the farthest plane: inside the distance to the surface, outside at most that."""
-    return np.asarray((points @ planes[:, :3].T + planes[:, 3]).max(axis=1))

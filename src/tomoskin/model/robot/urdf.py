@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container
+from collections.abc import Callable, Container, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Self
@@ -155,15 +155,22 @@ class Urdf:
 
         Raises SkinError where the position of a joint is not known.
         """
-        pose = Pose()
-        while (joint := self.joints.get(link)) is not None:
-            pose = (joint.moved(positions) if positions else joint.pose) @ pose
-            link = joint.parent
-        return pose
+        return self.poses(positions, (link,))[link]
 
-    def poses(self, positions: Positions | None = None) -> dict[str, Pose]:
-        """Those of all links, in the order of the file, as :meth:`pose` has each."""
-        return {link: self.pose(link, positions) for link in self.links}
+    def poses(
+        self, positions: Positions | None = None, links: Iterable[str] | None = None
+    ) -> dict[str, Pose]:
+        """Those of some ``links``, or of all in the order of the file, as :meth:`pose` has each."""
+        poses = {self.root: Pose()}
+
+        def of(link: str) -> Pose:
+            if link not in poses:
+                joint = self.joints[link]
+                moved = joint.moved(positions) if positions else joint.pose
+                poses[link] = of(joint.parent) @ moved
+            return poses[link]
+
+        return {link: of(link) for link in (self.links if links is None else links)}
 
     def body(self, link: str) -> str:
         """The first link of the rigid body that ``link`` belongs to."""
