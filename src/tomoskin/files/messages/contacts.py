@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 import numpy as np
 
@@ -44,6 +44,8 @@ _UNCALIBRATED = {
 """What a row says of a touch whose force and depth nothing tells."""
 
 Vector = tuple[float, ...]
+T = TypeVar("T")
+_Near = tuple[NearLink | None, str | None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,26 +67,20 @@ class LinkPose:
     root: str
     pose: Pose | None
     problem: str | None = None
-    near: Callable[[], NearLink | None] = field(default=lambda: None, repr=False)
+    near: Callable[[], _Near] = field(default=lambda: (None, None), repr=False)
 
     @classmethod
     def of(cls, place: Place | None, utc: float | None) -> Self | None:
         """At a time, s since 1970; None of a skin that lies on no link."""
         if place is None or place.urdf is None:
             return None
-        near = partial(place.near, utc)
-        try:
-            return cls(place.urdf.root, place.in_root(utc), near=near)
-        except SkinError as error:
-            return cls(place.urdf.root, None, str(error), near)
+        pose, problem = _or_why(place.in_root, utc)
+        return cls(place.urdf.root, pose, problem, partial(_or_why, place.near, utc))
 
     @cached_property
-    def others(self) -> tuple[NearLink | None, str | None]:
+    def others(self) -> _Near:
         """What tells whether another link was near; None where it is not known, and why."""
-        try:
-            return self.near(), None
-        except SkinError as error:
-            return None, str(error)
+        return self.near()
 
     def content(self) -> dict[str, Any]:
         """The pose and what is wrong with it, as plain values by name."""
@@ -94,6 +90,16 @@ class LinkPose:
             "orientation": self.pose.quaternion(),
         }
         return {"root": pose, "root_problem": self.problem}
+
+
+def _or_why(
+    told: Callable[[float | None], T | None], utc: float | None
+) -> tuple[T | None, str | None]:
+    """What is ``told`` of a time; None where it is not known, and why."""
+    try:
+        return told(utc), None
+    except SkinError as error:
+        return None, str(error)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

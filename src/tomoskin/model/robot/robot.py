@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Self
@@ -102,13 +101,8 @@ class Place:
         """Which touches by the robot's own links cannot be told from others, and why; else ""."""
         if self.own is None or not self.own.others:
             return ""
-        if self.joints is None:
-            why = "no joint states are given"
-        elif unread := self.own.unread:
-            why = f"the shapes of {', '.join(unread)} cannot be read"
-        else:
-            return ""
-        return f"touches by the robot's own links are not marked: {why}"
+        why = "no joint states are given" if self.joints is None else self.own.problem
+        return why and f"touches by the robot's own links are not marked: {why}"
 
     def near(self, utc: float | None) -> NearLink | None:
         """What tells of points whether another link of the robot was near, then or just before.
@@ -117,10 +111,7 @@ class Place:
         """
         if self.own is None:
             return None
-        looks = [self.own.at(self._positions(utc))]
-        with suppress(SkinError):  # states that have only begun
-            looks.append(self.own.at(self._positions(utc and utc - LINGERS)))
-        return lambda points: any(look(points) for look in looks)
+        return self.own.at(self._positions(utc), self._positions(utc and utc - LINGERS))
 
     def _positions(self, utc: float | None) -> Positions:
         return _not_told if self.joints is None or utc is None else self.joints(utc)
@@ -360,13 +351,8 @@ def _own_links(given: SkinSection, urdf: Urdf, robot: RobotSection, where: str) 
     named = given.pressed_by or ()
     for link in named:
         urdf.check_link(link, f"{where} pressed_by")
-    return OwnLinks.of(
-        urdf,
-        given.link or "",
-        named=named,
-        margin=robot.self_margin,
-        leaves_out=robot.self_contacts == "leave-out",
-    )
+    leaves_out = robot.self_contacts == "leave-out"
+    return OwnLinks.of(urdf, given.link or "", named, robot.self_margin, leaves_out=leaves_out)
 
 
 def _from(folder: Path, source: str) -> str:

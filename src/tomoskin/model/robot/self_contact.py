@@ -84,30 +84,25 @@ class OwnLinks:
     link: str
     others: tuple[str, ...]
     margin: float
-    leaves_out: bool = False
+    leaves_out: bool
 
     @classmethod
     def of(
-        cls,
-        urdf: Urdf,
-        link: str,
-        *,
-        named: Sequence[str] = (),
-        margin: float,
-        leaves_out: bool = False,
+        cls, urdf: Urdf, link: str, named: Sequence[str], margin: float, *, leaves_out: bool
     ) -> Self:
         """All links but those of the rigid body of ``link``, and those that one joint holds to it
         unless they are ``named``: next to a joint shapes are always near. Raises SkinError."""
-        own, hinged = urdf.body(link), urdf.hinged_to(link)
-        for name in named:
-            if urdf.body(name) == own:
-                raise SkinError(
-                    f'expected links that move against "{link}", got "{name}", which fixed joints '
-                    "hold to it",
-                    where=urdf.source,
-                )
-        others = (n for n in urdf.links if urdf.body(n) != own)
-        others = (n for n in others if n in named or urdf.body(n) not in hinged)
+        bodies = {name: urdf.body(name) for name in urdf.links}
+        own = bodies[link]
+        if fixed := [name for name in named if bodies[name] == own]:
+            raise SkinError(
+                f'expected links that move against "{link}", got "{fixed[0]}", which fixed joints '
+                "hold to it",
+                where=urdf.source,
+            )
+        joined = [{bodies[joint.parent], bodies[child]} for child, joint in urdf.joints.items()]
+        near = {own}.union(*(pair for pair in joined if own in pair))
+        others = (name for name in urdf.links if name in named or bodies[name] not in near)
         return cls(urdf, link, tuple(others), margin, leaves_out)
 
     @cached_property
@@ -117,25 +112,21 @@ class OwnLinks:
         return tuple(hull for hull in map(Hull.of, shapes) if hull is not None)
 
     @property
-    def unread(self) -> tuple[str, ...]:
-        """The links whose touches cannot be known, since no shape of theirs can be read."""
-        shaped = {hull.link for hull in self.hulls}
-        unread = (s.link for s in self.urdf.shapes if s.link in {*self.others} - shaped)
-        return tuple(dict.fromkeys(unread))
+    def problem(self) -> str:
+        """Which links have shapes and none that can be read; "" where there are none."""
+        blind = {*self.others} - {hull.link for hull in self.hulls}
+        unread = ", ".join(dict.fromkeys(s.link for s in self.urdf.shapes if s.link in blind))
+        return unread and f"the shapes of {unread} cannot be read"
 
-    def at(self, positions: Positions) -> NearLink:
-        """What tells of points that another link is near, at these positions of the joints.
+    def at(self, *stances: Positions) -> NearLink:
+        """What tells of points that another link is near, the joints as in one of ``stances``.
 
-        Raises SkinError where one is not known.
+        Raises SkinError where the position of a joint is not known.
         """
-        if not self.hulls:
-            return lambda _: False
-        poses = self.urdf.poses(positions, (self.link, *(h.link for h in self.hulls)))
-
-        def is_near(points: FloatArray) -> bool:
-            in_root = poses[self.link](points)
-            return any(
-                hull.is_near(poses[hull.link].inside(in_root), self.margin) for hull in self.hulls
-            )
-
-        return is_near
+        links = self.link, *(hull.link for hull in self.hulls)
+        placed = [self.urdf.poses(positions, links) for positions in stances]
+        return lambda points: any(
+            hull.is_near(poses[hull.link].inside(poses[self.link](points)), self.margin)
+            for poses in placed
+            for hull in self.hulls
+        )

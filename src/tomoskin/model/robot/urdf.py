@@ -178,12 +178,6 @@ class Urdf:
             link = joint.parent
         return link
 
-    def hinged_to(self, link: str) -> frozenset[str]:
-        """First links of the rigid bodies that a single joint holds to that of ``link``."""
-        own = self.body(link)
-        ends = [{self.body(joint.parent), self.body(child)} for child, joint in self.joints.items()]
-        return frozenset().union(*(pair for pair in ends if own in pair)) - {own}
-
     @property
     def meshes(self) -> dict[str, Pose]:
         """Pose on its link of the first mesh of each link that has one."""

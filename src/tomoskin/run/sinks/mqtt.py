@@ -132,9 +132,7 @@ class MqttSink(Sink):
         self._check(sent)
 
     def _properties(self, expiry: int) -> Any:
-        packets = needed("paho.mqtt.packettypes", "mqtt", _WHERE, SinkError).PacketTypes
-        module = needed("paho.mqtt.properties", "mqtt", _WHERE, SinkError)
-        properties = module.Properties(packets.PUBLISH)
+        properties = self._paho.Properties(self._paho.PacketTypes.PUBLISH)
         properties.MessageExpiryInterval = expiry
         return properties
 
