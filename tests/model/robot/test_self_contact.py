@@ -71,13 +71,12 @@ def test_what_is_within_the_margin_is_near(loaded, kind):
     urdf, positions = place.urdf, AT.__getitem__
     in_hand = np.random.default_rng(5).uniform(-0.16, 0.16, (3000, 3))
     points = urdf.pose("pad", positions).inside(urdf.pose("hand", positions)(in_hand))
-    marked = np.array([near(point[None]) for point in points])
+    marked = near(points)
     far = distance(kind, in_hand)
     assert marked[far < MARGIN - 3e-4].all()  # a cylinder has 32 sides
     assert not marked[far > 1.8 * MARGIN].any()  # corners are sharp: planes go on beyond them
     assert (marked != (far < MARGIN)).mean() < 0.01
-    assert near(points[~marked][:5]) is False
-    assert near(np.concatenate([points[~marked][:5], points[marked][:1]])) is True
+    assert marked.any()
 
 
 def test_a_mesh_is_bounded_and_one_that_cannot_be_read_is_named(loaded, tmp_path):
@@ -86,7 +85,7 @@ def test_a_mesh_is_bounded_and_one_that_cannot_be_read_is_named(loaded, tmp_path
     mesh = URDF.replace("SHAPE", '<mesh filename="hand.stl" scale="0.001 0.001 0.001"/>')
     place = loaded(mesh).skins[0].place
     inside = place.urdf.pose("hand", AT.__getitem__)(np.array([[0.03, 0.01, 0.03]]))
-    assert place.near(0.0)(place.urdf.pose("pad", AT.__getitem__).inside(inside)) is True
+    assert place.near(0.0)(place.urdf.pose("pad", AT.__getitem__).inside(inside)).all()
     assert place.unmarked == ""
     place = loaded(mesh.replace("hand.stl", "none.stl")).skins[0].place
     assert place.unmarked.endswith("not marked: the shapes of hand cannot be read")

@@ -33,8 +33,10 @@ _ANY_TURN = math.pi**2 / 3
 """Variance of an angle of which nothing is known, rad²."""
 
 _AROUND = np.arange(12) * math.pi / 6
-_ELLIPSE = np.vstack([np.zeros(2), np.column_stack([np.cos(_AROUND), np.sin(_AROUND)])])
-"""The middle of an ellipse and points of it, in standard deviations along its axes."""
+_SPREAD = np.sqrt(-2 * np.log([[0.75], [0.25]] * 6)) * np.column_stack(
+    [np.cos(_AROUND), np.sin(_AROUND)]
+)
+"""Points of an ellipse, in standard deviations along its axes: each stands for a twelfth."""
 
 _UNCALIBRATED = {
     f"{name}{part}": value
@@ -159,7 +161,7 @@ class Contact:
 
     @property
     def is_self(self) -> bool | None:
-        """Whether a link of the robot itself touches within the ellipse of the position.
+        """Whether a link of the robot itself is more likely where it touches than not.
 
         None where that is not known.
         """
@@ -169,7 +171,8 @@ class Contact:
         spread = self.covariance
         values, vectors = np.linalg.eigh(np.zeros((3, 3)) if spread is None else spread)
         axes = vectors * np.sqrt(np.maximum(values, 0.0))
-        return near(self.position + _ELLIPSE @ axes[:, 1:].T)  # the first is along the normal
+        points = self.position + _SPREAD @ axes[:, 1:].T  # the first is along the normal
+        return bool(near(points).mean() > 0.5)
 
     @property
     def orientation(self) -> Vector:

@@ -107,11 +107,14 @@ def name_of(element: Element, where: str) -> str:
 
 def origin_of(element: Element, where: str) -> Pose:
     """The pose that its <origin> says."""
-    origin = element.find("origin")
-    given = {} if origin is None else origin.attrib
-    return Pose.of(
-        *(numbers_of(given.get(key, "0 0 0"), 3, "<origin>", where) for key in ("xyz", "rpy"))
-    )
+    return Pose.of(*(part_of(element, "origin", key, "0 0 0", where) for key in ("xyz", "rpy")))
+
+
+def part_of(element: Element, tag: str, key: str, default: str, where: str) -> list[float]:
+    """As many finite numbers as ``default`` has, of a part of ``element`` or by default."""
+    part = element.find(tag)
+    text = default if part is None else part.get(key, default)
+    return numbers_of(text, 3 if " " in default else 1, f"<{tag}> {key}", where)
 
 
 def numbers_of(text: str, count: Literal[1, 3], what: str, where: str) -> list[float]:

@@ -61,10 +61,6 @@ class Moved(Surface):
         """Derivatives (n, 3, 2) of the points."""
         return np.asarray(self.pose.rotation @ self.surface.jacobian(uv))
 
-    def check(self, uv: ArrayLike) -> None:
-        """Check the surface that is moved."""
-        self.surface.check(uv)
-
 
 JointPositions = Callable[[float], Positions]
 """How a robot stands at a time, s since 1970."""

@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
 from tomoskin.core import FloatArray, GeometryError, SkinError
@@ -17,8 +18,8 @@ from tomoskin.model.robot.urdf import Positions, Urdf
 LINGERS = 0.1
 """Seconds for which a touch goes on after a link has gone: some scans tell that it has ended."""
 
-NearLink = Callable[[FloatArray], bool]
-"""Whether one of the points (n, 3) m, in the frame of a skin's link, is near another link."""
+NearLink = Callable[[FloatArray], NDArray[np.bool_]]
+"""Which of the points (n, 3) m, in the frame of a skin's link, are near another link."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,16 +50,16 @@ class Hull:
         middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
         return cls(shape.link, planes, middle, np.linalg.norm(corners - middle, axis=1).max())
 
-    def is_near(self, points: FloatArray, margin: float) -> bool:
-        """Whether one of ``points`` (n, 3) m is within ``margin`` m of it.
+    def near(self, points: FloatArray, margin: float) -> NDArray[np.bool_]:
+        """(n,) which of ``points`` (n, 3) m are within ``margin`` m of it.
 
         The distance is that to the farthest plane: near an edge or a corner it is less than the
         true one.
         """
         if np.linalg.norm(points - self.middle, axis=1).min() > self.radius + margin:
-            return False
+            return np.zeros(len(points), dtype=bool)
         distances = (points @ self.planes[:, :3].T + self.planes[:, 3]).max(axis=1)
-        return bool(distances.min() < margin)
+        return np.asarray(distances < margin)
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,8 +126,11 @@ class OwnLinks:
         """
         links = self.link, *(hull.link for hull in self.hulls)
         placed = [self.urdf.poses(positions, links) for positions in stances]
-        return lambda points: any(
-            hull.is_near(poses[hull.link].inside(poses[self.link](points)), self.margin)
-            for poses in placed
-            for hull in self.hulls
+        return lambda points: np.any(
+            [
+                hull.near(poses[hull.link].inside(poses[self.link](points)), self.margin)
+                for poses in placed
+                for hull in self.hulls
+            ],
+            axis=0,
         )

@@ -17,8 +17,8 @@ from tomoskin.model.robot.link_shapes import (
     LinkShape,
     Pose,
     name_of,
-    numbers_of,
     origin_of,
+    part_of,
     read_shapes,
     thinned,
 )
@@ -257,24 +257,15 @@ def _joint(element: ElementTree.Element, where: str) -> UrdfJoint:
         raise SkinError(
             f'expected a type of {", ".join(filter(None, known))}, got "{kind}"', where=where
         )
-    mimic, axis = element.find("mimic"), np.array(_number(element, "axis", "xyz", "1 0 0", where))
+    mimic, axis = element.find("mimic"), np.array(part_of(element, "axis", "xyz", "1 0 0", where))
     if not (length := np.linalg.norm(axis)) > 0:
         raise SkinError("expected an axis with a direction, got 0 0 0", where=where)
     return UrdfJoint(
         name, parent, child, origin_of(element, where), kind, axis / length,
         "" if mimic is None else mimic.get("joint", ""),
-        _number(element, "mimic", "multiplier", "1", where)[0],
-        _number(element, "mimic", "offset", "0", where)[0],
+        part_of(element, "mimic", "multiplier", "1", where)[0],
+        part_of(element, "mimic", "offset", "0", where)[0],
     )  # fmt: skip
-
-
-def _number(
-    element: ElementTree.Element, tag: str, key: str, default: str, where: str
-) -> list[float]:
-    """As many finite numbers as ``default`` has, of a part of ``element`` or by default."""
-    part = element.find(tag)
-    text = default if part is None else part.get(key, default)
-    return numbers_of(text, 3 if " " in default else 1, f"<{tag}> {key}", where)
 
 
 def _solid(shapes: list[LinkShape], most: int) -> LinkSolid:
