@@ -68,7 +68,7 @@ def distance(kind, p):
 def test_what_is_within_the_margin_is_near(loaded, kind):
     place = loaded(URDF.replace("SHAPE", SHAPES[kind])).skins[0].place
     near = place.near(0.0)
-    urdf, positions = place.urdf, AT.__getitem__
+    urdf, positions = place.own.urdf, AT.__getitem__
     in_hand = np.random.default_rng(5).uniform(-0.16, 0.16, (3000, 3))
     points = urdf.pose("pad", positions).inside(urdf.pose("hand", positions)(in_hand))
     marked = near(points)
@@ -84,8 +84,8 @@ def test_a_mesh_is_bounded_and_one_that_cannot_be_read_is_named(loaded, tmp_path
     write_stl(tmp_path / "hand.stl", peak)
     mesh = URDF.replace("SHAPE", '<mesh filename="hand.stl" scale="0.001 0.001 0.001"/>')
     place = loaded(mesh).skins[0].place
-    inside = place.urdf.pose("hand", AT.__getitem__)(np.array([[0.03, 0.01, 0.03]]))
-    assert place.near(0.0)(place.urdf.pose("pad", AT.__getitem__).inside(inside)).all()
+    inside = place.own.urdf.pose("hand", AT.__getitem__)(np.array([[0.03, 0.01, 0.03]]))
+    assert place.near(0.0)(place.own.urdf.pose("pad", AT.__getitem__).inside(inside)).all()
     assert place.unmarked == ""
     place = loaded(mesh.replace("hand.stl", "none.stl")).skins[0].place
     assert place.unmarked.endswith("not marked: the shapes of hand cannot be read")

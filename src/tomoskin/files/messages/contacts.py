@@ -74,10 +74,10 @@ class LinkPose:
     @classmethod
     def of(cls, place: Place | None, utc: float | None) -> Self | None:
         """At a time, s since 1970; None of a skin that lies on no link."""
-        if place is None or place.urdf is None:
+        if place is None or place.own is None:
             return None
         pose, problem = _or_why(place.in_root, utc)
-        return cls(place.urdf.root, pose, problem, partial(_or_why, place.near, utc))
+        return cls(place.own.urdf.root, pose, problem, partial(_or_why, place.near, utc))
 
     @cached_property
     def others(self) -> _Near:
@@ -94,12 +94,10 @@ class LinkPose:
         return {"root": pose, "root_problem": self.problem}
 
 
-def _or_why(
-    told: Callable[[float | None], T | None], utc: float | None
-) -> tuple[T | None, str | None]:
-    """What is ``told`` of a time; None where it is not known, and why."""
+def _or_why(of: Callable[[float | None], T], utc: float | None) -> tuple[T | None, str | None]:
+    """What was ``of`` that time; None where it is not known, and why."""
     try:
-        return told(utc), None
+        return of(utc), None
     except SkinError as error:
         return None, str(error)
 

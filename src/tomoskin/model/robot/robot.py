@@ -70,16 +70,15 @@ JointPositions = Callable[[float], Positions]
 class Place:
     """Which of a robot's skins it is, and where: ``pose`` in the frame ``link``.
 
-    ``link`` is "" where it is not known: coordinates are then the skin's own. ``urdf`` is the
-    robot's, ``joints`` says how it stands, and ``own`` which of its links can touch the skin.
+    ``link`` is "" where it is not known: coordinates are then the skin's own. ``own`` are the
+    links of the robot that can touch the skin, and ``joints`` says how it stands.
     """
 
     name: str
     link: str = ""
     pose: Pose = field(default_factory=Pose)
-    urdf: Urdf | None = None
-    joints: JointPositions | None = None
     own: OwnLinks | None = None
+    joints: JointPositions | None = None
 
     def moved(self, surface: Surface) -> Surface:
         """The skin's ``surface`` in the coordinates of the link."""
@@ -90,7 +89,7 @@ class Place:
 
         None where there is no link. Raises SkinError where the pose is not known.
         """
-        return None if self.urdf is None else self.urdf.pose(self.link, self._positions(utc))
+        return self.own.urdf.pose(self.link, self._positions(utc)) if self.own else None
 
     @property
     def unmarked(self) -> str:
@@ -105,9 +104,8 @@ class Place:
 
         None where there is no link. Raises SkinError where the pose of one is not known.
         """
-        if self.own is None:
-            return None
-        return self.own.at(self._positions(utc), self._positions(utc and utc - LINGERS))
+        stances = [self._positions(utc and utc - ago) for ago in (0.0, LINGERS)]
+        return self.own.at(*stances) if self.own else None
 
     def _positions(self, utc: float | None) -> Positions:
         return _not_told if self.joints is None or utc is None else self.joints(utc)
@@ -285,7 +283,8 @@ class Robot:
 def add_skin(path: StrPath, given: Mapping[str, Any], urdf: str | None = None) -> str:
     """Text of the robot file at ``path`` with one more skin; of a new one where there is none.
 
-    ``given``: keys of its section as written; ``urdf``: path from the file. Raises SkinError.
+    ``given``: keys of its section as written; ``urdf``: path from the file. Raises SkinError,
+    also where no robot can be made of the text.
     """
     path = Path(path)
     if path.exists():
@@ -297,9 +296,10 @@ def add_skin(path: StrPath, given: Mapping[str, Any], urdf: str | None = None) -
     else:
         lines = [f"format = {FORMAT}", "", "[robot]"]
         text = "\n".join(lines + ([] if urdf is None else [f"urdf = {literal(urdf)}"]))
-    SkinSection.complete(given, f"{path}: new [[skin]]")
     entry = [f"{name} = {literal(value)}" for name, value in given.items()]
-    return "\n".join([text, "", "[[skin]]", *entry]) + "\n"
+    text = "\n".join([text, "", "[[skin]]", *entry]) + "\n"
+    Robot.of(toml_tables(text, str(path), FORMAT, SECTIONS), str(path), path.parent)
+    return text
 
 
 def _placed(
@@ -311,13 +311,10 @@ def _placed(
     ):
         if not form.fullmatch(text):
             raise SkinError(f'expected a {what}, got "{text}"', where=where)
-    if given.link is not None:
-        _check_link(given.link, urdf, where)
-    own = _own_links(given, urdf, robot, where) if urdf and given.link else None
-    zero = np.zeros(3)
+    own, zero = _own_links(given, urdf, robot, where), np.zeros(3)
     pose = Pose.of(given.position or zero, given.angles or zero)
     return PlacedSkin(
-        place=Place(given.name, given.link or "", pose, urdf if given.link else None, own=own),
+        place=Place(given.name, given.link or "", pose, own),
         skin=str(folder / given.skin) if given.skin.endswith(".toml") else given.skin,
         source=_from(folder, given.source),
         board=given.board,
@@ -325,30 +322,31 @@ def _placed(
     )
 
 
-def _check_link(link: str, urdf: Urdf | None, where: str) -> None:
-    """Raise SkinError for a link that the robot does not have, or that can name no frame."""
+def _own_links(
+    given: SkinSection, urdf: Urdf | None, robot: RobotSection, where: str
+) -> OwnLinks | None:
+    """What a skin on a link meets. SkinError for a link that the robot does not have, or that can
+    name no frame."""
+    if given.link is None:
+        return None
     if urdf is None:
         raise SkinError(
-            f'expected a URDF that has the link "{link}", got none',
+            f'expected a URDF that has the link "{given.link}", got none',
             where=where,
             hint='name it in the section [robot], as in urdf = "arm.urdf", or leave out link',
         )
-    urdf.check_link(link, where)
-    if not FRAME.fullmatch(link):
+    named = given.pressed_by or ()
+    for link in (given.link, *named):
+        urdf.check_link(link, where)
+    if not FRAME.fullmatch(given.link):
         raise SkinError(
             'expected a link of letters, digits, "_", "-" and ".", with "/" between names, since '
-            f'it is the frame_id of all messages; got "{link}"',
+            f'it is the frame_id of all messages; got "{given.link}"',
             where=where,
             hint=f"rename it in {urdf.source}",
         )
-
-
-def _own_links(given: SkinSection, urdf: Urdf, robot: RobotSection, where: str) -> OwnLinks:
-    named = given.pressed_by or ()
-    for link in named:
-        urdf.check_link(link, f"{where} pressed_by")
     leaves_out = robot.self_contacts == "leave-out"
-    return OwnLinks.of(urdf, given.link or "", named, robot.self_margin, leaves_out=leaves_out)
+    return OwnLinks.of(urdf, given.link, named, robot.self_margin, leaves_out=leaves_out)
 
 
 def _from(folder: Path, source: str) -> str:
