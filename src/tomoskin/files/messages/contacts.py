@@ -159,9 +159,9 @@ class Contact:
 
     @property
     def is_self(self) -> bool | None:
-        """Whether a link of the robot itself is more likely where it touches than not.
+        """Whether a link of the robot itself is near a third of its ellipse or more.
 
-        None where that is not known.
+        None where that is not known. A link that is so near presses as a rule, so a third will do.
         """
         near = self.link and self.link.others[0]
         if not near:
@@ -170,7 +170,7 @@ class Contact:
         values, vectors = np.linalg.eigh(np.zeros((3, 3)) if spread is None else spread)
         axes = vectors * np.sqrt(np.maximum(values, 0.0))
         points = self.position + _SPREAD @ axes[:, 1:].T  # the first is along the normal
-        return bool(near(points).mean() > 0.5)
+        return bool(3 * near(points).sum() >= len(points))
 
     @property
     def orientation(self) -> Vector:
