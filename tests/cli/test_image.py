@@ -19,7 +19,7 @@ from PIL import Image
 from core.seeing import blue_beside_red
 from tomoskin.core import FloatArray
 from tomoskin.files import imports
-from tomoskin.files.exports.display import circular_average
+from tomoskin.files.exports.picture import circular_average
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import triangulate
 from tomoskin.model.pattern import Pattern

@@ -288,7 +288,7 @@ class NoRoom:
 
 
 def test_a_full_disk_ends_the_recording_but_not_the_run(runner, until, tmp_path, monkeypatch):
-    monkeypatch.setattr("tomoskin.files.session.message_log.Path", FullPath)
+    monkeypatch.setattr("tomoskin.files.session.session_writer.Path", FullPath)
     path = tmp_path / "x.mcap"
     runner.ask(commands.Record(path))
     assert runner.status().recording == path

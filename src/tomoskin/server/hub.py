@@ -16,14 +16,15 @@ import numpy as np
 from tomoskin.board.source import Transport
 from tomoskin.core import DataError, GeometryError, TomoskinError, WireError
 from tomoskin.files.session import read_timeline
+from tomoskin.learning import DEPTH, DentMap, dent_map
 from tomoskin.model.skin import Skin
-from tomoskin.pipeline import Prepared, Unresolved, colour_limit
+from tomoskin.pipeline import FrameResult, Prepared, Unresolved, colour_limit
 from tomoskin.run import FILE_NAME, Runner, SetPresses, Snapshot, StrictRequest, commands
 from tomoskin.server import views
-from tomoskin.server.dents import Dents
 from tomoskin.server.frames import encode_result
 from tomoskin.server.page_connection import Handler, Handlers, Host, Page, Tasks, during
 from tomoskin.server.page_messages import (
+    DentNow,
     EventNote,
     Message,
     PlayedTimeline,
@@ -31,7 +32,7 @@ from tomoskin.server.page_messages import (
     Scene,
     UnresolvedMap,
 )
-from tomoskin.server.requests import AskUnresolved, Painted, SetRecording
+from tomoskin.server.requests import AskUnresolved, Painted, SetRecording, ShowDent
 from tomoskin.twin import Probe
 
 
@@ -261,3 +262,29 @@ class Hub(Host):
             if self.pages:
                 self.tell(*news, views.state(self.runner.status()))
             await asyncio.sleep(_STATE_PERIOD)
+
+
+class Dents:
+    """The ``pages`` that show the dent of touches, and what they are sent."""
+
+    def __init__(self, runner: Runner) -> None:
+        self._runner = runner
+        self.pages: set[Page] = set()
+        self.handlers: Handlers = {ShowDent: self._show}
+
+    def _show(self, page: Page, request: ShowDent) -> None:
+        """Send dents from now on, or no more; answer why there are none."""
+        prepared, problem = self._runner.prepared, ""
+        if DEPTH.name not in prepared.calibrations:
+            problem = "depths are uncalibrated: teach them in Set up, or choose a calibration there"
+        elif prepared.skin.layer is None:
+            problem = 'the skin file does not give the layer: add layer = "3 mm" to [surface]'
+        page.post(DentNow(problem=problem).json)
+        (self.pages.add if request.on else self.pages.discard)(page)
+
+    def of(self, result: FrameResult) -> DentMap | None:
+        """The dent of its touches; None where nothing touches, or depths are not known."""
+        layer, nodes = self._runner.prepared.skin.layer, self._runner.prepared.mesh.points
+        if layer is None or not result.touches:
+            return None
+        return dent_map([touch.detection for touch in result.touches], nodes[:, :2], layer)

@@ -13,7 +13,7 @@ import pytest
 from shapes import box, disc
 from tomoskin.core import DataError, Detection, FloatArray, Image, Touch
 from tomoskin.files.exports import Display, Panel, plot, write_picture
-from tomoskin.files.exports.display import circular_average
+from tomoskin.files.exports.picture import circular_average
 from tomoskin.model.mesh import Mesh
 
 

@@ -177,7 +177,7 @@ def test_a_curved_sheet_has_no_images(tmp_path, start):
 
 
 def test_a_full_disk_ends_the_recording_and_leaves_it_readable(tmp_path, monkeypatch, said, start):
-    monkeypatch.setattr("tomoskin.files.session.message_log.Path", FailingPath)
+    monkeypatch.setattr("tomoskin.files.session.session_writer.Path", FailingPath)
     path = tmp_path / "x.mcap"
     worker = start(path)
     record(worker, 500)

@@ -6,11 +6,11 @@ from tomoskin.files.exports.curves import (
     write_merit_table as write_merit_table,
     write_promise as write_promise,
 )
-from tomoskin.files.exports.display import Display as Display
 from tomoskin.files.exports.export import Export as Export
 from tomoskin.files.exports.picture import (
     FILMS as FILMS,
     MOST_PANELS as MOST_PANELS,
+    Display as Display,
     Panel as Panel,
     plot as plot,
     write_picture as write_picture,

@@ -7,7 +7,6 @@ from tomoskin.files.session.info import (
     session_info as session_info,
 )
 from tomoskin.files.session.layout import Truth as Truth
-from tomoskin.files.session.message_log import MessageLog as MessageLog, errors_of as errors_of
 from tomoskin.files.session.playback import Timeline as Timeline, read_timeline as read_timeline
 from tomoskin.files.session.recorder import (
     BoardInfo as BoardInfo,
@@ -53,6 +52,8 @@ from tomoskin.files.session.session_reader import (
     skins_in as skins_in,
 )
 from tomoskin.files.session.session_writer import (
+    MessageLog as MessageLog,
     SessionWriter as SessionWriter,
+    errors_of as errors_of,
     robot_logs as robot_logs,
 )

@@ -41,15 +41,16 @@ from tomoskin.files.session.mcap_records import (
     decode_chunk,
     messages_in,
 )
-from tomoskin.files.session.message_log import LIBRARY, errors_of
 from tomoskin.files.session.scanned import Advance, no_report
 from tomoskin.files.session.session_reader import epoch_of
 from tomoskin.files.session.session_writer import (
     ABOUT,
+    LIBRARY,
     OLD_INDEX_FILE,
     SKIN_FILE,
     SKINS,
     about_session,
+    errors_of,
 )
 from tomoskin.model.skin import Skin
 
