@@ -5,9 +5,9 @@ from __future__ import annotations
 import textwrap
 import threading
 import time
-from dataclasses import asdict, dataclass
-from types import TracebackType
-from typing import TYPE_CHECKING, Annotated, Any, Self
+from dataclasses import asdict
+from itertools import takewhile
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Self
 
 import typer
 
@@ -45,12 +45,12 @@ class Bar:
             TaskProgressColumn("{task.percentage:>3.0f} %", text_format_no_percentage=""),
             TimeRemainingColumn(),
         )
-        self._progress = Progress(*columns, console=console, transient=True)
-        self._shown = console.is_terminal
+        shown = console.is_terminal
+        self._progress = Progress(*columns, console=console, transient=True, disable=not shown)
         self._task = self._progress.add_task(title, total=None)
         self._begun = time.monotonic()
         self._lock = threading.Lock()
-        self._running = self._over = False
+        self._over = False
         self._timer = threading.Timer(_PATIENCE, self._show)
         self._timer.daemon = True
 
@@ -62,27 +62,21 @@ class Bar:
 
     def _show(self) -> None:
         with self._lock:
-            if self._shown and not self._running and not self._over:
+            if not self._over:
                 self._progress.start()
-                self._running = True
 
     def __enter__(self) -> Self:
         """Show the bar when the job takes long."""
-        if self._shown:
+        if not self._progress.disable:
             self._timer.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Remove the bar, however the job ended."""
         self._timer.cancel()
         with self._lock:
             self._over = True
-            if self._running:
+            if self._progress.live.is_started:
                 self._progress.stop()
 
 
@@ -130,18 +124,6 @@ def remark(text: str) -> None:
     typer.echo(f"tomoskin: {text}", err=True)
 
 
-@dataclass(frozen=True)
-class _Column:
-    heading: str
-    values: tuple[str, ...]
-    key: bool
-
-    @property
-    def width(self) -> int:
-        """Of its widest value, or of the longest word of its heading."""
-        return max(map(len, (*self.heading.split(), *self.values)))
-
-
 def tables(
     title: str,
     headings: Sequence[str],
@@ -157,38 +139,45 @@ def tables(
         from rich.console import Console
 
         width = Console().width
-    columns = _columns(headings, rows)
-    keys = [column for column in columns if column.key]
-    blocks, rest = [list(keys)], [column for column in columns if not column.key]
+    columns = [
+        _Column(heading, [str(row[number]) for row in rows])
+        for number, heading in enumerate(headings)
+    ]
+    told = (any(isinstance(row[number], str) for row in rows) for number in range(1, len(columns)))
+    count = 1 + sum(1 for _ in takewhile(bool, told))
+    keys, rest = columns[:count], columns[count:]
+    blocks = [list(keys)]
     for column in rest:
         needed = sum(c.width + 1 for c in (*blocks[-1], column)) - 1
-        if needed > width and len(blocks[-1]) > len(keys):
+        if needed > width and len(blocks[-1]) > count:
             blocks.append(list(keys))
         blocks[-1].append(column)
-    return [_table(title if block is blocks[0] else "", block) for block in blocks]
+    return [_table(title if block is blocks[0] else "", block, count) for block in blocks]
 
 
-def _columns(headings: Sequence[str], rows: Sequence[Sequence[object]]) -> list[_Column]:
-    columns, key = [], True
-    for number, heading in enumerate(headings):
-        values = [row[number] for row in rows]
-        key = key and (number == 0 or any(isinstance(value, str) for value in values))
-        columns.append(_Column(heading, tuple(map(str, values)), key))
-    return columns
+class _Column(NamedTuple):
+    heading: str
+    values: list[str]
+
+    @property
+    def width(self) -> int:
+        """Of its widest value, or of the longest word of its heading."""
+        return max(map(len, (*self.heading.split(), *self.values)))
 
 
-def _table(title: str, columns: Sequence[_Column]) -> Table:
+def _table(title: str, columns: Sequence[_Column], count: int) -> Table:
+    """The first ``count`` columns say what a row is about."""
     from rich import box
     from rich.table import Table
     from rich.text import Text
 
     style = {"box": box.SIMPLE_HEAD, "show_edge": False, "pad_edge": False, "padding": 0}
     table = Table(title=title or None, **style)  # type: ignore[arg-type]
-    for column in columns:
+    for number, column in enumerate(columns):
         heading = "\n".join(textwrap.wrap(column.heading, column.width))
         table.add_column(
             Text(heading),
-            justify="left" if column.key else "right",
+            justify="left" if number < count else "right",
             no_wrap=True,
             min_width=column.width,
             vertical="bottom",

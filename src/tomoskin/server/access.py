@@ -67,7 +67,7 @@ class AccessPolicy:
             return False
         if name in LOOPBACK_NAMES or name == _bracketed(self.host).lower():
             return True
-        return self.host in _WILDCARDS and _is_address(name)
+        return self.host in _WILDCARDS and _address(name) is not None and "%" not in name
 
     def admits_origin(self, origin: str | None, host: str) -> bool:
         """Whether a request with this Origin header may open a WebSocket on ``host``.
@@ -118,12 +118,8 @@ def answer_headers(host: str) -> Mapping[str, str]:
 
 def is_loopback(host: str) -> bool:
     """Whether only this machine can reach a server bound to ``host``."""
-    if host == "localhost":
-        return True
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False
+    address = _address(host)
+    return host == "localhost" or (address is not None and address.is_loopback)
 
 
 def load_token(path: StrPath) -> str:
@@ -160,12 +156,11 @@ def _bracketed(host: str) -> str:
     return f"[{host}]" if ":" in host and not host.startswith("[") else host
 
 
-def _is_address(name: str) -> bool:
+def _address(name: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:
     try:
-        ipaddress.ip_address(name.removeprefix("[").removesuffix("]"))
+        return ipaddress.ip_address(name.removeprefix("[").removesuffix("]"))
     except ValueError:
-        return False
-    return "%" not in name
+        return None
 
 
 def _read_token(path: Path) -> str:

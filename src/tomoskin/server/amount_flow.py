@@ -21,7 +21,7 @@ from tomoskin.learning import (
     report_of,
 )
 from tomoskin.pipeline import FrameResult, Prepared
-from tomoskin.server.guided_flow import Estimate, GuidedFlow, counted
+from tomoskin.server.guided_flow import Estimate, GuidedFlow, presses_text
 from tomoskin.server.page_messages import Figures, LabelNow, Phase, Point
 from tomoskin.server.press_taker import OFTEN
 from tomoskin.server.requests import SetLabel
@@ -212,7 +212,7 @@ class AmountFlow(GuidedFlow):
     def estimate_from(self, examples: tuple[LabelledPlacement, ...]) -> Estimate:
         """Learn the amounts of touches from these presses."""
         if len(examples) < _FEWEST:
-            return Estimate(f"{_presses(_FEWEST - len(examples))} more for a first answer")
+            return Estimate(f"{presses_text(_FEWEST - len(examples))} more for a first answer")
         model = AmountModel.fit(labelled_presses(examples), self.prepared.skin)
         return Estimate(
             f"{report_of(model)['text']}. {_advice(model)}",
@@ -270,7 +270,7 @@ def labelled_presses(examples: tuple[LabelledPlacement, ...]) -> LabelledPresses
 def _advice(model: AmountModel) -> str:
     n = len(np.unique(model.presses.press[model.presses.labelled]))
     if n < _ENOUGH:
-        return f"Ten presses are a start: {_presses(_ENOUGH - n)} more."
+        return f"Ten presses are a start: {presses_text(_ENOUGH - n)} more."
     if model.remarks:
         return "These would be enough without the problems below."
     if n < _GOOD:
@@ -284,7 +284,3 @@ def _of_press(number: int | None) -> str:
 
 def _shown(label: AmountLabel | None) -> LabelNow | None:
     return None if label is None else LabelNow.of(label)
-
-
-def _presses(count: int) -> str:
-    return counted(count, "press", "presses")

@@ -62,9 +62,9 @@ class Estimate:
     answer: Any = None
 
 
-def counted(count: int, one: str, many: str) -> str:
-    """A number of things in words."""
-    return f"{count} {one if count == 1 else many}"
+def presses_text(count: int) -> str:
+    """A number of presses in words."""
+    return f"{count} press{'' if count == 1 else 'es'}"
 
 
 class StoppedError(TomoskinError):
@@ -197,25 +197,23 @@ class GuidedFlow(ABC):
 
 
 class Dots:
-    """Where to press next: where an estimate says, else where nobody has pressed yet."""
+    """Where to press next: where an estimate says, else where nobody has pressed yet.
+
+    ``places``: (n, 2) m where a dot may be.
+    """
 
     def __init__(self, prepared: Prepared) -> None:
         region = Region.of(prepared.skin)
         self._unit = region.unit
-        self._places = region.metres(_INSIDE * region.grid)
+        self.places = region.metres(_INSIDE * region.grid)
         self._filled = region.metres(_FILLED * region.grid)
-
-    @property
-    def places(self) -> FloatArray:
-        """(n, 2) m where a dot may be."""
-        return self._places
 
     def next(self, places: Sequence[Point], estimate: Estimate | None) -> Point:
         """(x, y) m of the next dot, after presses at ``places``."""
         pressed = np.array(places).reshape(-1, 2)
         if estimate is not None and estimate.place is not None:
-            near = np.argmin(np.linalg.norm(self._places - estimate.place, axis=1))
-            place = self._places[near]
+            near = np.argmin(np.linalg.norm(self.places - estimate.place, axis=1))
+            place = self.places[near]
             if _gap(pressed, place[None])[0] > _APART * self._unit:
                 return float(place[0]), float(place[1])
         if not len(pressed):

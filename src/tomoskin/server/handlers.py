@@ -19,7 +19,7 @@ from tomoskin.server.page_messages import Calibrations
 from tomoskin.server.requests import UseCalibration
 from tomoskin.server.settings_handlers import SettingsHandlers
 from tomoskin.server.settings_messages import TwinBend, TwinRefused, TwinState, TwinStretch
-from tomoskin.server.source_handlers import FileHandlers, SourceHandlers, SourceSwitch
+from tomoskin.server.source_handlers import SourceHandlers, SourceSwitch
 
 _OFFERED: dict[str, Kind[Any]] = {"touch": TOUCH, "force": FORCE, "depth": DEPTH}
 
@@ -28,9 +28,7 @@ def serve_requests(hub: Hub, source: str) -> None:
     """Let ``hub`` answer every request, before the first page comes; ``source``: the first one."""
     SettingsHandlers(hub)
     TwinHandlers(hub)
-    switch = SourceSwitch(hub, source)
-    FileHandlers(hub, switch)
-    SourceHandlers(hub, switch)
+    SourceHandlers(hub, SourceSwitch(hub, source))
     GuideHandlers(hub, CalibrationHandlers(hub).note)
 
 

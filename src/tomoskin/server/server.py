@@ -225,23 +225,23 @@ def _limit_stalled(listener: socket.socket) -> None:
         listener.setsockopt(socket.IPPROTO_TCP, option, int(2e3 * PATIENCE))
 
 
+_REFUSALS = {
+    errno.EADDRINUSE: (
+        *("the port is in use, perhaps by another tomoskin", "port"),
+        "choose another with --port, or a free one with --port 0",
+    ),
+    errno.EACCES: (
+        *("you have no permission to use this port", "port"),
+        "choose one above 1023 with --port",
+    ),
+    errno.EADDRNOTAVAIL: (
+        *("is not an address of this machine", "host"),
+        "choose one of its own with --host, such as 127.0.0.1",
+    ),
+}
+"""Why the system refuses to listen: in words, at which option, and what to do."""
+
+
 def _refused(error: OSError, host: str, port: int) -> ServerError:
-    if error.errno == errno.EADDRINUSE:
-        return ServerError(
-            "the port is in use, perhaps by another tomoskin",
-            where=f"port {port}",
-            hint="choose another with --port, or a free one with --port 0",
-        )
-    if error.errno == errno.EACCES:
-        return ServerError(
-            "you have no permission to use this port",
-            where=f"port {port}",
-            hint="choose one above 1023 with --port",
-        )
-    if error.errno == errno.EADDRNOTAVAIL:
-        return ServerError(
-            "is not an address of this machine",
-            where=f"host {host}",
-            hint="choose one of its own with --host, such as 127.0.0.1",
-        )
-    return ServerError(f"{error.strerror}", where=f"host {host}")
+    message, option, hint = _REFUSALS.get(error.errno or 0, (f"{error.strerror}", "host", ""))
+    return ServerError(message, where=f"{option} {port if option == 'port' else host}", hint=hint)

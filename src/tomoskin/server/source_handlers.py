@@ -110,34 +110,6 @@ def _replay(path: Path, skin: Skin) -> Transport:
     return ReplayTransport(SessionReader(path), skin)
 
 
-class SourceHandlers:
-    """Connects the sources of a list, and no others: a page gives no path and no address."""
-
-    def __init__(self, hub: Hub, switch: SourceSwitch) -> None:
-        self._hub, self._switch = hub, switch
-        hub.serve({ListSources: self._list, Connect: self._connect})
-
-    def _list(self, page: Page, _: ListSources) -> None:
-        def answer(offers: list[Offer]) -> None:
-            page.post(self._message(offers).json)
-
-        self._hub.tasks.run(page, self._switch.offers, answer)
-
-    def _connect(self, page: Page, request: Connect) -> None:
-        work = partial(self._switch.connect, request.source)
-        self._hub.tasks.run(page, work, lambda _: self._hub.show())
-
-    def _message(self, offers: list[Offer]) -> Sources:
-        status = self._hub.runner.status()
-        return Sources(
-            sources=offers,
-            current=self._switch.spec,
-            host_protocol=f"{SCHEMA.major}.{SCHEMA.minor}",
-            board=None if status.board is None else _identity(status.board, status.board_name),
-            problem=status.problem,
-        )
-
-
 def _identity(info: Info, name: str) -> BoardNow:
     return BoardNow.of(
         info,
@@ -189,8 +161,9 @@ class SessionUse:
             raise DataError("is being exported: wait until it has ended", where=name)
 
 
-class FileHandlers:
-    """Answers about files of one folder by their names; one export at a time."""
+class SourceHandlers:
+    """Answers about files of one folder by their names, one export at a time; and connects the
+    sources of a list, no others: a page gives no path and no address."""
 
     def __init__(self, hub: Hub, switch: SourceSwitch) -> None:
         self._hub, self._switch = hub, switch
@@ -198,9 +171,11 @@ class FileHandlers:
         self._use = SessionUse(hub.runner)
         hub.serve(
             {
+                ListSources: self._list_sources,
+                Connect: lambda page, ask: self._go(page, partial(switch.connect, ask.source)),
+                OpenSession: lambda page, ask: self._go(page, partial(self._play, ask.name)),
+                GoLive: lambda page, _: self._go(page, switch.back),
                 ListFiles: lambda page, _: self._list(page),
-                OpenSession: self._open,
-                GoLive: lambda page, _: self._live(page),
                 ExportSession: self._export,
                 RenameSession: self._rename,
                 DeleteSession: self._delete,
@@ -230,9 +205,7 @@ class FileHandlers:
         self._change(page, work, lambda _: f"{request.name} is deleted")
 
     def _annotate(self, page: Page, request: Annotate) -> None:
-        def work() -> None:
-            self._folder.annotate(request.name, request.text)
-
+        work = partial(self._folder.annotate, request.name, request.text)
         self._change(page, work, lambda _: f"Notes on {request.name} are saved")
 
     def _change(self, page: Page, work: Callable[[], _T], said: Callable[[_T], str]) -> None:
@@ -244,14 +217,28 @@ class FileHandlers:
 
         self._hub.tasks.run(page, work, done)
 
-    def _open(self, page: Page, request: OpenSession) -> None:
-        def work() -> None:
-            self._switch.play(self._complete(request.name))
+    def _list_sources(self, page: Page, _: ListSources) -> None:
+        def answer(offers: list[Offer]) -> None:
+            page.post(self._sources(offers).json)
 
-        self._hub.tasks.run(page, work, lambda _: self._hub.show())
+        self._hub.tasks.run(page, self._switch.offers, answer)
 
-    def _live(self, page: Page) -> None:
-        self._hub.tasks.run(page, self._switch.back, lambda _: self._hub.show())
+    def _sources(self, offers: list[Offer]) -> Sources:
+        status = self._hub.runner.status()
+        return Sources(
+            sources=offers,
+            current=self._switch.spec,
+            host_protocol=f"{SCHEMA.major}.{SCHEMA.minor}",
+            board=None if status.board is None else _identity(status.board, status.board_name),
+            problem=status.problem,
+        )
+
+    def _go(self, page: Page, switch: Callable[[], None]) -> None:
+        """Have the source switched, and show every page the new one."""
+        self._hub.tasks.run(page, switch, lambda _: self._hub.show())
+
+    def _play(self, name: str) -> None:
+        self._switch.play(self._complete(name))
 
     def _export(self, page: Page, request: ExportSession) -> None:
         if self._use.exporting is not None:

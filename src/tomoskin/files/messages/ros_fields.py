@@ -110,19 +110,8 @@ def diagnostics(head: Value, frame: Contacts) -> Value:
 
 def touch_frames(head: Value, frame: Contacts) -> Value:
     """``tf2_msgs/TFMessage``: the frame of each touch, which tracks name, z along the normal."""
-    return {
-        "transforms": [
-            {
-                "header": head,
-                "child_frame_id": _name(head, contact),
-                "transform": {
-                    "translation": _named("xyz", contact.position),
-                    "rotation": _named("xyzw", contact.orientation),
-                },
-            }
-            for contact in frame.touches
-        ]
-    }
+    moved = (_transform(head, _name(head, c), c.position, c.orientation) for c in frame.touches)
+    return {"transforms": list(moved)}
 
 
 def voltages(frame: Contacts) -> Value:
@@ -145,12 +134,8 @@ def voltages(frame: Contacts) -> Value:
 
 def transform(stamp: int, frame: str, mount: Place) -> Value:
     """``tf2_msgs/TFMessage``: where the skin is on the robot."""
-    place = {
-        "translation": _named("xyz", mount.pose.position.tolist()),
-        "rotation": _named("xyzw", mount.pose.quaternion()),
-    }
-    head = header(stamp, mount.link)
-    return {"transforms": [{"header": head, "child_frame_id": frame, "transform": place}]}
+    position, rotation = mount.pose.position.tolist(), mount.pose.quaternion()
+    return {"transforms": [_transform(header(stamp, mount.link), frame, position, rotation)]}
 
 
 def image(head: Value, change: Image, pixels: PixelMap) -> Value:
@@ -186,6 +171,13 @@ def points(head: Value, change: Image, places: FloatArray) -> Value:
         "data": data.tobytes(),
         "is_dense": True,
     }
+
+
+def _transform(
+    head: Value, child: str, position: Sequence[float], rotation: Sequence[float]
+) -> Value:
+    moved = {"translation": _named("xyz", position), "rotation": _named("xyzw", rotation)}
+    return {"header": head, "child_frame_id": child, "transform": moved}
 
 
 def _pose(contact: Contact) -> Value:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from array import array
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -9,8 +10,10 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from tomoskin.board.source import ClockFit, ClockFitter
-from tomoskin.core import Mark, MarkedFrame, StrPath
+from tomoskin.core import FloatArray, Mark, MarkedFrame, StrPath
 from tomoskin.files.session.scanned import Advance, first_scan, no_report, scanned_touches
 from tomoskin.files.session.session_reader import (
     SessionReader,
@@ -124,49 +127,27 @@ class SessionInfo:
     spans: tuple[Span, ...] = ()
 
 
-@dataclass
-class _Frames:
-    """Counts frames; what has no underscore is told of the session by the same name."""
-
-    frames: int = 0
-    held: int = 0
-    skipped: int = 0
-    lost: int = 0
-    gaps: int = 0
-    dropped: int = 0
-    longest_pause: float = 0.0
-    _first: float = 0.0
-    _last: float = 0.0
-    _sequence: int = 0
-    _drops: int = 0
-
-    def add(self, item: MarkedFrame) -> None:
-        """Take the next frame; those from before the recording do not count."""
-        frame, mark = item.frame, item.mark
-        if mark & Mark.EARLIER:
-            return
-        self.held += bool(mark & Mark.HELD)
-        self.skipped += bool(mark & Mark.SKIPPED)
-        missing = (frame.sequence - self._sequence - 1) % _MODULUS
-        if self.frames and not mark & Mark.OPENED and 0 < missing < _MODULUS // 2:
-            self.lost, self.gaps = self.lost + missing, self.gaps + 1
-        if self.frames:
-            self.longest_pause = max(self.longest_pause, frame.host_time - self._last)
-        else:
-            self._first = frame.host_time
-        begun_anew = frame.drops < self._drops
-        self.dropped += frame.drops if begun_anew else frame.drops - self._drops
-        self._sequence, self._drops, self._last = frame.sequence, frame.drops, frame.host_time
-        self.frames += 1
-
-    def summary(self, epoch: float) -> dict[str, Any]:
-        """The counts by name, with when the frames began, how long they took, and their rate."""
-        span = self._last - self._first
-        return {name: value for name, value in vars(self).items() if name[0] != "_"} | {
-            "begun": epoch + self._first if epoch else None,
-            "duration": span,
-            "rate": (self.frames - 1) / span if span > 0 else float("nan"),
-        }
+def _summary(table: FloatArray, epoch: float) -> dict[str, Any]:
+    """What a session says of its own frames by name; a row of the ``table`` is a frame's host time,
+    sequence, drops and mark."""
+    times, sequence, drops = table[:, :3].T
+    marks = table[:, 3].astype(int)
+    missing = (np.diff(sequence) - 1) % _MODULUS
+    missing[(missing >= _MODULUS // 2) | (marks[1:] & Mark.OPENED > 0)] = 0
+    more = np.diff(drops, prepend=0.0)  # less than before where the board has begun again
+    first, span = (times[0], times[-1] - times[0]) if len(times) else (0.0, 0.0)
+    return {
+        "frames": len(times),
+        "held": int(np.count_nonzero(marks & Mark.HELD)),
+        "skipped": int(np.count_nonzero(marks & Mark.SKIPPED)),
+        "lost": int(missing.sum()),
+        "gaps": int(np.count_nonzero(missing)),
+        "dropped": int(np.where(more < 0, drops, more).sum()),
+        "longest_pause": float(np.max(np.diff(times), initial=0.0)),
+        "begun": epoch + float(first) if epoch else None,
+        "duration": float(span),
+        "rate": float((len(times) - 1) / span) if span > 0 else float("nan"),
+    }
 
 
 def _begun(counts: Sequence[int]) -> int:
@@ -184,12 +165,14 @@ def session_info(path: StrPath, advance: Advance = no_report) -> SessionInfo:
     """
     path = Path(path)
     size = path.stat().st_size if path.is_file() else 0
-    frames, clock = _Frames(), ClockFitter()
+    table, clock = array("d"), ClockFitter()
     with SessionReader(path) as session:
         total = indexed_frames(session)
         for number, item in enumerate(session.frames()):
-            frames.add(item)
-            clock.add(item.frame.ticks, item.frame.host_time)
+            frame = item.frame
+            clock.add(frame.ticks, frame.host_time)
+            if not item.mark & Mark.EARLIER:
+                table.extend((frame.host_time, frame.sequence, frame.drops, item.mark))
             if number % _OFTEN == 0:
                 advance(number, max(total, number + 1))
         begun = first_scan(session)
@@ -204,7 +187,7 @@ def session_info(path: StrPath, advance: Advance = no_report) -> SessionInfo:
             skin_identity=session.skin.identity,
             electrodes=session.skin.n_electrodes,
             rows=session.skin.pattern().n_meas,
-            **frames.summary(session.epoch),
+            **_summary(np.array(table).reshape(-1, 4), session.epoch),
             touches=len(spans),
             presses=_begun([len(item.presses) for item in session.truth()]),
             events=dict(Counter(event.kind for event in session.events())),
