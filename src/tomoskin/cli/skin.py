@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tomoskin.cli.alpha import alpha
 from tomoskin.cli.app import group
 from tomoskin.cli.named_files import SKIN, ForceFlag, Otherwise, Reads, Writes
 from tomoskin.cli.options import DEFAULT_SKIN, NamedSkinOption, RecordingArgument, SkinArgument
 from tomoskin.cli.output import JsonFlag, remark, tell
-from tomoskin.cli.skin_merit import merit
+from tomoskin.cli.skin_figures import alpha, merit
 from tomoskin.core import DIMENSIONS, DataError, SkinError, no_such, write_text
 
 if TYPE_CHECKING:

@@ -89,18 +89,16 @@ class Overview(Host):
                 for runner in self.run.runners.values():
                     runner.submit(request)
             case SetRecording():
-                self._tasks.run(page, self._recording(on=request.on), lambda _: self._tell())
+                work = partial(self._record, on=request.on)
+                self._tasks.run(page, work, lambda _: self._tell())
             case _:
                 raise WireError("this is possible only on the page of one skin")
 
-    def _recording(self, *, on: bool) -> Callable[[], None]:
-        def record() -> None:
-            if on:
-                self.run.record(self.folder / time.strftime(FILE_NAME))
-            else:
-                self.run.stop_recording()
-
-        return record
+    def _record(self, *, on: bool) -> None:
+        if on:
+            self.run.record(self.folder / time.strftime(FILE_NAME))
+        else:
+            self.run.stop_recording()
 
     def _tell(self) -> None:
         self.tell(states(self.run))

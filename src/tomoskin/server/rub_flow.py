@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from tomoskin.core import DataError, FloatArray, WireError, reach
+from tomoskin.files.messages import Every
 from tomoskin.learning import TOUCH, Rubbing, quiet_electrodes
 from tomoskin.pipeline import FrameResult, Prepared
 from tomoskin.sensing.segment import Region
@@ -120,13 +121,12 @@ class RubbedTouches:
         self._dv: list[FloatArray] = []
         self._covered = np.zeros(len(self.places))
         self._several = self._frames = 0
-        self._last = -np.inf
+        self._is_due = Every(OFTEN)
 
     def push(self, result: FrameResult) -> None:
         """Take a frame, where it shows one touch that is not the last one again."""
-        if 0 <= result.host_time - self._last < OFTEN or not result.touches:
+        if not result.touches or not self._is_due(result.host_time):
             return
-        self._last = result.host_time
         self._frames += 1
         if len(result.touches) > 1 or result.touches[0].merged:
             self._several += 1

@@ -9,12 +9,11 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
-from tomoskin.board.source import BOARDS, DEFAULT_BOARD, Transport, list_ports, open_source
+from tomoskin.board.source import BOARDS, DEFAULT_BOARD, list_ports, open_source
 from tomoskin.board.wire import SCHEMA, Info
 from tomoskin.core import DataError, SourceError, WireError
 from tomoskin.files.exports import WRITERS, Export, export_touches
 from tomoskin.files.session import ReplayTransport, SessionReader, as_recorded, parse_replay
-from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared
 from tomoskin.run import Runner, commands
 from tomoskin.server.folder import SESSION, Folder
@@ -88,7 +87,9 @@ class SourceSwitch:
         with SessionReader(path) as session:
             prepared = as_recorded(session, runner.prepared)
         live = self._live or _Live(self.spec, runner.prepared)
-        runner.ask(commands.Change(prepared, partial(_replay, path, prepared.skin)))
+        runner.ask(
+            commands.Change(prepared, lambda: ReplayTransport(SessionReader(path), prepared.skin))
+        )
         self._live, self.spec, self._hub.opener = live, f"replay:{path.name}", None
 
     def back(self) -> None:
@@ -104,10 +105,6 @@ class SourceSwitch:
         self._hub.runner.ask(commands.Change(live.prepared, opener))
         self._live, self.spec = None, live.spec
         self._hub.opener = partial(open_source, live.spec)
-
-
-def _replay(path: Path, skin: Skin) -> Transport:
-    return ReplayTransport(SessionReader(path), skin)
 
 
 def _identity(info: Info, name: str) -> BoardNow:

@@ -1,16 +1,25 @@
-"""MATLAB files (v5 to v7) as plain arrays and structures, refused where they would not end."""
+"""MATLAB files (v5 to v7) as plain arrays and structures, refused where they would not end; EIDORS'
+structures in them."""
 
 from __future__ import annotations
 
 import math
 import struct
 import zlib
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
 from scipy.io import loadmat, whosmat
+from scipy.sparse import issparse
 
-from tomoskin.core import DataError, check_fits
+from tomoskin.core import DataError, FloatArray, IntArray, check_fits, numeric
+from tomoskin.files.imports.interchange import OWN
+from tomoskin.files.imports.tables import drives_of, pairs_of, voltages_of
+from tomoskin.sensing.signal import Recording
 
 _HEAD = 128
 _COMPRESSED = 15
@@ -79,3 +88,134 @@ def _unpacked(data: bytes, total: int, where: str) -> int:
         check_fits(total, where)
         data = unpack.unconsumed_tail
     return total
+
+
+_DATA = ("vi", "vv", "v", "data", "meas")
+_REFERENCE = ("vh", "reference")
+
+
+def is_eidors(variables: Mapping[str, Any]) -> bool:
+    """Whether there is a stimulation structure, or the same as matrices."""
+    return _stimulation(variables) is not None or set(variables) >= {"stim", "meas", "meas_stim"}
+
+
+def read_eidors(variables: Mapping[str, Any], source: str) -> Recording:
+    """EIDORS' structures: a ``stimulation`` array with ``stim_pattern`` and ``meas_pattern``.
+
+    They stand alone or in a model (``fmdl``, ``img.fwd_model``, …). Each has the current into every
+    electrode (n_el, 1) and one row of ±1 a measurement (n, n_el). Data are columns, one a frame:
+    ``vi``, ``vv``, ``v``, ``data`` or ``meas`` (or a structure with ``meas``), with ``vh`` as the
+    reference; full scans are thinned by ``meas_select``. The same as plain matrices: ``stim``
+    (n_drives, n_el), ``meas`` (n_meas, n_el), ``meas_stim`` (n_meas, 1) from 1. Electrodes keep
+    their numbers: EIDORS' own circles begin at the top and count clockwise, as built-in skins do.
+
+    Raises
+    ------
+    DataError
+        When a pattern is not one electrode against one other, there are no data, or their
+        number of rows is another.
+    """
+    stimulation = _stimulation(variables)
+    if stimulation is None:
+        drive, measure = _flat_rows(variables, source)
+        names = tuple(name for name in _DATA if name != "meas")
+    else:
+        drive, measure = _rows(stimulation, source)
+        names = _DATA
+    select = variables.get("meas_select")
+    voltages = _read(variables, names, select, len(drive), source)
+    if voltages is None:
+        raise DataError(
+            f"expected data of {len(drive)} rows among {', '.join(names)}, got the variables "
+            f"{', '.join(sorted(variables))}",
+            where=source,
+        )
+    reference = _read(variables, _REFERENCE, select, len(drive), source)
+    idle = _numbers(variables, "idle", ())
+    recording = voltages_of(
+        source,
+        voltages,
+        (drive, measure),
+        time=_numbers(variables, "time_s", (len(voltages),)),
+        reference=None if reference is None else reference[0],
+        labels=_numbers(variables, "xy_m", (len(voltages), 2)),
+    )
+    return replace(
+        recording,
+        idle=int(idle) if idle is not None and idle in range(1, len(voltages) + 1) else 1,
+        board_known=OWN in variables,
+    )
+
+
+def _stimulation(variables: Any) -> list[Mapping[str, Any]] | None:
+    """The first stimulation structure in the variables or in a model among them."""
+    if not isinstance(variables, Mapping):
+        return None
+    for key in ("stimulation", "stim"):
+        names = variables.get(key)
+        listed = [names] if isinstance(names, Mapping) else names
+        if isinstance(listed, list | np.ndarray) and len(listed):
+            items = [item for item in listed if isinstance(item, Mapping)]
+            if len(items) == len(listed) and all("stim_pattern" in item for item in items):
+                return items
+    inner = (_stimulation(value) for value in variables.values())
+    return next((item for item in inner if item is not None), None)
+
+
+def _rows(stimulation: list[Mapping[str, Any]], source: str) -> tuple[NDArray[Any], IntArray]:
+    currents, measures = [], []
+    for number, item in enumerate(stimulation, start=1):
+        where = f"{source}, stimulation {number}"
+        current = _dense(item["stim_pattern"], where).reshape(1, -1)
+        patterns = np.atleast_2d(_dense(item.get("meas_pattern"), where))
+        measures.append(pairs_of(patterns, "measurement", where))
+        currents.append(np.repeat(current, len(patterns), axis=0))
+    drive = drives_of(np.concatenate(currents), "drive of row", source)
+    return drive, np.concatenate(measures)
+
+
+def _flat_rows(variables: Mapping[str, Any], source: str) -> tuple[NDArray[Any], IntArray]:
+    drives = drives_of(np.atleast_2d(_dense(variables["stim"], source)), "drive", source)
+    measure = pairs_of(np.atleast_2d(_dense(variables["meas"], source)), "measurement", source)
+    index = _dense(variables["meas_stim"], source).reshape(-1)
+    is_number = (index == np.round(index)) & (index >= 1) & (index <= len(drives))
+    if len(index) != len(measure) or not is_number.all():
+        raise DataError(
+            f"expected meas_stim of {len(measure)} drives from 1 to {len(drives)}, "
+            f"got {len(index)} values, not all of them such drives",
+            where=source,
+        )
+    return drives[index.astype(int) - 1], measure
+
+
+def _read(
+    variables: Mapping[str, Any], names: tuple[str, ...], select: Any, n_rows: int, source: str
+) -> NDArray[Any] | None:
+    """(n_frames, n_rows) of the first of ``names`` that has so many rows."""
+    for name in names:
+        value = variables.get(name)
+        if isinstance(value, Mapping):
+            value = value.get("meas")
+        if value is None or isinstance(value, str | list):
+            continue
+        data = _dense(value, source)
+        data = data.reshape(-1, 1) if data.ndim == 1 else data
+        if data.ndim == 2 and select is not None and len(data) == np.size(select) != n_rows:
+            data = data[np.flatnonzero(_dense(select, source))]
+        if data.ndim == 2 and len(data) == n_rows:
+            return np.ascontiguousarray(data.T)
+    return None
+
+
+def _numbers(variables: Mapping[str, Any], name: str, shape: tuple[int, ...]) -> FloatArray | None:
+    """What our own export has beside; None where it is something else."""
+    names = np.asarray(variables.get(name))
+    if names.size != math.prod(shape) or names.dtype.kind not in "iuf":
+        return None
+    return names.reshape(shape).astype(np.float64)
+
+
+def _dense(value: Any, where: str) -> NDArray[Any]:
+    sparse: Any = value
+    array = numeric(sparse.toarray() if issparse(value) else value, DataError, where=where)
+    return array.astype(np.complex128 if array.dtype.kind == "c" else np.float64, copy=False)

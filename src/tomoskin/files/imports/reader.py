@@ -11,16 +11,8 @@ import numpy as np
 from scipy.io.matlab import MatlabObject, MatlabOpaque
 
 from tomoskin.core import EMPTY, MAGIC, Arrays, DataError, StrPath, load_arrays, open_input
-from tomoskin.files.imports import (
-    csv_table,
-    eidors,
-    interchange,
-    matrices,
-    sciospec,
-    sixteen,
-    text_logs,
-)
-from tomoskin.files.imports.matlab import is_matlab, load_matlab
+from tomoskin.files.imports import interchange, matrices, sixteen, text_logs
+from tomoskin.files.imports.matlab import is_eidors, is_matlab, load_matlab, read_eidors
 from tomoskin.files.imports.text_logs import bytes_lines, text_lines
 from tomoskin.files.session import read_session
 from tomoskin.sensing.signal import Recording
@@ -37,10 +29,10 @@ ARRAY_FORMATS: tuple[Format, ...] = (
 """What recognises a format by its arrays, and what reads it."""
 
 TEXT_FORMATS: tuple[Format, ...] = (
-    (csv_table.detects, csv_table.parse),
+    (interchange.is_table, interchange.read_table),
     (text_logs.is_open_eit, text_logs.read_open_eit),
     (text_logs.is_eit_kit, text_logs.read_eit_kit),
-    (sciospec.detects, sciospec.parse),
+    (text_logs.is_sciospec, text_logs.read_sciospec),
     (text_logs.is_serial_log, text_logs.read_serial_log),
 )
 """The same for text, by its first lines."""
@@ -97,8 +89,8 @@ def _from_arrays(arrays: Arrays, path: Path) -> Recording:
 
 
 def _from_matlab(variables: dict[str, Any], path: Path) -> Recording:
-    if eidors.detects(variables):
-        return eidors.parse(variables, str(path))
+    if is_eidors(variables):
+        return read_eidors(variables, str(path))
     if objects := [k for k, v in variables.items() if isinstance(v, MatlabObject | MatlabOpaque)]:
         raise DataError(
             f"holds MATLAB objects ({', '.join(objects)}), which only MATLAB can read",

@@ -26,8 +26,10 @@ _QUIET = frozenset(
 
 _FLOAT32 = 7
 _FRAME = "skin"
-_TEXT_HEIGHT = 8e-3
-_TEXT_COLOUR = {"r": 0.5, "g": 0.5, "b": 0.5, "a": 1.0}
+TEXT_HEIGHT = 8e-3
+"""Height of a touch's number, m."""
+
+TEXT_COLOUR = {"r": 0.5, "g": 0.5, "b": 0.5, "a": 1.0}
 _UPRIGHT = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
 
 _UNUSED = ("arrows", "cubes", "cylinders", "lines", "triangles", "models")
@@ -123,8 +125,8 @@ def _entity(contact: Contact, now: dict[str, int]) -> Message:
              "color": touch_colour(touch)}
         ],
         "texts": [
-            {"pose": pose, "billboard": True, "font_size": _TEXT_HEIGHT, "scale_invariant": False,
-             "color": _TEXT_COLOUR, "text": str(touch.id)}
+            {"pose": pose, "billboard": True, "font_size": TEXT_HEIGHT, "scale_invariant": False,
+             "color": TEXT_COLOUR, "text": str(touch.id)}
         ],
     }  # fmt: skip
 

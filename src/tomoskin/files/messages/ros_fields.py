@@ -9,15 +9,17 @@ import numpy as np
 
 from tomoskin.core import FloatArray, Image, PixelMap
 from tomoskin.files.messages.contacts import Contact, Contacts
-from tomoskin.files.messages.foxglove_records import touch_colour, touch_width
+from tomoskin.files.messages.foxglove_records import (
+    TEXT_COLOUR,
+    TEXT_HEIGHT,
+    touch_colour,
+    touch_width,
+)
 from tomoskin.model.robot import Place
 
 Value = dict[str, Any]
 
 _SPHERE, _TEXT, _DELETE_ALL = 2, 9, 3
-_LABEL = 8e-3
-"""Height of a touch's number, m."""
-_GREY = {"r": 0.5, "g": 0.5, "b": 0.5, "a": 1.0}
 _OK, _WARN, _ERROR = 0, 1, 2
 _FLOAT32 = 7
 _NO_PARENT = "none: parent=LINK,at=X/Y/Z of the sink would publish where the frame is"
@@ -80,8 +82,8 @@ def markers(head: Value, frame: Contacts) -> Value:
         sphere = {"ns": "touch", "type": _SPHERE, "color": touch_colour(contact.touch)}
         scale = _named("xyz", (width, width, 0.2 * width))
         shown.append(about | sphere | {"scale": scale})
-        label = {"ns": "label", "type": _TEXT, "color": _GREY, "text": str(contact.touch.id)}
-        shown.append(about | label | {"scale": {"z": _LABEL}})
+        label = {"ns": "label", "type": _TEXT, "color": TEXT_COLOUR, "text": str(contact.touch.id)}
+        shown.append(about | label | {"scale": {"z": TEXT_HEIGHT}})
     return {"markers": shown}
 
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import functools
-import hashlib
-import json
 import re
 import struct
 from collections.abc import Mapping
@@ -14,11 +12,6 @@ from typing import Any
 
 import numpy as np
 
-_IDS = {
-    "uint8": 3, "int32": 6, "uint32": 7, "float32": 10, "float64": 11,
-    "bool": 15, "byte": 16, "string": 17,
-}  # fmt: skip
-_NESTED, _FIXED, _ENDLESS = 1, 48, 144
 _LAYOUTS = {
     "uint8": "B", "byte": "B", "bool": "?", "int32": "i", "uint32": "I", "int64": "q",
     "uint64": "Q", "float32": "f", "float64": "d",
@@ -26,18 +19,27 @@ _LAYOUTS = {
 _CDR = b"\x00\x01\x00\x00"
 
 
+_HASH = "# "
+"""What stands before a type's hash, behind its name."""
+
+
+def _text(file: str) -> str:
+    return (files(__package__) / file).read_text(encoding="utf-8")
+
+
 def _read_types(file: str) -> dict[str, dict[str, str]]:
-    text = (files(__package__) / file).read_text(encoding="utf-8")
     types = {}
-    for block in text.strip().split("\n\n"):
+    for block in _text(file).strip().split("\n\n"):
         title, *lines = re.sub("/(?!srv/|[A-Z][a-zA-Z]+_)", "/msg/", block).splitlines()
-        fields = [line.split() for line in lines]
+        fields = [line.split() for line in lines if not line.startswith(_HASH)]
         types[title.removeprefix("MSG: ")] = {name: kind for kind, name in fields}
     return types
 
 
 TYPES = _read_types("ros_types.msg")
 """Fields of each message by name, in order: a number, ``string``, another message, or an array."""
+
+_HASHES = dict(zip(TYPES, re.findall(f"{_HASH}(.+)", _text("ros_types.msg")), strict=True))
 
 NODE_TYPES = TYPES | _read_types("ros_node.msg")
 """The same with what the services of a node take and give, as ``rmw_cyclonedds`` sends it."""
@@ -57,26 +59,10 @@ class Field:
         kind, bracket, length = text.rstrip("]").partition("[")
         return Field(kind, int(length or 0) if bracket else None)
 
-    def description(self) -> dict[str, Any]:
-        """What a type's hash is made of."""
-        number = _IDS.get(self.kind, _NESTED)
-        if self.length is not None:
-            number += _FIXED if self.length else _ENDLESS
-        return {
-            "type_id": number,
-            "capacity": self.length or 0,
-            "string_capacity": 0,
-            "nested_type_name": "" if self.kind in _IDS else self.kind,
-        }
-
 
 def type_hash(kind: str) -> str:
     """RIHS01 hash of a message's type, as ROS 2 has it from Iron on."""
-    content = {
-        "type_description": _described(kind),
-        "referenced_type_descriptions": [_described(name) for name in sorted(_used_by(kind))],
-    }
-    return "RIHS01_" + hashlib.sha256(json.dumps(content).encode()).hexdigest()
+    return _HASHES[kind]
 
 
 def dds_name(kind: str) -> str:
@@ -108,13 +94,6 @@ def _fields(kind: str) -> str:
 def _short(kind: str) -> str:
     """As definitions name it: without "msg"."""
     return kind.replace("/msg/", "/")
-
-
-def _described(kind: str) -> dict[str, Any]:
-    fields = [
-        {"name": name, "type": Field.of(text).description()} for name, text in TYPES[kind].items()
-    ]
-    return {"type_name": kind, "fields": fields}
 
 
 def _used_by(kind: str) -> set[str]:
