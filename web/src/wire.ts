@@ -307,10 +307,8 @@ export interface Figures {
   readonly median_mm?: number;
   readonly doubtful?: readonly number[];
   readonly probability?: number;
-  readonly odds?: number;
   readonly mapping?: string;
   readonly runner_up?: string;
-  readonly polarity_known?: boolean;
   readonly errors?: readonly number[];
   readonly deviation_mm?: number;
   readonly remarks?: readonly string[];
@@ -332,7 +330,6 @@ export interface RubbedNow {
   readonly enough: boolean;
   readonly places: readonly number[];
   readonly covered: readonly number[];
-  readonly near_m: number;
 }
 
 /** Every section and key of a skin file. */

@@ -16,6 +16,7 @@ from tomoskin.cli.output import JsonFlag, concluded
 if TYPE_CHECKING:
     from tomoskin.board.source import Transport
     from tomoskin.run import CheckFinding
+    from tomoskin.sensing.signal import LoadRing
 
 app = group("board")
 
@@ -119,13 +120,11 @@ def _asked(question: str) -> float | None:
 
 
 @contextlib.contextmanager
-def _opened(source: str, ring: object, current: float) -> Iterator[Transport]:
+def _opened(source: str, ring: LoadRing, current: float) -> Iterator[Transport]:
     from tomoskin.board.source import open_source
     from tomoskin.model.skin import Skin
-    from tomoskin.sensing.signal import LoadRing
     from tomoskin.twin.emulator import emulate_load
 
-    assert isinstance(ring, LoadRing)
     name, _, board = source.partition(":")
     if name == "emulator" and (board or DEFAULT_BOARD) in BOARDS:
         with emulate_load(ring.resistance, current, board or DEFAULT_BOARD) as transport:

@@ -231,7 +231,5 @@ class Dots:
 
 def _gap(pressed: FloatArray, places: FloatArray) -> FloatArray:
     """(n,) m from each of ``places`` (n, 2) to the nearest of ``pressed`` (k, 2)."""
-    if not len(pressed):
-        return np.full(len(places), np.inf)
     apart = np.linalg.norm(places[:, None] - pressed, axis=-1)
-    return np.asarray(apart.min(axis=1))
+    return np.asarray(apart.min(axis=1, initial=np.inf))

@@ -324,8 +324,8 @@ class LabelNow(MessagePart, frozen=True):
 class RubbedNow(MessagePart, frozen=True):
     """What was rubbed so far.
 
-    ``places`` are the positions of the map, ``covered`` how many touches lay near each, and
-    ``near_m`` how near; ``text`` says what is missing.
+    ``places`` are the positions of the map, ``covered`` how many touches lay near each; ``text``
+    says what is missing.
     """
 
     touches: int
@@ -334,7 +334,6 @@ class RubbedNow(MessagePart, frozen=True):
     enough: bool
     places: Flat
     covered: Flat
-    near_m: float
 
 
 class Figures(MessagePart, frozen=True, omit_defaults=True):
@@ -344,10 +343,8 @@ class Figures(MessagePart, frozen=True, omit_defaults=True):
     median_mm: float | None = None
     doubtful: list[int] | None = None
     probability: float | None = None
-    odds: float | None = None
     mapping: str | None = None
     runner_up: str | None = None
-    polarity_known: bool | None = None
     errors: Flat | None = None
     deviation_mm: float | None = None
     remarks: list[str] | None = None

@@ -106,9 +106,7 @@ def estimate_mapping(
     figures = Figures(
         mapping=solution.mapping.text(ring),
         probability=solution.probability,
-        odds=min(solution.odds, 1e9),
         runner_up=solution.runner_up.text(ring),
-        polarity_known=solution.polarity_known,
         doubtful=[row for row, _, _ in solution.contradicted],
     )
     text = _in_words(solution, figures)

@@ -248,7 +248,6 @@ class RubFlow(DotFlow):
                 needed=_FEWEST,
                 places=self._touches.places.ravel().tolist(),
                 covered=rubbed.covered.tolist(),
-                near_m=self._touches.near,
             ),
         }
 

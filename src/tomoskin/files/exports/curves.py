@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tomoskin.core import AMOUNT, FloatArray, StrPath, write_rows
-from tomoskin.files.exports.picture import dress, new_figure, panel_axes, save_figure
+from tomoskin.files.exports.picture import dress, new_figure, panel_figure, save_figure
 from tomoskin.imaging import AlphaChoice, Curve, Merit, Picard
 from tomoskin.model.skin import Skin
 from tomoskin.sensing.fit import ResolutionBounds
@@ -41,11 +41,8 @@ def write_choices(
     """
     drawn = [(choice, choice.curve) for choice in choices if choice.curve is not None]
     count = len(drawn) + (picard is not None)
-    columns = max(min(count, _ACROSS), 1)
-    rows = max(-(-count // columns), 1)
-    figure = new_figure(path, 4.4 * columns, 3.4 * rows + 0.4)
+    figure, axes = panel_figure(path, count, _ACROSS, (4.4, 3.4), (0.0, 0.4))
     figure.suptitle(title, fontsize=11)
-    axes = panel_axes(figure, count, columns)
     for ax, (choice, curve) in zip(axes, drawn, strict=False):
         _draw(ax, choice, curve)
     if picard is not None:

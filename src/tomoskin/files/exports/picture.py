@@ -42,13 +42,20 @@ def new_figure(path: StrPath, width: float, height: float) -> Figure:
     return figure
 
 
-def panel_axes(figure: Figure, count: int, columns: int) -> list[Axes]:
-    """So many axes in rows of that many ``columns``; there may be none."""
+def panel_figure(
+    path: StrPath, count: int, across: int, size: tuple[float, float], more: tuple[float, float]
+) -> tuple[Figure, list[Axes]]:
+    """Figure of so many panels, none perhaps, at most so many ``across``; and their axes.
+
+    Each panel has that ``size``, and the figure so much ``more``: width and height in inches.
+    """
+    columns = max(min(count, across), 1)
     rows = max(-(-count // columns), 1)
+    figure = new_figure(path, size[0] * columns + more[0], size[1] * rows + more[1])
     axes: list[Axes] = np.atleast_1d(figure.subplots(rows, columns)).ravel().tolist()
     for ax in axes[count:]:
         ax.set_visible(False)
-    return axes[:count]
+    return figure, axes[:count]
 
 
 def dress(ax: Any, title: str, x: str, y: str) -> None:
@@ -201,12 +208,8 @@ class _Sheet:
 
     def figure(self) -> Figure:
         """All panels, in rows of four."""
-        panels = self.panels
-        columns = min(len(panels), 4)
-        rows = -(-len(panels) // columns)
-        figure = new_figure(self.name, 3.2 * columns + 1.1, 3.3 * rows)
-        axes = panel_axes(figure, len(panels), columns)
-        for ax, panel in zip(axes, panels, strict=True):
+        figure, axes = panel_figure(self.name, len(self.panels), 4, (3.2, 3.3), (1.1, 0.0))
+        for ax, panel in zip(axes, self.panels, strict=True):
             drawn = self.draw(ax, panel)
         figure.colorbar(drawn, ax=figure.axes, **self.bar)
         return figure

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, reduce
 from pathlib import Path
 from typing import Any
 
@@ -53,9 +53,7 @@ def as_recorded(session: SessionReader, previous: Prepared | None = None) -> Pre
     """
     known = previous.calibrations if previous else {}
     prepared = prepare(session.skin, previous.uncalibrated() if previous else None)
-    for calibration in recorded_calibrations(session, known):
-        prepared = prepared.calibrated(calibration)
-    return prepared
+    return reduce(Prepared.calibrated, recorded_calibrations(session, known), prepared)
 
 
 def recorded_calibrations(
