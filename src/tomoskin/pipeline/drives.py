@@ -271,8 +271,6 @@ class DriveWatch:
         if known is not None and not known.stands(touch, moving.content, time):
             known.touch, known.frames = touch, None
             return known
-        if known is not None and known.lifted is None and time < known.begun:
-            return _Followed(touch, known.moving, known.full, odds=known.odds)  # it came down then
         if heir is not None and heir.lifted is None:
             return _Followed(touch, heir.moving, moving.content, odds=heir.odds)
         return _Followed(touch, moving, moving.content)
