@@ -777,6 +777,7 @@ export interface SpaceTouch {
   readonly peak: number;
   readonly force: number | null;
   readonly more_than: number | null;
+  readonly is_self: boolean | null;
 }
 
 export type ServerMessage =

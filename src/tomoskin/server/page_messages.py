@@ -443,7 +443,8 @@ class SpaceTouch(MessagePart, frozen=True):
     """A touch where the robot is drawn, in the frame of its root.
 
     ``force``: N, null where nothing gives it; ``more_than``: N that it is more than, where it is
-    beyond what was taught; else null.
+    beyond what was taught; else null. ``is_self``: whether a link of the robot itself touches;
+    null where that is not known.
     """
 
     id: int
@@ -452,6 +453,7 @@ class SpaceTouch(MessagePart, frozen=True):
     peak: float
     force: float | None
     more_than: float | None = None
+    is_self: bool | None = None
 
 
 class TouchesOfSkin(MessagePart, frozen=True):
