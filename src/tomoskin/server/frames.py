@@ -118,10 +118,7 @@ def encode_result(
             _record("Truth", [(p.x, p.y, p.force, p.radius) for p in truth]),
             _bend(result.bend),
             _labels(touches, len(result.image.values)),
-            *(
-                np.rint(np.minimum(part / DENT_STEP, 65535)).astype("<u2").tobytes()
-                for part in dent or ()
-            ),
+            np.rint(np.minimum(np.array(dent or ()) / DENT_STEP, 65535)).astype("<u2").tobytes(),
         ]
     )
 
