@@ -11,7 +11,7 @@ import numpy as np
 from bench_rig import drawn, gap
 from report import Floats, Report, mm, progress, rms, table
 from tomoskin.core import Detection, Frame
-from tomoskin.learning import BENDS, BendExamples, BendModel, Differences, FrameView, JointReference
+from tomoskin.learning import BODY, BodyExamples, BodyModel, Differences, FrameView, JointReference
 from tomoskin.model.mesh import Cylinder, Hinge
 from tomoskin.pipeline import Pipeline, Prepared
 from tomoskin.pipeline.finding import finder_of, voltage_covariance
@@ -160,7 +160,7 @@ class Bench:
             self.volts((), pose)
         return found
 
-    def learnt(self) -> BendModel:
+    def learnt(self) -> BodyModel:
         """From one recording of known bends."""
         rows, angles, times = [], [], []
         for top, step in TURNS:
@@ -169,12 +169,12 @@ class Bench:
                 angles.append(math.radians(angle))
                 times.append(self.lab.time)
         axis = np.full(len(rows), math.pi / 2)
-        examples = BendExamples.checked(np.array(rows), angles, axis, times)
-        return BendModel.learn(examples, voltage_covariance(self.lab.prepared, self.flat))
+        examples = BodyExamples.checked(np.array(rows), angles, axis, times)
+        return BodyModel.learn(examples, voltage_covariance(self.lab.prepared, self.flat))
 
     def moved(self) -> Moving:
         """Single touches while the sheet bends up and down, as the live pipeline sees them."""
-        bends = BENDS.of(self.model, self.lab.prepared.pattern)
+        bends = BODY.of(self.model, self.lab.prepared.pattern)
         pipeline = Pipeline(self.lab.prepared.calibrated(bends))
         out: Moving = {name: [] for name in ("places", "plain", "free", "touched", "right")}
         self.frame((), (), REST)

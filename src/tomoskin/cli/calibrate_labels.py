@@ -3,10 +3,11 @@ B-1, arrays of the file, and what the twin has noted in a session."""
 
 from __future__ import annotations
 
+import csv
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import typer
@@ -16,7 +17,7 @@ from tomoskin.core import DataError, FloatArray
 
 if TYPE_CHECKING:
     from tomoskin.core import Arrays, Detection, Touch
-    from tomoskin.learning import Codes, Examples, LabelledPresses, Measurand
+    from tomoskin.learning import BodyExamples, Codes, Examples, LabelledPresses, Measurand
     from tomoskin.pipeline import Reconstruction
     from tomoskin.sensing.signal import Recording
 
@@ -178,19 +179,64 @@ def _goes_on(before: Touch, touch: Touch) -> bool:
     return before.id == touch.id and bool(apart**2 <= now.area / np.pi)
 
 
-Bends = tuple[list[int], FloatArray, FloatArray]
-"""Frames, and the angle and axis in each, rad."""
+def body_examples(
+    path: Path, data: Recording, rest: FloatArray, given: list[str] | None, table: Path | None
+) -> BodyExamples:
+    """Frames with the states of the body that options or a ``table`` name, else those of the
+    file's ``body`` or the session's truth; of a file without any, all frames without a state.
 
-
-def bends(path: Path, data: Recording, given: list[str] | None) -> Bends:
-    """Bends that options name, else those of the session's truth.
-
-    From the truth come frames that nothing presses, with one bend or none.
+    From the truth come frames that nothing presses.
     """
-    pairs = _named_bends(given, len(data)) if given else _true_bends(path, data)
-    frames = sorted(pairs)
-    angle, axis = np.array([pairs[frame] for frame in frames]).T
-    return frames, angle, axis
+    from tomoskin.learning import BodyExamples
+
+    frames, known = _states(path, data, given, table)
+    return BodyExamples.checked(data.voltages[frames] - rest, data.time[frames], **known)
+
+
+def _states(
+    path: Path, data: Recording, given: list[str] | None, table: Path | None
+) -> tuple[list[int], dict[str, Any]]:
+    """Frames, and what is known of the body in them."""
+    if given:
+        pairs = _named_bends(given, len(data))
+        angle, axis = np.array([pairs[frame] for frame in sorted(pairs)]).T
+        return sorted(pairs), {"angle": angle, "axis": axis}
+    if table is not None:
+        return _tabled(table, len(data))
+    arrays = _arrays(path)
+    if "body" in arrays:
+        state = arrays["body"].reshape(len(data), -1)
+        names = arrays.get("body_names", np.arange(1, state.shape[1] + 1)).ravel().tolist()
+        return list(range(len(data))), _named(list(map(str, names)), state)
+    return _true_states(path, data)
+
+
+def _tabled(table: Path, n: int) -> tuple[list[int], dict[str, Any]]:
+    """The states of a table with a column ``frame`` and one for each coordinate."""
+    with table.open(encoding="utf-8", newline="") as file:
+        head, *rows = list(csv.reader(file))
+    try:
+        values = np.array(rows, dtype=np.float64)
+    except ValueError:
+        values = np.zeros((0, 0))
+    if head[:1] != ["frame"] or values.ndim != 2 or values.shape[1] != len(head) > 1:
+        raise DataError(
+            "expected a column frame, one for each coordinate, and numbers",
+            where=str(table),
+            hint="for example: frame,angle_deg,stretch",
+        )
+    frames = values[:, 0].astype(int)
+    if len(frames) and not 0 <= frames.min() <= frames.max() < n:
+        raise DataError(f"expected frames within 0:{n}, got others", where=str(table))
+    return frames.tolist(), _named(head[1:], values[:, 1:])
+
+
+def _named(names: list[str], state: FloatArray) -> dict[str, Any]:
+    """Coordinates in the units in which they are kept: angles in rad."""
+    turned = [name.startswith("angle") and name.endswith("_deg") for name in names]
+    state = state * np.where(turned, math.pi / 180, 1.0)
+    kept = [name.removesuffix("_deg") if t else name for name, t in zip(names, turned, strict=True)]
+    return {"state": state, "names": tuple(name.removesuffix("_rad") for name in kept)}
 
 
 def _named_bends(given: list[str], n: int) -> dict[int, tuple[float, float]]:
@@ -211,26 +257,33 @@ def _angles(text: str) -> tuple[float, float]:
     return angle
 
 
-def _true_bends(path: Path, data: Recording) -> dict[int, tuple[float, float]]:
+def _true_states(path: Path, data: Recording) -> tuple[list[int], dict[str, Any]]:
     from tomoskin.files.imports import is_session
     from tomoskin.files.session import SessionReader
 
-    truth, pairs = [], {}
+    truth = []
     if is_session(path):
         with SessionReader(path) as session:
             truth = list(session.truth())
+    if not any(item.bends for item in truth):
+        return list(range(len(data))), {}
     at = np.searchsorted([item.host_time for item in truth], data.time, side="right") - 1
-    for frame, number in enumerate(at.tolist()):
-        item = truth[number] if number >= 0 else None
-        if item is None or item.presses or len(item.bends) > 1:
-            continue
-        bend = item.bends[0] if item.bends else {"angle": 0.0, "axis": math.pi / 2}
-        if "angle" in bend:
-            pairs[frame] = float(bend["angle"]), float(bend["axis"])
-    if not pairs:
-        raise DataError(
-            "holds no angles of bends",
-            where=str(path),
-            hint="give them: --bend 0=0:20 --bend 30=40:60",
-        )
-    return pairs
+    frames = [k for k, number in enumerate(at.tolist()) if number >= 0]
+    frames = [k for k in frames if not truth[at[k]].presses]
+    rows = [_amounts(truth[at[k]].bends) for k in frames]
+    angle, axis, stretch = np.array(rows).T
+    if not stretch.any():
+        return frames, {"angle": angle, "axis": axis}
+    names: tuple[str, ...] = ("angle", "stretch")
+    state = np.column_stack([angle, stretch])
+    if not angle.any():
+        state, names = state[:, 1:], names[1:]
+    return frames, {"state": state, "names": names, "axis": axis[np.abs(angle).argmax()]}
+
+
+def _amounts(bends: Sequence[Mapping[str, Any]]) -> tuple[float, float, float]:
+    """Angle and axis of what is bent, and elongation of what is stretched."""
+    bent = [bend for bend in bends if "angle" in bend]
+    angle, axis = (bent[0]["angle"], bent[0]["axis"]) if bent else (0.0, math.pi / 2)
+    stretch = sum(bend["strain"] for bend in bends if "strain" in bend)
+    return float(angle), float(axis), float(stretch)

@@ -176,6 +176,9 @@ class Applied:
         del view
         return detections
 
+    def renew(self, response: Response, gain: float) -> None:
+        """Go on with touches that are fitted on another sheet; see :class:`TouchFit`."""
+
     def read(self, view: FrameView, detections: list[Detection], *, touched: bool) -> Any | None:
         """What the frame says of the calibration's subject.
 
