@@ -1,4 +1,4 @@
-"""A body that moves: what it does to the data, its state, and references by a joint's angle."""
+"""A body that moves: what it does to the data, and its state."""
 
 from __future__ import annotations
 
@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from tomoskin.core import DataError
-from tomoskin.learning import BodyExamples, BodyModel, BodyReader, JointReference
+from tomoskin.learning import BodyExamples, BodyModel, BodyReader
 from tomoskin.learning.body.body_model import Memory
-from tomoskin.learning.body.body_reader import BodyReader
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import prepare
 from tomoskin.sensing.fit import SpotModel
@@ -265,23 +264,3 @@ def test_the_angle_is_read_beside_a_touch(skin):
     assert np.degrees(found.angle) == pytest.approx(30, abs=1.5)
     blind = read.push(data, (), common, 0.1)
     assert abs(blind.angle - np.radians(30)) > abs(found.angle - np.radians(30))
-
-
-def test_references_between_recorded_angles():
-    random = np.random.default_rng(6)
-    angle = np.repeat(np.radians([0.0, 20.0, 40.0, 60.0]), 10)
-    level = 1.0 + np.outer(angle, SHAPES[0]) + np.outer(angle**2, SHAPES[1])
-    joint = JointReference.of(level + NOISE * random.standard_normal(level.shape), angle)
-    at = np.radians(30)
-    wanted = 1.0 + at * SHAPES[0] + at**2 * SHAPES[1]
-    assert joint.at(at).mean == pytest.approx(wanted, abs=1e-4)
-    assert joint.at(0.0).mean == pytest.approx(np.ones(ROWS), abs=2 * NOISE)
-    assert joint.at(at).noise == pytest.approx(np.full(ROWS, NOISE), rel=0.5)
-    assert joint.at(at).n_frames == 10
-    with pytest.raises(DataError, match=r"from 0\.0° to 60\.0°, got 75\.0°"):
-        joint.at(np.radians(75))
-
-
-def test_a_joint_that_was_not_moved_is_no_reference():
-    with pytest.raises(DataError, match="two or more angles"):
-        JointReference.of(np.ones((5, ROWS)), np.zeros(5))

@@ -15,10 +15,7 @@ from tomoskin.learning.amount.measurand import (
     Measurand as Measurand,
     Weight as Weight,
 )
-from tomoskin.learning.body.body_examples import (
-    BodyExamples as BodyExamples,
-    JointReference as JointReference,
-)
+from tomoskin.learning.body.body_examples import BodyExamples as BodyExamples
 from tomoskin.learning.body.body_model import BodyModel as BodyModel
 from tomoskin.learning.body.body_reader import (
     BODY as BODY,

@@ -148,10 +148,10 @@ class BodyModel:
 
         Directions are the principal ones of the whitened frames above the edge of noise
         (Marchenko & Pastur 1967). Amplitudes are a ridge regression on features of the state.
-        The degree, whether the past counts, and the ridge are what errs least on left-out fifths of the
-        recording. A sheet that remembers is taken to have moved so before its reference was taken,
-        as it will have whenever it is used. Without measured states the leading amplitudes are
-        the state, as few of them as explain the others.
+        Its degree, whether the past counts, and the ridge are what errs least on left-out fifths
+        of the recording. A sheet that remembers is taken to have moved so before its reference
+        was taken, as it will have whenever it is used. Without measured states the leading
+        amplitudes are the state, as few of them as explain the others.
 
         Raises
         ------

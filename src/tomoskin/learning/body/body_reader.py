@@ -13,6 +13,7 @@ from tomoskin.core import Detection, FloatArray
 from tomoskin.learning.body.body_model import BodyModel
 from tomoskin.learning.kind import Applied, Conditions, FrameView, Kind, TouchFit
 from tomoskin.sensing.fit import Response, spots_of
+from tomoskin.sensing.track import RESIDUAL
 
 _BENT = 3.0
 """Deviations by which a state must stand out of rest to be called a bend."""
@@ -25,6 +26,9 @@ _ROUGH = 0.15
 
 _STEPS, _NEAR = 8, 1e-4
 """Of Gauss and Newton, and the step, in parts of a coordinate's largest, that ends them."""
+
+_FADES = 30.0
+"""Seconds in which what touches have left behind fades."""
 
 _WANDER = 1.0
 """Deviation of a state about the one before, in parts of the largest: it may be anything."""
@@ -108,6 +112,8 @@ class BodyReader:
         self._low, self._high = span.min(axis=0), span.max(axis=0)
         self._low, self._high = np.minimum(self._low, 0.0), np.maximum(self._high, 0.0)
         self._x = np.zeros(span.shape[1])
+        self._left = self._pressed = np.zeros((model.n_modes, model.n_modes))
+        self._time = -np.inf
 
     def push(
         self,
@@ -126,6 +132,8 @@ class BodyReader:
         one who has seen the frames before.
         """
         model = self._model
+        self._left = self._left * np.exp((self._time - time) / _FADES)
+        self._time = time
         z, weights, strange = self._amplitudes(dv, detections, common)
         x, spread = self._solved(z, weights, time)
         self._memory.push(x, time)
@@ -154,6 +162,7 @@ class BodyReader:
         model, modes = self._model, self._modes
         change, free = self._touches(detections)
         data = model.whiten(dv) - change
+        self._press(change)
         blind = _basis(np.hstack([model.whiten(common.T).T, free]))
         data, modes = (part - blind @ (blind.T @ part) for part in (data, modes))
         information = modes.T @ modes
@@ -162,9 +171,19 @@ class BodyReader:
         degrees = max(len(data) - blind.shape[1] - model.n_modes, 1)
         left = float(residual @ residual)
         weights = information / max(left / degrees, 1.0)
-        weights = np.linalg.solve(np.eye(model.n_modes) + weights @ model.excess, weights)
+        excess = model.excess + self._left + self._pressed
+        weights = np.linalg.solve(np.eye(model.n_modes) + weights @ excess, weights)
         explained = float(np.sum(model.whiten(dv) ** 2)) * _ROUGH**2
         return z, (weights + weights.T) / 2, left > _LIKE**2 * degrees + explained
+
+    def _press(self, change: FloatArray) -> None:
+        """Take what touches ``change`` (r,), whitened: as much as a part of it along the body's
+        directions, whichever way, may be missed, and stays behind when they are lifted."""
+        if not change.any():
+            self._left, self._pressed = self._left + self._pressed, 0.0 * self._pressed
+            return
+        along = RESIDUAL.part / 2 * (self._modes.T @ change)
+        self._pressed = float(along @ along) * np.eye(len(along))
 
     def _solved(
         self, z: FloatArray, weights: FloatArray, time: float
