@@ -46,6 +46,7 @@ def run() -> Iterator[Report]:
         f"textile twin, springs {' '.join(f'{1e3 * foam:g}' for foam in FOAMS)} mm long; {PRESSES} "
         f"presses of 2 to 4 N, tips of 8 to 15 mm radius, up to 85 mm from the middle; seed {SEED}",
         "off: mean distance of the nearest touch; the last of eight frames",
+        across="layer in the skin file",
     )
     yield table(
         "six expressions of a face",

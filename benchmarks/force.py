@@ -63,6 +63,7 @@ def run(data: Path | None) -> Iterator[Report]:
             "least deviation that one frame of 16 electrodes allows: "
             "Cramér–Rao of the twin without memory at the read-out's noise, from its own "
             "derivatives; position unknown; above 100 % it says that nothing is known",
+            across="force N" if of == "force" else "depth mm",
         )
     yield table(
         "force of held-out presses on the twin's textile, 16 electrodes",
@@ -88,6 +89,7 @@ def run(data: Path | None) -> Iterator[Report]:
         (row for seed, radius in DENTS.items() for row in _dents(seed, radius)),
         f"{MAPS} maps each of 0.3 to 1.1 mm; one tip a sheet, whose size is not given, seeds "
         f"{', '.join(map(str, DENTS))}; without a map: rms of the dent; the dent: above 5 %",
+        across="presses",
     )
     folder = available(data, "eskin_fingertip8", "eskin_hydrogel_round")
     if folder is None:

@@ -328,13 +328,9 @@ def _forward(m: Measured) -> dict[str, Any]:
         "cells": _size(m),
         "unknowns": f"{m.unknowns:,}",
         "ms": _ms(m, "forward"),
-        "faer ms": _ms(m, "faer"),
         "ms/faer": cell(m.ratio("forward", "faer")),
-        "own ms": _ms(m, "own"),
         "ms/own": cell(m.ratio("forward", "own")),
-        "script ms": _ms(m, "script forward"),
         "script ×": cell(m.ratio("script forward", "forward, script run")),
-        "pyEIT ms": _ms(m, "peer forward"),
         "pyEIT ×": cell(m.ratio("peer forward", "forward")),
         "peak MB": cell(m.peak.get("forward")),
     }
@@ -344,12 +340,9 @@ def _jacobian(m: Measured) -> dict[str, Any]:
     return {
         "cells": _size(m),
         "ms": _ms(m, "jacobian"),
-        "script ms": _ms(m, "script jacobian"),
         "script ×": cell(m.ratio("script jacobian", "jacobian, script run")),
-        "pyEIT ms": _ms(m, "peer jacobian"),
         "pyEIT ×": cell(m.ratio("peer jacobian", "jacobian")),
         "after solves ms": _ms(m, "rows"),
-        "copy ms": _ms(m, "copy"),
         "ms/copy": cell(m.ratio("rows", "copy")),
         "ms/new copy": cell(m.ratio("rows", "new copy")),
         "peak MB": cell(m.peak.get("jacobian")),
@@ -361,7 +354,6 @@ def _set_up(m: Measured) -> dict[str, Any]:
         "cells": _size(m),
         "model ms": _ms(m, "model"),
         "ms": _ms(m, "set-up"),
-        "pyEIT ms": _ms(m, "peer set-up"),
         "pyEIT ×": cell(m.ratio("peer set-up", "set-up")),
     }
 

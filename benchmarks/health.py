@@ -61,6 +61,7 @@ def run(data: Path | None) -> Iterator[Report]:
         (_alarms(*case, pressed=on) for case in WELL_SKINS for on in (False, True)),
         "seed 7; pressed: up to three presses at a time of 1 to 12 N anywhere within 95 % of "
         "the radius, begun and ended within a frame, 1 to 10 frames long, no two the same",
+        across="run",
     )
     folder = available(data)
     if folder is None:
@@ -78,6 +79,7 @@ def run(data: Path | None) -> Iterator[Report]:
         (_blamed(folder, *series) for series in dict.fromkeys(SERIES + PRESSED)),
         "voltages only, the reference from the first 20 untouched frames and not followed; "
         "nothing is known of these skins' electrodes, so an alarm may be right",
+        across="frames",
     )
 
 
@@ -220,9 +222,9 @@ def _blamed(folder: Path, name: str, key: str) -> dict[str, Any]:
     named = sorted({f"E{e.electrode + 1} {e.state}" for h in health for e in h.sick})
     return {
         "recording": name.split("/")[1],
+        "rows": pattern.n_meas,
         "frames": "pressed" if (name, key) in PRESSED else "untouched",
         "how many": len(values),
-        "rows": pattern.n_meas,
         "with a sick electrode": sum(bool(h.sick) for h in health),
         "rows lost, median": int(np.median([h.lost.sum() for h in health])),
         "which": ", ".join(named[:4]) + (" …" if len(named) > 4 else "") or "–",

@@ -145,6 +145,7 @@ def run(data: Path | None) -> Iterator[Report]:
         "an old calibration in another session, mean error in mm",
         _another_session(folder / "eskin_hydrogel_round"),
         "eskin_hydrogel_round, 16 electrodes; tested on rows 200 to 399 of the other file",
+        across="presses of the other session",
     )
     yield table(
         "other sessions and skins: mean error in mm, and part in the 90 % ellipses",
@@ -161,6 +162,7 @@ def run(data: Path | None) -> Iterator[Report]:
         "near row 7920 nine of the 32 channels change at once, some up to a hundredfold: the "
         "last tested stretch is mostly after it, what is learnt from is before",
         "rows watched: frame by frame, without labels; what has jumped is left out (Watch)",
+        across="learnt from the last",
     )
     yield table(
         "rows that jump, simulated",
@@ -168,6 +170,7 @@ def run(data: Path | None) -> Iterator[Report]:
         f"learnt from the presses before the last {BEFORE + AFTER} (at most 300); then, after "
         f"{BEFORE} presses, a fifth of the rows (drawn, seed {SEEDS[0]}); tested on the last "
         f"{AFTER}",
+        across="what jumps",
     )
 
 
@@ -180,6 +183,7 @@ def run_strangers(data: Path | None) -> Iterator[Report]:
         f"learnt from presses of the first three quarters (drawn, seed {SEEDS[0]}); own: the last "
         f"{LATE}; others: {LATE} of each other set of the same rows",
         "strangeness: medians of a set; the part in the 90 % ellipses is the least of the others",
+        across="presses",
     )
 
 
@@ -359,13 +363,13 @@ def _drift(data: Path) -> Iterator[dict[str, Any]]:
         scores = []
         for end in ENDS:
             score = _of(known.at(slice(end - past, end)), known.at(slice(end, end + AHEAD)))
-            case = {"learnt from the last": past, "tested": f"{end} to {end + AHEAD - 1}"}
+            case = {"tested": f"{end} to {end + AHEAD - 1}", "learnt from the last": past}
             watched = {"rows watched mm": round(float(score.watched.mean()), 2)}
             yield case | score.figures | watched | {"promised mm": target}
             scores.append(score)
         yield {
-            "learnt from the last": past,
             "tested": "mean of all",
+            "learnt from the last": past,
             "locator mm": round(float(np.mean([s.errors.mean() for s in scores])), 2),
             "rows watched mm": round(float(np.mean([s.watched.mean() for s in scores])), 2),
             "promised mm": target,

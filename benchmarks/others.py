@@ -259,6 +259,7 @@ def run(data: Path | None) -> Iterator[Report]:
         _figures(data),
         f"found: within {NEAR} R; ghost: a maximum above {SHOWN} of the greatest, farther away",
         f"NOSER: plain differences, λ {LAMBDA}, exponent 1/2; angle: median error",
+        across="method",
     )
 
 

@@ -60,13 +60,31 @@ class Report:
     machine: dict[str, str] = field(default_factory=machine)
 
 
-def table(title: str, rows: Iterable[Row], *notes: str) -> Report:
-    """A report whose columns are the names in its rows, as they come; a row may lack some."""
+def table(title: str, rows: Iterable[Row], *notes: str, across: str = "") -> Report:
+    """A report whose columns are the names in its rows, as they come; a row may lack some.
+
+    Rows that are the same up to the column ``across`` become one, with a cell for each value of it.
+    """
     every = tuple(rows)
     columns = tuple(dict.fromkeys(name for row in every for name in row))
-    return Report(
-        title, columns, tuple(tuple(row.get(name, "–") for name in columns) for row in every), notes
-    )
+    cells = tuple(tuple(row.get(name, "–") for name in columns) for row in every)
+    if across:
+        columns, cells, note = joined(columns, cells, columns.index(across))
+        notes = (note, *notes)
+    return Report(title, columns, cells, notes)
+
+
+def joined(
+    columns: tuple[str, ...], rows: Iterable[tuple[Any, ...]], at: int
+) -> tuple[tuple[str, ...], tuple[tuple[Any, ...], ...], str]:
+    """Columns and rows with what is behind the column ``at`` in cells, and a note on those."""
+    cells: dict[tuple[Any, ...], dict[str, str]] = {}
+    for row in rows:
+        cell = "; ".join(map(str, row[at + 1 :]))
+        cells.setdefault(row[:at], {})[f"{columns[at]}: {row[at]}"] = cell
+    names = tuple(dict.fromkeys(name for some in cells.values() for name in some))
+    lines = tuple((*case, *(some.get(name, "–") for name in names)) for case, some in cells.items())
+    return (*columns[:at], *names), lines, f"in each cell: {'; '.join(columns[at + 1 :])}"
 
 
 def cell(value: float | None) -> str:

@@ -108,7 +108,6 @@ def _row(name: str, messages: Messages, before: float) -> Row:
         "messages/s": f"{len(ms) / SECONDS:.0f}",
         "median, ms": f"{np.median(ms):.2f}",
         "99 of 100": f"{np.percentile(ms, 99):.2f}",
-        "longest": f"{ms.max():.1f}",
     }
 
 

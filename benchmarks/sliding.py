@@ -105,6 +105,7 @@ def run() -> Iterator[Report]:
         "errors against the middle of the scan; straight on: from "
         f"{STRAIGHT:g} s after a corner on; behind: along the way, median, straight on",
         "ideal: without memory, drift and vices; rolls: friction of 0.02 in place of 0.3",
+        across="slide_lag, mm",
     )
 
 
@@ -132,15 +133,15 @@ def _row(runs: Sequence[tuple[Way, Sequence[Seen]]], lag: float) -> dict[str, An
                 behind.append(-float(nearest @ heading) / float(np.hypot(*heading)))
     median, p95 = mm(*np.percentile(errors, (50, 95)), digits=1)
     return {
-        "slide_lag, mm": f"{1e3 * lag:g}",
         "frames": frames,
         "found": len(errors),
         "with a second touch": second,
+        "lifted: frames with a touch": after,
+        "slide_lag, mm": f"{1e3 * lag:g}",
         "median mm": median,
         "p95 mm": p95,
         "straight on: median mm": mm(np.median(straight), digits=1)[0],
         "behind, mm": mm(np.median(behind), digits=1)[0],
-        "lifted: frames with a touch": after,
     }
 
 

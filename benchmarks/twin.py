@@ -5,8 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from itertools import product
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -16,9 +14,7 @@ from report import Report, spent, table
 from tomoskin.model.forward import State
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import prepare
-from tomoskin.run import in_processes, in_this_process, make_set
-from tomoskin.twin import COMMON_PRESSES, Press, SetPlan, SteppedSkin, TwinSettings, TwinSkin
-from tomoskin.twin.dent import solved_dent
+from tomoskin.twin import Press, SteppedSkin, TwinSettings, TwinSkin
 
 CASES = (
     ("textile-disc-16", "ideal", 3000),
@@ -28,7 +24,6 @@ CASES = (
     ("tank-16", "tank", 3000),
 )
 FRAMES, ROUND, CHECKED, SEED = 300, 100, 20, 1
-SET, SET_SKIN, SET_ROUNDS, PROCESSES = 5000, "textile-disc-8", 2, (1, 2)
 STEPS, STEPPED_SEED = 500, 11
 
 
@@ -41,48 +36,12 @@ def run() -> Iterator[Report]:
         f"off: largest difference to a model's whole solve over {CHECKED} frames, at the "
         "amplifiers, as a part of the read-out noise of a sample; promised: a tenth",
     )
-    yield _labelled()
 
 
 def run_steps() -> Iterator[Report]:
     """Steps a second of a twin that is pressed step by step, with and without its touches."""
     cases = product(("textile-disc-8", "textile-disc-16"), ("ideal", "textile"), STEPPED)
     yield table("steps a second of processor time, one core", (_stepped(*case) for case in cases))
-
-
-def _labelled() -> Report:
-    """Labelled frames by one process and by two, starts and writing included."""
-    took: dict[int, list[float]] = {n: [] for n in PROCESSES}
-    for number, n in product(range(SET_ROUNDS), PROCESSES):
-        took[n].append(_set_seconds(number, n))
-    rows = (
-        {
-            "skin": SET_SKIN,
-            "frames": SET,
-            "processes": n,
-            "s, least": round(min(times), 1),
-            "s, most": round(max(times), 1),
-            "frames /s": round(SET / min(times)),
-            "× one process": round(min(took[1]) / min(times), 2),
-        }
-        for n, times in took.items()
-    )
-    return table(
-        "twin: labelled frames, over processes",
-        rows,
-        f"one round press each, preset textile; {SET_ROUNDS} rounds in turn, seeds from 0",
-        "each process first solves the dents of 25 faces, about 2.5 s of processor time",
-    )
-
-
-def _set_seconds(seed: int, processes: int) -> float:
-    plan = SetPlan(Skin.load(SET_SKIN).to_toml(), COMMON_PRESSES, "textile", seed, SET)
-    workers = in_this_process if processes == 1 else in_processes(processes)
-    solved_dent.cache_clear()
-    with TemporaryDirectory() as folder:
-        start = time.perf_counter()
-        make_set(plan, Path(folder) / "set", workers, lambda _, __: None)
-        return time.perf_counter() - start
 
 
 def row(name: str, preset: str, triangles: int) -> dict[str, Any]:

@@ -1,7 +1,12 @@
-/* The machine as an ATmega2560 at 16 MHz: timer 1 counts ticks of 4 us, timer 3 is the scan's, timer
+/* The machine as an ATmega2560 at 16 MHz: timer 1 is the scan's, timer 3 counts ticks of 4 us, timer
    0 wakes the main loop every 16 ms; USART 0 the host; the converter one conversion at a time,
    started in the interrupt of the one before. Each timer has one task: writing a compare register
-   disturbs the other channels of a timer in simavr. */
+   disturbs the other channels of a timer in simavr.
+
+   Which interrupt runs first is fixed: timer 1, then what is received and sent, then the converter,
+   then timer 3. Bytes may come and go every 10 us, which is about what the processor needs for both.
+   So the scan's timer stands before them, and sending lets the converter in: a host that talks must
+   not lengthen a drive. */
 #include "hal.h"
 
 #include "crc.h"
@@ -93,13 +98,13 @@ void hal_init(void) {
     ADDRESS_DDR = ADDRESS_MASK;
     DIDR0 = 0xFFu; /* digital inputs off where potentials come in */
     DIDR2 = 0xFFu;
-    TCCR1A = 0u;
-    TCCR1B = BY_64(1);
-    TIMSK1 = _BV(TOIE1);
+    TCCR3A = 0u;
+    TCCR3B = BY_64(3);
+    TIMSK3 = _BV(TOIE3);
     TCCR0A = 0u;
     TCCR0B = _BV(CS02) | _BV(CS00); /* 64 us; an overflow every 16.4 ms */
     TIMSK0 = _BV(TOIE0);
-    TCCR3A = 0u;
+    TCCR1A = 0u;
     hal_uart_set_baud(FIRST_BAUD);
     UCSR0C = _BV(UCSZ01) | _BV(UCSZ00);
     UCSR0B = _BV(RXCIE0) | _BV(RXEN0) | _BV(TXEN0);
@@ -154,7 +159,7 @@ uint32_t hal_current(void) {
     return identity.current;
 }
 
-static void take_byte(void) {
+static inline __attribute__((always_inline)) void take_byte(void) {
     uint8_t byte = UDR0;
     uint8_t next = (uint8_t)((receive_end + 1u) % RECEIVE_SIZE);
     if (next != receive_first) {
@@ -191,9 +196,9 @@ void hal_switches_enable(uint8_t source, uint8_t sink) {
 uint32_t hal_ticks(void) {
     uint8_t state = SREG;
     cli();
-    uint16_t low = TCNT1;
+    uint16_t low = TCNT3;
     uint16_t high = ticks_high;
-    if ((TIFR1 & _BV(TOV1)) != 0u && low < 0x8000u) {
+    if ((TIFR3 & _BV(TOV3)) != 0u && low < 0x8000u) {
         high++; /* it has overflowed, and the interrupt has not run yet */
     }
     SREG = state;
@@ -210,22 +215,22 @@ void hal_delay_us(uint16_t us) {
 }
 
 void hal_timer_set(uint16_t ticks) {
-    TCCR3B = 0u;
-    TCNT3 = 0u;
-    OCR3A = ticks;
-    TIFR3 = _BV(OCF3A);
-    TIMSK3 = _BV(OCIE3A);
-    TCCR3B = BY_64(3);
+    TCCR1B = 0u;
+    TCNT1 = 0u;
+    OCR1A = ticks;
+    TIFR1 = _BV(OCF1A);
+    TIMSK1 = _BV(OCIE1A);
+    TCCR1B = BY_64(1);
 }
 
 void hal_timer_extend(uint16_t ticks) {
-    uint16_t gone = TCNT3;
+    uint16_t gone = TCNT1;
     hal_timer_set(ticks > gone + 1u ? (uint16_t)(ticks - gone) : 1u);
 }
 
 void hal_timer_cancel(void) {
-    TIMSK3 = 0u;
-    TCCR3B = 0u;
+    TIMSK1 = 0u;
+    TCCR1B = 0u;
 }
 
 void hal_adc_prepare(uint8_t prescaler, uint8_t wanted) {
@@ -273,7 +278,7 @@ void hal_uart_send(const uint8_t *bytes, uint16_t size) {
 }
 
 bool hal_uart_busy(void) {
-    return (UCSR0B & _BV(UDRIE0)) != 0u; /* the interrupt's last act is to switch itself off */
+    return (UCSR0B & _BV(UDRIE0)) != 0u; /* the interrupt leaves it on while bytes are left */
 }
 
 bool hal_uart_sent(void) {
@@ -336,7 +341,7 @@ void hal_watchdog_kick(void) {
     wdt_reset();
 }
 
-ISR(TIMER1_OVF_vect) {
+ISR(TIMER3_OVF_vect) {
     ticks_high++;
 }
 
@@ -344,8 +349,8 @@ ISR(TIMER0_OVF_vect) {
     awake = true;
 }
 
-ISR(TIMER3_COMPA_vect) {
-    TIMSK3 = 0u; /* it counts on: it may be extended */
+ISR(TIMER1_COMPA_vect) {
+    TIMSK1 = 0u; /* it counts on: it may be extended */
     scan_on_timer();
 }
 
@@ -363,15 +368,20 @@ ISR(USART0_RX_vect) {
     take_byte();
 }
 
+/* Other interrupts run meanwhile: this one is switched off, and again on as its last act. */
 ISR(USART0_UDRE_vect) {
+    UCSR0B &= (uint8_t)~_BV(UDRIE0);
+    sei();
     const uint8_t *at = next_to_send;
     uint16_t left = (uint16_t)(left_to_send - 1u);
     next_to_send = at + 1;
     left_to_send = left;
+    cli();
     if (left == 0u) {
         UCSR0A = _BV(U2X0) | _BV(TXC0); /* clears the flag: set again when this byte has left */
-        UCSR0B &= (uint8_t)~_BV(UDRIE0);
         awake = true;
+    } else {
+        UCSR0B |= _BV(UDRIE0);
     }
     UDR0 = *at;
 }

@@ -163,7 +163,7 @@ def test_what_it_has_not_is_said(third: BoardRecord) -> None:
         build_firmware(third, 24)
     with pytest.raises(SourceError, match=r"no emulator of the Third board.*twin:board=third"):
         programs_of("third")
-    with pytest.raises(SourceError, match=r'expected a board of mega, .*third, got "fourth"'):
+    with pytest.raises(SourceError, match=r'expected a board among mega, .*third, got "fourth"'):
         open_source("twin:board=fourth", Skin.load("textile-disc-8"))
 
 

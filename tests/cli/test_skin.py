@@ -38,6 +38,17 @@ def test_what_show_prints_is_a_skin_file_of_that_skin(tomoskin, tmp_path):
     assert json.loads(out)["identity"] == again.identity
 
 
+def test_show_leaves_out_what_has_no_effect_unless_a_person_has_set_it(tomoskin, tmp_path):
+    own = Skin.load("textile-disc-8").altered({"touch": {"gamma2": 0.8}})
+    (tmp_path / "own.toml").write_text(own.to_toml())
+    _, out, _ = tomoskin("skin", "show", tmp_path / "own.toml")
+    assert 'prior = "noser"' in out
+    assert "coupling" not in out  # of another prior
+    assert "gamma1" not in out  # of another method
+    assert "gamma2 = 0.8" in out
+    assert Skin.load(tmp_path / "own.toml").document == own.document
+
+
 def test_check(tomoskin):
     code, out, _ = tomoskin("skin", "check", "textile-disc-8")
     assert code == 0

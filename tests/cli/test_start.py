@@ -86,6 +86,21 @@ def test_a_command_that_is_nearly_one_is_named(tomoskin) -> None:
 
 
 @pytest.mark.parametrize(
+    "words",
+    [
+        ("firmware", "build", "--board", "mgea"),
+        ("record", "run.mcap", "--source", "twin:mgea"),
+        ("record", "run.mcap", "--source", "twin:board=mgea"),
+    ],
+)
+def test_a_board_that_is_nearly_one_is_named(tomoskin, words, tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, _, err = tomoskin(*words)
+    assert code
+    assert 'did you mean "mega"?' in " ".join(err.replace("│", " ").split())
+
+
+@pytest.mark.parametrize(
     ("board", "channels", "said"),
     [
         ("mega", 7, "expected 8 or 16 channels (Arduino Mega 2560), got 7"),

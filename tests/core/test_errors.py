@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tomoskin import core
-from tomoskin.core import TomoskinError
+from tomoskin.core import TomoskinError, no_such
 
 
 @pytest.mark.parametrize(
@@ -27,3 +27,10 @@ def test_every_error_of_the_library_is_caught_as_one() -> None:
     errors = [getattr(core, name) for name in dir(core) if name.endswith("Error")]
     assert len(errors) >= 8
     assert all(issubclass(error, TomoskinError) for error in errors)
+
+
+def test_a_word_that_is_none_of_the_known_is_compared_with_them() -> None:
+    assert no_such("mgea", ["mega", "pico"]) == (
+        'expected mega or pico, got "mgea"; did you mean "mega"?'
+    )
+    assert no_such("x", ["a", "b"], "a kind") == 'expected a kind among a, b, got "x"'

@@ -8,6 +8,7 @@ import pytest
 
 from tomoskin.core import DataError, GeometryError, load_arrays, open_input
 from tomoskin.files.imports.reader import read_recording
+from tomoskin.files.imports.text_logs import text_lines
 from tomoskin.files.session import SessionReader
 from tomoskin.files.session.repair import repair
 from tomoskin.model.mesh import Mesh
@@ -22,16 +23,24 @@ def pipe(tmp_path: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize(
-    "read",
-    [
-        open_input,
-        load_arrays,
-        read_recording,
-        SessionReader,
-        lambda path: repair(path, path.with_name("new.mcap")),
-    ],
-)
+READERS = [
+    open_input,
+    load_arrays,
+    read_recording,
+    SessionReader,
+    text_lines,
+    lambda path: repair(path, path.with_name("new.mcap")),
+]
+
+
+@pytest.mark.parametrize("read", READERS)
+def test_every_reader_says_in_the_same_words_what_is_no_file(tmp_path: Path, read) -> None:  # type: ignore[no-untyped-def]
+    for path, said in (("none.mcap", "there is no such file"), ("", "is a folder, not a file")):
+        with pytest.raises(DataError, match=f"{said}$"):
+            list(read(tmp_path / path))
+
+
+@pytest.mark.parametrize("read", [reader for reader in READERS if reader is not text_lines])
 def test_a_pipe_is_refused_at_once(pipe: Path, read) -> None:  # type: ignore[no-untyped-def]
     with pytest.raises(DataError, match=r"pipe.mcap: is a pipe or a device.*into a file"):
         read(pipe)

@@ -114,7 +114,7 @@ def test_a_script_of_nothing_is_an_idle_skin() -> None:
         ('id = "a"', "", "[[press]] 1 id", "is missing"),
         ('id = "a"', "id = 7", "[[press]] 1 id", "expected text, got 7"),
         ('hold = "2 s"', "", '[[press]] 1 "a" hold', "is missing"),
-        ('hold = "2 s"', 'hold = "20 s"', '[[press]] 1 "a" hold', "at most 10 s, got 21.4 s"),
+        ('hold = "2 s"', 'hold = "20 s"', '[[press]] 1 "a"', "to end by 10 s, got 21.4 s"),
         ('hold = "2 s"', 'hold = "5 ms"', '[[press]] 1 "a" hold', "5 ms is shorter than a frame"),
         ('hold = "2 s"', 'hold = "2 s"\nrise = "0 s"', '[[press]] 1 "a" hold', "0 ms is shorter"),
         (
@@ -226,6 +226,10 @@ def test_a_script_that_cannot_be_meant(text: str, where: str, what: str) -> None
         (
             PRESS + changed('start = "1 s"', 'start = "3.3 s"'),
             ('2 "a" id: "a" already', "1 s to 3.4 s", "(two presses at once need different ids)"),
+        ),
+        (
+            changed('hold = "2 s"', 'hold = "9 s"'),
+            ('1 "a": expected it to end by 10 s, got 10.4 s (raise [script] duration)',),
         ),
         (
             changed('hold = "2 s"', 'hold = "5 ms"'),

@@ -56,7 +56,7 @@ def test_joints_stretches_and_profiles():
         ),
         (HINGE.replace("60 deg", "-170 deg").replace("60 mm", "5 mm"), "folds"),
         (HINGE.replace("60 deg", "200 deg"), "at most 180"),
-        (HINGE.replace('"2 s"', '"20 s"'), "lasts|at most 10"),
+        (HINGE.replace('"2 s"', '"20 s"'), "lasts|to end by 10"),
         (
             '[[bend]]\nkind = "joint"\nradius = "30 mm"\nlength = "10 mm"\nangle = "90 deg"\n'
             'start = "0 s"\nhold = "1 s"\n',

@@ -11,7 +11,7 @@ from tomoskin.cli.named_files import FIGURE, ForceFlag, Reads, Writes
 from tomoskin.cli.named_parts import Recorded, frame_range
 from tomoskin.cli.options import FramesOption, ReferenceOption, SkinArgument
 from tomoskin.cli.output import JsonFlag, tell
-from tomoskin.core import TomoskinError, meant
+from tomoskin.core import TomoskinError, no_such
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -50,10 +50,7 @@ def alpha(
     from tomoskin.pipeline import prepare, recorded_frames
 
     if rule is not None and rule not in RULES:
-        raise typer.BadParameter(
-            f'expected a rule among {", ".join(RULES)}; got "{rule}"{meant(rule, RULES)}',
-            param_hint="--rule",
-        )
+        raise typer.BadParameter(no_such(rule, RULES, "a rule"), param_hint="--rule")
     prepared = prepare(Skin.load(skin))
     given = None if recording is None else Recorded.of(recording, skin, reference)
     noise: FloatArray | None = prepared.predicted_noise()

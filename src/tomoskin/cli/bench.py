@@ -16,7 +16,7 @@ import typer
 
 from tomoskin.cli.named_files import Otherwise, Reads
 from tomoskin.cli.output import JsonFlag, tables, tell
-from tomoskin.core import DataError, meant
+from tomoskin.core import DataError, no_such
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -69,10 +69,7 @@ def bench(
             typer.echo(f"{key:<18} {benchmark.summary}")
         return
     if name not in benchmarks:
-        raise typer.BadParameter(
-            f'expected {", ".join(benchmarks)}; got "{name}"{meant(name, benchmarks)}',
-            param_hint="NAME",
-        )
+        raise typer.BadParameter(no_such(name, benchmarks, "a benchmark"), param_hint="NAME")
     module = load_benchmark(benchmarks[name].module)
     usual: int = getattr(module, "CORES", 1)
     cores = cores or usual

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -13,7 +12,7 @@ from tomoskin.cli.named_files import TABLE, ForceFlag, Reads, Writes
 from tomoskin.cli.named_parts import Recorded
 from tomoskin.cli.options import RecordingArgument, ReferenceOption, SameSkinOption
 from tomoskin.cli.output import Bar, JsonFlag, tell
-from tomoskin.core import written
+from tomoskin.core import write_rows
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -84,16 +83,12 @@ def _documents(data: Recording, answers: Answers) -> list[dict[str, Any]]:
 def _write(
     path: Path, frames: list[dict[str, Any]], names: tuple[str, ...], *, overwrite: bool
 ) -> None:
-    with (
-        written(path, overwrite=overwrite) as part,
-        part.open("w", newline="", encoding="utf-8") as file,
-    ):
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(["frame", "time_s", "class", "probability", "unknown", *names])
-        for row in frames:
-            when, sure, unknown = f"{row['time_s']:.6f}", row["probability"], int(row["unknown"])
-            each = [f"{p:.4f}" for p in row["each"]]
-            table.writerow([row["frame"], when, row["class"], f"{sure:.4f}", unknown, *each])
+    rows: list[list[object]] = [["frame", "time_s", "class", "probability", "unknown", *names]]
+    for row in frames:
+        when, sure, unknown = f"{row['time_s']:.6f}", row["probability"], int(row["unknown"])
+        each = [f"{p:.4f}" for p in row["each"]]
+        rows.append([row["frame"], when, row["class"], f"{sure:.4f}", unknown, *each])
+    write_rows(path, rows, overwrite=overwrite)
 
 
 def _lines(answers: Answers, asked: list[int]) -> Iterator[str]:

@@ -13,6 +13,7 @@ from tomoskin.cli.app import group
 from tomoskin.cli.choices import quantity
 from tomoskin.cli.options import DEFAULT_SKIN, NamedSkinOption
 from tomoskin.cli.output import Bar
+from tomoskin.core import no_such
 
 app = group("firmware")
 
@@ -35,7 +36,7 @@ Channels = Annotated[int, typer.Option(help=f"Number of the board's channels: {_
 
 def _checked_board(board: str) -> str:
     if board not in BOARDS:
-        raise typer.BadParameter(f'expected {" or ".join(BOARDS)}, got "{board}"')
+        raise typer.BadParameter(no_such(board, BOARDS))
     return board
 
 

@@ -23,7 +23,7 @@ from tomoskin.cli.options import (
     TouchesOut,
 )
 from tomoskin.cli.output import Bar, JsonFlag, remark, tell
-from tomoskin.core import MEASURANDS, DataError, meant
+from tomoskin.core import MEASURANDS, DataError, no_such
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -94,10 +94,9 @@ class Tuned:
             with suppress(ValueError):
                 alpha = float(given)
             if not (isinstance(alpha, float) and 1e-9 <= alpha <= 1e9):
+                what = "a number above 0, or a word"
                 raise typer.BadParameter(
-                    f"expected a number above 0, auto, or a rule among {', '.join(RULES)}; "
-                    f'got "{given}"{meant(given, (*RULES, "auto"))}',
-                    param_hint="--alpha",
+                    no_such(given, ("auto", *RULES), what), param_hint="--alpha"
                 )
         return skin.altered({"inverse": {"alpha": alpha}}), None
 

@@ -62,7 +62,7 @@ def record(
         prepared.warm_up()  # else this would take up some of the seconds
     say_headroom(prepared.headroom)
     runner = Runner(prepared, lambda: open_source(source, chosen), sinks=sinks)
-    with ended_by_signals(), recording_to(runner, file) as stopped:
+    with ended_by_signals(), recording_to(runner, file, frames) as stopped:
         if seconds is None and frames is None and not json:
             typer.echo(f"{runner.flow.source} is recorded to {file}; Ctrl-C ends it", err=True)
         _wait(runner, seconds, frames)
@@ -79,9 +79,10 @@ def record(
         raise DataError(
             "was moved while it was recorded; it is complete where it is now", where=str(file)
         ) from None
-    document = {"file": str(file), "bytes": size, "frames": status.frames, "lost": status.gaps,
+    count = status.frames if frames is None else min(status.frames, frames)
+    document = {"file": str(file), "bytes": size, "frames": count, "lost": status.gaps,
                 "dropped": status.dropped, "corrupt": status.corrupt}  # fmt: skip
-    lines = [f"{file}: {status.frames} frames, {size / 1e6:.1f} MB, {status.gaps} lost"]
+    lines = [f"{file}: {count} frames, {size / 1e6:.1f} MB, {status.gaps} lost"]
     if slow:
         document["slowest"] = [asdict(cost) for cost in status.slowest[:slow]]
         lines += [f"frame {cost.sequence:>6}  {cost.text}" for cost in status.slowest[:slow]]
@@ -100,15 +101,18 @@ def ended_by_signals() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def recording_to(runner: Runner, file: Path | None) -> Iterator[list[str]]:
-    """The runner runs while the block lasts, and records from its first byte to ``file``.
+def recording_to(
+    runner: Runner, file: Path | None, frames: int | None = None
+) -> Iterator[list[str]]:
+    """The runner runs while the block lasts, and records from its first byte to ``file``, at most
+    so many ``frames``.
 
     The list says why recordings have ended by themselves; it is whole after the block.
     """
     from tomoskin.run import commands
 
     if file is not None:
-        runner.ask(commands.Record(file))
+        runner.ask(commands.Record(file, frames=frames))
     try:
         runner.start()
     except BaseException:
@@ -157,7 +161,11 @@ def _wait(runner: Runner, seconds: float | None, frames: int | None) -> None:
     elapsed = 0.0
     with Bar("recording") as bar:
         while (flow := runner.flow).out.recordings.path is not None:
-            shares = [(elapsed, seconds), (flow.latency.frames, frames), *_played(flow.played)]
+            shares = [
+                (elapsed, seconds),
+                (flow.out.recordings.frames, frames),
+                *_played(flow.played),
+            ]
             limits = [(part, limit) for part, limit in shares if limit is not None]
             for part, limit in limits:
                 if part >= limit:

@@ -14,7 +14,7 @@ from tomoskin.cli.named_files import SKIN, ForceFlag, Otherwise, Reads, Writes
 from tomoskin.cli.options import DEFAULT_SKIN, NamedSkinOption, RecordingArgument, SkinArgument
 from tomoskin.cli.output import JsonFlag, remark, tell
 from tomoskin.cli.skin_merit import merit
-from tomoskin.core import DIMENSIONS, DataError, SkinError, write_text
+from tomoskin.core import DIMENSIONS, DataError, SkinError, no_such, write_text
 
 if TYPE_CHECKING:
     from tomoskin.core import FloatArray
@@ -120,7 +120,7 @@ def lay(
     from tomoskin.model.skin import Skin, lay as laid
 
     if unit not in ("mm", "cm", "m"):
-        raise DataError(f'expected mm, cm or m, got "{unit}"', where="--unit")
+        raise DataError(no_such(unit, ("mm", "cm", "m")), where="--unit")
     skin = laid(surface, _positions(electrodes), unit=unit, like=Skin.load(like), source=str(out))
     mesh = skin.mesh()
     write_text(out, skin.to_toml(), overwrite=force)

@@ -18,6 +18,7 @@ from tomoskin.core.errors import (
     WireError as WireError,
     meant as meant,
     meant_or_known as meant_or_known,
+    no_such as no_such,
 )
 from tomoskin.core.stages import finished as finished, reach as reach, watch_stages as watch_stages
 from tomoskin.core.units import DIMENSIONS as DIMENSIONS, parse_quantity as parse_quantity
@@ -32,6 +33,8 @@ from tomoskin.core.user_files import (
     disk_refusals as disk_refusals,
     most_bytes as most_bytes,
     open_input as open_input,
+    read_refusals as read_refusals,
+    write_rows as write_rows,
     write_text as write_text,
     written as written,
 )

@@ -16,6 +16,13 @@ def meant(given: str, known: Iterable[str]) -> str:
     return f'; did you mean "{close[0]}"?' if close else ""
 
 
+def no_such(given: str, known: Iterable[str], what: str = "", *more: str) -> str:
+    """What is wrong with a word that is none of the ``known`` ones, nor of ``more`` kinds."""
+    words = list(known)
+    expected = f"{what} among {', '.join([*words, *more])}" if what else " or ".join(words)
+    return f'expected {expected}, got "{given}"{meant(given, words)}'
+
+
 def meant_or_known(given: str, known: Iterable[str], what: str = "known") -> str:
     """A hint: the one of the ``known`` words that was probably meant, else all of them."""
     words = list(known)

@@ -4,6 +4,7 @@ and how much of this machine's memory one may take."""
 
 from __future__ import annotations
 
+import csv
 import os
 import secrets
 import stat
@@ -182,6 +183,16 @@ def _is_recording(path: Path) -> bool:
 
 
 @contextmanager
+def read_refusals(path: StrPath, kind: type[TomoskinError] = DataError) -> Iterator[None]:
+    """What the disk refuses to read in the block is an error of that ``kind``."""
+    try:
+        yield
+    except OSError as error:
+        reason = error.strerror or error
+        raise kind(f"cannot be read: {reason}", where=str(path)[:80]) from error
+
+
+@contextmanager
 def disk_refusals(path: StrPath) -> Iterator[None]:
     """What the disk refuses in the block is a DataError that names ``path``."""
     try:
@@ -229,6 +240,15 @@ def write_text(path: StrPath, text: str, *, overwrite: bool = False) -> None:
         part.write_text(text, encoding="utf-8", newline="\n")
 
 
+def write_rows(path: StrPath, rows: Iterable[Iterable[object]], *, overwrite: bool = False) -> None:
+    """Write a CSV file, complete or not at all; raises as :func:`written` does."""
+    with (
+        written(path, overwrite=overwrite) as part,
+        part.open("w", newline="", encoding="utf-8") as file,
+    ):
+        csv.writer(file, lineterminator="\n").writerows(rows)
+
+
 def _settle(part: Path, target: Path) -> None:
     """On the disk, and readable by those who could read what was there."""
     with part.open("rb+") as file:
@@ -242,7 +262,7 @@ def check_is_file(
 ) -> None:
     """Raise ``error`` where ``path`` is no ordinary file: a pipe or a device may never end."""
     path = Path(path)
-    try:
+    with read_refusals(path, error):
         if not path.exists():
             raise error("there is no such file", where=str(path))
         if path.is_dir():
@@ -253,9 +273,6 @@ def check_is_file(
                 where=str(path),
                 hint="copy what comes out of it into a file",
             )
-    except (OSError, ValueError) as cause:  # a name that is too long, or has a zero byte
-        reason = getattr(cause, "strerror", None) or str(cause)
-        raise error(f"cannot be read: {reason}", where=str(path)[:80]) from cause
 
 
 def open_input(
@@ -272,10 +289,8 @@ def open_input(
         Of the kind ``error``, when it is missing, a folder, a pipe or a device, or unreadable.
     """
     check_is_file(path, error, what)
-    try:
+    with read_refusals(path, error):
         return Path(path).open("rb", buffering=buffering)
-    except OSError as cause:
-        raise error(f"cannot be read: {cause.strerror or cause}", where=str(path)) from cause
 
 
 _SHARE = 4

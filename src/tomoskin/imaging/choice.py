@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
-from tomoskin.core import DataError, FloatArray, ModelError, reach
+from tomoskin.core import DataError, FloatArray, ModelError, no_such, reach
 from tomoskin.imaging.linear.spectrum import Spectrum
 from tomoskin.imaging.trained.merit import deviations, noise_figure
 from tomoskin.model.mesh import Mesh
@@ -276,5 +276,5 @@ def choose(spectrum: Spectrum, rule: str, noise: FloatArray | None = None) -> Al
         When the criterion needs the noise, and it is missing or none.
     """
     if rule not in RULES:
-        raise ModelError(f'expected a rule among {", ".join(RULES)}, got "{rule}"')
+        raise ModelError(no_such(rule, RULES, "a rule"))
     return RULES[rule](spectrum, noise)

@@ -184,6 +184,8 @@ class Record:
     path: Path
     log: MessageLog | None = None
     """Where the session goes, instead of a file of its own."""
+    frames: int | None = None
+    """The most that are recorded."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -193,7 +193,7 @@ class Loop:
             case commands.HoldPresses():
                 flow.twin.hold(command.owner, command.presses)
             case commands.Record():
-                return flow.out.recordings.begin(command.path, command.log)
+                return flow.out.recordings.begin(command.path, command.log, command.frames)
             case commands.StopRecording():
                 return flow.out.recordings.end()
             case commands.Adopt():

@@ -145,14 +145,22 @@ class Recordings:
         """The newest frames in which nothing touched."""
         return self._pre_roll.untouched
 
-    def begin(self, path: Path, log: session.MessageLog | None = None) -> Future[None]:
-        """Record from the next bytes on, and end what was being recorded.
+    @property
+    def frames(self) -> int:
+        """How many have been given to the recording."""
+        worker = self._current
+        return 0 if worker is None else worker.consumer.frames
+
+    def begin(
+        self, path: Path, log: session.MessageLog | None = None, most: int | None = None
+    ) -> Future[None]:
+        """Record from the next bytes on, at ``most`` so many frames, and end what was recorded.
 
         ``log``: where it goes, instead of a file of its own. Done when the file has been made;
         DataError where it cannot be.
         """
         self.end()
-        worker = self._awaiting = _worker(path, self._prepared, self._clock(), self._say, log)
+        worker = self._awaiting = self._worker(path, log, most)
         worker.start()
         return worker.opening
 
@@ -231,15 +239,16 @@ class Recordings:
             },
         )
 
+    def _worker(
+        self, path: Path, log: session.MessageLog | None, most: int | None
+    ) -> Worker[session.Recorder]:
+        prepared, start = self._prepared, self._clock()
 
-def _worker(
-    path: Path, prepared: Prepared, start: float, say: Say, log: session.MessageLog | None
-) -> Worker[session.Recorder]:
-    def make() -> session.SessionWriter:
-        writer = session.SessionWriter(path, prepared.skin, epoch=epoch(), start=start, log=log)
-        for calibration in prepared.calibrations.values():
-            writer.attach(calibration.kind.attachment, "application/zip", calibration.encode())
-        return writer
+        def make() -> session.SessionWriter:
+            writer = session.SessionWriter(path, prepared.skin, epoch=epoch(), start=start, log=log)
+            for calibration in prepared.calibrations.values():
+                writer.attach(calibration.kind.attachment, "application/zip", calibration.encode())
+            return writer
 
-    recorder = session.Recorder(path, make, raster(prepared), say)
-    return Worker(recorder, Capacity(MOST_WAITING, "oldest"), say)
+        recorder = session.Recorder(path, make, raster(prepared), self._say, most)
+        return Worker(recorder, Capacity(MOST_WAITING, "oldest"), self._say)

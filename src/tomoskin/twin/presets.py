@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, fields, replace
 from importlib.resources import files
 from typing import Any, Self
 
-from tomoskin.core import ModelError
+from tomoskin.core import ModelError, no_such
 from tomoskin.sensing.signal import FIGURES
 from tomoskin.twin.bend import BendSettings
 from tomoskin.twin.circuit import ElectronicsSettings
@@ -55,7 +55,7 @@ class TwinSettings:
             For another name.
         """
         if name not in PRESETS:
-            raise ModelError(f'expected a twin of {", ".join(PRESETS)}, got "{name}"', where="twin")
+            raise ModelError(no_such(name, PRESETS, "a preset"), where="twin")
         return replace(PRESETS[name], seed=seed)
 
     def with_electrodes(self, kind: str | None) -> Self:

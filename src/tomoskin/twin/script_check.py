@@ -115,18 +115,16 @@ def _check_ids(presses: tuple[ScriptedPress, ...]) -> None:
 
 def _check_ends(script: Script) -> None:
     lasting: list[ScriptedPress | ScriptedBend] = [*script.presses, *script.bends]
-    last = [
-        (one.end, f"{one.where} {'profile' if one.given.profile else 'hold'}") for one in lasting
-    ]
+    last = [(one.end, one.where, "it to end by") for one in lasting]
     last += [
-        (one.given.stop, f"{one.where} {'end' if one.given.end else 'start'}")
+        (one.given.stop, f"{one.where} {'end' if one.given.end else 'start'}", "at most")
         for one in script.faults
     ]
-    last += [(mark.given.at, f"{mark.where} at") for mark in script.marks]
-    for time, where in last:
+    last += [(mark.given.at, f"{mark.where} at", "at most") for mark in script.marks]
+    for time, where, what in last:
         if time > script.duration + _ROUNDING:
             raise ScriptError(
-                f"expected at most {script.duration:g} s, got {time:g} s",
+                f"expected {what} {script.duration:g} s, got {time:g} s",
                 where=where,
                 hint="raise [script] duration",
             )

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from tomoskin.board.source import BOARDS, BoardRecord, ScanSettings, read_options
-from tomoskin.core import Clock, Frame, SourceError, WallClock, meant
+from tomoskin.core import Clock, Frame, SourceError, WallClock, no_such
 from tomoskin.model.pattern import Scan
 from tomoskin.model.skin import ReadoutSettings, Skin
 from tomoskin.twin.bend import Pose
@@ -180,9 +180,7 @@ def read_settings(options: Mapping[str, str], skin: Skin, where: str) -> TwinSet
         raise SourceError(f'expected a seed of 0 or more, got "{seed}"', where=where)
     preset = options.get("preset", skin.twin.preset)
     if preset not in PRESETS:
-        names = ", ".join(PRESETS)
-        guess = meant(preset, PRESETS)
-        raise SourceError(f'expected a preset of {names}, got "{preset}"{guess}', where=where)
+        raise SourceError(no_such(preset, PRESETS, "a preset"), where=where)
     return TwinSettings.preset(preset, int(seed))
 
 
@@ -196,9 +194,7 @@ def read_board(options: Mapping[str, str], where: str) -> str | None:
     if len(names) > 1:
         raise SourceError(f"expected one board, got {' and '.join(sorted(names))}", where=where)
     for name in names - BOARDS.keys():
-        known = ", ".join(BOARDS)
-        guess = meant(name, BOARDS)
-        raise SourceError(f'expected a board of {known}, got "{name}"{guess}', where=where)
+        raise SourceError(no_such(name, BOARDS, "a board"), where=where)
     return next(iter(names), None)
 
 

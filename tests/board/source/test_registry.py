@@ -29,7 +29,7 @@ def test_names_and_arguments():
 
 
 def test_an_unknown_source_is_refused_with_those_known():
-    with pytest.raises(SourceError, match=r"expected a source \(serial, twin\), got \"usb\""):
+    with pytest.raises(SourceError, match=r"expected a source among serial, twin, got \"usb\""):
         open_source("usb:1", None)
 
 

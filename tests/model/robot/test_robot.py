@@ -269,7 +269,7 @@ def test_a_joint_that_no_number_tells_has_no_pose(files):
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("continuous", "revolut", 'joint "turn": expected a type of revolute, .*got "revolut"'),
+        ("continuous", "revolut", 'joint "turn": expected a type among revolute, .*got "revolut"'),
         ('xyz="0 3 4"', 'xyz="0 0 0"', 'joint "turn": expected an axis with a direction'),
         ('xyz="0 3 4"', 'xyz="0 3"', "three numbers in <axis> xyz"),
         ('mimic joint="turn"', 'mimic joint="trun"', 'expected a joint to mimic, got "trun"'),

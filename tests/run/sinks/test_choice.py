@@ -36,8 +36,9 @@ def test_names_say_where_results_go_but_no_password(spec, name):
 @pytest.mark.parametrize(
     ("spec", "said"),
     [
-        ("", "there is no sink"),
-        ("kafka", f"sinks: {', '.join(sink_names())}"),
+        ("", "expected a sink among"),
+        ("kafka", f"among {', '.join(sink_names())}, got"),
+        ("mqtl", 'did you mean "mqtt"'),
         ("foxglove:port", "expected a port"),
         ("foxglove:70000", "expected a port"),
         ("foxglove:0", "expected a port"),

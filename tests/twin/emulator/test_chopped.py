@@ -22,6 +22,7 @@ from tomoskin.board.wire import (
     Fault,
     GetBoard,
     Hello,
+    Ping,
     Result,
     SafeOff,
     SetHeartbeat,
@@ -30,6 +31,7 @@ from tomoskin.board.wire import (
     SetScan,
     Start,
     Stop,
+    encode,
 )
 from tomoskin.core import Frame, SourceError
 from tomoskin.twin.emulator.board_process import (
@@ -269,6 +271,22 @@ def test_off_in_whichever_direction(board: Powered) -> None:
     assert ask(talk, Start(53, 5)).result is Result.WRONG_CONFIGURATION
     talk.transport.close()
     assert board.look().longest_on <= 0.5 / mode.frequency + board.kind.lateness
+
+
+def test_a_host_that_talks_without_end_does_not_lengthen_a_drive(board: Powered) -> None:
+    """Bytes that come while others are sent take the processor nearly whole."""
+    talk = Talk(SerialTransport(board.process.port))
+    frequency = board.kind.settings.chop_frequency
+    settling = round(board.kind.settings.settling * 1e6)
+    set_up(talk, SetMode(4, 5, DriveMode.CHOPPED, frequency, 2), settling)
+    assert ask(talk, Start(20, 5)).result is Result.OK
+    for _ in range(20):
+        talk.transport.write(encode(Ping(30)) * 20)
+        talk.next(Frame, PATIENCE)
+        talk.next(Frame, PATIENCE)
+    assert ask(talk, Stop(21)).result is Result.OK
+    talk.transport.close()
+    assert board.look().longest_on <= 0.5 / frequency + board.kind.lateness
 
 
 MUTANTS = {

@@ -12,7 +12,7 @@ from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Protocol, TypeVar, runtime_checkable
 
 from tomoskin.board.wire import Ack, Command, Decoder, Message, encode
-from tomoskin.core import SourceError, meant
+from tomoskin.core import SourceError, no_such
 
 if TYPE_CHECKING:
     from tomoskin.model.skin import Skin
@@ -87,10 +87,8 @@ def open_source(spec: str, skin: Skin) -> Transport:
     for entry in entry_points(group=GROUP, name=name):
         opener: Callable[[str, Skin], Transport] = entry.load()
         return opener(argument, skin)
-    names = ", ".join(source_names()) or "none is installed"
     raise SourceError(
-        f'expected a source ({names}), got "{name}"{meant(name, source_names())}',
-        hint="for example twin or serial:PORT",
+        no_such(name, source_names(), "a source"), hint="for example twin or serial:PORT"
     )
 
 
@@ -100,9 +98,7 @@ def read_options(argument: str, known: tuple[str, ...], where: str) -> dict[str,
     for item in filter(None, (part.strip() for part in argument.split(","))):
         key, _, value = item.partition("=")
         if key not in known:
-            raise SourceError(
-                f'expected an option among {", ".join(known)}, got "{key}"', where=where
-            )
+            raise SourceError(no_such(key, known, "an option"), where=where)
         options[key] = value
     return options
 

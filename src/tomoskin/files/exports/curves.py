@@ -3,13 +3,12 @@ merit over distance, and what a skin can resolve."""
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tomoskin.core import AMOUNT, FloatArray, StrPath, written
+from tomoskin.core import AMOUNT, FloatArray, StrPath, write_rows
 from tomoskin.files.exports.picture import dress, new_figure, panel_axes, save_figure
 from tomoskin.imaging import AlphaChoice, Curve, Merit, Picard
 from tomoskin.model.skin import Skin
@@ -122,17 +121,12 @@ def write_merit_table(
 
     Raises as :func:`written` does.
     """
-    with (
-        written(path, overwrite=overwrite) as part,
-        part.open("w", newline="", encoding="utf-8") as file,
-    ):
-        writer = csv.writer(file)
-        writer.writerow(COLUMNS)
-        for operator, merit in merits.items():
-            table = (merit.distance, *(getattr(merit, name) for name, *_ in _FIGURES))
-            for row in zip(*table, strict=True):
-                numbers = (merit.noise_figure, *row)
-                writer.writerow([operator, *(f"{number:.6g}" for number in numbers)])
+    rows: list[Sequence[object]] = [COLUMNS]
+    for operator, merit in merits.items():
+        table = (merit.distance, *(getattr(merit, name) for name, *_ in _FIGURES))
+        for row in zip(*table, strict=True):
+            rows.append([operator, *(f"{number:.6g}" for number in (merit.noise_figure, *row))])
+    write_rows(path, rows, overwrite=overwrite)
 
 
 _MM = 1e3

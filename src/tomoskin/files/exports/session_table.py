@@ -3,7 +3,6 @@ it in one HDF5 file (extra ``hdf5``)."""
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Iterable
 from typing import Any
@@ -12,7 +11,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import MEASURANDS, StrPath, needed, written
+from tomoskin.core import MEASURANDS, StrPath, needed, write_rows, written
 from tomoskin.files.exports.export import Export
 from tomoskin.files.imports import column_names
 from tomoskin.files.session import (
@@ -133,17 +132,12 @@ def write_touches(
 
     Raises as :func:`written` does.
     """
-    names, count = columns_of(surface, measured=measured, begun=begun), 0
-    with (
-        written(path, overwrite=overwrite) as part,
-        part.open("w", newline="", encoding="utf-8") as file,
-    ):
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(names)
-        for row in touch_rows(frames, surface, measured=measured, begun=begun):
-            table.writerow(_touch_text(name, value) for name, value in zip(names, row, strict=True))
-            count += 1
-    return count
+    names = columns_of(surface, measured=measured, begun=begun)
+    rows: list[Iterable[str]] = [names]
+    for row in touch_rows(frames, surface, measured=measured, begun=begun):
+        rows.append([_touch_text(name, value) for name, value in zip(names, row, strict=True)])
+    write_rows(path, rows, overwrite=overwrite)
+    return len(rows) - 1
 
 
 def _touch_text(name: str, value: object) -> str:

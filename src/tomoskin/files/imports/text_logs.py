@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tomoskin.core import DataError, IntArray, check_fits
+from tomoskin.core import DataError, IntArray, check_fits, open_input, read_refusals
 from tomoskin.files.imports.tables import (
     adjacent_scan,
     for_magnitudes,
@@ -57,13 +57,10 @@ def text_lines(path: Path) -> Iterator[str]:
     DataError
         When the file cannot be read or is too large for memory.
     """
-    try:
+    with read_refusals(path), open_input(path) as file:
         check_fits(path.stat().st_size, str(path))
-        with path.open("rb") as file:
-            while line := file.readline(LONGEST_LINE):
-                yield _text(line)
-    except OSError as error:
-        raise DataError(f"cannot be read: {error.strerror or error}", where=str(path)) from error
+        while line := file.readline(LONGEST_LINE):
+            yield _text(line)
 
 
 def bytes_lines(data: bytes) -> Iterator[str]:

@@ -14,7 +14,7 @@ from typing import Self
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Footer, Metadata
 
-from tomoskin.core import EMPTY, MAGIC, DataError, open_input
+from tomoskin.core import EMPTY, MAGIC, DataError, open_input, read_refusals
 from tomoskin.files.session.mcap_records import (
     LARGEST,
     LARGEST_SUMMARY,
@@ -204,12 +204,9 @@ class ContainerReader:
         return self._read(offset, PREFIX.size + length)
 
     def _read(self, place: int, length: int) -> bytes:
-        try:
+        with read_refusals(self.where):
             self._file.seek(max(place, 0))
             return self._file.read(length)
-        except OSError as error:
-            reason = error.strerror or error
-            raise DataError(f"cannot be read: {reason}", where=self.where) from error
 
     def _damage(self, place: int, why: str) -> DataError:
         return DataError(f"is damaged: {why}", where=f"{self.where}, byte {place}", hint=MEND)

@@ -76,6 +76,13 @@ class Recorder(Consumer):
         For the images; None where the skin has none (a curved sheet): then there are no images.
     say
         Called with the kind and text of an event.
+    most
+        Frames that are recorded, where not all are.
+
+    Attributes
+    ----------
+    frames
+        How many have come, those from before the recording not counted.
     """
 
     kind, slow = "recording", "the disk is too slow, and messages are lost"
@@ -87,8 +94,10 @@ class Recorder(Consumer):
         make: Callable[[], SessionWriter],
         pixels: PixelMap | None,
         say: Callable[[str, str], None],
+        most: int | None = None,
     ) -> None:
         path = Path(path)
+        self.frames, self._most = 0, most
         self.path, self.name = path, f"{path}:"
         self._make, self._pixels, self._say = make, pixels, say
         self._session: SessionWriter
@@ -99,6 +108,10 @@ class Recorder(Consumer):
 
     def admit(self, message: RunMessage) -> list[_Part] | None:
         """What of ``message`` is to be written; by the thread that puts it."""
+        if isinstance(message, MarkedFrame):
+            self.frames += not message.mark & Mark.EARLIER
+        if self._most is not None and self.frames > self._most:
+            return None
         if not isinstance(message, FrameResult):
             return [message]
         parts: list[_Part] = []

@@ -25,6 +25,7 @@ from tomoskin.core import (
     Output,
     SkinError,
     StrPath,
+    check_is_file,
     check_outputs,
     open_input,
     written,
@@ -119,8 +120,7 @@ def repair(
     """
     source, target = Path(source), Path(target)
     check_outputs([Output(target)], [source])
-    if not source.exists():
-        raise DataError("there is no such file", where=str(source))
+    check_is_file(source)
     result = Repaired(target)
     about, attachments = _front(source, skin, lambda done, size: advance(done, 2 * size))
     with _new_file(target) as mended:

@@ -11,7 +11,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tomoskin.core import FloatArray, IntArray, PatternError, meant, refuse_first
+from tomoskin.core import FloatArray, IntArray, PatternError, no_such, refuse_first
 
 _BALANCE = 1e-3
 """Currents of a drive sum to zero, up to this part of the largest of them."""
@@ -365,7 +365,4 @@ def _one(name: str, n: int) -> Pattern:
     kind, _, k = name.partition(":")
     if kind == "skip" and k.isdigit():
         return Pattern.skip(n, int(k))
-    raise PatternError(
-        f'expected a pattern among {", ".join(NAMED)}, skip:K, or several joined by +, got "{name}"'
-        f"{meant(name, NAMED)}"
-    )
+    raise PatternError(no_such(name, NAMED, "a pattern", "skip:K", "or several joined by +"))

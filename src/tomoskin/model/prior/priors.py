@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, issparse
 
-from tomoskin.core import FloatArray, ModelError
+from tomoskin.core import FloatArray, ModelError, no_such
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.prior.penalty import Diagonal, Penalty, dense_penalty, sparse_penalty
 from tomoskin.model.prior.smooth import GaussianHighPass, Laplace, Matern, graph_laplacian
@@ -176,7 +176,7 @@ def penalty_of(prior: PriorLike, mesh: Mesh, jacobian: NDArray[Any]) -> Penalty:
     """
     if isinstance(prior, str):
         if prior not in PRIORS:
-            raise ModelError(f'expected a prior among {", ".join(PRIORS)}, got "{prior}"')
+            raise ModelError(no_such(prior, PRIORS, "a prior"))
         prior = PRIORS[prior]
     if hasattr(prior, "penalty"):
         penalty: Penalty = prior.penalty(mesh, jacobian)

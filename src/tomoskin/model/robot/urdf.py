@@ -11,7 +11,15 @@ from xml.etree import ElementTree
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tomoskin.core import FloatArray, GeometryError, SkinError, StrPath, meant_or_known, needed
+from tomoskin.core import (
+    FloatArray,
+    GeometryError,
+    SkinError,
+    StrPath,
+    meant_or_known,
+    needed,
+    no_such,
+)
 from tomoskin.model.robot.link_shapes import (
     MOST_TRIANGLES,
     LinkShape,
@@ -239,9 +247,7 @@ def _joint(element: ElementTree.Element, where: str) -> UrdfJoint:
     kind = element.get("type", "")
     known = (*_TURNS, *_SLIDES, *_STANDS, *_UNTOLD)
     if kind not in known:
-        raise SkinError(
-            f'expected a type of {", ".join(filter(None, known))}, got "{kind}"', where=where
-        )
+        raise SkinError(no_such(kind, filter(None, known), "a type"), where=where)
     mimic, axis = element.find("mimic"), np.array(_number(element, "axis", "xyz", "1 0 0", where))
     if not (length := np.linalg.norm(axis)) > 0:
         raise SkinError("expected an axis with a direction, got 0 0 0", where=where)

@@ -72,6 +72,11 @@ class Key:
                 return f"needs {other} = {kinds}, got {other} = {show(filled.get(other))}"
         return ""
 
+    def is_idle(self, filled: Mapping[str, object]) -> bool:
+        """Whether it has its default in a section where it has no effect."""
+        other, words = self.effective or ("", ())
+        return bool(other) and filled.get(other) not in words and filled[self.name] == self.default
+
     def read(self, value: object, where: str) -> Any:
         """``value`` in SI units; SkinError that names the key."""
         try:
@@ -289,12 +294,13 @@ def toml_tables(text: str, source: str, version: int, sections: Iterable[str]) -
 
 
 def toml_text(document: Document, sections: Iterable[type[Section]], version: int) -> str:
-    """Text of a TOML file with the keys of ``document``, in the order of their declaration."""
+    """Text of a TOML file with the keys of ``document``, in the order of their declaration, but
+    for those that have no effect there and stand at their defaults."""
     lines = [f"format = {version}"]
     for section in sections:
         keys = document[section.section]
-        lines += ["", section.heading]
-        lines += [f"{k.name} = {literal(keys[k.name])}" for k in section.keys if k.name in keys]
+        shown = [k.name for k in section.keys if k.name in keys and not k.is_idle(keys)]
+        lines += ["", section.heading, *(f"{name} = {literal(keys[name])}" for name in shown)]
     return "\n".join(lines) + "\n"
 
 

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
 
-from tomoskin.core import Capacity, Consumer, Event, Say, SinkError, TomoskinError, Worker, meant
+from tomoskin.core import Capacity, Consumer, Event, Say, SinkError, TomoskinError, Worker, no_such
 from tomoskin.files.messages import Item, Naming, Reporter, Stream
 from tomoskin.pipeline import FrameResult
 
@@ -70,10 +70,7 @@ def make_sink(spec: str) -> Sink:
     name, _, argument = spec.partition(":")
     entries = tuple(entry_points(group=GROUP, name=name))
     if not entries:
-        raise SinkError(
-            f'there is no sink "{name}"{meant(name, sink_names())}',
-            hint=f"sinks: {', '.join(sink_names()) or 'none'}",
-        )
+        raise SinkError(no_such(name, sink_names(), "a sink"))
     entry = entries[0]
     try:
         sink = entry.load()(argument)

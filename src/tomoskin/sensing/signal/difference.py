@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
-from tomoskin.core import DataError, FloatArray
+from tomoskin.core import DataError, FloatArray, no_such
 
 DIFFERENCES = ("plain", "normalised")
 
@@ -33,7 +33,7 @@ def difference(values: FloatArray, reference: FloatArray, kind: str) -> FloatArr
         When shapes differ, the kind is unknown, or a reference of zero would divide.
     """
     if kind not in DIFFERENCES:
-        raise DataError(f'expected a difference among {", ".join(DIFFERENCES)}, got "{kind}"')
+        raise DataError(no_such(kind, DIFFERENCES, "a difference"))
     if values.shape[-1:] != reference.shape:
         raise DataError(f"expected {len(reference)} voltages, got {values.shape[-1]}")
     change = values - reference
