@@ -347,6 +347,12 @@ def classes(
     )
 
 
+@app.command("bend", hidden=True, context_settings={"ignore_unknown_options": True})
+def bend(_given: Annotated[list[str] | None, typer.Argument()] = None) -> None:
+    """Say what this command is called now."""
+    raise typer.BadParameter("is called tomoskin calibrate body now", param_hint="calibrate bend")
+
+
 @_kind("body", "A recorded motion of the body, without touches.")
 def body(
     labelled: Recorded,
@@ -355,8 +361,8 @@ def body(
         typer.Option(
             metavar="DEG[@AXIS]=A:B",
             help="Label: frames A to B-1 are bent by this angle about an axis in this direction "
-            f"from x (default {ALONG_Y:.0f}). Can be repeated. Default: body of the file, or the "
-            "session's own truth.",
+            f"from x (default {ALONG_Y:.0f}). Can be repeated. Default: the session's own "
+            "truth.",
         ),
     ] = None,
     states: Annotated[

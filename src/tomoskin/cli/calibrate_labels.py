@@ -3,9 +3,8 @@ B-1, arrays of the file, and what the twin has noted in a session."""
 
 from __future__ import annotations
 
-import csv
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -183,60 +182,44 @@ def body_examples(
     path: Path, data: Recording, rest: FloatArray, given: list[str] | None, table: Path | None
 ) -> BodyExamples:
     """Frames with the states of the body that options or a ``table`` name, else those of the
-    file's ``body`` or the session's truth; of a file without any, all frames without a state.
-
-    From the truth come frames that nothing presses.
-    """
+    session's truth that nothing presses; of a file without any, all frames without a state."""
     from tomoskin.learning import BodyExamples
 
-    frames, known = _states(path, data, given, table)
+    known: dict[str, Any]
+    if given:
+        pairs = _named_bends(given, len(data))
+        frames = sorted(pairs)
+        angle, axis = np.array([pairs[frame] for frame in frames]).T
+        known = {"angle": angle, "axis": axis}
+    elif table is not None:
+        frames, known = _tabled(table, len(data))
+    else:
+        frames, known = _true_states(path, data)
     return BodyExamples.checked(data.voltages[frames] - rest, data.time[frames], **known)
 
 
-def _states(
-    path: Path, data: Recording, given: list[str] | None, table: Path | None
-) -> tuple[list[int], dict[str, Any]]:
-    """Frames, and what is known of the body in them."""
-    if given:
-        pairs = _named_bends(given, len(data))
-        angle, axis = np.array([pairs[frame] for frame in sorted(pairs)]).T
-        return sorted(pairs), {"angle": angle, "axis": axis}
-    if table is not None:
-        return _tabled(table, len(data))
-    arrays = _arrays(path)
-    if "body" in arrays:
-        state = arrays["body"].reshape(len(data), -1)
-        names = arrays.get("body_names", np.arange(1, state.shape[1] + 1)).ravel().tolist()
-        return list(range(len(data))), _named(list(map(str, names)), state)
-    return _true_states(path, data)
-
-
 def _tabled(table: Path, n: int) -> tuple[list[int], dict[str, Any]]:
-    """The states of a table with a column ``frame`` and one for each coordinate."""
-    with table.open(encoding="utf-8", newline="") as file:
-        head, *rows = list(csv.reader(file))
+    """The states of a table with a column ``frame`` and one for each coordinate; angles that end
+    in _deg are kept in rad."""
     try:
-        values = np.array(rows, dtype=np.float64)
-    except ValueError:
-        values = np.zeros((0, 0))
-    if head[:1] != ["frame"] or values.ndim != 2 or values.shape[1] != len(head) > 1:
+        rows = np.atleast_1d(np.genfromtxt(table, delimiter=",", names=True, encoding="utf-8"))
+    except (ValueError, OSError) as error:
+        raise DataError(f"is no table of numbers: {error}", where=str(table)) from None
+    first, *names = rows.dtype.names or ("",)
+    frames = rows[first] if first == "frame" and names else np.array([-1.0])
+    if not np.isin(frames, np.arange(n)).all():
         raise DataError(
-            "expected a column frame, one for each coordinate, and numbers",
+            f"expected a column frame, of numbers within 0:{n}, and one for each coordinate",
             where=str(table),
             hint="for example: frame,angle_deg,stretch",
         )
-    frames = values[:, 0].astype(int)
-    if len(frames) and not 0 <= frames.min() <= frames.max() < n:
-        raise DataError(f"expected frames within 0:{n}, got others", where=str(table))
-    return frames.tolist(), _named(head[1:], values[:, 1:])
+    state = np.column_stack([rows[k] * (math.pi / 180 if _in_degrees(k) else 1) for k in names])
+    kept = tuple(k.removesuffix("_deg") if _in_degrees(k) else k for k in names)
+    return frames.astype(int).tolist(), {"state": state, "names": kept}
 
 
-def _named(names: list[str], state: FloatArray) -> dict[str, Any]:
-    """Coordinates in the units in which they are kept: angles in rad."""
-    turned = [name.startswith("angle") and name.endswith("_deg") for name in names]
-    state = state * np.where(turned, math.pi / 180, 1.0)
-    kept = [name.removesuffix("_deg") if t else name for name, t in zip(names, turned, strict=True)]
-    return {"state": state, "names": tuple(name.removesuffix("_rad") for name in kept)}
+def _in_degrees(name: str) -> bool:
+    return name.startswith("angle") and name.endswith("_deg")
 
 
 def _named_bends(given: list[str], n: int) -> dict[int, tuple[float, float]]:
@@ -268,22 +251,12 @@ def _true_states(path: Path, data: Recording) -> tuple[list[int], dict[str, Any]
     if not any(item.bends for item in truth):
         return list(range(len(data))), {}
     at = np.searchsorted([item.host_time for item in truth], data.time, side="right") - 1
-    frames = [k for k, number in enumerate(at.tolist()) if number >= 0]
-    frames = [k for k in frames if not truth[at[k]].presses]
-    rows = [_amounts(truth[at[k]].bends) for k in frames]
-    angle, axis, stretch = np.array(rows).T
+    frames = [k for k in np.flatnonzero(at >= 0).tolist() if not truth[at[k]].presses]
+    bends = [{key: b[key] for b in truth[at[k]].bends for key in b} for k in frames]
+    angle, stretch = (np.array([b.get(key, 0.0) for b in bends]) for key in ("angle", "strain"))
+    axis = np.array([b["axis"] if "angle" in b else math.pi / 2 for b in bends])
     if not stretch.any():
         return frames, {"angle": angle, "axis": axis}
-    names: tuple[str, ...] = ("angle", "stretch")
-    state = np.column_stack([angle, stretch])
-    if not angle.any():
-        state, names = state[:, 1:], names[1:]
-    return frames, {"state": state, "names": names, "axis": axis[np.abs(angle).argmax()]}
-
-
-def _amounts(bends: Sequence[Mapping[str, Any]]) -> tuple[float, float, float]:
-    """Angle and axis of what is bent, and elongation of what is stretched."""
-    bent = [bend for bend in bends if "angle" in bend]
-    angle, axis = (bent[0]["angle"], bent[0]["axis"]) if bent else (0.0, math.pi / 2)
-    stretch = sum(bend["strain"] for bend in bends if "strain" in bend)
-    return float(angle), float(axis), float(stretch)
+    about = axis[np.abs(angle).argmax()]
+    state = np.column_stack([stretch, angle] if angle.any() else [stretch])
+    return frames, {"state": state, "names": ("stretch", "angle")[: state.shape[1]], "axis": about}

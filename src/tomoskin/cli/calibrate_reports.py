@@ -160,21 +160,16 @@ def body_facts(model: BodyModel) -> dict[str, Any]:
     return {
         "frames": len(model.body.time),
         "directions": model.n_modes,
-        "coordinates": list(model.body.names),
-        "errors": model.error.tolist(),
-        "largest": model.body.size.tolist(),
+        "errors": dict(zip(model.body.names, model.error.tolist(), strict=True)),
         "remembers": model.remembers,
     }
 
 
 def body_lines(model: BodyModel, facts: dict[str, Any]) -> list[str]:
     """What :func:`body_facts` gave, in sentences."""
-    each = zip(facts["coordinates"], facts["errors"], facts["largest"], strict=True)
     errors = ", ".join(
-        f"{name} {np.degrees(error):.2f}°"
-        if name.startswith("angle")
-        else f"{name} {error:.3g} of {largest:.3g}"
-        for name, error, largest in each
+        f"{name} {np.degrees(error):.2f}°" if name.startswith("angle") else f"{name} {error:.3g}"
+        for name, error in facts["errors"].items()
     )
     lines = [
         f"{facts['frames']} frames, {facts['directions']} directions; in cross-validation "
@@ -183,7 +178,7 @@ def body_lines(model: BodyModel, facts: dict[str, Any]) -> list[str]:
     if model.remembers:
         lines.append("the sheet's memory is part of the calibration: process frames in their order")
     if not model.examples.names:
-        lines.append("nothing measured the state, so it has no unit: give --states, or body")
+        lines.append("nothing measured the state, so it has no unit: --states TABLE.csv gives one")
     elif not model.body.turns and "angle" in model.body.names:
         lines.append(
             "the axis of a bend is estimated from three directions on; here the given axis is used"

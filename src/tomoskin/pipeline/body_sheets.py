@@ -27,7 +27,7 @@ _NEARER = 0.8
 
 
 class BodySheets:
-    """Sheets that were fitted where the body has been, each with what it ``moved`` then.
+    """Sheets that were fitted for some poses, each with what the body ``moved`` then.
 
     Parameters
     ----------
@@ -35,12 +35,16 @@ class BodySheets:
         The model of the sheet at rest.
     reference
         What that reads.
+    poses
+        (p, n_meas) V that the body moved while it was learnt: the farthest from all that are kept
+        is fitted when there is nothing else to do.
     """
 
-    def __init__(self, rest: SpotModel, reference: Reference) -> None:
-        self.rest, self._reference = rest, reference
+    def __init__(self, rest: SpotModel, reference: Reference, poses: FloatArray) -> None:
+        self.rest, self._reference, self._poses = rest, reference, poses
         self._apart = _APART * float(np.linalg.norm(reference.mean))
         self._kept: list[tuple[FloatArray, SpotModel]] = [(np.zeros_like(reference.mean), rest)]
+        self._away = np.linalg.norm(poses, axis=1)
         self._now = 0
 
     def shifted(self, reference: Reference) -> Reference:
@@ -48,23 +52,23 @@ class BodySheets:
         return replace(reference, mean=reference.mean + self._kept[self._now][0])
 
     def steps(self, prepared: Prepared, moved: FloatArray) -> Steps | None:
-        """Pieces of work that lead to the sheet for a body that has ``moved`` the voltages by so
-        much, (n_meas,) V; None where the sheet of the moment serves."""
+        """Pieces of work that lead to a better sheet for a body that has ``moved`` the voltages by
+        so much, (n_meas,) V, or to one that will serve later; None where there is none."""
         away = [float(np.linalg.norm(moved - own)) for own, _ in self._kept]
-        nearest = int(np.argmin(away))
-        if away[nearest] > self._apart and len(self._kept) < _MOST:
-            return self._fitted(prepared, moved)
+        nearest, farthest = int(np.argmin(away)), int(np.argmax(self._away))
         if away[nearest] < _NEARER * away[self._now]:
             return self._taken(prepared, nearest)
-        return None
+        if len(self._kept) > _MOST:
+            return None
+        if away[nearest] > self._apart:
+            return self._fitted(moved)
+        return self._fitted(self._poses[farthest]) if self._away[farthest] > self._apart else None
 
-    def _fitted(self, prepared: Prepared, moved: FloatArray) -> Steps:
-        reference = self._reference
-        deviation = np.nan_to_num(reference.noise)
-        even = self.rest.even or self.rest
-        sheet = yield from even.fitting(reference.mean + moved, deviation)
+    def _fitted(self, moved: FloatArray) -> Steps:
+        even, deviation = self.rest.even or self.rest, np.nan_to_num(self._reference.noise)
+        sheet = yield from even.fitting(self._reference.mean + moved, deviation)
         self._kept.append((moved, sheet))
-        yield from self._taken(prepared, len(self._kept) - 1)
+        self._away = np.minimum(self._away, np.linalg.norm(self._poses - moved, axis=1))
 
     def _taken(self, prepared: Prepared, number: int) -> Steps:
         self._now = number

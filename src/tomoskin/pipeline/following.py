@@ -113,9 +113,10 @@ class Following:
         self._applied = {k: c.apply(conditions) for k, c in prepared.calibrations.items()}
         self._tuning = None if reference is None else tune(prepared, reference, excluded)
         self._sheets: BodySheets | None = None
+        poses = [applied.poses for applied in self._applied.values() if len(applied.poses)]
         plain = prepared.operator.difference == "plain"
-        if BODY.name in self._applied and reference and prepared.spots and fitted and plain:
-            self._sheets = BodySheets(prepared.spots, reference)
+        if poses and reference and prepared.spots and fitted and plain:
+            self._sheets = BodySheets(prepared.spots, reference, poses[0])
         self._interval = interval if interval > 0 else prepared.longest_scan
         self._drives: DriveWatch | None = None
 

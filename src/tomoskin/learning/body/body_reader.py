@@ -27,6 +27,10 @@ _ROUGH = 0.15
 _STEPS, _NEAR = 8, 1e-4
 """Of Gauss and Newton, and the step, in parts of a coordinate's largest, that ends them."""
 
+_ANOTHER = 1.5
+"""By how much another motion errs more than a part of the same that was left out: chosen on the
+twins 11, 12 and 9601."""
+
 _FADES = 30.0
 """Seconds in which what touches have left behind fades."""
 
@@ -171,7 +175,7 @@ class BodyReader:
         degrees = max(len(data) - blind.shape[1] - model.n_modes, 1)
         left = float(residual @ residual)
         weights = information / max(left / degrees, 1.0)
-        excess = model.excess + self._left + self._pressed
+        excess = _ANOTHER**2 * model.excess + self._left + self._pressed
         weights = np.linalg.solve(np.eye(model.n_modes) + weights @ excess, weights)
         explained = float(np.sum(model.whiten(dv) ** 2)) * _ROUGH**2
         return z, (weights + weights.T) / 2, left > _LIKE**2 * degrees + explained
@@ -279,6 +283,8 @@ class BodyApplied(Applied):
     def __init__(self, model: BodyModel, fit: TouchFit) -> None:
         self._reader = BodyReader(model, fit.response, fit.gain)
         self._detect = fit.detect
+        self.poses = model.whiten(model.examples.dv) @ model.whiten(model.directions.T).T
+        self.poses = self.poses @ model.directions.T
 
     def renew(self, response: Response, gain: float) -> None:
         """Go on with touches on another sheet."""
