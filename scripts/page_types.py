@@ -64,6 +64,7 @@ def _records() -> Iterator[str]:
     yield f"export const FLAGS = {{ {flags} }} as const;"
     yield f"export const MAGIC = 0x{int.from_bytes(frames.MAGIC, 'little'):x};"
     yield f"export const BEND_STATES = [{words}] as const;"
+    yield f"export const DENT_STEP = {frames.DENT_STEP:g};"
 
 
 def _getter(kind: np.dtype[Any], offset: int) -> str:

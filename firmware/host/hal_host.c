@@ -32,6 +32,7 @@ static const struct skin_memory *skin;
 static uint32_t current_ua;
 static uint64_t started;
 static uint64_t event_time; /* of the interrupt that runs; 0: none runs */
+static uint64_t latest; /* that it has been in one: a dead time is not waited for, but counts */
 static uint64_t timer_due = NEVER;
 static uint64_t timer_from;
 static uint64_t adc_due = NEVER;
@@ -65,7 +66,8 @@ static uint64_t now_ns(void) {
     }
     uint64_t now = real_time();
     uint64_t due = next_due();
-    return due < now ? due : now;
+    now = due < now ? due : now;
+    return now < latest ? latest : now;
 }
 
 static _Noreturn void give_up(const char *what) {
@@ -269,6 +271,7 @@ static bool deliver(uint64_t until) {
         }
         scan_on_sample(sum);
     }
+    latest = event_time;
     event_time = 0u;
     return true;
 }

@@ -139,7 +139,7 @@ def test_a_film_shows_a_fall_in_blue_and_a_rise_in_red(tmp_path):
 @pytest.mark.parametrize(("kind", "end"), [("decrease", 0), ("increase", -1)])
 def test_a_touch_in_foxglove_has_the_colour_of_its_sign(kind, end):
     touch = type(TOUCH)(1, kind, 0.0, TOUCH.detection)
-    (entity,) = scene_message([Contact.of(touch, Plane())], 0)["entities"]
+    (entity,) = scene_message(Contact.each([touch], Plane()), 0)["entities"]
     (sphere,) = entity["spheres"]
     levels = [255 * sphere["color"][channel] for channel in "rgb"]
     assert levels == pytest.approx(CHANGE.table[end])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
@@ -10,6 +10,8 @@ import pytest
 from run.board import pressed, samples_of
 from tomoskin.core import DriveSamples, Frame
 from tomoskin.pipeline import DriveResult, FrameResult, Pipeline, Prepared
+from tomoskin.pipeline.drives import DriveWatch
+from tomoskin.sensing.fit import DriveView
 
 SECONDS, NEEDED = 0.056, 20
 
@@ -125,6 +127,57 @@ def test_what_no_frame_confirms_is_withdrawn_and_its_number_is_not_given_again(
     withdrawn = {touch.id for result in turns.drives if result for touch in result.withdrawn}
     assert begun == withdrawn == {number + 1}
     assert turns.pipeline.numbered > number
+
+
+def test_a_scan_that_saw_a_touch_come_down_looks_like_noise_but_its_release_is_no_later(
+    turns, idle, touched, monkeypatch
+):
+    turns.turn(idle, touched, since=2)
+    key, noise = DriveView.key.fget, DriveView.noise
+    loud = [replace(excess, level=1e4) for excess in [key(watch_of(turns).view)[3]]]
+    monkeypatch.setattr(
+        DriveView, "key", property(lambda view: (*key(view)[:3], *loud, key(view)[4]))
+    )
+    monkeypatch.setattr(DriveView, "noise", lambda view: [1e4 * part for part in noise(view)])
+    turns.turn(touched)
+    assert all(turns.told)
+    turns.turn(touched, idle, since=2)
+    assert not turns.told[-1]
+
+
+def test_what_drives_follow_goes_to_the_touch_of_the_frame_that_is_there(turns, touched):
+    """A fit of half a scan has put it elsewhere, and the next one shows it as a further touch."""
+    for _ in range(6):
+        turns.turn(touched)
+    (touch,) = turns.frames[-1].touches
+    d = touch.detection
+    elsewhere = replace(touch, detection=replace(d, x=d.x - 0.05, sd_x=0.05, sd_y=0.05))
+    further = replace(touch, id=touch.id + 1)
+    watch_of(turns).confirm([elsewhere, further], (turns.number - 1) * SECONDS)
+    turns.turn(touched)
+    assert all(further.id in {t.id for t in touches} for touches in turns.told)
+
+
+def test_a_touch_that_drives_took_for_lifted_is_there_again_where_they_show_most_of_it(
+    turns, touched
+):
+    for _ in range(6):
+        turns.turn(touched)
+    (one,) = watch_of(turns)._followed.values()
+    for _ in range(4):
+        one.take(one.moving, one.moving, 1.5, 0.0)
+    assert one.lifted is not None
+    state = one.moving.state.copy()
+    state[5] *= 0.4
+    part = replace(one.moving, state=state)  # which a sheet may show for long
+    for moving, lifted in ((part, True), (one.moving, False)):
+        for _ in range(3):
+            one.take(moving, moving, -20.0, -5.0)
+        assert (one.lifted is not None) == lifted
+
+
+def watch_of(turns) -> DriveWatch:
+    return turns.pipeline._state._drives
 
 
 def test_frames_are_to_the_bit_what_they_are_without_drives(turns, prepared, idle, touched):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from contextlib import ExitStack, contextmanager
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from mcap.reader import make_reader
 
 from run.board import Board, samples_of
+from tomoskin.board.wire import Ping
 from tomoskin.core import DataError, OutputError, SourceError
 from tomoskin.files.session import SessionReader, repair, split, split_targets
 from tomoskin.model.robot import Place, Pose
@@ -201,14 +203,14 @@ def test_one_file_holds_all_and_is_split(prepared, boards, tmp_path, tomoskin):
         split(path)
 
 
-def test_turns_are_taken_in_order():
-    turns, taken = Turns(), []
+def test_turns_are_taken_in_order_and_who_waits_does_something_else():
+    turns, taken, asked = Turns(), [], threading.Semaphore(0)
 
     def take(name):
-        with turns:
+        with turns.turn(asked.release):
             taken.append(name)
 
-    with turns:
+    with turns.turn(asked.release):
         threads = []
         for name in "abc":
             thread = threading.Thread(target=take, args=name)
@@ -216,7 +218,21 @@ def test_turns_are_taken_in_order():
             threads.append(thread)
             while len(turns._waiting) < len(threads):
                 pass
+        assert all(asked.acquire(timeout=PATIENCE) for _ in range(6))
         assert taken == []
     for thread in threads:
         thread.join(PATIENCE)
     assert taken == ["a", "b", "c"]
+
+
+def test_a_board_hears_its_host_while_another_skin_computes_for_long(prepared, boards):
+    members = [member(prepared, name, board) for name, board in boards.items()]
+    with running(members) as run:
+        Watch(run).until(grown(run, boards))
+        turns = run.runners["left"].audience.turns
+        with turns.turn(lambda: None):
+            before = len(boards["hand"].commands)
+            end = time.monotonic() + PATIENCE
+            while sum(isinstance(c, Ping) for c in boards["hand"].commands[before:]) < 3:
+                assert time.monotonic() < end
+                time.sleep(0.02)

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from tomoskin.core import Amount, Detection, Image, Touch
-from tomoskin.learning import BODY, BodyReading
+from tomoskin.learning import BODY, BodyReading, DentMap
 from tomoskin.pipeline import FrameResult
 from tomoskin.server.frames import encode_result
 from tomoskin.twin import Finger, Press, Probe
 
 HEADER = (
     *("magic", "sequence", "host_time", "n_cells", "n_meas"),
-    *("n_touches", "n_truth", "flags", "latency_us"),
+    *("n_touches", "n_truth", "flags", "latency_us", "n_dent"),
 )
 
 
@@ -41,7 +41,7 @@ def touch(number, cells, kind="decrease", sd=0.001):
 
 def decode(data):
     """By the contract's table alone."""
-    head = dict(zip(HEADER, struct.unpack_from("<4sIdIIHHII", data), strict=True))
+    head = dict(zip(HEADER, struct.unpack_from("<4sIdIIHHIII", data), strict=True))
     at = 40
 
     def floats(n):
@@ -65,6 +65,9 @@ def decode(data):
         at += 16
     head["labels"] = list(data[at : at + head["n_cells"]])
     at += math.ceil(head["n_cells"] / 4) * 4
+    n = head["n_dent"]
+    head["dent"] = np.reshape(struct.unpack_from(f"<{2 * n}H", data, at), (2, n)) * 2e-6
+    at += 4 * n
     assert at == len(data)
     return head
 
@@ -88,6 +91,14 @@ def test_round_trip(n_cells):
     assert math.isnan(second[4])
     assert found["truth"] == [pytest.approx((0.5, -0.25, 3.0, 0.015))]
     assert found["labels"] == [1, 1, 0, 2] + [0] * (n_cells - 4)
+
+
+def test_a_dent_that_is_asked_for_follows_the_labels():
+    dent = DentMap(np.array([0.0, 1.234e-3, 5.0]), np.array([1e-6, 2e-4, 0.0]))
+    found = decode(encode_result(make(), [], 0.0, dent))
+    assert found["dent"][0] == pytest.approx([0, 1.234e-3, 0.13107])
+    assert found["dent"][1] == pytest.approx([0, 2e-4, 0], abs=1e-6)
+    assert decode(encode_result(make(), [], 0.0))["dent"].size == 0
 
 
 def test_nothing_to_tell():

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 from contextlib import closing
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -16,7 +15,7 @@ from server.serving import Site
 from server.test_play import Page
 from server.watching import Watched
 from tomoskin.board.source import open_source
-from tomoskin.learning import DEPTH, FORCE, TOUCH, AmountModel
+from tomoskin.learning import DEPTH, FORCE, TOUCH
 from tomoskin.model.skin import Skin
 from tomoskin.run import Runner, commands
 from tomoskin.server import serve_requests
@@ -130,13 +129,13 @@ def test_a_kept_press_is_on_the_twin_after_its_pattern_has_changed(opened, site)
 
 def lay(opened, newtons, place, done):
     """Say a weight and lay it on with the pointer; until it is taken."""
-    opened.test_id("weight").fill(f"{newtons:g}")
+    opened.test_id("label").fill(f"{newtons:g}")
     opened.page.keyboard.press("Enter")
-    opened.test_id("weight-now").filter(has_text=f"{newtons:g} N").wait_for()
+    opened.test_id("label-now").filter(has_text=f"{newtons:g} N").wait_for()
     opened.test_id("phase").filter(has_text="Put the weight on").wait_for()
     opened.move(*place)
     opened.page.mouse.down()
-    opened.test_id("taken").filter(has_text=f"{done + 1} placement").wait_for()
+    opened.test_id("taken").filter(has_text=f"{done + 1} press").wait_for()
     opened.page.mouse.up()
 
 
@@ -144,24 +143,21 @@ def test_weights_are_laid_on_and_forces_are_shown(opened, folder):
     opened.test_id("open-setup").click()
     opened.test_id("step-force").click()
     opened.test_id("flow-begin").click()
-    opened.test_id("weight-unit").select_option("N")
-    opened.test_id("weight").fill("200")
+    opened.test_id("label-unit").select_option("N")
+    opened.test_id("label").fill("200")
     opened.page.keyboard.press("Enter")
     opened.test_id("flow-asked").filter(has_text="Did you mean 200 g (1.96 N)?").wait_for()
     places = [(0.03, 0.03), (-0.04, 0.02), (0.0, -0.05), (-0.02, -0.02), (0.04, -0.03)]
     for done, (newtons, place) in enumerate(zip((2, 8, 4, 6, 3), places, strict=True)):
         lay(opened, newtons, place, done)
     opened.test_id("flow-text").filter(has_text="forces are missed by").wait_for()
-    in_sight(opened, "phase", "weight-set", "flow-end", "flow-keep")
+    in_sight(opened, "phase", "label-set", "flow-end", "flow-keep")
     looks_right(opened, "force")
     opened.test_id("flow-keep").click()
     opened.test_id("calibration").filter(has_text="force.npz").wait_for()
     forces = FORCE.read(folder / "force.npz")
     learnt = forces.model.presses
     assert learnt.amount[learnt.labelled].tolist() == [2, 8, 4, 6, 3]
-    deep = replace(learnt, amount=1e-4 * learnt.amount, measurand="depth")
-    depths = AmountModel.learn(deep, forces.model.conductivity, forces.model.unit)
-    DEPTH.of(depths, forces.pattern).write(folder / "depth.npz")
     opened.press(0.03, 0.03)
     opened.test_id("force").wait_for()
     looks_right(opened, "forces")
@@ -169,20 +165,40 @@ def test_weights_are_laid_on_and_forces_are_shown(opened, folder):
     opened.test_id("strength-unit").filter(has_text="Strength, S").wait_for()
     assert opened.test_id("force").count() == 0, "the list and the chart show the same"
     opened.page.mouse.up()
-    opened.test_id("calibration-of-depth").filter(has_text="uncalibrated").wait_for()
-    opened.test_id("open-setup").click()
-    opened.test_id("open-setup").click()
-    opened.test_id("step-force").click()
-    opened.page.get_by_label("Depths from").select_option("depth.npz")
-    opened.test_id("calibration-of-depth").filter(has_text="depth.npz").wait_for()
-    opened.press(0.03, 0.03)
-    opened.test_id("strength-unit").press("Enter")
-    opened.test_id("strength-unit").press("Enter")
-    opened.test_id("strength-unit").filter(has_text="Depth, mm").wait_for()
-    opened.test_id("depth").wait_for()
-    opened.page.mouse.up()
     opened.page.get_by_label("Calibration").select_option("")
     opened.test_id("calibration").filter(has_text="No weights").wait_for()
+
+
+def test_depths_are_read_off_the_twin_and_shown(opened, site, folder):
+    twin = site.runner.flow.twin
+    opened.test_id("open-setup").click()
+    opened.test_id("step-depth").click()
+    opened.test_id("calibration-of-depth").filter(has_text="uncalibrated").wait_for()
+    opened.test_id("flow-begin").click()
+    places = [(0.03, 0.03), (-0.04, 0.02), (0.0, -0.05), (-0.02, -0.02), (0.04, -0.03)]
+    depths = []
+    for done, place in enumerate(places):
+        opened.test_id("phase").filter(has_text="Press anywhere, and hold").wait_for()
+        for _ in range(2):
+            opened.page.keyboard.press("+")
+        opened.move(*place)
+        opened.page.mouse.down()
+        opened.test_id("taken").filter(has_text=f"{done + 1} press").wait_for()
+        depths.append(twin.depth)
+        opened.page.mouse.up()
+    opened.test_id("flow-text").filter(has_text="depths are missed by").wait_for()
+    in_sight(opened, "phase", "flow-end", "flow-keep")
+    looks_right(opened, "depth")
+    opened.test_id("flow-keep").click()
+    opened.test_id("calibration-of-depth").filter(has_text="depth.npz").wait_for()
+    learnt = DEPTH.read(folder / "depth.npz").model.presses
+    assert learnt.amount[learnt.labelled] == pytest.approx(depths, abs=1e-6)
+    opened.press(0.03, 0.03)
+    opened.test_id("depth").wait_for()
+    opened.test_id("strength-unit").filter(has_text="Depth, mm").wait_for()
+    opened.page.mouse.up()
+    opened.page.get_by_label("Depths from").select_option("")
+    opened.test_id("calibration-of-depth").filter(has_text="uncalibrated").wait_for()
 
 
 LAPS, REACH, STEP = 4.5, 0.085, 0.008
@@ -259,10 +275,10 @@ def test_a_flow_whose_drawer_is_closed_is_paused_and_named(opened):
     opened.test_id("open-setup").click()
     opened.test_id("step-force").click()
     opened.test_id("flow-begin").click()
-    opened.test_id("weight-unit").select_option("N")
+    opened.test_id("label-unit").select_option("N")
     lay(opened, 2, (0.03, 0.03), 0)
     opened.test_id("state").filter(has_text="Teaching forces").wait_for()
-    opened.test_id("weight").fill("0")
+    opened.test_id("label").fill("0")
     opened.page.keyboard.press("Enter")
     opened.test_id("remark").filter(has_text="expected a weight").wait_for()
     opened.test_id("remark").filter(has_text="Teaching forces: 1 recorded").wait_for()
@@ -279,10 +295,10 @@ def test_a_flow_whose_drawer_is_closed_is_paused_and_named(opened):
     opened.until("last?.referenceReady")
     opened.test_id("state").filter(has_text="Teaching paused").wait_for()
     opened.test_id("open-setup").click()
-    opened.test_id("taken").filter(has_text="1 placement recorded").wait_for()
+    opened.test_id("taken").filter(has_text="1 press recorded").wait_for()
     opened.test_id("state").filter(has_text="Teaching forces").wait_for()
-    assert opened.test_id("weight").input_value() == "2"
-    assert opened.test_id("weight-unit").input_value() == "N"
+    assert opened.test_id("label").input_value() == "2"
+    assert opened.test_id("label-unit").input_value() == "N"
     opened.test_id("flow-end").click()
     opened.test_id("flow-end").filter(has_text="Forget all of it").click()
     opened.test_id("state").filter(has_text="Live").wait_for()

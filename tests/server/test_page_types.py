@@ -28,7 +28,7 @@ def test_they_hold_every_message_and_request(script):
     made = script.types()
     for message in (*page_messages.PAGE_MESSAGES, *settings_messages.SETTINGS_MESSAGES):
         assert f"export interface {message.__name__} {{\n  readonly type: " in made
-    assert '  readonly type: "flow_weight";' in made
+    assert '  readonly type: "flow_label";' in made
     assert "  readonly sure?: boolean;" in made
     assert "  readonly errors_mm?: readonly number[];" in made
     assert f"TOUCH_BYTES = {frames.RECORDS['Touch'].itemsize};" in made

@@ -37,6 +37,12 @@ function bendAt(data: DataView, at: number) {
 /** How the sheet is bent; angles in rad. */
 export type Bend = Readonly<ReturnType<typeof bendAt>>;
 
+/** By how much each node of the mesh has given way, and the deviation of that, in `wire.DENT_STEP`. */
+export interface Dent {
+  readonly deflection: Uint16Array;
+  readonly deviation: Uint16Array;
+}
+
 export interface Frame {
   readonly sequence: number;
   readonly hostTime: number;
@@ -54,6 +60,8 @@ export interface Frame {
   readonly bend: Bend | null;
   /** 0 none, k: the cell belongs to the k-th touch. */
   readonly labels: Uint8Array;
+  /** Null: nothing touches, the page has not asked for it, or depths are uncalibrated. */
+  readonly dent: Dent | null;
 }
 
 /** Decode one frame. Throws RangeError for bytes that are not one. */
@@ -62,13 +70,14 @@ export function decodeFrame(buffer: ArrayBuffer): Frame {
   if (buffer.byteLength < wire.HEADER_BYTES || data.getUint32(0, true) !== wire.MAGIC) {
     throw new RangeError("expected a frame beginning with TSK1");
   }
-  const { sequence, hostTime, nCells, nMeas, nTouches, nTruth, flags, latencyUs } = wire.readHeader(data, 0);
+  const { sequence, hostTime, nCells, nMeas, nTouches, nTruth, flags, latencyUs, nDent } = wire.readHeader(data, 0);
   const bent = (flags & wire.FLAGS.bent) !== 0;
   const touchesAt = wire.HEADER_BYTES + 4 * (nCells + 2 * nMeas);
   const truthsAt = touchesAt + wire.TOUCH_BYTES * nTouches;
   const bendsAt = truthsAt + wire.TRUTH_BYTES * nTruth;
   const labelsAt = bendsAt + (bent ? wire.BEND_BYTES : 0);
-  if (buffer.byteLength < labelsAt + nCells) {
+  const dentAt = labelsAt + 4 * Math.ceil(nCells / 4);
+  if (buffer.byteLength < (nDent ? dentAt + 4 * nDent : labelsAt + nCells)) {
     throw new RangeError(
       `expected ${labelsAt + nCells} bytes for ${nCells} cells, got ${buffer.byteLength}`,
     );
@@ -87,5 +96,11 @@ export function decodeFrame(buffer: ArrayBuffer): Frame {
     truths: Array.from({ length: nTruth }, (_, k) => wire.readTruth(data, truthsAt + wire.TRUTH_BYTES * k)),
     bend: bent ? bendAt(data, bendsAt) : null,
     labels: new Uint8Array(buffer, labelsAt, nCells),
+    dent: nDent
+      ? {
+          deflection: new Uint16Array(buffer, dentAt, nDent),
+          deviation: new Uint16Array(buffer, dentAt + 2 * nDent, nDent),
+        }
+      : null,
   };
 }

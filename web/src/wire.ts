@@ -192,6 +192,12 @@ export interface UnresolvedMap {
   readonly problem: string;
 }
 
+/** Why frames hold no dent of touches, in words; "" where they do. */
+export interface DentNow {
+  readonly type: "dent";
+  readonly problem: string;
+}
+
 /** What happened in the recording that is played, at times from its first frame. */
 export interface PlayedTimeline {
   readonly type: "timeline";
@@ -277,7 +283,7 @@ export interface Calibrations {
 /** The guided flow; ``kind`` null: none goes on. */
 export interface FlowNow {
   readonly type: "flow";
-  readonly kind: "force" | "mapping" | "rub" | "touch" | null;
+  readonly kind: "depth" | "force" | "mapping" | "rub" | "touch" | null;
   readonly paused: boolean;
   readonly phase: "hold" | "name" | "press" | "release" | "rest" | "rub" | "several";
   readonly dot: readonly [number, number] | null;
@@ -287,10 +293,10 @@ export interface FlowNow {
   readonly ready: boolean;
   readonly figures: Figures;
   readonly effort: "hard" | "softly" | null;
-  readonly weights: readonly string[];
-  readonly weight: WeightNow | null;
-  readonly asked: WeightNow | null;
-  readonly meant: WeightNow | null;
+  readonly labels: readonly string[];
+  readonly label: LabelNow | null;
+  readonly asked: LabelNow | null;
+  readonly meant: LabelNow | null;
   readonly rubbed: RubbedNow | null;
   readonly stage: string;
 }
@@ -310,11 +316,11 @@ export interface Figures {
   readonly remarks?: readonly string[];
 }
 
-/** A weight, in the unit in which it was given, in newtons, and in words. */
-export interface WeightNow {
+/** A weight or depth, in the unit in which it was given, in SI, and in words. */
+export interface LabelNow {
   readonly value: number;
-  readonly unit: "N" | "g" | "kg";
-  readonly newtons: number;
+  readonly unit: "N" | "g" | "kg" | "mm";
+  readonly si: number;
   readonly text: string;
 }
 
@@ -588,6 +594,12 @@ export interface AskUnresolved {
   readonly type: "unresolved";
 }
 
+/** This page shows the dent of touches, or does not any more; it is answered what there is. */
+export interface ShowDent {
+  readonly type: "dent";
+  readonly on: boolean;
+}
+
 /** How long the page took of late from a frame's arrival to the end of drawing it, s. */
 export interface Painted {
   readonly type: "painted";
@@ -684,10 +696,10 @@ export interface Connect {
   readonly source: string;
 }
 
-/** Ask for presses: where the dot is, to learn touch or to find the channel mapping; with known weights, to learn forces; everywhere, to learn touch without labels. */
+/** Ask for presses: where the dot is, to learn touch or to find the channel mapping; with known weights or to known depths, to learn these; everywhere, to learn touch without labels. */
 export interface BeginFlow {
   readonly type: "flow_begin";
-  readonly kind: "force" | "mapping" | "rub" | "touch";
+  readonly kind: "depth" | "force" | "mapping" | "rub" | "touch";
 }
 
 /** This page shows the flow, or hides it: while no page shows it, it is paused. */
@@ -702,11 +714,11 @@ export interface DeletePress {
   readonly number?: number | null;
 }
 
-/** What lies on the skin, or comes next; ``sure``: an unusual weight is meant as it is said. */
-export interface SetWeight {
-  readonly type: "flow_weight";
+/** The weight or depth of a press, or the next; ``sure``: an unusual one is meant as it is said. */
+export interface SetLabel {
+  readonly type: "flow_label";
   readonly value: number;
-  readonly unit: "N" | "g" | "kg";
+  readonly unit: "N" | "g" | "kg" | "mm";
   readonly sure?: boolean;
 }
 
@@ -765,6 +777,7 @@ export interface SpaceTouch {
   readonly peak: number;
   readonly force: number | null;
   readonly more_than: number | null;
+  readonly is_self: boolean | null;
 }
 
 export type ServerMessage =
@@ -774,6 +787,7 @@ export type ServerMessage =
   | EventNote
   | Refusal
   | UnresolvedMap
+  | DentNow
   | PlayedTimeline
   | Files
   | Exported
@@ -806,6 +820,7 @@ export type PageRequest =
   | SetLoop
   | SetRecording
   | AskUnresolved
+  | ShowDent
   | Painted
   | SetSettings
   | UndoSettings
@@ -825,7 +840,7 @@ export type PageRequest =
   | BeginFlow
   | ShowFlow
   | DeletePress
-  | SetWeight
+  | SetLabel
   | AskPoint
   | LearnFlow
   | StopLearning
@@ -844,6 +859,7 @@ export const readHeader = (data: DataView, at: number) => ({
   nTruth: data.getUint16(at + 26, true),
   flags: data.getUint32(at + 28, true),
   latencyUs: data.getUint32(at + 32, true),
+  nDent: data.getUint32(at + 36, true),
 });
 
 export const TOUCH_BYTES = 64;
@@ -892,3 +908,5 @@ export const FLAGS = { ready: 1, noImage: 2, rowsLeftOut: 4, bent: 8 } as const;
 export const MAGIC = 0x314b5354;
 
 export const BEND_STATES = ["idle", "bend", "touch", "bend and touch", "unknown"] as const;
+
+export const DENT_STEP = 2e-06;

@@ -72,7 +72,7 @@ function warningsOf(status: RunState, age: number | null): Warning[] {
   return found;
 }
 
-const TEACHING = { touch: "touch", rub: "touch", force: "forces", mapping: "channels" } as const;
+const TEACHING = { touch: "touch", rub: "touch", force: "forces", depth: "depths", mapping: "channels" } as const;
 
 /** A guided flow, in place of the calm word of a live skin; any other word stays. */
 function withFlow(

@@ -60,6 +60,20 @@ describe("decodeFrame", () => {
     expect([...frame.labels]).toEqual([0, 1, 1, 0, 0]);
   });
 
+  it("reads the dent after the labels, where there is one", () => {
+    expect(decodeFrame(sample()).dent).toBeNull();
+    const bytes = new Uint8Array(172 + 8);
+    bytes.set(new Uint8Array(sample()));
+    const data = new DataView(bytes.buffer);
+    data.setUint32(36, 2, true);
+    [500, 0, 50, 7].forEach((count, k) => data.setUint16(172 + 2 * k, count, true));
+    const { dent, labels } = decodeFrame(bytes.buffer);
+    expect([...(dent?.deflection ?? [])]).toEqual([500, 0]);
+    expect([...(dent?.deviation ?? [])]).toEqual([50, 7]);
+    expect([...labels]).toEqual([0, 1, 1, 0, 0]);
+    expect(() => decodeFrame(bytes.buffer.slice(0, 176))).toThrow(RangeError);
+  });
+
   it("refuses foreign, short and empty bytes", () => {
     expect(() => decodeFrame(new ArrayBuffer(0))).toThrow(RangeError);
     expect(() => decodeFrame(new ArrayBuffer(64))).toThrow("TSK1");

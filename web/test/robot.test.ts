@@ -90,6 +90,11 @@ describe("the row of a skin", () => {
     expect(touchLines({ valid: true, touches: [], pose_problem: null })).toEqual(["no touch"]);
   });
 
+  it("says that the robot touches itself", () => {
+    const found = { valid: true, touches: [{ ...touch, force: null, more_than: null, is_self: true }], pose_problem: null };
+    expect(touchLines(found as never)).toEqual(["touch 3 by the robot at 300, \u221220, 50 mm"]);
+  });
+
   it("says no place where it is not known where the link is", () => {
     const found = { valid: true, touches: [{ ...touch, force: 2, more_than: null }], pose_problem: "pose unknown: why" };
     expect(touchLines(found as never)).toEqual(["touch 3, 2.0 N"]);

@@ -43,13 +43,27 @@ describe("a place on the mesh", () => {
 });
 
 describe("a sheet in space", () => {
-  const seen = new Seen(topology, locator, bent, rotation({ turn: 0.4, tilt: 0.3 }));
+  const seen = Seen.of(topology, locator, bent, rotation({ turn: 0.4, tilt: 0.3 }));
   const view = around(seen, 800, 600, { left: 100, right: 50, top: 50, bottom: 50 });
 
   it.each([[0, 0], [0.05, -0.03], [-0.02, 0.08]])("gives the pressed place back: %f, %f", (x, y) => {
     const [backX, backY] = toSheet(view, ...toPixels(view, x, y));
     expect(backX).toBeCloseTo(x, 4);
     expect(backY).toBeCloseTo(y, 4);
+  });
+
+  it("gives way into itself, true to scale, and is lit on the other side", () => {
+    const counts = new Uint16Array(topology.nPoints);
+    const middle = (N / 2) * (N + 1) + N / 2;
+    counts[middle] = 5000;
+    const dented = seen.dented(counts, 2e-6);
+    const way = (node: number) => Math.hypot(...[0, 1, 2].map((k) => dented.places[3 * node + k] - seen.places[3 * node + k]));
+    expect(way(middle)).toBeCloseTo(0.01, 5);
+    expect(way(middle + 3)).toBe(0);
+    expect(dented.places[3 * middle + 2]).toBeLessThan(seen.places[3 * middle + 2]);
+    expect(dented.lit?.[middle + 5]).toBe(1);
+    expect(dented.lit?.[middle - N - 1]).toBeGreaterThan(1.05); // the wall that looks up
+    expect(dented.lit?.[middle + N + 1]).toBeLessThan(0.95);
   });
 
   it("has nothing beside it", () => {
@@ -59,7 +73,7 @@ describe("a sheet in space", () => {
   it("stays in its window however it is turned", () => {
     for (let turn = 0; turn < 6; turn += 0.5) {
       const other = around(
-        new Seen(topology, locator, bent, rotation({ turn, tilt: 1.2 })),
+        Seen.of(topology, locator, bent, rotation({ turn, tilt: 1.2 })),
         800,
         600,
         { left: 100, right: 50, top: 50, bottom: 50 },

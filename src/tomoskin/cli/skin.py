@@ -219,19 +219,10 @@ def place(
         "source": source or f"twin:seed={len(earlier) + 1}",
         "link": link,
     } | _pose(robot, link, at, on_mesh=on_mesh)
-    text = add_skin(out, given, _from(str(urdf), out))
-    before = out.read_text(encoding="utf-8") if out.exists() else None
-    write_text(out, text, overwrite=True)
-    try:
-        count = len(Robot.load(out).skins)
-    except Exception:
-        if before is None:
-            out.unlink()
-        else:
-            write_text(out, before, overwrite=True)
-        raise
+    write_text(out, add_skin(out, given, _from(str(urdf), out)), overwrite=True)
     typer.echo(
-        f"{out}: {given['name']} on {link}, {count} skins in all; next: tomoskin live --robot {out}"
+        f"{out}: {given['name']} on {link}, {len(earlier) + 1} skins in all; "
+        f"next: tomoskin live --robot {out}"
     )
 
 

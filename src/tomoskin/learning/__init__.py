@@ -12,8 +12,8 @@ from tomoskin.learning.amount.dent_map import DentMap as DentMap, dent_map as de
 from tomoskin.learning.amount.labelled_presses import LabelledPresses as LabelledPresses
 from tomoskin.learning.amount.measurand import (
     MEASURED as MEASURED,
+    AmountLabel as AmountLabel,
     Measurand as Measurand,
-    Weight as Weight,
 )
 from tomoskin.learning.body.body_examples import BodyExamples as BodyExamples
 from tomoskin.learning.body.body_model import BodyModel as BodyModel

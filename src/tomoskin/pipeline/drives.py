@@ -7,7 +7,7 @@ touch that has begun, or withdraw it.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,9 +23,16 @@ _LIFTED = 5.0
 _MOST = 4.0
 """The most that one drive says of that: a single one may be wrong."""
 
+_THERE = 0.7
+"""Part of a touch that shows that it has not been lifted."""
+
 _FRAMES, _SECONDS = 2, 0.15
 """Frames, and seconds, within which a touch that has begun must show in frames, or it is withdrawn.
 The scan of the first one may have seen it come down, and quick ones tell little each."""
+
+_CALM = 8
+"""Frames since touches came or went in which more noise may be what these look like: a scan that
+sees a touch come down disagrees with itself, and it takes so many frames to forget that."""
 
 _STEP = 1e-4
 """Seconds of a drive that allow one step of what is made anew, where drives wait for it: with 8
@@ -80,13 +87,20 @@ class _Followed:
 
         What shows a part of a touch would draw it elsewhere, and later drives would speak of what
         is there. So such a drive is left out, and the odds begin with it. The next one counts.
+        One that has been lifted is there after all where later drives say as much against it, and
+        show most of it: a sheet that does not come back at once shows a part for long.
         """
         self.doubtful = going > _MOST and not self.doubtful
         self.moving = moving = moved if self.doubtful else told
-        if self.lifted is None:
-            self.odds = max(self.odds + min(gone, _MOST), min(going, _MOST), 0.0)
-            left = RESIDUAL.holds(abs(moving.content), abs(self.full)) and self.frames is None
-            self.lifted = moving.time if left or self.odds > _LIFTED else None
+        if self.lifted is not None:
+            self.odds = min(self.odds + max(gone, -_MOST), _LIFTED)
+            if self.odds < 0 and abs(moving.content) > _THERE * abs(self.full):
+                self.odds, self.lifted = 0.0, None
+            return
+        self.odds = max(self.odds + min(gone, _MOST), min(going, _MOST), 0.0)
+        left = RESIDUAL.holds(abs(moving.content), abs(self.full)) and self.frames is None
+        if left or self.odds > _LIFTED:
+            self.odds, self.lifted = _LIFTED, moving.time
 
     def stands(self, touch: Touch, content: float, time: float) -> bool:
         """Whether a frame whose scan began at ``time`` s has a ``touch`` of a ``content`` m² that
@@ -126,6 +140,7 @@ class DriveWatch:
         self._evidence: fit.DriveEvidence | None = None
         self._filter: fit.DriveFilter | None = None
         self._followed: dict[int, _Followed] = {}
+        self._calm = 0
         self._withdrawn: tuple[Touch, ...] = ()
 
     def push(
@@ -173,7 +188,14 @@ class DriveWatch:
         provisional ones are withdrawn."""
         before = self._followed
         new = [number for number, each in before.items() if each.frames is not None]
-        self._followed = {t.id: self._going_on(t, before, time) for t in touches}
+        middle = time + self._length * self._drives[-1] / 2
+        heirs = {}
+        for each in before.values() if touches else ():
+            far = [_off(each.moving, touch.detection, middle) for touch in touches]
+            number = touches[int(np.argmin(far))].id
+            if min(far) < GATE and (number not in heirs or number == each.touch.id):
+                heirs[number] = each
+        self._followed = {t.id: self._going_on(t, heirs.get(t.id), time) for t in touches}
         for number in new if not touches else []:
             each = before[number]
             each.frames = (each.frames or 0) + 1
@@ -181,6 +203,7 @@ class DriveWatch:
                 self._followed[number] = each
             else:
                 self._withdrawn += (each.touch,)
+        self._calm = self._calm + 1 if before.keys() == self._followed.keys() else 0
         if before and not self._followed and self._initiation is not None:
             self._initiation.forget()
         return len(new) - len(self._followed) if not touches else 0
@@ -190,6 +213,8 @@ class DriveWatch:
         key = self.view.key
         is_newer = self._key is None or not _is_same(key, self._key)
         says_less = self._key is None or _says_less(key, self._key)
+        if says_less and self._key is not None and key[0] is self._key[0] and self._followed:
+            is_newer &= self._calm >= _CALM
         if is_newer and (says_less or self._making is None):  # else it is made first
             begun = self._initiation is not None and self._initiation.begun
             if not begun:  # a frame into which a touch comes down looks like more noise
@@ -221,7 +246,7 @@ class DriveWatch:
         detection = self.view.shown(moving.spot, onset.covariance, onset.ratio)
         kind = "decrease" if moving.content < 0 else "increase"
         since = host_time - onset.drives * self._length
-        touch = Touch(number, kind, since, detection, provisional=True)
+        touch, self._calm = Touch(number, kind, since, detection, provisional=True), 0
         self._followed[number] = _Followed(touch, moving, moving.content, time, frames=0)
 
     def _follow(self, rows: slice, data: FloatArray, time: float) -> None:
@@ -235,9 +260,10 @@ class DriveWatch:
             own = data - every + responses[n][0]
             each.take(moved[n], *self._filter.pushed(moved[n], rows, own, responses[n]))
 
-    def _going_on(self, touch: Touch, before: Mapping[int, _Followed], time: float) -> _Followed:
-        """A touch of a frame whose scan began at ``time`` s: as the drives have it where they
-        agree, else as the frame has it."""
+    def _going_on(self, touch: Touch, heir: _Followed | None, time: float) -> _Followed:
+        """A touch of a frame whose scan began at ``time`` s: as the drives have what is nearest to
+        it, its ``heir``, else as the frame has it."""
+        before = self._followed
         known = before.get(touch.id)
         if known is None:
             known = next((each for each in before.values() if each.frames is not None), None)
@@ -248,12 +274,10 @@ class DriveWatch:
         if known is not None and not known.stands(touch, moving.content, time):
             known.touch, known.frames = touch, None
             return known
-        if known is not None and known.lifted is None:
-            where, spread = known.moving.position()
-            off = where - [touch.detection.x, touch.detection.y]
-            off = off - known.moving.state[2:4] * (known.moving.time - middle)
-            if off @ np.linalg.solve(spread + _spread(touch.detection), off) < GATE:
-                return _Followed(touch, known.moving, moving.content, odds=known.odds)
+        if known is not None and known.lifted is None and time < known.begun:
+            return _Followed(touch, known.moving, known.full, odds=known.odds)  # it came down then
+        if heir is not None and heir.lifted is None:
+            return _Followed(touch, heir.moving, moving.content, odds=heir.odds)
         return _Followed(touch, moving, moving.content)
 
     def _shown(self, each: _Followed, time: float) -> Touch:
@@ -280,6 +304,13 @@ def _says_less(key: fit.NoiseKey, before: fit.NoiseKey) -> bool:
     (nuisance, *_, excess, left), (*_, less, known) = key, before
     louder = excess.level > less.level or bool((excess.variance > less.variance).any())
     return nuisance is not before[0] or louder or sum(left) > sum(known)
+
+
+def _off(moving: fit.MovingTouch, detection: Detection, time: float) -> float:
+    """Squared Mahalanobis distance of a ``detection`` at a ``time`` s from what drives follow."""
+    where, spread = moving.position()
+    off = where - [detection.x, detection.y] - moving.state[2:4] * (moving.time - time)
+    return float(off @ np.linalg.solve(spread + _spread(detection), off))
 
 
 def _spread(detection: Detection) -> FloatArray:

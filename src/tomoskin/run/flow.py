@@ -144,9 +144,9 @@ class Flow:
         drives = [item for item in items if isinstance(item, DriveSamples)]
         for item in items:
             if isinstance(item, DriveSamples):
-                _tell_drive(self, item, late=item is not drives[-1])
+                _tell_drive(self, link, item, late=item is not drives[-1])
             elif isinstance(item, Frame):
-                self._mark(item, late=late > 0)
+                self._mark(link, item, late=late > 0)
                 late -= 1
         replay = self.marker.replay
         if replay is not None and replay.ended != self._ended:
@@ -231,20 +231,20 @@ class Flow:
         if self.marker.replay is None:
             self._recall.meet(info, self)
 
-    def _mark(self, frame: Frame, *, late: bool) -> None:
+    def _mark(self, link: Link, frame: Frame, *, late: bool) -> None:
         mark = self.marker.mark(frame, late=late)
         if mark is not None:
             for before in self.out.recordings.again():
                 self.pipeline.push(*before)
             self.out.put(MarkedFrame(frame, mark))
-            with self.turns:
+            if mark & Mark.SKIPPED:  # without a turn, or it would take as long as one that counts
+                self.intake.skipped += 1
+                return
+            with self.turns.turn(link.keep_alive):
                 self._take_frame(frame, mark)
 
     def _take_frame(self, frame: Frame, mark: Mark) -> None:
         intake = self.intake
-        if mark & Mark.SKIPPED:
-            intake.skipped += 1
-            return
         intake.standstill = None
         # the times in a replay are the recording's
         read, begun = intake.polled if self.marker.replay else frame.host_time, self._clock()
@@ -266,14 +266,14 @@ class Flow:
         self.out.tell(result)
 
 
-def _tell_drive(flow: Flow, drive: DriveSamples, *, late: bool) -> None:
+def _tell_drive(flow: Flow, link: Link, drive: DriveSamples, *, late: bool) -> None:
     """Tell where touches are by now, unless that is ``late``: of drives that wait the newest alone
     is told. Frames alone are recorded."""
     newest = flow.newest
     if newest is None or flow.marker.held:
         return
     try:
-        with flow.turns:
+        with flow.turns.turn(link.keep_alive):
             known = flow.pipeline.push_drive(drive, late=late)
     except (TomoskinError, np.linalg.LinAlgError) as error:  # frames go on
         _leave_out(flow, "drive", drive.host_time, error)

@@ -23,6 +23,9 @@ from tomoskin.run.sinks import Sink, SinkConsumer, SinkReport, sink_report, sink
 MOST_WAITING = 256
 """Results that may wait for a subscriber; the oldest make room."""
 
+_OFTEN = 0.25
+"""Seconds after which who waits for a turn does something else."""
+
 _log = logging.getLogger(__name__)
 
 
@@ -68,7 +71,7 @@ class Subscriber(Consumer):
 
 
 class Turns:
-    """A context manager that one thread is in at a time; those who wait come in their order.
+    """Turns that one thread has at a time; those who wait come in their order.
 
     Many runs that computed at once would take the interpreter from each other, and every frame
     of all of them would be late. One after the other, a run that is flooded with frames holds
@@ -81,24 +84,32 @@ class Turns:
         self._waiting: deque[threading.Lock] = deque()
         self._taken = False
 
-    def __enter__(self) -> None:
-        """Wait for the turn and take it."""
-        with self._lock:
-            if not self._taken:
-                self._taken = True
-                return
-            ticket = threading.Lock()
-            ticket.acquire()
-            self._waiting.append(ticket)
-        ticket.acquire()
+    @contextlib.contextmanager
+    def turn(self, meanwhile: Callable[[], None]) -> Iterator[None]:
+        """Wait for the turn, and have it while the block lasts.
 
-    def __exit__(self, *_: object) -> None:
-        """Give the turn to the next one."""
+        It calls ``meanwhile`` before, and now and then while it waits: a first frame may take
+        seconds, and boards stop that hear nothing for so long. It must not raise.
+        """
+        meanwhile()
+        ticket = threading.Lock()
+        ticket.acquire()
         with self._lock:
-            if self._waiting:
-                self._waiting.popleft().release()
-            else:
-                self._taken = False
+            self._waiting.append(ticket)
+            if not self._taken:
+                self._pass_on()
+        while not ticket.acquire(timeout=_OFTEN):
+            meanwhile()
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._pass_on()
+
+    def _pass_on(self) -> None:
+        self._taken = bool(self._waiting)
+        if self._taken:
+            self._waiting.popleft().release()
 
 
 class Audience:

@@ -87,6 +87,7 @@ class RobotRun:
         }
         self.skins = {name: LiveSkin(runner) for name, runner in self.runners.items()}
         self._boards = {m.place.name: m.board for m in members}
+        self._unmarked = {m.place.name: m.place.unmarked for m in members}
         self._problems: Mapping[str, str] = {}
         self._logs: Mapping[str, MessageLog] = {}
         self._ended = threading.Event()
@@ -113,6 +114,9 @@ class RobotRun:
         if len(missing) == len(started):
             self.stop()
             raise missing[0]
+        for name, text in self._unmarked.items():
+            if text:
+                self.runners[name].say("self-contacts-unknown", text)
         self._watch.start()
 
     def stop(self) -> None:

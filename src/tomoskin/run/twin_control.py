@@ -146,6 +146,12 @@ class TwinControl:
         self.truth, self.refusals = _felt(self._source, asked)
         return True
 
+    @property
+    def depth(self) -> float | None:
+        """M by which the source's sheet gives way under its only press; None for any other."""
+        sheet = getattr(self._source, "sheet", None)
+        return sheet.depth_under(*self.truth) if sheet and len(self.truth) == 1 else None
+
     def _can(self, *methods: str) -> bool:
         return all(getattr(self._source, name, None) is not None for name in methods)
 

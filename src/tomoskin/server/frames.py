@@ -2,7 +2,7 @@
 
 ====================  ======================================================================
 header, 40 bytes      ``TSK1``, sequence u32, host_time f64, n_cells u32, n_meas u32,
-                      n_touches u16, n_truth u16, flags u32, latency_us u32, reserved u32
+                      n_touches u16, n_truth u16, flags u32, latency_us u32, n_dent u32
 image                 f32 [n_cells], change of conductivity in the scene's unit
 voltages, reference   f32 [n_meas] each, V
 touches, 64 bytes     id u32, kind u8 (0 decrease, 1 increase), several u8 (0 no, 1 may be
@@ -14,6 +14,8 @@ truth, 16 bytes each  x, y (m), force (N), radius (m) f32: the presses on the tw
 bend, 16 bytes        with flag bit 3 only: angle, its deviation, axis (rad) f32, state u32 (a
                       place in :data:`BEND_STATES`)
 labels                u8 [n_cells], 0 none, k = cells of the k-th touch; padded to 4 bytes
+dent                  u16 [n_dent] twice: by how much each node of the mesh has given way, and the
+                      deviation of that, in :data:`DENT_STEP`; n_dent is 0 where none is asked for
 ====================  ======================================================================
 
 Flags: bit 0 the reference stands; bit 1 too many rows are unusable, there is no image;
@@ -28,7 +30,7 @@ from enum import IntFlag
 import numpy as np
 
 from tomoskin.core import Touch
-from tomoskin.learning import BodyReading
+from tomoskin.learning import BodyReading, DentMap
 from tomoskin.pipeline import FrameResult
 from tomoskin.sensing.track import amount_values
 from tomoskin.twin import Probe
@@ -48,6 +50,9 @@ class Flag(IntFlag):
 BEND_STATES = ("idle", "bend", "touch", "bend and touch", "unknown")
 """States of a :class:`~tomoskin.learning.BodyReading`, as they are numbered here."""
 
+DENT_STEP = 2e-6
+"""Metres by which a dent is counted: a page has up to 131 mm."""
+
 _MEASURES = (
     *("x", "y", "sd_x", "sd_y", "area", "peak", "since", "cov_xy"),
     *("force", "force_low", "force_high", "depth", "depth_low", "depth_high"),
@@ -64,7 +69,7 @@ RECORDS = {
             ("n_truth", "<u2"),
             ("flags", "<u4"),
             ("latency_us", "<u4"),
-            ("reserved", "<u4"),
+            ("n_dent", "<u4"),
         ]
     ),
     "Touch": np.dtype(
@@ -86,7 +91,9 @@ _MOST = 255
 """Labels are bytes: more touches than that are not sent."""
 
 
-def encode_result(result: FrameResult, truth: Sequence[Probe], latency: float) -> bytes:
+def encode_result(
+    result: FrameResult, truth: Sequence[Probe], latency: float, dent: DentMap | None = None
+) -> bytes:
     """Message of one result.
 
     Parameters
@@ -97,11 +104,13 @@ def encode_result(result: FrameResult, truth: Sequence[Probe], latency: float) -
         The twin's own presses when the frame was read; empty for a real skin.
     latency
         Seconds from the frame's last byte to its touches.
+    dent
+        The dent of its touches at the nodes of the mesh, where a page asks for it.
     """
     touches = result.touches[:_MOST]
     return b"".join(
         [
-            _header(result, len(touches), len(truth), latency),
+            _header(result, len(touches), len(truth), latency, dent),
             result.image.values.astype("<f4").tobytes(),
             result.voltages.astype("<f4").tobytes(),
             result.reference.astype("<f4").tobytes(),
@@ -109,11 +118,17 @@ def encode_result(result: FrameResult, truth: Sequence[Probe], latency: float) -
             _record("Truth", [(p.x, p.y, p.force, p.radius) for p in truth]),
             _bend(result.bend),
             _labels(touches, len(result.image.values)),
+            *(
+                np.rint(np.minimum(part / DENT_STEP, 65535)).astype("<u2").tobytes()
+                for part in dent or ()
+            ),
         ]
     )
 
 
-def _header(result: FrameResult, n_touches: int, n_truth: int, latency: float) -> bytes:
+def _header(
+    result: FrameResult, n_touches: int, n_truth: int, latency: float, dent: DentMap | None
+) -> bytes:
     flags = Flag.READY * result.ready | Flag.NO_IMAGE * (not result.has_image)
     flags |= Flag.ROWS_LEFT_OUT * (result.left_out > 0) | Flag.BENT * bool(_bend(result.bend))
     values = (
@@ -126,7 +141,7 @@ def _header(result: FrameResult, n_touches: int, n_truth: int, latency: float) -
         n_truth,
         flags,
         min(max(round(latency * 1e6), 0), 2**32 - 1),
-        0,
+        0 if dent is None else len(dent.deflection),
     )
     return _record("Header", values)
 

@@ -12,6 +12,7 @@ from tomoskin.core import TomoskinError, WireError
 from tomoskin.learning import Kind
 from tomoskin.pipeline import FrameResult, Prepared
 from tomoskin.run import Runner
+from tomoskin.server.amount_flow import DepthFlow, ForceFlow
 from tomoskin.server.folder import Folder
 from tomoskin.server.guided_flow import GuidedFlow, StoppedError
 from tomoskin.server.hub import Hub
@@ -26,18 +27,17 @@ from tomoskin.server.requests import (
     FlowKind,
     KeepFlow,
     LearnFlow,
-    SetWeight,
+    SetLabel,
     ShowFlow,
     StopLearning,
 )
 from tomoskin.server.rub_flow import RubFlow
-from tomoskin.server.weigh_flow import WeighFlow
 
-_OF_FLOWS = (DeletePress, SetWeight, AskPoint, LearnFlow, StopLearning)
+_OF_FLOWS = (DeletePress, SetLabel, AskPoint, LearnFlow, StopLearning)
 """Requests that the flow of the moment answers."""
 
 _FLOWS: dict[FlowKind, Callable[[Prepared], GuidedFlow]] = {
-    flow.kind: flow for flow in (TouchFlow, MappingFlow, WeighFlow, RubFlow)
+    flow.kind: flow for flow in (TouchFlow, MappingFlow, ForceFlow, DepthFlow, RubFlow)
 }
 _LOOKS = 0.3
 """Seconds after which pages are told how far an estimate is."""
@@ -95,6 +95,8 @@ class GuideHandlers:
         if self._hub.runner.flow.marker.replay is not None:
             raise WireError("presses need a live source: go back to live first")
         flow = _FLOWS[kind](self._hub.runner.prepared)
+        if isinstance(flow, DepthFlow):
+            flow.skin_says = lambda: self._hub.runner.flow.twin.depth
         self._leave()
         self._flow, self._shown_by = flow, {page}
         look = partial(self._look, flow, asyncio.get_running_loop())

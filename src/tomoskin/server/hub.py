@@ -20,6 +20,7 @@ from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, Unresolved, colour_limit
 from tomoskin.run import FILE_NAME, Runner, SetPresses, Snapshot, StrictRequest, commands
 from tomoskin.server import views
+from tomoskin.server.dents import Dents
 from tomoskin.server.frames import encode_result
 from tomoskin.server.page_connection import Handler, Handlers, Host, Page, Tasks, during
 from tomoskin.server.page_messages import (
@@ -136,8 +137,10 @@ class Hub(Host):
         self._past: deque[EventNote] = deque(maxlen=_FIRST_EVENTS)
         self._limit = colour_limit(runner.prepared)
         self._scene: Scene | None = None
-        self._made: tuple[Snapshot, bytes] | None = None
+        self._made: tuple[Snapshot, bool, bytes] | None = None
+        self._dents = Dents(runner)
         self.serve(run_handlers(runner, self.folder, self.tasks))
+        self.serve(self._dents.handlers, farewell=self._dents.pages.discard)
 
     def serve(
         self,
@@ -179,13 +182,16 @@ class Hub(Host):
         shown = self.runner.newest
         if shown is None:
             return None
-        if self._made is None or self._made[0] is not shown:
-            self._made = shown, encode_result(shown.result, shown.truth, shown.latency)
-        return self._made[1]
+        asked = bool(self._dents.pages)
+        if self._made is None or self._made[0] is not shown or self._made[1] is not asked:
+            dent = self._dents.of(shown.result) if asked else None
+            made = encode_result(shown.result, shown.truth, shown.latency, dent)
+            self._made = shown, asked, made
+        return self._made[2]
 
     def note_sent(self, frame: bytes) -> None:
         """Note how long it took until a page's connection had ``frame``."""
-        if self._made is not None and self._made[1] is frame:
+        if self._made is not None and self._made[2] is frame:
             self.runner.flow.latency.add_published(time.monotonic() - self._made[0].ready)
 
     def leave(self, page: Page, why: str = "") -> None:

@@ -162,6 +162,7 @@ def _on(contacts: Contacts, poses: Mapping[str, Pose]) -> TouchesOfSkin:
                 peak=contact.touch.detection.peak,
                 force=None if math.isnan(contact.force) else contact.force,
                 more_than=_more_than(contact.touch.detection.force),
+                is_self=contact.is_self,
             )
             for contact in contacts.touches
         ],

@@ -221,6 +221,12 @@ class UnresolvedMap(Message, frozen=True, tag="unresolved"):
     problem: str
 
 
+class DentNow(Message, frozen=True, tag="dent"):
+    """Why frames hold no dent of touches, in words; "" where they do."""
+
+    problem: str
+
+
 class PlayedTimeline(Message, frozen=True, tag="timeline"):
     """What happened in the recording that is played, at times from its first frame."""
 
@@ -306,12 +312,12 @@ class Calibrations(Message, frozen=True, tag="calibrations"):
 Phase = Literal["rest", "press", "hold", "release", "several", "name", "rub"]
 
 
-class WeightNow(MessagePart, frozen=True):
-    """A weight, in the unit in which it was given, in newtons, and in words."""
+class LabelNow(MessagePart, frozen=True):
+    """A weight or depth, in the unit in which it was given, in SI, and in words."""
 
     value: float
     unit: Unit
-    newtons: float
+    si: float
     text: str
 
 
@@ -351,8 +357,8 @@ class FlowNow(Message, frozen=True, tag="flow"):
     """The guided flow; ``kind`` null: none goes on.
 
     ``paused``: no page shows it, and nothing is recorded; ``effort``: how to press the dot;
-    ``weights``: what each press was; ``weight``: what lies there or comes next; ``asked``: what was
-    said and is probably meant as ``meant``; ``stage``: how far learning is.
+    ``labels``: what each press was; ``label``: what it is now or next; ``asked``: what was said and
+    is probably meant as ``meant``; ``stage``: how far learning is.
     """
 
     kind: FlowKind | None = None
@@ -365,10 +371,10 @@ class FlowNow(Message, frozen=True, tag="flow"):
     ready: bool = False
     figures: Figures = Figures()
     effort: Literal["softly", "hard"] | None = None
-    weights: list[str] = []
-    weight: WeightNow | None = None
-    asked: WeightNow | None = None
-    meant: WeightNow | None = None
+    labels: list[str] = []
+    label: LabelNow | None = None
+    asked: LabelNow | None = None
+    meant: LabelNow | None = None
     rubbed: RubbedNow | None = None
     stage: str = ""
 
@@ -437,7 +443,8 @@ class SpaceTouch(MessagePart, frozen=True):
     """A touch where the robot is drawn, in the frame of its root.
 
     ``force``: N, null where nothing gives it; ``more_than``: N that it is more than, where it is
-    beyond what was taught; else null.
+    beyond what was taught; else null. ``is_self``: whether a link of the robot itself touches;
+    null where that is not known.
     """
 
     id: int
@@ -446,6 +453,7 @@ class SpaceTouch(MessagePart, frozen=True):
     peak: float
     force: float | None
     more_than: float | None = None
+    is_self: bool | None = None
 
 
 class TouchesOfSkin(MessagePart, frozen=True):
@@ -470,7 +478,7 @@ class RobotTouches(MessagePart, frozen=True):
 
 
 PAGE_MESSAGES = (
-    *(Scene, Scale, RunState, EventNote, Refusal, UnresolvedMap, PlayedTimeline),
+    *(Scene, Scale, RunState, EventNote, Refusal, UnresolvedMap, DentNow, PlayedTimeline),
     *(Files, Exported, Sources, Calibrations, FlowNow),
 )
 """What the page of one skin is sent, beside :data:`~.settings_messages.SETTINGS_MESSAGES`."""

@@ -35,9 +35,9 @@ Stem = Annotated[str, Meta(pattern=rf"^{STEM}\Z")]
 
 Format = Literal["touches", "csv", "npz", "mat", "h5", "parquet", "png", "gif"]
 
-FlowKind = Literal["touch", "mapping", "force", "rub"]
+FlowKind = Literal["touch", "mapping", "force", "depth", "rub"]
 
-Unit = Literal["N", "g", "kg"]
+Unit = Literal["N", "g", "kg", "mm"]
 
 Calibrated = Literal["touch", "force", "depth"]
 """What a calibration that a page can choose is of."""
@@ -58,6 +58,12 @@ class SetRecording(StrictRequest, frozen=True, tag="record"):
 
 class AskUnresolved(StrictRequest, frozen=True, tag="unresolved"):
     """The map of what the data cannot tell, with the electrodes and the alpha of the moment."""
+
+
+class ShowDent(StrictRequest, frozen=True, tag="dent"):
+    """This page shows the dent of touches, or does not any more; it is answered what there is."""
+
+    on: bool
 
 
 class Painted(StrictRequest, frozen=True, tag="painted"):
@@ -159,7 +165,7 @@ class Connect(StrictRequest, frozen=True, tag="connect"):
 
 class BeginFlow(StrictRequest, frozen=True, tag="flow_begin"):
     """Ask for presses: where the dot is, to learn touch or to find the channel mapping; with known
-    weights, to learn forces; everywhere, to learn touch without labels."""
+    weights or to known depths, to learn these; everywhere, to learn touch without labels."""
 
     kind: FlowKind
 
@@ -176,8 +182,8 @@ class DeletePress(StrictRequest, frozen=True, tag="flow_delete"):
     number: Annotated[int, Meta(ge=0, le=10_000)] | None = None
 
 
-class SetWeight(StrictRequest, frozen=True, tag="flow_weight"):
-    """What lies on the skin, or comes next; ``sure``: an unusual weight is meant as it is said.
+class SetLabel(StrictRequest, frozen=True, tag="flow_label"):
+    """The weight or depth of a press, or the next; ``sure``: an unusual one is meant as it is said.
 
     What a person types is judged by the flow, which says what is wrong with it.
     """

@@ -79,7 +79,7 @@ def image():
 
 @pytest.fixture
 def scene():
-    return scene_message([Contact.of(TOUCH, Plane())], 2_500_000_000)
+    return scene_message(Contact.each([TOUCH], Plane()), 2_500_000_000)
 
 
 def test_each_is_what_the_sdk_makes(image, scene):
@@ -106,7 +106,7 @@ def test_schemas_name_the_fields_of_the_messages(image, scene, topic):
 
 
 def test_on_a_curved_skin_a_touch_is_in_space():
-    (entity,) = scene_message([Contact.of(TOUCH, Cylinder(0.05))], 0)["entities"]
+    (entity,) = scene_message(Contact.each([TOUCH], Cylinder(0.05)), 0)["entities"]
     for part in (entity["spheres"][0], entity["texts"][0]):
         x, y, z = part["pose"]["position"].values()
         assert math.hypot(x, z + 0.05) == pytest.approx(0.05)

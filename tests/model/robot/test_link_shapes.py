@@ -10,7 +10,7 @@ import pytest
 
 from tomoskin.core import SkinError
 from tomoskin.model.robot import Urdf
-from tomoskin.model.robot.link_shapes import ball, box, rod, thinned
+from tomoskin.model.robot.link_shapes import box, capsule, rod, thinned
 
 LINKS = """<link name="a">
   <visual><origin xyz="0 0 1"/><geometry><box size="0.2 0.4 0.6"/></geometry></visual>
@@ -52,7 +52,8 @@ def area(triangles):
     [
         (box(np.array([1.0, 2.0, 3.0])), 22.0),
         (rod(0.5, 2.0), 2 * np.pi * 0.25 + 2 * np.pi * 0.5 * 2),
-        (ball(0.5), np.pi),
+        (capsule(0.5), np.pi),
+        (capsule(0.5, 2.0), np.pi + 2 * np.pi * 0.5 * 2),
     ],
 )
 def test_a_shape_is_closed_and_has_its_size(triangles, whole):
@@ -142,7 +143,7 @@ def test_numbers_that_cannot_be_meant(tmp_path, old, new, said):
 
 
 def test_a_fine_mesh_is_drawn_coarsely():
-    fine = np.concatenate([ball(radius) for radius in np.linspace(0.96, 1.0, 5)])
+    fine = np.concatenate([capsule(radius) for radius in np.linspace(0.96, 1.0, 5)])
     coarse = thinned(fine, 1000)
     assert 250 < len(coarse) <= 1000 < len(fine)
     assert np.abs(coarse).max() == pytest.approx(1.0, abs=0.1)

@@ -8,7 +8,7 @@ type Of = "touch" | "force" | "depth";
 const WITHOUT: Readonly<Record<Of, string>> = {
   touch: "Positions of touches come from the voltages and the model of the skin.",
   force: "No weights have been learnt: strengths are changes of conductivity.",
-  depth: "Depths are uncalibrated: tomoskin calibrate depth learns them from presses of known depth.",
+  depth: "No depths have been learnt: they are uncalibrated.",
 };
 const WITH: Readonly<Record<Of, string>> = {
   touch: "Positions of touches come from",

@@ -10,6 +10,7 @@ const names: Readonly<Record<FlowKind, Signal<string>>> = {
   touch: signal("touch"),
   rub: signal("rubbed"),
   force: signal("force"),
+  depth: signal("depth"),
 };
 
 /** How much was recorded when leaving was asked for; null: it was not. */

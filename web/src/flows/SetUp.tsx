@@ -1,4 +1,4 @@
-/** The drawer that sets a skin up: the board, the reference, the wires, the touch, the force. */
+/** The drawer that sets a skin up: the board, the reference, the wires, the touch, force and depth. */
 
 import { useEffect } from "preact/hooks";
 import { takeReference } from "../commands";
@@ -7,17 +7,18 @@ import { duration, millimetres } from "../format";
 import { narrow } from "../screen";
 import { send, status } from "../state";
 import type { FlowNow } from "../wire";
+import { Amount } from "./Amount";
 import { InUse } from "./Calibrations";
 import { Keep, Leave } from "./Keep";
 import { askFiles, askSources, flow, type FlowKind, type Phase, sources, type Step, step, stepOf } from "./model";
 import { Rub } from "./Rub";
-import { Weigh } from "./Weigh";
 
 const STEPS: readonly (readonly [Step, string])[] = [
   ["board", "1 Board"],
   ["mapping", "2 Channels"],
   ["touch", "3 Touch"],
   ["force", "4 Force"],
+  ["depth", "5 Depth"],
 ];
 
 function Identity() {
@@ -145,6 +146,13 @@ const TEACHING: Readonly<Record<Exclude<Step, "board">, readonly Teaching[]>> = 
       begin: "Begin",
     },
   ],
+  depth: [
+    {
+      kind: "depth",
+      text: "This teaches the skin how deep touches are. Press it to known depths with a stand, one at a time, ten times or more, shallow and deep, at many spots. Depths count from where the tip just touches. Use tips such as will press later.",
+      begin: "Begin",
+    },
+  ],
 };
 
 const PHASES: Partial<Record<Phase, string>> = {
@@ -214,7 +222,7 @@ function Going({ kind }: { kind: FlowKind }) {
 /** The flow that goes on, where it belongs to this step. */
 function Guided({ kinds }: { kinds: readonly Teaching[] }) {
   const kind = flow.value.kind;
-  if (kind === "force" && kinds[0].kind === kind) return <Weigh />;
+  if ((kind === "force" || kind === "depth") && kinds[0].kind === kind) return <Amount kind={kind} />;
   if (kind === "rub" && kinds.some((each) => each.kind === kind)) return <Rub />;
   if (kind && kinds.some((each) => each.kind === kind)) return <Going kind={kind} />;
   return (
@@ -262,14 +270,13 @@ function View() {
           </button>
         ))}
       </div>
-      {(shown === "touch" || shown === "force") && going !== shown && <InUse of={shown} />}
-      {shown === "force" && going !== shown && <InUse of="depth" />}
+      {shown !== "board" && shown !== "mapping" && going !== shown && <InUse of={shown} />}
       {shown === "board" ? <Board /> : <Guided kinds={TEACHING[shown]} />}
     </div>
   );
 }
 
-addDrawer({ id: "setup", label: "Set up", key: "U", title: "Board, reference, channel mapping, touch, force", View });
+addDrawer({ id: "setup", label: "Set up", key: "U", title: "Board, reference, channel mapping, touch, force, depth", View });
 
 whileOpened("setup", 2000, () => {
   askSources();

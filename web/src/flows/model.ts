@@ -20,8 +20,8 @@ const NO_FLOW: FlowNow = {
   ready: false,
   figures: {},
   effort: null,
-  weights: [],
-  weight: null,
+  labels: [],
+  label: null,
   asked: null,
   meant: null,
   rubbed: null,
@@ -149,7 +149,7 @@ export const allSpans = computed(() =>
 export const askFiles = (): void => send({ type: "files" });
 export const askSources = (): void => send({ type: "sources" });
 
-export type Step = "board" | "mapping" | "touch" | "force";
+export type Step = "board" | "mapping" | "touch" | "force" | "depth";
 
 /** The step that the set-up drawer shows. */
 export const step = signal<Step>("board");

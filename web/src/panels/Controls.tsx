@@ -4,6 +4,7 @@ import { signal } from "@preact/signals";
 import * as commands from "../commands";
 import type { Command } from "../commands";
 import { fixed } from "../format";
+import { heights, relief } from "../sheet/relief";
 import { inSpace, space } from "../sheet/space";
 import { hand, keepPresses, link, scene, showTruth, smoothed, status } from "../state";
 
@@ -97,6 +98,7 @@ export function Controls() {
       )}
       <div role="group" aria-label="View" class="views">
         <Button command={space} pressed={inSpace.value} />
+        <Button remote command={relief} pressed={heights.value !== "off"} />
         <Button command={commands.flat} label={smoothed.value ? "Show cells" : "Smooth"} />
         {scene.value?.truth && <Button command={commands.truth} pressed={showTruth.value} />}
       </div>

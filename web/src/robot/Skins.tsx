@@ -7,11 +7,11 @@ import { states, robot, touches, type SkinTouches } from "./model";
 export function touchLines(found: SkinTouches[string] | undefined): string[] {
   if (!found?.valid) return ["not known"];
   if (found.touches.length === 0) return ["no touch"];
-  return found.touches.map(({ id, position, force, more_than: least }) => {
+  return found.touches.map(({ id, position, force, more_than: least, is_self }) => {
     const place = position.map((value) => millimetres(value, 0)).join(", ");
     const newtons = least === null ? fixed(force, 1) : `> ${fixed(least, 1)}`;
     const at = found.pose_problem === null ? ` at ${place} mm` : "";
-    return `touch ${id}${at}${force === null ? "" : `, ${newtons} N`}`;
+    return `touch ${id}${is_self ? " by the robot" : ""}${at}${force === null ? "" : `, ${newtons} N`}`;
   });
 }
 

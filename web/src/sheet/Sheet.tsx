@@ -23,6 +23,7 @@ import { narrow } from "../screen";
 import { Furniture, LABELS } from "./Furniture";
 import { Painter } from "./painter";
 import { cursor, listen } from "./pointer";
+import { depthAt, heights, Relief } from "./relief";
 import { hovered, locator, seen, shownDrive, shownPair } from "./space";
 import { around, boxOf, fit, type Margin, type View } from "./view";
 
@@ -58,6 +59,7 @@ function Reading() {
       {!open && <span class="of">change </span>}
       <strong>{open ? percent(open[found.cell]) : inScale(frame.image[found.cell], scale)}</strong>{" "}
       {open ? "% left open" : scale.unit}
+      {depthAt(frame, found)}
     </p>
   );
 }
@@ -98,7 +100,7 @@ export function Sheet() {
         painter.resize(width, height);
       }),
       effect(() => {
-        void [view.value, theme.value, topology.value, limit.value, smoothed.value, painted.value, showTruth.value, hand.value, cursor.value];
+        void [view.value, theme.value, topology.value, limit.value, smoothed.value, painted.value, showTruth.value, hand.value, cursor.value, heights.value];
         painter.request();
       }),
       () => painter.stop(),
@@ -142,6 +144,7 @@ export function Sheet() {
       )}
       {view.value.width > 0 && <Target view={view.value} />}
       <Reading />
+      {view.value.seen && <Relief view={view.value} />}
       <Probe />
       {!accelerated.value && (
         <p class="remark">This browser lacks WebGL 2: the sheet is drawn flat, and more slowly.</p>

@@ -9,14 +9,17 @@ import { toNodes, type Topology } from "./topology";
 const VERTEX = `#version 300 es
 layout(location = 0) in vec3 place;
 layout(location = 1) in float node;
+layout(location = 2) in float light;
 uniform vec4 view;
 uniform float depth;
 uniform highp sampler2D values;
 uniform int row;
 uniform bool smoothed;
 out float value;
+out float lit;
 out vec3 corner;
 void main() {
+  lit = light;
   int index = smoothed ? int(node) : gl_VertexID / 3;
   value = texelFetch(values, ivec2(index % row, index / row), 0).r;
   int k = gl_VertexID % 3;
@@ -31,6 +34,7 @@ uniform float limit;
 uniform float size;
 uniform vec4 mesh;
 in float value;
+in float lit;
 in vec3 corner;
 out vec4 colour;
 void main() {
@@ -38,7 +42,8 @@ void main() {
   vec3 shade = texture(map, vec2((t * (size - 1.0) + 0.5) / size, 0.5)).rgb;
   vec3 near = smoothstep(vec3(0.0), fwidth(corner) * 1.2, corner);
   float edge = 1.0 - min(min(near.x, near.y), near.z);
-  colour = vec4(mix(shade, mesh.rgb, edge * mesh.a), 1.0);
+  vec3 level = mix(shade, mesh.rgb, edge * mesh.a);
+  colour = vec4(mix(level * min(lit, 1.0), vec3(1.0), 0.35 * max(lit - 1.0, 0.0)), 1.0);
 }`;
 
 const ROW = 1024;
@@ -56,15 +61,16 @@ function makeTexture(gl: WebGL2RenderingContext, unit: number, filter: number): 
   return texture;
 }
 
-/** Three corners a cell: x, y, z, node; of the flat sheet, or of the sheet as it is seen. */
+/** Three corners a cell: x, y, z, node, light; of the flat sheet, or of the sheet as it is seen. */
 function cornerData({ cells, points }: Topology, seen: Seen | undefined): Float32Array {
-  const corners = new Float32Array(4 * cells.length);
+  const corners = new Float32Array(5 * cells.length);
   cells.forEach((node, k) => {
-    const at = 4 * k;
+    const at = 5 * k;
     corners[at] = seen ? seen.places[3 * node] : points[2 * node];
     corners[at + 1] = seen ? seen.places[3 * node + 1] : points[2 * node + 1];
     corners[at + 2] = seen ? seen.places[3 * node + 2] : 0;
     corners[at + 3] = node;
+    corners[at + 4] = seen?.lit?.[node] ?? 1;
   });
   return corners;
 }
@@ -97,9 +103,11 @@ export class GlPicture implements Picture {
     );
     gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
     gl.enableVertexAttribArray(0);
-    gl.vertexAttribPointer(0, 3, gl.FLOAT, false, 16, 0);
+    gl.vertexAttribPointer(0, 3, gl.FLOAT, false, 20, 0);
     gl.enableVertexAttribArray(1);
-    gl.vertexAttribPointer(1, 1, gl.FLOAT, false, 16, 12);
+    gl.vertexAttribPointer(1, 1, gl.FLOAT, false, 20, 12);
+    gl.enableVertexAttribArray(2);
+    gl.vertexAttribPointer(2, 1, gl.FLOAT, false, 20, 16);
     gl.enable(gl.DEPTH_TEST);
   }
 
@@ -125,7 +133,7 @@ export class GlPicture implements Picture {
     if (!topology) return;
     const { scale, originX, originY, width, height, seen } = look.view;
     if (seen !== this.seen) this.placeCorners(topology, seen);
-    gl.uniform1f(uniforms.depth, seen ? 0.9 / seen.radius : 0);
+    gl.uniform1f(uniforms.depth, seen ? 0.7 / seen.radius : 0);
     gl.viewport(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight);
     gl.uniform4f(
       uniforms.view,

@@ -8,6 +8,7 @@ import { GlPicture, openGl } from "./gl";
 import { drawMarks } from "./overlay";
 import { flatPicture, type Picture } from "./picture";
 import { cursor } from "./pointer";
+import { dented } from "./relief";
 import type { Topology } from "./topology";
 import type { View } from "./view";
 
@@ -65,7 +66,8 @@ export class Painter {
   private readonly paint = timed(() => {
     this.planned = 0;
     const shape = topology.peek();
-    const view = this.view();
+    const frame = newest.frame;
+    const view = dented(this.view(), frame);
     if (!shape || view.width === 0) return;
     if (shape !== this.painted) {
       this.picture.setTopology(shape);
@@ -73,7 +75,6 @@ export class Painter {
       this.painted = shape;
     }
     const colours = theme.peek();
-    const frame = newest.frame;
     const open = painted.peek();
     this.picture.paint(open ?? frame?.image ?? this.untouched, {
       view,

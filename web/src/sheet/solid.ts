@@ -18,29 +18,51 @@ export function rotation({ turn, tilt }: Orbit): readonly number[] {
   return [c, -s, 0, s * ct, c * ct, st, -s * st, -c * st, ct];
 }
 
+/** Where light comes from: the upper left, before the sheet; and how much it does. */
+const LIGHT = [-0.5, 0.62, 0.6];
+const CONTRAST = 0.9;
+
 /** What one sees of a solid, in units of the sheet. */
 export class Seen {
-  /** x right, y up, z towards the eye, of every node. */
-  readonly places: Float32Array;
-  readonly radius: number;
+  private own: Float32Array | null = null;
 
-  constructor(
+  private constructor(
     private readonly topology: Topology,
     private readonly locator: Locator,
-    points: ArrayLike<number>,
-    readonly matrix: readonly number[],
-  ) {
+    /** x right, y up, z towards the eye, of every node. */
+    readonly places: Float32Array,
+    readonly radius: number,
+    /** Of every node what light a dent lends it, 1 where there is none. */
+    readonly lit: Float32Array | null = null,
+  ) {}
+
+  /** The sheet whose nodes are at `points` in space, turned by `matrix`. */
+  static of(topology: Topology, locator: Locator, points: ArrayLike<number>, matrix: readonly number[]): Seen {
     const middle = middleOf(points);
-    this.places = new Float32Array(points.length);
+    const places = new Float32Array(points.length);
     let radius = 0;
     for (let k = 0; k < points.length; k += 3) {
       const [x, y, z] = [points[k] - middle[0], points[k + 1] - middle[1], points[k + 2] - middle[2]];
       radius = Math.max(radius, Math.hypot(x, y, z));
       for (let row = 0; row < 3; row++) {
-        this.places[k + row] = matrix[3 * row] * x + matrix[3 * row + 1] * y + matrix[3 * row + 2] * z;
+        places[k + row] = matrix[3 * row] * x + matrix[3 * row + 1] * y + matrix[3 * row + 2] * z;
       }
     }
-    this.radius = radius;
+    return new Seen(topology, locator, places, radius);
+  }
+
+  /** The same where each node has given way by so much: `counts` of `step` m. */
+  dented(counts: Uint16Array, step: number): Seen {
+    this.own ??= normalsOf(this.topology, this.places);
+    const places = this.places.map((at, k) => at - step * counts[Math.floor(k / 3)] * (this.own?.[k] ?? 0));
+    const tilted = normalsOf(this.topology, places);
+    const lit = new Float32Array(counts.length);
+    for (let n = 0; n < lit.length; n++) {
+      let more = 0;
+      for (let axis = 0; axis < 3; axis++) more += LIGHT[axis] * (tilted[3 * n + axis] - this.own[3 * n + axis]);
+      lit[n] = Math.max(0.35, 1 + CONTRAST * more);
+    }
+    return new Seen(this.topology, this.locator, places, this.radius, lit);
   }
 
   /** Right and up of a place on the sheet. */
@@ -81,6 +103,26 @@ export class Seen {
     }
     return best;
   }
+}
+
+/** Out of the front at every node, of length 1. */
+function normalsOf({ cells, nCells }: Topology, places: Float32Array): Float32Array {
+  const out = new Float32Array(places.length);
+  for (let c = 0; c < nCells; c++) {
+    const [i, j, k] = [3 * cells[3 * c], 3 * cells[3 * c + 1], 3 * cells[3 * c + 2]];
+    const [ux, uy, uz] = [places[j] - places[i], places[j + 1] - places[i + 1], places[j + 2] - places[i + 2]];
+    const [vx, vy, vz] = [places[k] - places[i], places[k + 1] - places[i + 1], places[k + 2] - places[i + 2]];
+    for (const at of [i, j, k]) {
+      out[at] += uy * vz - uz * vy;
+      out[at + 1] += uz * vx - ux * vz;
+      out[at + 2] += ux * vy - uy * vx;
+    }
+  }
+  for (let at = 0; at < out.length; at += 3) {
+    const length = Math.hypot(out[at], out[at + 1], out[at + 2]) || 1;
+    for (let axis = 0; axis < 3; axis++) out[at + axis] /= length;
+  }
+  return out;
 }
 
 function middleOf(points: ArrayLike<number>): readonly number[] {

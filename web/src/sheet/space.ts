@@ -9,6 +9,7 @@ import { FIRST_ORBIT, type Orbit, rotation, Seen } from "./solid";
 /** Null: as the skin is, in space where it lies on a surface. */
 const chosen = signal<boolean | null>(null);
 export const inSpace = computed(() => chosen.value ?? scene.value?.solid != null);
+export const showInSpace = (): void => void (chosen.value = true);
 export const orbit = signal<Orbit>(FIRST_ORBIT);
 
 export const locator = computed(() => (topology.value ? new Locator(topology.value) : null));
@@ -24,7 +25,7 @@ const solid = computed(() => {
 
 export const seen = computed(() => {
   if (!inSpace.value || !topology.value || !locator.value) return null;
-  return new Seen(topology.value, locator.value, solid.value, rotation(orbit.value));
+  return Seen.of(topology.value, locator.value, solid.value, rotation(orbit.value));
 });
 
 /** Where the pointer is on the sheet, m. */

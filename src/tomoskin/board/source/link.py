@@ -118,6 +118,12 @@ class Link(AbstractContextManager["Link"]):
         items += self._listen(max(patience, 0.0))
         return items
 
+    def keep_alive(self) -> None:
+        """Let the board know that the host is there, while :meth:`poll` is not called for long."""
+        self._session.keep_alive(self._clock())
+        with contextlib.suppress(SourceError):  # gone: the next poll says so
+            self._flush()
+
     def connect(self) -> Info:
         """Poll until the board scans; what it said of itself. Raises as :meth:`poll` does."""
         while not self.running:

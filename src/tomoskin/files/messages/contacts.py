@@ -7,17 +7,17 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import Any, Self
+from functools import cached_property, partial
+from typing import Any, Self, TypeVar
 
 import numpy as np
 
 from tomoskin.core import MEASURANDS, Detection, Event, FloatArray, Image, SkinError, Touch
 from tomoskin.files.messages.stream import Stream
 from tomoskin.model.mesh import Surface
-from tomoskin.model.robot import Place, Pose, quaternion
+from tomoskin.model.robot import NearLink, Place, Pose, quaternion
 from tomoskin.pipeline import FrameResult
 from tomoskin.sensing.track import TouchEvent
 
@@ -32,6 +32,12 @@ _DENT = 1e-4
 _ANY_TURN = math.pi**2 / 3
 """Variance of an angle of which nothing is known, rad²."""
 
+_AROUND = np.arange(12) * math.pi / 6
+_SPREAD = np.sqrt(-2 * np.log([[0.75], [0.25]] * 6)) * np.column_stack(
+    [np.cos(_AROUND), np.sin(_AROUND)]
+)
+"""Points of an ellipse, in standard deviations along its axes: each stands for a twelfth."""
+
 _UNCALIBRATED = {
     f"{name}{part}": value
     for name in MEASURANDS
@@ -40,11 +46,13 @@ _UNCALIBRATED = {
 """What a row says of a touch whose force and depth nothing tells."""
 
 Vector = tuple[float, ...]
+T = TypeVar("T")
+_Near = tuple[NearLink | None, str | None]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class LinkPose:
-    """Where the link of a robot that a skin lies on was at some time.
+    """Where the link of a robot that a skin lies on was at some time, and what was near it.
 
     Attributes
     ----------
@@ -54,21 +62,27 @@ class LinkPose:
         Of the link in that frame; None where it is not known.
     problem
         Why it is not known, or None.
+    near
+        Looks at where the other links were: see :meth:`~tomoskin.model.robot.Place.near`.
     """
 
     root: str
     pose: Pose | None
     problem: str | None = None
+    near: Callable[[], _Near] = field(default=lambda: (None, None), repr=False)
 
     @classmethod
     def of(cls, place: Place | None, utc: float | None) -> Self | None:
         """At a time, s since 1970; None of a skin that lies on no link."""
-        if place is None or place.urdf is None:
+        if place is None or place.own is None:
             return None
-        try:
-            return cls(place.urdf.root, place.in_root(utc))
-        except SkinError as error:
-            return cls(place.urdf.root, None, str(error))
+        pose, problem = _or_why(place.in_root, utc)
+        return cls(place.own.urdf.root, pose, problem, partial(_or_why, place.near, utc))
+
+    @cached_property
+    def others(self) -> _Near:
+        """What tells whether another link was near; None where it is not known, and why."""
+        return self.near()
 
     def content(self) -> dict[str, Any]:
         """The pose and what is wrong with it, as plain values by name."""
@@ -78,6 +92,14 @@ class LinkPose:
             "orientation": self.pose.quaternion(),
         }
         return {"root": pose, "root_problem": self.problem}
+
+
+def _or_why(of: Callable[[float | None], T], utc: float | None) -> tuple[T | None, str | None]:
+    """What was ``of`` that time; None where it is not known, and why."""
+    try:
+        return of(utc), None
+    except SkinError as error:
+        return None, str(error)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,14 +127,18 @@ class Contact:
     link: LinkPose | None = field(default=None, repr=False)
 
     @classmethod
-    def of(cls, touch: Touch, surface: Surface, link: LinkPose | None = None) -> Self:
-        """Of a touch of the sheet that lies on ``surface``; plain numbers, which is faster."""
-        uv = [[touch.detection.x, touch.detection.y]]
-        slope = surface.jacobian(uv)[0]
-        along, up = map(_unit, slope.T.tolist())
-        normal = _unit(_cross(along, up))
-        x, y, z = surface.point(uv)[0].tolist()
-        return cls(touch, (x, y, z), (along, _cross(normal, along), normal), slope, link)
+    def each(
+        cls, touches: Sequence[Touch], surface: Surface, link: LinkPose | None = None
+    ) -> tuple[Self, ...]:
+        """Of touches of the sheet that lies on ``surface``; plain numbers, which is faster."""
+        if not touches:
+            return ()
+        uv = np.array([(touch.detection.x, touch.detection.y) for touch in touches])
+        places, slopes = surface.point(uv).tolist(), surface.jacobian(uv)
+        return tuple(
+            cls(touch, tuple(place), _axes(*slope.T.tolist()), slope, link)
+            for touch, place, slope in zip(touches, places, slopes, strict=True)
+        )
 
     @property
     def normal(self) -> Vector:
@@ -130,6 +156,21 @@ class Contact:
         """(3,) unit vector in that frame; None where the pose of the link is not known."""
         pose = self.link and self.link.pose
         return tuple((pose.rotation @ self.normal).tolist()) if pose else None
+
+    @property
+    def is_self(self) -> bool | None:
+        """Whether a link of the robot itself is near a third of its ellipse or more.
+
+        None where that is not known. A link that is so near presses as a rule, so a third will do.
+        """
+        near = self.link and self.link.others[0]
+        if not near:
+            return None
+        spread = self.covariance
+        values, vectors = np.linalg.eigh(np.zeros((3, 3)) if spread is None else spread)
+        axes = vectors * np.sqrt(np.maximum(values, 0.0))
+        points = self.position + _SPREAD @ axes[:, 1:].T  # the first is along the normal
+        return bool(3 * near(points).sum() >= len(points))
 
     @property
     def orientation(self) -> Vector:
@@ -185,6 +226,7 @@ class Contact:
         }
         if self.link is not None:
             content |= {"root_position": self.root_position, "root_normal": self.root_normal}
+            content |= {"self": self.is_self, "self_problem": self.link.others[1]}
         return content
 
     def _in_space(self, sheet: FloatArray) -> FloatArray:
@@ -256,7 +298,7 @@ class Contacts:
         """What ``result`` says of the skin; of a replay that is played: as if ``measured`` then."""
         valid = result.ready and result.has_image
         when = _when(result.scanned, result.host_time)
-        return cls(
+        contacts = cls(
             stream=stream,
             sequence=result.sequence,
             host_time=result.host_time,
@@ -274,6 +316,8 @@ class Contacts:
             noise=result.baseline.deviation if result.ready and result.baseline else None,
             measured=(math.nan if stream.replayed else when) if measured is None else measured,
         )
+        own = stream.place and stream.place.own
+        return contacts._without_self() if own and own.leaves_out else contacts
 
     def outdated(self, problem: str) -> Self:
         """The same, but no touches, which are not true any more, and why."""
@@ -281,6 +325,13 @@ class Contacts:
             self, valid=False, problem=problem, tracked=(), happened=(), voltages=None,
             reference=None, change=None, image=None,
         )  # fmt: skip
+
+    def _without_self(self) -> Self:
+        """The same without touches by the robot's own links, and what happened to them."""
+        tracked = tuple(c.touch for c in self.touches if not c.is_self)
+        happened = zip(self.happened, self._changed, strict=True)
+        kept = tuple(event for event, contact in happened if not contact.is_self)
+        return replace(self, tracked=tracked, happened=kept)
 
     @property
     def age_s(self) -> float:
@@ -315,7 +366,12 @@ class Contacts:
     @cached_property
     def touches(self) -> tuple[Contact, ...]:
         """The touches in space, in the order of their identities."""
-        return tuple(Contact.of(t, self.stream.surface, self.link) for t in self.tracked)
+        return Contact.each(self.tracked, self.stream.surface, self.link)
+
+    @property
+    def _changed(self) -> tuple[Contact, ...]:
+        """Of each thing that happened the touch in space."""
+        return Contact.each([e.touch for e in self.happened], self.stream.surface, self.link)
 
     @cached_property
     def link(self) -> LinkPose | None:
@@ -353,10 +409,8 @@ class Contacts:
     def happenings(self) -> list[dict[str, Any]]:
         """Each thing that happened to a touch, with that touch, as plain values by name."""
         return [
-            {"time_s": event.host_time, "event": event.kind}
-            | self.header()
-            | Contact.of(event.touch, self.stream.surface, self.link).content()
-            for event in self.happened
+            {"time_s": event.host_time, "event": event.kind} | self.header() | contact.content()
+            for event, contact in zip(self.happened, self._changed, strict=True)
         ]
 
 
@@ -417,10 +471,17 @@ def event_content(stream: Stream, event: Event, *, of_frame: bool = False) -> di
 
 def _on_sheet(detection: Detection) -> FloatArray:
     """(2, 2) m², the covariance of a position on the sheet."""
-    variance = np.array([detection.sd_x**2, detection.sd_y**2])
-    if np.isfinite(variance).all():
-        return np.diag(variance) + detection.cov_xy * np.eye(2)[::-1]
-    return np.diag(np.where(np.isfinite(variance), variance, _ANYWHERE))
+    x, y, xy = detection.sd_x * detection.sd_x, detection.sd_y * detection.sd_y, detection.cov_xy
+    if not (math.isfinite(x) and math.isfinite(y)):
+        x, y, xy = x if math.isfinite(x) else _ANYWHERE, y if math.isfinite(y) else _ANYWHERE, 0.0
+    return np.array([[x, xy], [xy, y]])
+
+
+def _axes(along: Vector, up: Vector) -> tuple[Vector, Vector, Vector]:
+    """Unit vectors along the sheet's x, across it, and away from the body."""
+    along = _unit(along)
+    normal = _unit(_cross(along, _unit(up)))
+    return along, _cross(normal, along), normal
 
 
 def _cross(a: Vector, b: Vector) -> Vector:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 from tomoskin.core import Event
 from tomoskin.files.messages.contacts import Contacts, without_frame
@@ -73,7 +74,7 @@ class Reporter:
         """The contacts of a frame; ``with_image``: where it is time for one."""
         whole, self._is_lost = Contacts.of(self.stream, result), False
         shown = with_image and whole.valid and self._image_is_due(whole.host_time)
-        return self._paced(whole if shown else replace(whole, image=None))
+        return self._paced(whole, image=whole.image if shown else None)
 
     def lost(self, event: Event) -> Contacts | None:
         """What a source that is lost says last; None where ``event`` says no such thing."""
@@ -111,7 +112,7 @@ class Reporter:
             return self.stream.clock()
         return otherwise if self._newest is None else self._newest.host_time
 
-    def _paced(self, whole: Contacts) -> Contacts:
+    def _paced(self, whole: Contacts, **changes: Any) -> Contacts:
         state: tuple[object, ...]
         if self._is_lost:
             state, period = (whole.problem,), math.inf
@@ -123,5 +124,5 @@ class Reporter:
             self._state, self._sent = state, whole.host_time
         reports = self._report_is_due(whole.host_time) or whole.valid is not self._valid
         self._valid = whole.valid
-        self._newest = replace(whole, is_due=is_due, reports=reports)
+        self._newest = replace(whole, is_due=is_due, reports=reports, **changes)
         return self._newest

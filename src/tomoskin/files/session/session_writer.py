@@ -151,7 +151,7 @@ class SessionWriter(AbstractContextManager["SessionWriter"]):
     ) -> None:
         """One image for tools that show it, with its touches; the frames give it exactly."""
         log_time = self._log.log_time(host_time)
-        shown = [Contact.of(touch, _FLAT) for touch in touches]
+        shown = Contact.each(touches, _FLAT)
         _put(self._log, channels.IMAGE, host_time, grid_message(image, pixels, host_time, log_time))
         _put(self._log, channels.SCENE, host_time, scene_message(shown, log_time))
 

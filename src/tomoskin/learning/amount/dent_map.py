@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 from itertools import product
 from typing import NamedTuple
 
@@ -21,6 +22,9 @@ _SPREAD = 4.0, 0.7
 would; and deviation of the logarithm of that. Assumed: neither tension nor modulus is known."""
 
 _NEAR = 1e-9
+
+_AWAY = np.concatenate([[0.0], np.geomspace(1e-4, 10, 4000)])
+"""Distances from the middle of a touch for which the fall is kept, m: a page asks at its rate."""
 
 
 class DentMap(NamedTuple):
@@ -82,19 +86,32 @@ def dent_map(
     if not (0 < tip[0] < math.inf and 0 <= tip[1] < math.inf):
         raise DataError(f"expected a tip with a radius above 0 m, got {tip[0]:g} ± {tip[1]:g}")
     mean, variance = np.zeros(len(points)), np.zeros(len(points))
+    falls = _falls(layer, tip)
     for touch in touches:
         if touch.depth is None:
             return None
-        depth, (first, second) = touch.depth, _moments(touch, points, layer, tip)
+        depth, (first, second) = touch.depth, _moments(touch, points, falls)
         mean += depth.value * first
         variance += depth.value**2 * np.maximum(second - first**2, 0) + _sd(depth) ** 2 * second
     return DentMap(np.minimum(mean, layer), np.sqrt(variance))
 
 
+@lru_cache(maxsize=4)
+def _falls(layer: float, tip: tuple[float, float]) -> FloatArray:
+    """(2, n) mean of the fall at :data:`_AWAY`, and of its square, over tip and what the sheet
+    carries."""
+    falls = np.zeros((2, len(_AWAY)))
+    for (a, of_a), (t, of_t) in product(_nodes(7), _nodes(3)):
+        radius, carried = tip[0] * math.exp(tip[1] * a), _SPREAD[0] * math.exp(_SPREAD[1] * t)
+        part = fall(_AWAY, radius, carried * layer)
+        falls += of_a * of_t * np.stack([part, part**2])
+    return falls
+
+
 def _moments(
-    touch: Detection, points: FloatArray, layer: float, tip: tuple[float, float]
+    touch: Detection, points: FloatArray, falls: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """(n,) mean of the fall, and of its square, over place, tip and what the sheet carries."""
+    """(n,) mean of the fall, and of its square, over the place too."""
     off = points - (touch.x, touch.y)
     away = np.hypot(*off.T)
     x, y = off.T / np.maximum(away, _NEAR)
@@ -102,11 +119,10 @@ def _moments(
     square = square_x * x**2 + square_y * y**2 + 2 * mixed * x * y + touch.bias**2
     sd = np.sqrt(np.maximum(square, 0))  # of the distance: along the line to each point
     first, second = np.zeros(len(points)), np.zeros(len(points))
-    for (a, of_a), (t, of_t), (s, of_s) in product(_nodes(7), _nodes(3), _nodes(3)):
-        radius, carried = tip[0] * math.exp(tip[1] * a), _SPREAD[0] * math.exp(_SPREAD[1] * t)
-        part, weight = fall(np.abs(away + s * sd), radius, carried * layer), of_a * of_t * of_s
-        first += weight * part
-        second += weight * part**2
+    for s, weight in _nodes(3):
+        from_middle = np.abs(away + s * sd)
+        first += weight * np.interp(from_middle, _AWAY, falls[0])
+        second += weight * np.interp(from_middle, _AWAY, falls[1])
     return first, second
 
 

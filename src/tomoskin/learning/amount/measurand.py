@@ -107,37 +107,43 @@ MEASURED = {one.name: one for one in (_FORCE, _DEPTH)}
 
 
 @dataclass(frozen=True)
-class Weight:
-    """What lies on the skin: ``value`` in ``unit``, one of a force's."""
+class AmountLabel:
+    """What a person says of a press: ``value`` in ``unit``, one of those ``of`` the measurand."""
 
     value: float
     unit: str
+    of: Measurand = _FORCE
 
-    def checked(self) -> Self:
-        """Itself. Raises DataError where nothing can be learnt from such a weight."""
-        if 0 < self.newtons <= _FORCE.most:
+    def checked(self, layer: float | None = None) -> Self:
+        """Itself. Raises DataError where nothing can be learnt from it, as from a depth beyond the
+        ``layer`` m that is pressed."""
+        of, within = self.of, ""
+        most = of.most
+        if of is _DEPTH and layer is not None:
+            most, within = layer, ", the layer under the sheet"
+        if self.unit in of.units and 0 < self.si <= most:
             return self
         raise DataError(
-            f"expected a weight above 0 and up to {_FORCE.most:g} N, got {self.text}",
-            hint="1 N is the weight of 102 g: check the unit",
+            f"expected a {of.labels[:-1]} above 0 and up to {of.text(most)}{within}, got "
+            f"{self.value:.6g} {self.unit}",
+            hint="1 N is the weight of 102 g: check the unit" if of is _FORCE else "",
         )
 
     @property
-    def newtons(self) -> float:
-        """The force of the weight, in newtons."""
-        return self.value * _FORCE.units[self.unit]
+    def si(self) -> float:
+        """The amount in SI."""
+        return self.value * self.of.units[self.unit]
 
     @property
     def text(self) -> str:
-        """For people, with the force where another unit was given."""
+        """For people, with the usual unit where another one was given."""
         own = f"{self.value:.6g} {self.unit}"
-        return own if self.unit == "N" else f"{own} ({self.newtons:.3g} N)"
+        return own if self.unit == self.of.shown else f"{own} ({self.of.text(self.si)})"
 
     @property
-    def meant(self) -> Weight | None:
+    def meant(self) -> AmountLabel | None:
         """The weight that was probably meant, where this one is unusual; else None."""
-        newtons = self.newtons
-        unusual = newtons > _HEAVY if self.unit == "N" else newtons < _LIGHT
-        if self.value <= 0 or not unusual or self.unit not in _PROBABLE:
+        if self.value <= 0 or self.of is not _FORCE or self.unit not in _PROBABLE:
             return None
-        return Weight(self.value, _PROBABLE[self.unit])
+        unusual = self.si > _HEAVY if self.unit == "N" else self.si < _LIGHT
+        return AmountLabel(self.value, _PROBABLE[self.unit]) if unusual else None

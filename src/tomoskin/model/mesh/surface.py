@@ -114,6 +114,9 @@ def _of_lengths(mesh: Mesh, surface: Surface) -> FloatArray:
     return np.asarray(entries[:, [[0, 1], [1, 2]]])
 
 
+_FLAT = np.eye(3)[None, :, :2]
+
+
 @dataclass(frozen=True)
 class Plane(Surface):
     """The surface of a sheet that lies flat."""
@@ -121,11 +124,13 @@ class Plane(Surface):
     def point(self, uv: ArrayLike) -> FloatArray:
         """The points (n, 3) in m, with z = 0."""
         uv = rows_of(uv)
-        return np.column_stack([uv, np.zeros(len(uv))])
+        out = np.zeros((len(uv), 3))
+        out[:, :2] = uv
+        return out
 
     def jacobian(self, uv: ArrayLike) -> FloatArray:
         """The unit vectors of u and v, at every point."""
-        return np.tile(np.eye(3)[:, :2], (len(rows_of(uv)), 1, 1))
+        return np.repeat(_FLAT, len(rows_of(uv)), axis=0)
 
 
 @dataclass(frozen=True)

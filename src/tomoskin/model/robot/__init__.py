@@ -13,4 +13,5 @@ from tomoskin.model.robot.robot import (
     Robot as Robot,
     add_skin as add_skin,
 )
+from tomoskin.model.robot.self_contact import NearLink as NearLink
 from tomoskin.model.robot.urdf import Urdf as Urdf

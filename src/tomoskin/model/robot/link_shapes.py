@@ -60,6 +60,10 @@ class Pose:
         """(n, 3) m: points of the inner frame, in the outer one."""
         return np.asarray(points @ self.rotation.T + self.position)
 
+    def inside(self, points: FloatArray) -> FloatArray:
+        """(n, 3) m: points of the outer frame, in the inner one."""
+        return np.asarray((points - self.position) @ self.rotation)
+
     def __matmul__(self, inner: Pose) -> Pose:
         """A frame inside this one's inner frame, in this one's outer frame."""
         position = self.rotation @ inner.position + self.position
@@ -89,8 +93,8 @@ def quaternion(axes: ArrayLike) -> tuple[float, ...]:
 MOST_TRIANGLES = 20_000
 """Of all links together: what is finer is drawn more coarsely."""
 
-_AROUND, _UPWARDS = 32, 16
-"""Sides of a round shape."""
+_AROUND, _UPWARDS = 32, 8
+"""Sides of a round shape, and of the quarter of one."""
 
 
 def name_of(element: Element, where: str) -> str:
@@ -103,11 +107,14 @@ def name_of(element: Element, where: str) -> str:
 
 def origin_of(element: Element, where: str) -> Pose:
     """The pose that its <origin> says."""
-    origin = element.find("origin")
-    given = {} if origin is None else origin.attrib
-    return Pose.of(
-        *(numbers_of(given.get(key, "0 0 0"), 3, "<origin>", where) for key in ("xyz", "rpy"))
-    )
+    return Pose.of(*(part_of(element, "origin", key, "0 0 0", where) for key in ("xyz", "rpy")))
+
+
+def part_of(element: Element, tag: str, key: str, default: str, where: str) -> list[float]:
+    """As many finite numbers as ``default`` has, of a part of ``element`` or by default."""
+    part = element.find(tag)
+    text = default if part is None else part.get(key, default)
+    return numbers_of(text, 3 if " " in default else 1, f"<{tag}> {key}", where)
 
 
 def numbers_of(text: str, count: Literal[1, 3], what: str, where: str) -> list[float]:
@@ -136,10 +143,11 @@ def rod(radius: float, length: float) -> FloatArray:
     return _turned(np.array([0, radius, radius, 0.0]), np.array([-half, -half, half, half]))
 
 
-def ball(radius: float) -> FloatArray:
-    """(n, 3, 3) m: a sphere about its middle."""
-    up = np.linspace(-np.pi / 2, np.pi / 2, _UPWARDS + 1)
-    return _turned(radius * np.cos(up), radius * np.sin(up))
+def capsule(radius: float, length: float = 0.0) -> FloatArray:
+    """(n, 3, 3) m: two half spheres with a cylinder of ``length`` between, about its middle."""
+    up = np.linspace(0.0, np.pi / 2, _UPWARDS + 1)
+    radii, heights = radius * np.cos(up), radius * np.sin(up) + length / 2
+    return _turned(np.append(radii[::-1], radii), np.append(-heights[::-1], heights))
 
 
 def mesh_file(path: str, scale: FloatArray, urdf: Path) -> FloatArray:
@@ -213,8 +221,10 @@ def _form(form: Element, where: str, urdf: Path) -> Callable[[], FloatArray] | N
             return partial(box, np.array(numbers("size", 3)))
         case "cylinder":
             return partial(rod, *numbers("radius", 1), *numbers("length", 1))
+        case "capsule":
+            return partial(capsule, *numbers("radius", 1), *numbers("length", 1))
         case "sphere":
-            return partial(ball, *numbers("radius", 1))
+            return partial(capsule, *numbers("radius", 1))
         case "mesh":
             scale = np.array(numbers("scale", 3, "1 1 1"))
             return partial(mesh_file, form.get("filename", ""), scale, urdf)

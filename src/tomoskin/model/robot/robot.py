@@ -14,8 +14,10 @@ from numpy.typing import ArrayLike
 from tomoskin.core import FloatArray, SkinError, StrPath
 from tomoskin.model.mesh import Surface
 from tomoskin.model.robot.link_shapes import Pose
+from tomoskin.model.robot.self_contact import LINGERS, NearLink, OwnLinks
 from tomoskin.model.robot.urdf import Positions, Urdf
 from tomoskin.model.section import (
+    Choice,
     OneOrMore,
     Quantity,
     Row,
@@ -59,10 +61,6 @@ class Moved(Surface):
         """Derivatives (n, 3, 2) of the points."""
         return np.asarray(self.pose.rotation @ self.surface.jacobian(uv))
 
-    def check(self, uv: ArrayLike) -> None:
-        """Check the surface that is moved."""
-        self.surface.check(uv)
-
 
 JointPositions = Callable[[float], Positions]
 """How a robot stands at a time, s since 1970."""
@@ -72,14 +70,14 @@ JointPositions = Callable[[float], Positions]
 class Place:
     """Which of a robot's skins it is, and where: ``pose`` in the frame ``link``.
 
-    ``link`` is "" where it is not known: coordinates are then the skin's own. ``urdf`` is the
-    robot's, and ``joints`` says how it stands.
+    ``link`` is "" where it is not known: coordinates are then the skin's own. ``own`` are the
+    links of the robot that can touch the skin, and ``joints`` says how it stands.
     """
 
     name: str
     link: str = ""
     pose: Pose = field(default_factory=Pose)
-    urdf: Urdf | None = None
+    own: OwnLinks | None = None
     joints: JointPositions | None = None
 
     def moved(self, surface: Surface) -> Surface:
@@ -91,11 +89,26 @@ class Place:
 
         None where there is no link. Raises SkinError where the pose is not known.
         """
-        if self.urdf is None:
-            return None
-        if self.joints is None or utc is None:
-            return self.urdf.pose(self.link, _not_told)
-        return self.urdf.pose(self.link, self.joints(utc))
+        return self.own.urdf.pose(self.link, self._positions(utc)) if self.own else None
+
+    @property
+    def unmarked(self) -> str:
+        """Which touches by the robot's own links cannot be told from others, and why; else ""."""
+        if self.own is None or not self.own.others:
+            return ""
+        why = "no joint states are given" if self.joints is None else self.own.problem
+        return why and f"touches by the robot's own links are not marked: {why}"
+
+    def near(self, utc: float | None) -> NearLink | None:
+        """What tells of points whether another link of the robot was near, then or just before.
+
+        None where there is no link. Raises SkinError where the pose of one is not known.
+        """
+        stances = [self._positions(utc and utc - ago) for ago in (0.0, LINGERS)]
+        return self.own.at(*stances) if self.own else None
+
+    def _positions(self, utc: float | None) -> Positions:
+        return _not_told if self.joints is None or utc is None else self.joints(utc)
 
 
 def _not_told(joint: str) -> float:
@@ -119,6 +132,19 @@ class RobotSection(Section, section="robot"):
         default=None,
         needs="urdf",
     )
+    self_contacts: str = key(
+        Choice(("mark", "leave-out")),
+        "What becomes of touches by the robot's own links.",
+        default="mark",
+        needs="joints",
+    )
+    self_margin: float = key(
+        Quantity("length", "mm", 0, 1000),
+        "How near the shape of a link has to be to the skin's surface to touch it: the thickness "
+        "of the sheet, and what shapes and poses are wrong by.",
+        default="5 mm",
+        needs="joints",
+    )
 
 
 class SkinSection(Section, section="skin", many=True):
@@ -138,6 +164,12 @@ class SkinSection(Section, section="skin", many=True):
     )
     angles: tuple[float, ...] | None = key(
         _RPY, "Angles about the link's fixed x, y and z, as in a URDF.", default=None, needs="link"
+    )
+    pressed_by: tuple[str, ...] = key(
+        OneOrMore(Text(200)),
+        "Links next to its own, held by a single joint, that can touch the skin too.",
+        default=None,
+        needs="link",
     )
     calibration: tuple[str, ...] = key(
         OneOrMore(_FILE), "Files from `tomoskin calibrate`, one of each kind.", default=None
@@ -216,7 +248,7 @@ class Robot:
         robot = RobotSection.read(tables.get("robot", {}), f"{source}: [robot]")
         urdf = None if robot.urdf is None else Urdf.read(Path(folder) / robot.urdf)
         each = SkinSection.each(tables, source)
-        skins = tuple(_placed(given, where, Path(folder), urdf) for given, where in each)
+        skins = tuple(_placed(given, where, Path(folder), urdf, robot) for given, where in each)
         if not 0 < len(skins) <= MOST_SKINS:
             raise SkinError(
                 f"expected 1 to {MOST_SKINS} sections [[skin]], got {len(skins)}", where=source
@@ -241,7 +273,9 @@ class Robot:
         return places[name]
 
     def moved_by(self, joints: JointPositions) -> Self:
-        """The same, whose skins know by ``joints`` where their links are."""
+        """The same, whose skins know by ``joints`` where the links are; meshes are read here."""
+        for skin in self.skins:
+            _ = skin.place.own and skin.place.own.hulls
         skins = (replace(s, place=replace(s.place, joints=joints)) for s in self.skins)
         return replace(self, skins=tuple(skins))
 
@@ -249,7 +283,8 @@ class Robot:
 def add_skin(path: StrPath, given: Mapping[str, Any], urdf: str | None = None) -> str:
     """Text of the robot file at ``path`` with one more skin; of a new one where there is none.
 
-    ``given``: keys of its section as written; ``urdf``: path from the file. Raises SkinError.
+    ``given``: keys of its section as written; ``urdf``: path from the file. Raises SkinError,
+    also where no robot can be made of the text.
     """
     path = Path(path)
     if path.exists():
@@ -261,24 +296,25 @@ def add_skin(path: StrPath, given: Mapping[str, Any], urdf: str | None = None) -
     else:
         lines = [f"format = {FORMAT}", "", "[robot]"]
         text = "\n".join(lines + ([] if urdf is None else [f"urdf = {literal(urdf)}"]))
-    SkinSection.complete(given, f"{path}: new [[skin]]")
     entry = [f"{name} = {literal(value)}" for name, value in given.items()]
-    return "\n".join([text, "", "[[skin]]", *entry]) + "\n"
+    text = "\n".join([text, "", "[[skin]]", *entry]) + "\n"
+    Robot.of(toml_tables(text, str(path), FORMAT, SECTIONS), str(path), path.parent)
+    return text
 
 
-def _placed(given: SkinSection, where: str, folder: Path, urdf: Urdf | None) -> PlacedSkin:
+def _placed(
+    given: SkinSection, where: str, folder: Path, urdf: Urdf | None, robot: RobotSection
+) -> PlacedSkin:
     for text, form, what in (
         (given.name, _NAME, "name of small letters, digits and _ that begins with a letter"),
         (given.board or "00", _BOARD, "unique id of hexadecimal digits, two a byte"),
     ):
         if not form.fullmatch(text):
             raise SkinError(f'expected a {what}, got "{text}"', where=where)
-    if given.link is not None:
-        _check_link(given.link, urdf, where)
-    zero = np.zeros(3)
+    own, zero = _own_links(given, urdf, robot, where), np.zeros(3)
     pose = Pose.of(given.position or zero, given.angles or zero)
     return PlacedSkin(
-        place=Place(given.name, given.link or "", pose, urdf if given.link else None),
+        place=Place(given.name, given.link or "", pose, own),
         skin=str(folder / given.skin) if given.skin.endswith(".toml") else given.skin,
         source=_from(folder, given.source),
         board=given.board,
@@ -286,22 +322,31 @@ def _placed(given: SkinSection, where: str, folder: Path, urdf: Urdf | None) -> 
     )
 
 
-def _check_link(link: str, urdf: Urdf | None, where: str) -> None:
-    """Raise SkinError for a link that the robot does not have, or that can name no frame."""
+def _own_links(
+    given: SkinSection, urdf: Urdf | None, robot: RobotSection, where: str
+) -> OwnLinks | None:
+    """What a skin on a link meets. SkinError for a link that the robot does not have, or that can
+    name no frame."""
+    if given.link is None:
+        return None
     if urdf is None:
         raise SkinError(
-            f'expected a URDF that has the link "{link}", got none',
+            f'expected a URDF that has the link "{given.link}", got none',
             where=where,
             hint='name it in the section [robot], as in urdf = "arm.urdf", or leave out link',
         )
-    urdf.check_link(link, where)
-    if not FRAME.fullmatch(link):
+    named = given.pressed_by or ()
+    for link in (given.link, *named):
+        urdf.check_link(link, where)
+    if not FRAME.fullmatch(given.link):
         raise SkinError(
             'expected a link of letters, digits, "_", "-" and ".", with "/" between names, since '
-            f'it is the frame_id of all messages; got "{link}"',
+            f'it is the frame_id of all messages; got "{given.link}"',
             where=where,
             hint=f"rename it in {urdf.source}",
         )
+    leaves_out = robot.self_contacts == "leave-out"
+    return OwnLinks.of(urdf, given.link, named, robot.self_margin, leaves_out=leaves_out)
 
 
 def _from(folder: Path, source: str) -> str:

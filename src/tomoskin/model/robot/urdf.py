@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container
+from collections.abc import Callable, Container, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Self
@@ -25,8 +25,8 @@ from tomoskin.model.robot.link_shapes import (
     LinkShape,
     Pose,
     name_of,
-    numbers_of,
     origin_of,
+    part_of,
     read_shapes,
     thinned,
 )
@@ -163,30 +163,45 @@ class Urdf:
 
         Raises SkinError where the position of a joint is not known.
         """
-        pose = Pose()
-        while (joint := self.joints.get(link)) is not None:
-            pose = (joint.moved(positions) if positions else joint.pose) @ pose
-            link = joint.parent
-        return pose
+        return self.poses(positions, (link,))[link]
 
-    def poses(self, positions: Positions | None = None) -> dict[str, Pose]:
-        """Those of all links, in the order of the file, as :meth:`pose` has each."""
-        return {link: self.pose(link, positions) for link in self.links}
+    def poses(
+        self, positions: Positions | None = None, links: Iterable[str] | None = None
+    ) -> dict[str, Pose]:
+        """Those of some ``links``, or of all in the order of the file, as :meth:`pose` has each."""
+        poses = {self.root: Pose()}
+
+        def of(link: str) -> Pose:
+            if link not in poses:
+                joint = self.joints[link]
+                moved = joint.moved(positions) if positions else joint.pose
+                poses[link] = of(joint.parent) @ moved
+            return poses[link]
+
+        return {link: of(link) for link in (self.links if links is None else links)}
+
+    def body(self, link: str) -> str:
+        """The first link of the rigid body that ``link`` belongs to."""
+        while (joint := self.joints.get(link)) is not None and joint.kind in _STANDS:
+            link = joint.parent
+        return link
 
     @property
     def meshes(self) -> dict[str, Pose]:
         """Pose on its link of the first mesh of each link that has one."""
         return {s.link: s.pose for s in self.shapes[::-1] if s.is_mesh}
 
+    def shapes_of(self, link: str, kind: str) -> list[LinkShape]:
+        """Those of a link that are of the ``kind``, or all where none is."""
+        shapes = [s for s in self.shapes if s.link == link]
+        return [s for s in shapes if s.kind == kind] or shapes
+
     def solids(self) -> tuple[LinkSolid, ...]:
         """What is drawn of each link that has a shape: its visual parts, else those that collide.
 
         Mesh files are read here; one that cannot be is a problem of its link.
         """
-        drawn = []
-        for link in self.links:
-            shapes = [s for s in self.shapes if s.link == link]
-            drawn.append([s for s in shapes if s.kind == "visual"] or shapes)
+        drawn = [self.shapes_of(link, "visual") for link in self.links]
         most = MOST_TRIANGLES // max(1, sum(map(len, drawn)))
         return tuple(_solid(shapes, most) for shapes in drawn if shapes)
 
@@ -248,24 +263,15 @@ def _joint(element: ElementTree.Element, where: str) -> UrdfJoint:
     known = (*_TURNS, *_SLIDES, *_STANDS, *_UNTOLD)
     if kind not in known:
         raise SkinError(no_such(kind, filter(None, known), "a type"), where=where)
-    mimic, axis = element.find("mimic"), np.array(_number(element, "axis", "xyz", "1 0 0", where))
+    mimic, axis = element.find("mimic"), np.array(part_of(element, "axis", "xyz", "1 0 0", where))
     if not (length := np.linalg.norm(axis)) > 0:
         raise SkinError("expected an axis with a direction, got 0 0 0", where=where)
     return UrdfJoint(
         name, parent, child, origin_of(element, where), kind, axis / length,
         "" if mimic is None else mimic.get("joint", ""),
-        _number(element, "mimic", "multiplier", "1", where)[0],
-        _number(element, "mimic", "offset", "0", where)[0],
+        part_of(element, "mimic", "multiplier", "1", where)[0],
+        part_of(element, "mimic", "offset", "0", where)[0],
     )  # fmt: skip
-
-
-def _number(
-    element: ElementTree.Element, tag: str, key: str, default: str, where: str
-) -> list[float]:
-    """As many finite numbers as ``default`` has, of a part of ``element`` or by default."""
-    part = element.find(tag)
-    text = default if part is None else part.get(key, default)
-    return numbers_of(text, 3 if " " in default else 1, f"<{tag}> {key}", where)
 
 
 def _solid(shapes: list[LinkShape], most: int) -> LinkSolid:

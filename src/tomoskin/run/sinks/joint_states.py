@@ -123,18 +123,11 @@ def joint_states(spec: str) -> JointStates:
     """
     name, _, argument = spec.partition(":")
     if name != "ros2":
-        states = list(_recorded(Path(spec)))
-        return JointStates(lambda: _once(states), spec)
+        states = iter(list(_recorded(Path(spec))))  # the first who asks takes them all
+        return JointStates(lambda: states, spec)
     options = options_of(filter(None, argument.split(",")), ("domain", "topic"), _WHERE)
     topic = options.get("topic", "joint_states").removeprefix("/")
     return JointStates(_listener(ros_domain(options, _WHERE), topic), f"/{topic}", _MOST)
-
-
-def _once(states: list[State]) -> list[State]:
-    """All of them, and none the next time."""
-    given = states.copy()
-    states.clear()
-    return given
 
 
 def _listener(domain: int, topic: str) -> Callable[[], Iterable[State]]:

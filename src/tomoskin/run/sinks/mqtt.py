@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import socket
-import threading
 from collections import deque
 from dataclasses import replace
 from pathlib import Path
+from queue import Empty, SimpleQueue
 from typing import Any
 from urllib.parse import SplitResult, unquote, urlsplit
 
@@ -75,13 +75,13 @@ class MqttSink(Sink):
             client.username_pw_set(unquote(self._url.username), password)
         client.connect_timeout = _PATIENCE
         client.will_set(stream.naming.topic("status"), "offline", qos=1, retain=True)
-        answer = _Answer()
-        client.on_connect = answer
+        answers: SimpleQueue[Any] = SimpleQueue()
+        client.on_connect = lambda *answer: answers.put(answer[3])
         client.connect(self._url.hostname, self._port, keepalive=_KEEPALIVE)
         # a second message of a frame must not wait until the first is acknowledged, 40 ms
         client.socket().setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         client.loop_start()
-        answer.check(self.name)
+        _check_answer(answers, self.name)
         self._say("online")
         owed, self._owed = self._owed, deque(maxlen=_MOST_OWED)
         for name, data, sent in owed:
@@ -132,9 +132,7 @@ class MqttSink(Sink):
         self._check(sent)
 
     def _properties(self, expiry: int) -> Any:
-        packets = needed("paho.mqtt.packettypes", "mqtt", _WHERE, SinkError).PacketTypes
-        module = needed("paho.mqtt.properties", "mqtt", _WHERE, SinkError)
-        properties = module.Properties(packets.PUBLISH)
+        properties = self._paho.Properties(self._paho.PacketTypes.PUBLISH)
         properties.MessageExpiryInterval = expiry
         return properties
 
@@ -143,24 +141,15 @@ class MqttSink(Sink):
             raise SinkError(self._paho.error_string(sent.rc), where=self.name)
 
 
-class _Answer:
-    """What the broker says to our wish to connect; called from the client's thread."""
-
-    def __init__(self) -> None:
-        self._came = threading.Event()
-        self._refused = ""
-
-    def __call__(self, *answer: Any) -> None:
-        reason = answer[3]
-        self._refused = str(reason) if reason.is_failure else ""
-        self._came.set()
-
-    def check(self, where: str) -> None:
-        """Wait for the answer; SinkError where it is no."""
-        if not self._came.wait(_PATIENCE):
-            raise SinkError(f"the broker did not answer within {_PATIENCE:.0f} s", where=where)
-        if self._refused:
-            raise SinkError(f"the broker refused the connection: {self._refused}", where=where)
+def _check_answer(answers: SimpleQueue[Any], where: str) -> None:
+    """Wait for what the broker says to our wish to connect; SinkError where it is no."""
+    try:
+        reason = answers.get(timeout=_PATIENCE)
+    except Empty:
+        why = f"the broker did not answer within {_PATIENCE:.0f} s"
+        raise SinkError(why, where=where) from None
+    if reason.is_failure:
+        raise SinkError(f"the broker refused the connection: {reason}", where=where)
 
 
 def open_mqtt(argument: str) -> MqttSink:

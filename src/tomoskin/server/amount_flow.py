@@ -1,23 +1,33 @@
-"""The flow in which known weights are laid on the skin, and forces are learnt from them."""
+"""The flow of presses with known weights, or to known depths: these are learnt from them."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from tomoskin.core import DataError, Detection, FloatArray, Touch, WireError
-from tomoskin.learning import FORCE, AmountModel, LabelledPresses, Weight, least_known, report_of
+from tomoskin.learning import (
+    DEPTH,
+    FORCE,
+    MEASURED,
+    AmountLabel,
+    AmountModel,
+    LabelledPresses,
+    Measurand,
+    least_known,
+    report_of,
+)
 from tomoskin.pipeline import FrameResult, Prepared
 from tomoskin.server.guided_flow import Estimate, GuidedFlow, counted
-from tomoskin.server.page_messages import Figures, Phase, Point, WeightNow
+from tomoskin.server.page_messages import Figures, LabelNow, Phase, Point
 from tomoskin.server.press_taker import OFTEN
-from tomoskin.server.requests import SetWeight
+from tomoskin.server.requests import SetLabel
 
 _FEWEST, _ENOUGH, _GOOD = 5, 10, 20
-"""Placements from which forces are learnt, that are enough to begin with, and that are good."""
+"""Presses from which amounts are learnt, that are enough to begin with, and that are good."""
 
 
 _STILL_FOR, _FEWEST_FRAMES = 0.6, 8
@@ -36,8 +46,8 @@ _GONE = 3
 _PATIENCE = 3.0
 """Seconds of lying there after which it is said why nothing is recorded."""
 
-_EARLY = "Not recorded: it was lifted before it had lain still for 0.6 s. Let it lie."
-_MOVES = "Not recorded yet: it still moves or sinks in. Let it lie, or lift it and lay it on again."
+_EARLY = "Not recorded: it was lifted before it had rested for 0.6 s. Let it rest."
+_MOVES = "Not recorded yet: it still moves or sinks in. Let it rest, or lift it and press again."
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,33 +137,36 @@ class PlacementTaker:
 
 
 @dataclass(frozen=True, eq=False)
-class Weighed:
-    """A placement, and what lay there."""
+class LabelledPlacement:
+    """A placement, and what is said of it."""
 
     placement: Placement
-    weight: Weight
+    label: AmountLabel
 
 
-class WeighFlow(GuidedFlow):
-    """Weights that lay on the skin so far; see :class:`GuidedFlow`.
+class AmountFlow(GuidedFlow):
+    """Presses of a known amount so far; see :class:`GuidedFlow`.
 
     Attributes
     ----------
     taken
-        Placements so far, each with its weight.
-    weight
-        What lies there, or comes next; None where that has not been said.
+        Placements so far, each with its label.
+    label
+        What presses now, or comes next; None where that has not been said.
     asked
         What was said, where it is probably meant otherwise.
+    skin_says
+        Gives the amount in SI of the press on a simulated skin that knows it, else None.
     """
 
-    kind, teaches = "force", FORCE
+    of: ClassVar[Measurand]
 
     def __init__(self, prepared: Prepared) -> None:
         super().__init__(prepared)
-        self.weight: Weight | None = None
-        self.asked: Weight | None = None
-        self.answers[SetWeight] = self._set
+        self.label: AmountLabel | None = None
+        self.asked: AmountLabel | None = None
+        self.skin_says: Callable[[], float | None] = lambda: None
+        self.answers[SetLabel] = self._set
         self._taker = PlacementTaker()
         self._waiting: Placement | None = None
 
@@ -165,25 +178,28 @@ class WeighFlow(GuidedFlow):
         if placement is None:
             return None if before == (taker.phase, taker.hint) else False
         self._waiting = placement
+        if (known := self.skin_says()) is not None:
+            value = round(known / self.of.units[self.of.shown], 3)
+            self.label = AmountLabel(value, self.of.shown, self.of)
         return self._record()
 
     def restart(self) -> None:
-        """Forget the weight that is being placed."""
+        """Forget the press that has begun."""
         self._taker = PlacementTaker()
 
     def _record(self) -> bool:
-        """Put the placement that waits on the list, once its weight has been said."""
-        if self._waiting is None or self.weight is None:
+        """Put the placement that waits on the list, once its amount has been said."""
+        if self._waiting is None or self.label is None:
             return False
-        self.taken.append(Weighed(self._waiting, self.weight))
+        self.taken.append(LabelledPlacement(self._waiting, self.label))
         self._waiting = None
         return True
 
-    def _set(self, request: SetWeight) -> bool:
-        weight = Weight(request.value, request.unit)
-        self.asked = None if request.sure or weight.meant is None else weight
+    def _set(self, request: SetLabel) -> bool:
+        label = AmountLabel(request.value, request.unit, self.of)
+        self.asked = None if request.sure or label.meant is None else label
         try:
-            self.weight = None if self.asked else weight.checked()
+            self.label = None if self.asked else label.checked(self.prepared.skin.layer)
         except DataError as error:
             raise WireError(str(error)) from None
         return self._record()
@@ -193,11 +209,11 @@ class WeighFlow(GuidedFlow):
         """Why no placement is recorded."""
         return self._taker.hint
 
-    def estimate_from(self, examples: tuple[Weighed, ...]) -> Estimate:
-        """Estimate the forces of touches from these weights."""
+    def estimate_from(self, examples: tuple[LabelledPlacement, ...]) -> Estimate:
+        """Learn the amounts of touches from these presses."""
         if len(examples) < _FEWEST:
-            return Estimate(f"{_placements(_FEWEST - len(examples))} more for a first answer")
-        model = AmountModel.fit(weighed_presses(examples), self.prepared.skin)
+            return Estimate(f"{_presses(_FEWEST - len(examples))} more for a first answer")
+        model = AmountModel.fit(labelled_presses(examples), self.prepared.skin)
         return Estimate(
             f"{report_of(model)['text']}. {_advice(model)}",
             least_known(model, self._dots.places),
@@ -211,38 +227,50 @@ class WeighFlow(GuidedFlow):
         )
 
     def details(self) -> dict[str, Any]:
-        """What the page shows: the dot, and the weights so far."""
+        """What the page shows: the dot, and the presses so far."""
         places = [one.placement.xy for one in self.taken]
         return {
             "phase": "name" if self._waiting else self._taker.phase,
             "dot": self._dots.next(places, self.estimate),
             "presses": places,
-            "weights": [one.weight.text for one in self.taken],
-            "weight": _shown(self.weight),
+            "labels": [one.label.text for one in self.taken],
+            "label": _shown(self.label),
             "asked": _shown(self.asked),
             "meant": _shown(self.asked and self.asked.meant),
         }
 
 
-def weighed_presses(examples: tuple[Weighed, ...]) -> LabelledPresses:
+class ForceFlow(AmountFlow):
+    """Known weights are laid on."""
+
+    kind, teaches, of = "force", FORCE, MEASURED["force"]
+
+
+class DepthFlow(AmountFlow):
+    """A tip is lowered to known depths."""
+
+    kind, teaches, of = "depth", DEPTH, MEASURED["depth"]
+
+
+def labelled_presses(examples: tuple[LabelledPlacement, ...]) -> LabelledPresses:
     """What is learnt from: of each placement the way there, labelled where it lies still.
 
     Raises DataError as :meth:`LabelledPresses.of` does.
     """
     detections = [d for one in examples for d in one.placement.detections]
     length = [len(one.placement.detections) for one in examples]
-    force = np.full(len(detections), np.nan)
+    amount = np.full(len(detections), np.nan)
     still = np.cumsum([0, *length[:-1]]) + [one.placement.still for one in examples]
-    force[still] = [one.weight.newtons for one in examples]
+    amount[still] = [one.label.si for one in examples]
     press = np.repeat(np.arange(len(examples)), length)
     time = np.concatenate([one.placement.time for one in examples])
-    return LabelledPresses.of(detections, force, press, time)
+    return LabelledPresses.of(detections, amount, press, time, examples[0].label.of.name)
 
 
 def _advice(model: AmountModel) -> str:
     n = len(np.unique(model.presses.press[model.presses.labelled]))
     if n < _ENOUGH:
-        return f"Ten placements are a start: {_placements(_ENOUGH - n)} more."
+        return f"Ten presses are a start: {_presses(_ENOUGH - n)} more."
     if model.remarks:
         return "These would be enough without the problems below."
     if n < _GOOD:
@@ -251,12 +279,12 @@ def _advice(model: AmountModel) -> str:
 
 
 def _of_press(number: int | None) -> str:
-    return "" if number is None else f"Placement {number + 1}: "
+    return "" if number is None else f"Press {number + 1}: "
 
 
-def _shown(weight: Weight | None) -> WeightNow | None:
-    return None if weight is None else WeightNow.of(weight)
+def _shown(label: AmountLabel | None) -> LabelNow | None:
+    return None if label is None else LabelNow.of(label)
 
 
-def _placements(count: int) -> str:
-    return counted(count, "placement", "placements")
+def _presses(count: int) -> str:
+    return counted(count, "press", "presses")

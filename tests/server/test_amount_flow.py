@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from tomoskin.core import DataError, Detection, Touch, WireError
-from tomoskin.learning import FORCE, Weight
-from tomoskin.server.requests import DeletePress, SetWeight, decode_request
-from tomoskin.server.weigh_flow import PlacementTaker, WeighFlow, weighed_presses
+from tomoskin.learning import DEPTH, FORCE, AmountLabel
+from tomoskin.server.amount_flow import DepthFlow, ForceFlow, PlacementTaker, labelled_presses
+from tomoskin.server.requests import DeletePress, SetLabel, decode_request
 
 RATE = 0.04
+SEEN = "host_time", "touches"
 AREA = math.pi * 4e-4
 
 
@@ -87,7 +89,7 @@ def test_two_things_at_once_are_no_placement_and_one_that_lay_there_before_neith
 
 @pytest.fixture
 def flow(prepared):
-    flow = WeighFlow(prepared)
+    flow = ForceFlow(prepared)
 
     def see(time, touches):
         return flow.see(SimpleNamespace(host_time=time, touches=touches)) or None
@@ -96,7 +98,7 @@ def flow(prepared):
 
 
 def set_weight(flow, value, unit="N", *, sure=False):
-    return flow.answers[SetWeight](SetWeight(value, unit, sure))
+    return flow.answers[SetLabel](SetLabel(value, unit, sure))
 
 
 def weigh(flow, bench, newtons, x, y, *, said=None):
@@ -113,7 +115,7 @@ def test_ten_weights_are_learnt_from_saved_and_used(flow, tmp_path):
     flow, bench = flow
     for k, newtons in enumerate(TOPS[:4]):
         weigh(flow, bench, newtons, *PLACES[k])
-    assert flow.estimate_from(flow.examples()).text == "1 placement more for a first answer"
+    assert flow.estimate_from(flow.examples()).text == "1 press more for a first answer"
     for k, newtons in enumerate(TOPS[4:10], 4):
         weigh(flow, bench, newtons, *PLACES[k])
     estimate = flow.estimated(flow.examples())
@@ -130,7 +132,7 @@ def test_ten_weights_are_learnt_from_saved_and_used(flow, tmp_path):
     assert force.low < force.value < force.high
     flow.estimate = estimate
     fields = flow.now()
-    assert fields.weights[3] == "8 N"
+    assert fields.labels[3] == "8 N"
     assert fields.phase == "release"
 
 
@@ -141,7 +143,7 @@ def test_a_wrong_label_is_named_and_can_be_deleted(flow):
     estimate = flow.estimated(flow.examples())
     assert estimate.figures.doubtful == [6]
     assert "enough without the problems below" in estimate.text
-    named = "Placement 7: the label 10 N contradicts"
+    named = "Press 7: the label 10 N contradicts"
     assert any(remark.startswith(named) for remark in estimate.figures.remarks)
     assert flow.answers[DeletePress](DeletePress(6))
     estimate = flow.estimated(flow.examples())
@@ -172,7 +174,7 @@ def test_a_placement_that_is_refused_says_why(flow):
     bench.lift()
     assert not bench.lay(4.0, frames=5)
     bench.lift()
-    assert "lifted before it had lain still" in flow.now().text
+    assert "lifted before it had rested" in flow.now().text
     bench.number += 1
     for k in range(90):
         bench.show(touch(bench.number, 4.0, 1e-3 * k))
@@ -189,13 +191,13 @@ def test_grams_taken_for_newtons_are_asked_about(flow):
     fields = flow.now()
     assert fields.asked.text == "200 N"
     assert fields.meant.text == "200 g (1.96 N)"
-    assert fields.weight is None
+    assert fields.label is None
     with pytest.raises(WireError, match="up to 100 N"):
         set_weight(flow, 200.0, sure=True)
     set_weight(flow, 200.0, "g", sure=True)
-    assert flow.weight == Weight(200.0, "g")
+    assert flow.label == AmountLabel(200.0, "g")
     set_weight(flow, 30.0, sure=True)
-    assert flow.weight.newtons == 30.0
+    assert flow.label.si == 30.0
     set_weight(flow, 0.5, "g")
     assert flow.now().meant.text == "0.5 kg (4.9 N)"
 
@@ -205,11 +207,11 @@ def test_grams_taken_for_newtons_are_asked_about(flow):
 def test_a_weight_that_cannot_be_is_refused_in_words(flow, value, unit):
     """Not as a message that is not understood: a person typed it."""
     flow, _ = flow
-    asked = f'{{"type": "flow_weight", "value": {value}, "unit": "{unit}", "sure": true}}'
+    asked = f'{{"type": "flow_label", "value": {value}, "unit": "{unit}", "sure": true}}'
     request = decode_request(asked)
     with pytest.raises(WireError, match="expected a weight above 0 and up to 100 N"):
         flow.answers[type(request)](request)
-    assert float(value) > 0 or Weight(float(value), unit).meant is None
+    assert float(value) > 0 or AmountLabel(float(value), unit).meant is None
 
 
 def test_a_weight_that_is_named_after_it_lay_there_is_recorded_then(flow):
@@ -219,6 +221,25 @@ def test_a_weight_that_is_named_after_it_lay_there_is_recorded_then(flow):
     assert flow.now().phase == "name"
     assert set_weight(flow, 510.0, "g")
     (one,) = flow.examples()
-    assert one.weight.newtons == pytest.approx(5.0, rel=0.01)
+    assert one.label.si == pytest.approx(5.0, rel=0.01)
     with pytest.raises(DataError, match="at least 5"):
-        weighed_presses(flow.examples())
+        labelled_presses(flow.examples())
+
+
+def test_depths_are_learnt_by_the_same_flow_within_the_layer(prepared):
+    prepared = replace(prepared, skin=prepared.skin.altered({"surface": {"layer": "3 mm"}}))
+    flow = DepthFlow(prepared)
+    bench = Bench(lambda *seen: flow.see(SimpleNamespace(**dict(zip(SEEN, seen, strict=True)))))
+    for wrong, unit, reason in ((5.0, "mm", "the layer under the sheet"), (2.0, "N", "got 2 N")):
+        with pytest.raises(WireError, match=f"expected a depth above 0 and up to 3 mm.*{reason}"):
+            set_weight(flow, wrong, unit)
+    for k, newtons in enumerate(TOPS[:6]):
+        bench.lift()
+        set_weight(flow, 0.1 * newtons, "mm")
+        bench.lay(newtons, *PLACES[k])
+    answer = flow.estimated(flow.examples()).answer
+    assert (answer.presses.measurand, flow.teaches) == ("depth", DEPTH)
+    assert np.sort(answer.presses.amount[answer.presses.labelled]) == pytest.approx(
+        1e-4 * np.sort(TOPS[:6])
+    )
+    assert flow.now().labels[3] == "0.8 mm"
