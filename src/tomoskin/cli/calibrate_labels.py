@@ -204,7 +204,9 @@ def _tabled(table: Path, n: int) -> tuple[list[int], dict[str, Any]]:
     try:
         rows = np.atleast_1d(np.genfromtxt(table, delimiter=",", names=True, encoding="utf-8"))
     except (ValueError, OSError) as error:
-        raise DataError(f"is no table of numbers: {error}", where=str(table)) from None
+        raise DataError(
+            f"expected a table of numbers, got another file: {error}", where=str(table)
+        ) from None
     first, *names = rows.dtype.names or ("",)
     frames = rows[first] if first == "frame" and names else np.array([-1.0])
     if not np.isin(frames, np.arange(n)).all():

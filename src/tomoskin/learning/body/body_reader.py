@@ -173,12 +173,12 @@ class BodyReader:
         z = np.asarray(np.linalg.lstsq(information, modes.T @ data, rcond=1e-9)[0], np.float64)
         residual = data - modes @ z
         degrees = max(len(data) - blind.shape[1] - model.n_modes, 1)
-        left = float(residual @ residual)
-        weights = information / max(left / degrees, 1.0)
+        missed = float(residual @ residual)
+        weights = information / max(missed / degrees, 1.0)
         excess = _ANOTHER**2 * model.excess + self._left + self._pressed
         weights = np.linalg.solve(np.eye(model.n_modes) + weights @ excess, weights)
         explained = float(np.sum(model.whiten(dv) ** 2)) * _ROUGH**2
-        return z, (weights + weights.T) / 2, left > _LIKE**2 * degrees + explained
+        return z, (weights + weights.T) / 2, missed > _LIKE**2 * degrees + explained
 
     def _press(self, change: FloatArray) -> None:
         """Take what touches ``change`` (r,), whitened: as much as a part of it along the body's
