@@ -161,3 +161,53 @@ def test_the_live_pipeline_reads_the_bend_and_sees_no_touch_in_it(recorded):
     late = results[-4:]
     assert not any(result.touches for result in late)
     assert any(result.touches for result in results)
+
+
+@pytest.fixture
+def bare(recorded):
+    """The known bends as voltages alone."""
+    known = read_recording(recorded / "known.mcap")
+    path = recorded / "bare.npz"
+    np.savez(
+        path, voltages=known.voltages, drive=known.drive, measure=known.measure, time_s=known.time
+    )
+    return path
+
+
+def test_without_states_the_body_has_none_with_a_unit(bare, recorded, tomoskin):
+    code, out, err = tomoskin(
+        "calibrate", "body", bare, "--skin", "textile-disc-8", "--out", recorded / "latent.npz"
+    )
+    assert code == 0, err
+    assert "no unit" in out
+    assert BODY.read(recorded / "latent.npz").model.body.names[0] == "latent 1"
+
+
+def test_states_come_from_a_table_of_an_encoder(bare, recorded, tomoskin):
+    model = BODY.read(recorded / "c.npz").model
+    table, out = recorded / "encoder.csv", recorded / "encoder.npz"
+    frames = np.searchsorted(read_recording(bare).time, model.body.time)
+    lines = [
+        f"{k},{np.degrees(a):.3f}" for k, a in zip(frames, model.body.state[:, 0], strict=True)
+    ]
+    table.write_text("\n".join(["frame,angle_deg", *lines]))
+    given = ("--skin", "textile-disc-8", "--states", table, "--out", out)
+    code, _, err = tomoskin("calibrate", "body", bare, *given)
+    assert code == 0, err
+    assert BODY.read(out).model.body.size == pytest.approx(model.body.size, abs=1e-3)
+
+
+@pytest.mark.parametrize("text", ["angle_deg\n3", "frame,angle_deg\n9999,3", "frame,a\n1,2,3"])
+def test_a_table_that_holds_no_states_is_refused(bare, recorded, tomoskin, text):
+    table = recorded / "wrong.csv"
+    table.write_text(text)
+    given = ("--skin", "textile-disc-8", "--states", table, "--out", recorded / "w.npz")
+    code, _, err = tomoskin("calibrate", "body", bare, *given)
+    assert code == 1
+    assert "expected" in err
+
+
+def test_the_older_command_names_the_new_one(bare, tomoskin):
+    code, _, err = tomoskin("calibrate", "bend", bare, "--out", "c.npz")
+    assert code == 2
+    assert "tomoskin calibrate body" in err
