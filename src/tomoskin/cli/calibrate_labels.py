@@ -210,8 +210,9 @@ def _tabled(table: Path, n: int) -> tuple[list[int], dict[str, Any]]:
     first, *names = rows.dtype.names or ("",)
     frames = rows[first] if first == "frame" and names else np.array([-1.0])
     if not np.isin(frames, np.arange(n)).all():
+        given = ", ".join([first, *names])
         raise DataError(
-            f"expected a column frame, of numbers within 0:{n}, and one for each coordinate",
+            f"expected columns frame (within 0:{n}) and coordinates, got {given}",
             where=str(table),
             hint="for example: frame,angle_deg,stretch",
         )
