@@ -32,10 +32,8 @@ _DENT = 1e-4
 _ANY_TURN = math.pi**2 / 3
 """Variance of an angle of which nothing is known, rad²."""
 
-_AROUND = np.arange(12) * math.pi / 6
-_SPREAD = np.sqrt(-2 * np.log([[0.75], [0.25]] * 6)) * np.column_stack(
-    [np.cos(_AROUND), np.sin(_AROUND)]
-)
+_TURN = np.arange(12)[:, None] * math.pi / 6 + (0, -math.pi / 2)
+_SPREAD = np.sqrt(-2 * np.log([[0.75], [0.25]] * 6)) * np.cos(_TURN)
 """Points of an ellipse, in standard deviations along its axes: each stands for a twelfth."""
 
 _UNCALIBRATED = {
