@@ -62,8 +62,8 @@ class Estimate:
     answer: Any = None
 
 
-def presses_text(count: int) -> str:
-    """A number of presses in words."""
+def counted(count: int) -> str:
+    """So many presses, for people."""
     return f"{count} press{'' if count == 1 else 'es'}"
 
 

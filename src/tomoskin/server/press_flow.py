@@ -28,7 +28,7 @@ from tomoskin.server.guided_flow import (
     Estimate,
     GuidedFlow,
     GuidedPress,
-    presses_text,
+    counted,
 )
 from tomoskin.server.page_messages import Figures, Point
 from tomoskin.server.press_taker import PressTaker
@@ -41,7 +41,7 @@ _FIRST = 10
 def estimate_touch(prepared: Prepared, presses: Sequence[GuidedPress]) -> Estimate:
     """A locator of the presses, and by how much it misses them. Raises DataError."""
     if len(presses) < _FEWEST_TOUCH:
-        return Estimate(f"{presses_text(_FEWEST_TOUCH - len(presses))} more for a first estimate")
+        return Estimate(f"{counted(_FEWEST_TOUCH - len(presses))} more for a first estimate")
     dv, xy = _arrays(presses)
     locator = Locator.fit(dv, xy, pattern=prepared.pattern, skin=prepared.skin)
     errors = 1e3 * locator.errors
@@ -98,7 +98,7 @@ def estimate_mapping(
 ) -> Estimate:
     """The likeliest channel mapping and how sure it is; ``untouched`` mean, noise V. DataError."""
     if len(presses) < _FEWEST_MAPPING:
-        return Estimate(f"{presses_text(_FEWEST_MAPPING - len(presses))} more for a first answer")
+        return Estimate(f"{counted(_FEWEST_MAPPING - len(presses))} more for a first answer")
     dv, xy = _arrays(presses)
     rest, noise = untouched or (None, None)
     solution = solve_channel_mapping(dv, xy, prepared.skin, reference=rest, noise=noise)
