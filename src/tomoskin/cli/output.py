@@ -143,8 +143,10 @@ def tables(
         _Column(heading, [str(row[number]) for row in rows])
         for number, heading in enumerate(headings)
     ]
-    told = (any(isinstance(row[number], str) for row in rows) for number in range(1, len(columns)))
-    count = 1 + sum(1 for _ in takewhile(bool, told))
+    holds_text = (
+        any(isinstance(row[number], str) for row in rows) for number in range(1, len(columns))
+    )
+    count = 1 + sum(1 for _ in takewhile(bool, holds_text))
     keys, rest = columns[:count], columns[count:]
     blocks = [list(keys)]
     for column in rest:

@@ -39,8 +39,8 @@ def _read_types(file: str) -> dict[str, dict[str, str]]:
 TYPES = _read_types("ros_types.msg")
 """Fields of each message by name, in order: a number, ``string``, another message, or an array."""
 
-_FOUND: list[str] = re.findall(f"{_HASH}(.+)", _text("ros_types.msg"))
-_HASHES = dict(zip(TYPES, _FOUND, strict=True))
+_IN_ORDER: list[str] = re.findall(f"{_HASH}(.+)", _text("ros_types.msg"))
+_HASHES = dict(zip(TYPES, _IN_ORDER, strict=True))
 
 NODE_TYPES = TYPES | _read_types("ros_node.msg")
 """The same with what the services of a node take and give, as ``rmw_cyclonedds`` sends it."""
