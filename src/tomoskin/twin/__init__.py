@@ -56,8 +56,8 @@ from tomoskin.twin.scanning import (
     sample_table as sample_table,
     table_of as table_of,
 )
-from tomoskin.twin.script import Script as Script
-from tomoskin.twin.script_check import (
+from tomoskin.twin.script import (
+    Script as Script,
     check_script as check_script,
     check_settling as check_settling,
 )

@@ -181,9 +181,7 @@ class HeldScanning:
         """None: the drive is direct."""
         self.drives: list[wire.Drive | None] = []
 
-    def set(
-        self, command: wire.SetScan | wire.SetPattern | wire.SetFormat | wire.SetMode
-    ) -> Verdict:
+    def set(self, command: Setting) -> Verdict:
         """Take over what the board accepts."""
         if isinstance(command, wire.SetScan):
             if (verdict := self._board.check_scan(command)) == OK:
