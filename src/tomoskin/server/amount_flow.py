@@ -236,7 +236,7 @@ class AmountFlow(GuidedFlow):
 
 
 class ForceFlow(AmountFlow):
-    """Known weights are laid on."""
+    """The flow in which known weights are laid on the skin."""
 
     kind, teaches = "force", FORCE
 

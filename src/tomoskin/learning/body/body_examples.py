@@ -115,8 +115,8 @@ def _of_bends(
     if angle.ndim != 1 or angle.shape != axis.shape:
         raise DataError(f"expected (n,) labels, got {angle.shape} angles and {axis.shape} axes")
     bent = np.abs(angle) > _SAME
-    axes = np.unique(np.round(np.mod(axis[bent], np.pi), 5))
-    if len(axes) < 3:
+    axes = np.mod(axis[bent], np.pi)
+    if len(np.unique(axes.round(5))) < 3:
         return ("angle",), angle[:, None], axes[:1].sum()
     parts = np.column_stack([np.ones_like(axis), np.cos(2 * axis), np.sin(2 * axis)])
     return TENSOR, angle[:, None] * parts, np.zeros(())

@@ -29,7 +29,7 @@ _STEPS, _NEAR = 8, 1e-4
 
 _ANOTHER = 1.5
 """By how much another motion errs more than a part of the same that was left out: chosen on the
-twins 11, 12 and 9601."""
+twins 11 and 9601."""
 
 _FADES = 30.0
 """Seconds in which what touches have left behind fades."""
@@ -90,7 +90,7 @@ class BodyReading:
 
     @property
     def text(self) -> str:
-        """In words, for a line."""
+        """The state in words, for one line of a report."""
         shown = "body" if np.isnan(self.angle) else f"bend {np.degrees(self.angle):.0f}°"
         return f"{shown} ({self.state})"
 
