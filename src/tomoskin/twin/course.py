@@ -60,18 +60,13 @@ class ScriptedPress(Scripted[PressSection]):
     path: Rows
 
     @property
-    def start(self) -> float:
-        """Seconds since the end of the lead-in."""
-        return self.given.start
-
-    @property
     def end(self) -> float:
         """The time when the force is gone, in s."""
-        return self.start + self.force[-1][0]
+        return self.given.start + self.force[-1][0]
 
     def at(self, time: float, friction: Friction) -> Probe | None:
         """The probe at ``time`` s, None where there is no force."""
-        since = time - self.start
+        since = time - self.given.start
         force = float(along(self.force, since)[0])
         if not (0 <= since <= self.force[-1][0] and force > 0):
             return None
@@ -129,18 +124,13 @@ class ScriptedBend(Scripted[BendSection | StretchSection]):
         return made
 
     @property
-    def start(self) -> float:
-        """When it begins, s since the end of the lead-in."""
-        return self.given.start
-
-    @property
     def end(self) -> float:
         """When the sheet is flat again, s."""
-        return self.start + self.course[-1][0]
+        return self.given.start + self.course[-1][0]
 
     def amount(self, time: float) -> float:
         """Rad or elongation at ``time`` s."""
-        return float(along(self.course, time - self.start)[0])
+        return float(along(self.course, time - self.given.start)[0])
 
     def shape(self, amount: float) -> Deformation:
         """What the sheet does at an ``amount``."""

@@ -179,14 +179,14 @@ class TwinElectronics:
         middles = table.middles
         moves = self._moves(middles)
         if moves and all(move == moves[0] for move in moves):
-            self._set(*moves[0])
+            _set(self.sheet, *moves[0])
             moves = []
         if not moves:
             self._let_go_by(time)
             return self._potentials(table)
         lines = []
         for number, move in enumerate(moves):
-            self._set(*move)
+            _set(self.sheet, *move)
             self._let_go_by(time + float(middles[number]))
             lines.append(self._under(table.drives[number : number + 1], self.sheet.resistance()))
         read = np.concatenate([line.read for line in lines])
@@ -202,10 +202,6 @@ class TwinElectronics:
             (course(t) if course else sheet.presses, bending(t) if bending else sheet.pose)
             for t in times.tolist()
         ]
-
-    def _set(self, presses: tuple[Probe, ...], pose: Pose) -> None:
-        self.sheet.set_presses(presses)
-        self.sheet.set_pose(pose)
 
     def _let_go_by(self, time: float) -> None:
         """Let the sheet go on to ``time`` s."""
@@ -278,6 +274,11 @@ class TwinElectronics:
         if sd > 0 and dt > 0:
             chance = self._contacts.standard_normal(len(self._contact))
             self._contact = wandered(self._contact, sd, time, dt, chance)
+
+
+def _set(sheet: TwinSkin, presses: tuple[Probe, ...], pose: Pose) -> None:
+    sheet.set_presses(presses)
+    sheet.set_pose(pose)
 
 
 @lru_cache(maxsize=16)

@@ -243,10 +243,11 @@ def _check_faults(script: Script, skin: Skin, frame_time: float) -> None:
 
 def _check_ids(presses: tuple[ScriptedPress, ...]) -> None:
     for first, second in combinations(presses, 2):
-        together = min(first.end, second.end) > max(first.start, second.start) + _ROUNDING
+        start = first.given.start
+        together = min(first.end, second.end) > max(start, second.given.start) + _ROUNDING
         if first.given.id == second.given.id and together:
             raise ScriptError(
-                f'"{first.given.id}" already presses from {first.start:g} s to {first.end:g} s',
+                f'"{first.given.id}" already presses from {start:g} s to {first.end:g} s',
                 where=f"{second.where} id",
                 hint="two presses at once need different ids",
             )

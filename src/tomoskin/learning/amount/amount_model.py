@@ -19,8 +19,12 @@ from tomoskin.learning.amount.curve import (
     basis,
     without_memory,
 )
-from tomoskin.learning.amount.labelled_presses import LabelledPresses, check_rising, columns_of
-from tomoskin.learning.amount.measurand import MEASURED
+from tomoskin.learning.amount.measurand import (
+    MEASURED,
+    LabelledPresses,
+    check_rising,
+    columns_of,
+)
 from tomoskin.learning.kind import Applied, Calibration, Conditions, FrameView, Kind
 from tomoskin.learning.touch.gaussian_process import nine_in_ten
 from tomoskin.model.skin import MaterialMemory, MemoryState, Skin, advanced, load_of

@@ -24,8 +24,7 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.special import softmax
 
 from tomoskin.core import FloatArray, IntArray
-from tomoskin.learning.amount.labelled_presses import LabelledPresses
-from tomoskin.learning.amount.measurand import Measurand
+from tomoskin.learning.amount.measurand import LabelledPresses, Measurand
 from tomoskin.model.skin import MaterialMemory, MemoryState, load_of
 
 _NOISE = np.geomspace(0.01, 0.6, 9)
