@@ -74,7 +74,7 @@ class TwinSettings:
 def _preset(table: Mapping[str, Mapping[str, Any]]) -> TwinSettings:
     """Settings from the numbers of each stage; those of electronics that are given at all are on
     :data:`BOARD`."""
-    own = asdict(BOARD) | table["electronics"] if "electronics" in table else {}
+    own = {**asdict(BOARD), **table["electronics"]} if "electronics" in table else {}
     return msgspec.convert({**table, "electronics": own}, TwinSettings)
 
 
