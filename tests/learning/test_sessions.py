@@ -11,7 +11,7 @@ from learning.labelled import RADIUS, ROWS, Floats, held, presses
 from tomoskin import Locator, Pattern
 from tomoskin.core import DataError
 from tomoskin.learning import TOUCH, SessionAlignment
-from tomoskin.learning.touch.matching import CHANCE, distance, matched
+from tomoskin.learning.touch.session_alignment import CHANCE, distance, matched
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tomoskin.pipeline.body_sheets import BodySheets
+from tomoskin.pipeline.rest import BodySheets
 from tomoskin.sensing.signal import Reference
 
 MEAN = np.ones(40)

@@ -12,7 +12,8 @@ from tomoskin.core import DataError, FloatArray
 from tomoskin.files.exports import plot
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, prepare, reconstruct
-from tomoskin.pipeline.foreign import open_electrodes, tuned_by_file
+from tomoskin.pipeline.recorded import open_electrodes
+from tomoskin.pipeline.rest import tuned_by_file
 from tomoskin.sensing.signal import Recording, Reference
 
 

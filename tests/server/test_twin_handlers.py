@@ -156,7 +156,7 @@ def test_the_truth_of_a_recording_knows_bends_and_faces(twin, tmp_path):
     posed(hub, page, posing(bend=BEND))
     hub.obey(page, pressing(shape="polygon", vertices=CORNERS, angle=1.0))
     until(lambda: bool(runner.newest.truth))
-    assert transport.presses == runner.newest.truth
+    assert transport.sheet.presses == runner.newest.truth
     runner.ask(commands.StopRecording())
     with SessionReader(tmp_path / "bent.mcap") as session:
         last = list(session.truth())[-1]
@@ -222,7 +222,7 @@ def test_faces_that_cannot_press(twin, fields, says):
     hub, [transport] = twin
     with pytest.raises(WireError, match=says):
         hub.obey(Heard(), pressing(**fields))
-    assert transport.presses == ()
+    assert transport.sheet.presses == ()
 
 
 @pytest.mark.parametrize(

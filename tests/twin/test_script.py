@@ -10,8 +10,7 @@ from tomoskin.core import ScriptError
 from tomoskin.model.skin import Skin
 from tomoskin.twin.course import pressed
 from tomoskin.twin.probe import Circle, Face, Finger, Square
-from tomoskin.twin.script import Script
-from tomoskin.twin.script_check import check_script
+from tomoskin.twin.script import Script, check_script
 
 HEAD = 'format = 1\n[script]\nduration = "10 s"\n'
 PRESS = """[[press]]

@@ -84,7 +84,7 @@ def test_a_press_shows_in_the_next_frame_and_goes_again(skin):
         return frame.samples.tolist()
 
     transport.set_presses((PRESS,))
-    assert transport.presses == (PRESS,)
+    assert transport.sheet.presses == (PRESS,)
     assert following() != rest.samples.tolist()
     transport.set_presses(())
     assert following() == rest.samples.tolist()

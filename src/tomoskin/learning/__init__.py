@@ -1,22 +1,21 @@
 """What is learnt from examples: positions, forces and depths, classes, bends, mapping."""
 
-from tomoskin.learning.amount.amount_model import AmountModel as AmountModel
-from tomoskin.learning.amount.amount_process import AmountProcess as AmountProcess
-from tomoskin.learning.amount.amount_report import (
+from tomoskin.learning.amount.amount_model import (
     DEPTH as DEPTH,
     FORCE as FORCE,
+    AmountModel as AmountModel,
     least_known as least_known,
     report_of as report_of,
 )
+from tomoskin.learning.amount.amount_process import AmountProcess as AmountProcess
 from tomoskin.learning.amount.dent_map import DentMap as DentMap, dent_map as dent_map
-from tomoskin.learning.amount.labelled_presses import LabelledPresses as LabelledPresses
 from tomoskin.learning.amount.measurand import (
     MEASURED as MEASURED,
     AmountLabel as AmountLabel,
+    LabelledPresses as LabelledPresses,
     Measurand as Measurand,
 )
-from tomoskin.learning.body.body_examples import BodyExamples as BodyExamples
-from tomoskin.learning.body.body_model import BodyModel as BodyModel
+from tomoskin.learning.body.body_model import BodyExamples as BodyExamples, BodyModel as BodyModel
 from tomoskin.learning.body.body_reader import (
     BODY as BODY,
     BodyReader as BodyReader,

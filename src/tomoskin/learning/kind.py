@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from inspect import signature
 from typing import Any, Generic, Protocol, Self, TypeVar
 
 import numpy as np
@@ -37,7 +38,7 @@ from tomoskin.core import (
     unpack_arrays,
     whole_number,
 )
-from tomoskin.learning.record_arrays import kept_names, pack, unpack
+from tomoskin.learning.record_arrays import pack, unpack
 from tomoskin.model.pattern import Pattern
 from tomoskin.model.skin import Skin
 from tomoskin.sensing.fit import Response
@@ -285,7 +286,8 @@ class Kind(Generic[M]):
 
     def pack(self, model: M) -> dict[str, NDArray[Any]]:
         """What its file holds of a ``model``."""
-        return pack({name: getattr(model, name) for name in kept_names(self.learn, _GIVEN)})
+        kept = [name for name in signature(self.learn).parameters if name not in _GIVEN]
+        return pack({name: getattr(model, name) for name in kept})
 
     def _pattern(self, arrays: Arrays, where: str) -> Pattern:
         title = str(arrays.get("kind", ""))

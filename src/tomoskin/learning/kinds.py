@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from tomoskin.core import DataError, StrPath, load_arrays
-from tomoskin.learning.amount.amount_report import DEPTH, FORCE
+from tomoskin.learning.amount.amount_model import DEPTH, FORCE
 from tomoskin.learning.body.body_reader import BODY
 from tomoskin.learning.classes.classifier import CLASSES
 from tomoskin.learning.kind import Calibration, Kind, Progress, silent

@@ -66,13 +66,9 @@ def unpack(make: Callable[..., T], arrays: Arrays, **given: Any) -> T:
     return make(**values)
 
 
-def kept_names(make: Callable[..., object], given: set[str]) -> list[str]:
-    """Parameters of ``make`` other than those ``given``: what a file holds."""
-    return [name for name in signature(make).parameters if name not in given]
-
-
 def _value(hint: Any, arrays: Arrays, key: str) -> Any:
-    plain = [kind for kind in get_args(hint) if kind is not NoneType] if _optional(hint) else [hint]
+    kinds = get_args(hint)
+    plain = [kind for kind in kinds if kind is not NoneType] if NoneType in kinds else [hint]
     if plain == [str]:
         return str(arrays[key])
     if plain == [tuple[str, ...]]:
@@ -87,7 +83,3 @@ def _value(hint: Any, arrays: Arrays, key: str) -> Any:
             raise DataError(f"expected whole numbers in {key}, got others")
         return numbers.astype(np.int64)
     return float(numbers) if plain == [float] else numbers
-
-
-def _optional(hint: Any) -> bool:
-    return NoneType in get_args(hint)

@@ -231,16 +231,15 @@ class FitConditions:
         return TouchFit(model.response, gain, lambda view, _: finder.push(view))
 
 
-def voltage_covariance(
-    prepared: Prepared, reference: Reference | None, gain: float = 1.0
-) -> FloatArray:
-    """(n_meas, n_meas) V² of one frame less the reference; ``gain`` of what is predicted."""
-    return finished(_voltage_covariance(prepared, reference, gain))
+def voltage_covariance(prepared: Prepared, reference: Reference | None) -> FloatArray:
+    """(n_meas, n_meas) V² of one frame less the reference."""
+    return finished(_voltage_covariance(prepared, reference, 1.0))
 
 
 def _voltage_covariance(
     prepared: Prepared, reference: Reference | None, gain: float
 ) -> Generator[None, None, FloatArray]:
+    """``gain`` of what is predicted."""
     readout, scan = prepared.readout, prepared.scan
     oversampling = prepared.skin.readout.oversampling
     step = abs(gain) * readout.volts_per_count * oversampling

@@ -12,7 +12,6 @@ from tomoskin.core import Detection, FloatArray, Image, ModelError, Touch, Volta
 from tomoskin.learning import BODY, Differences, FrameView
 from tomoskin.model.pattern import Scan
 from tomoskin.pipeline import finding
-from tomoskin.pipeline.body_sheets import BodySheets
 from tomoskin.pipeline.conditioning import (
     BaselineDifferences,
     Conditioned,
@@ -23,7 +22,7 @@ from tomoskin.pipeline.drives import DriveResult, DriveWatch
 from tomoskin.pipeline.frame_result import FrameResult, looks_bent
 from tomoskin.pipeline.imaging import Filtered, SingleFrame
 from tomoskin.pipeline.prepare import Prepared
-from tomoskin.pipeline.rest import Rest, tune, tuned_sheet
+from tomoskin.pipeline.rest import BodySheets, Rest, tune, tuned_sheet
 from tomoskin.sensing.fit import LIVE, Pace
 from tomoskin.sensing.signal import Reference
 from tomoskin.sensing.track import SlideCorrection, Tracker

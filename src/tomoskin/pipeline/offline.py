@@ -15,12 +15,11 @@ from tomoskin.imaging import AlphaChoice, Observation, SharpDifference
 from tomoskin.learning import BODY, CLASSES, BodyReading, ClassReading
 from tomoskin.model.prior import TotalVariation
 from tomoskin.pipeline.following import Setting
-from tomoskin.pipeline.foreign import tuned_by_file
 from tomoskin.pipeline.frame_result import FrameResult, ModelAgreement
 from tomoskin.pipeline.pipeline import Pipeline
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.pipeline.recorded import Idle, RecordedFrames, recorded_frames
-from tomoskin.pipeline.rest import tuned_by_rule
+from tomoskin.pipeline.rest import tuned_by_file, tuned_by_rule
 from tomoskin.sensing.fit import EXHAUSTIVE
 from tomoskin.sensing.signal import Recording
 

@@ -13,7 +13,6 @@ from tomoskin.core import DataError, FloatArray, IntArray
 from tomoskin.imaging import MOST_EXCLUDED
 from tomoskin.model.pattern import Pattern
 from tomoskin.pipeline.conditioning import MOST_NUISANCE
-from tomoskin.pipeline.foreign import open_electrodes
 from tomoskin.pipeline.frame_result import NO_AGREEMENT, REFUSED, ModelAgreement
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.sensing.signal import Recording, Reference, difference, in_phase
@@ -333,3 +332,46 @@ def dead_rows(
             where=source,
         )
     return rows
+
+
+_TIMES = 5.0
+"""A measurement is off that is so many times the model's, or so many times less."""
+
+_SMALL = 0.2
+"""Below this part of their rms, what a model expects is too small for such a comparison."""
+
+_OFF = 0.5
+"""An electrode is open where at least this part of its measurements is off."""
+
+_LEFT = 0.25
+"""At least this part of the measurements stays, or nothing is said of electrodes."""
+
+
+def open_electrodes(pattern: Pattern, measured: NDArray[Any], model: FloatArray) -> list[int]:
+    """Electrodes without contact, by voltages (n_meas,) of the untouched skin; the model's too.
+
+    Most of what they drive or read is off by far. The worst is left out first, then the scale of
+    the others is taken again. Empty where too little would be left to judge by.
+    """
+    size, expected = np.abs(measured), np.abs(model)
+    rows = np.hstack([pattern.drive, pattern.measure])
+    kept, found = np.isfinite(size), list[int]()
+    while kept.mean() >= _LEFT:
+        scaled = expected * _size_over(size[kept], expected[kept])
+        small = _SMALL * np.sqrt(np.mean(scaled[kept] ** 2))
+        off = (size > _TIMES * np.maximum(scaled, small)) | (_TIMES * size < scaled - small)
+        own = [(rows == e).any(axis=1) & kept for e in range(pattern.n_electrodes)]
+        part = [float(off[mine].mean()) if mine.any() else 0.0 for mine in own]
+        worst = int(np.argmax(part))
+        if part[worst] < _OFF:
+            return sorted(found)
+        found.append(worst)
+        kept &= ~own[worst]
+    return []
+
+
+def _size_over(size: FloatArray, expected: FloatArray) -> float:
+    """Measured over expected, as most of all measurements have it to within a factor of two."""
+    ratio = np.log(np.maximum(size, 1e-300) / np.maximum(expected, 1e-300))
+    alike = (np.abs(ratio[:, None] - ratio) < np.log(2.0)).sum(axis=1)
+    return float(np.exp(ratio[int(alike.argmax())]))

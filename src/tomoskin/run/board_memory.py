@@ -172,7 +172,7 @@ class Recall:
         before, self._board = self._board, board
         if before is not None and before.unique_id != board.unique_id:
             flow.out.say("other-board", "another board answers: a new reference is taken")
-            flow.marker.take_reference()
+            flow.marker.reference = True
         if before is not None and before.unique_id == board.unique_id:
             return
         self._trial = None
@@ -203,7 +203,7 @@ class Recall:
                     "the skin has changed since this board's last run: a new reference is taken; "
                     "do not touch the skin",
                 )
-                flow.marker.take_reference()
+                flow.marker.reference = True
         if self.is_due(result.host_time):
             self._kept = result.host_time
             if self._writer is None or not self._writer.is_alive():
@@ -247,7 +247,7 @@ class Recall:
             mark = Mark.EARLIER | (Mark.NONE if number else Mark.REFERENCE)
             flow.out.put(MarkedFrame(frame, mark))
             flow.pipeline.push(frame, mark)
-        flow.marker.keep_reference()
+        flow.marker.reference = False
         self._trial = Trial(found.kept)
         names = ", ".join(c.kind.name for c in missing)
         what = f"reference and calibrations ({names})" if names else "reference"

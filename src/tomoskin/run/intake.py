@@ -42,12 +42,14 @@ class Marker:
     ----------
     replay
         The recording that is being played, or None.
+    reference
+        Whether the next frame begins a reference.
     """
 
     def __init__(self) -> None:
         """The first frame begins a reference."""
         self.replay: ReplayTransport | None = None
-        self._reference = True
+        self.reference = True
         self._held = False
         self._opened = False
 
@@ -62,14 +64,6 @@ class Marker:
             self.replay.pause(on)
         else:
             self._held = on
-
-    def take_reference(self) -> None:
-        """The next frame begins a reference."""
-        self._reference = True
-
-    def keep_reference(self) -> None:
-        """A reference stands: the next frame begins none."""
-        self._reference = False
 
     def begin(self, transport: Transport) -> None:
         """What comes from now on is of ``transport``, which has just been opened."""
@@ -90,8 +84,8 @@ class Marker:
         if self._opened:
             self._opened = False
             mark |= Mark.OPENED
-        if self._reference and not mark & Mark.SKIPPED:
-            self._reference = False
+        if self.reference and not mark & Mark.SKIPPED:
+            self.reference = False
             mark |= Mark.REFERENCE
         return mark
 

@@ -187,7 +187,7 @@ class Loop:
         flow = self.flow
         match command:
             case commands.TakeReference():
-                flow.marker.take_reference()
+                flow.marker.reference = True
             case commands.SetPause():
                 flow.marker.hold(command.on)
             case commands.HoldPresses():

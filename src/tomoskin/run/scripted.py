@@ -175,9 +175,7 @@ class _Run:
 
 def _idle_frames(script: twin.Script, frame_time: float) -> int:
     """Whole frames before anything presses or breaks, of at most what a live reference takes."""
-    starts = [press.start for press in script.presses]
-    starts += [bend.start for bend in script.bends]
-    starts += [fault.given.start for fault in script.faults]
+    starts = [one.given.start for one in (*script.presses, *script.bends, *script.faults)]
     quiet = script.lead_in + min(starts, default=script.duration)
     return max(1, min(REFERENCE_FRAMES, int(quiet / frame_time)))
 

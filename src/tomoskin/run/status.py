@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 from operator import attrgetter
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
@@ -118,8 +117,7 @@ _WINDOW = 512
 _RECENT = 1.0
 """Seconds over which the rate is counted."""
 
-Timed = Literal["sample", "decode", "reconstruct", "publish"]
-_TIMED: tuple[Timed, ...] = ("sample", "decode", "reconstruct", "publish")
+_TIMED = ("sample", "decode", "reconstruct", "publish")
 
 
 @dataclass(frozen=True, slots=True)

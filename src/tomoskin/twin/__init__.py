@@ -35,6 +35,7 @@ from tomoskin.twin.labelled import (
     COMMON_PRESSES as COMMON_PRESSES,
     Population as Population,
     SetPlan as SetPlan,
+    SteppedSkin as SteppedSkin,
     make_shard as make_shard,
 )
 from tomoskin.twin.material import MaterialSettings as MaterialSettings
@@ -56,8 +57,8 @@ from tomoskin.twin.scanning import (
     sample_table as sample_table,
     table_of as table_of,
 )
-from tomoskin.twin.script import Script as Script
-from tomoskin.twin.script_check import (
+from tomoskin.twin.script import (
+    Script as Script,
     check_script as check_script,
     check_settling as check_settling,
 )
@@ -71,4 +72,3 @@ from tomoskin.twin.source import (
     read_board as read_board,
     read_settings as read_settings,
 )
-from tomoskin.twin.stepped import SteppedSkin as SteppedSkin

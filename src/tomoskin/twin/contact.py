@@ -256,45 +256,38 @@ def solve_contact(probes: Sequence[Probe], settings: ContactSettings, grid: Grid
             )
         owner[nodes], gap[nodes] = number, height
     nodes = np.flatnonzero(owner >= 0)
-    problem = _Problem(
-        owner[nodes],
-        gap[nodes],
-        np.array([probe.force for probe in probes]) / grid.step**2,
-        lambda p: depth_of(_spread(p, nodes, shape)).ravel()[nodes],
-    )
-    pressure = _spread(_balance(problem), nodes, shape)
+    owner, gap = owner[nodes], gap[nodes]
+    force = np.array([probe.force for probe in probes]) / grid.step**2
+
+    def depth_at(pressure: FloatArray) -> FloatArray:
+        return depth_of(_spread(pressure, nodes, shape)).ravel()[nodes]
+
+    pressure = _spread(_balance(owner, gap, force, depth_at), nodes, shape)
     depth = depth_of(pressure)
     touching = pressure.ravel()[nodes] > 0
-    travel = _means(depth.ravel()[nodes] + gap[nodes], problem.owner, touching, len(probes))
+    travel = _means(depth.ravel()[nodes] + gap, owner, touching, len(probes))
     return Dented(grid, depth, pressure, travel)
 
 
-@dataclass(frozen=True, eq=False)
-class _Problem:
-    """Nodes under the faces: whose they are, their gap, force per node area, and p → w."""
-
-    owner: IntArray
-    gap: FloatArray
-    force: FloatArray
-    depth: Callable[[FloatArray], FloatArray]
-
-
-def _balance(problem: _Problem) -> FloatArray:
-    """(n_nodes,) Pa that keeps every face in balance."""
-    owner, n = problem.owner, len(problem.force)
-    pressure = (problem.force / np.bincount(owner, minlength=n))[owner]
-    if not problem.force.any():
+def _balance(
+    owner: IntArray, away: FloatArray, force: FloatArray, depth: Callable[[FloatArray], FloatArray]
+) -> FloatArray:
+    """(n_nodes,) Pa that keeps every face in balance, at nodes whose ``owner`` is a face that is
+    ``away`` m from the sheet there; ``force`` of each over the area of a node, and p → w."""
+    n = len(force)
+    pressure = (force / np.bincount(owner, minlength=n))[owner]
+    if not force.any():
         return pressure
     scale = pressure.max()
     step, last, fresh = np.zeros_like(pressure), 1.0, 0.0
     for _ in range(_ROUNDS):
         touching = pressure > 0
-        gap = problem.depth(pressure) + problem.gap
+        gap = depth(pressure) + away
         gap -= _means(gap, owner, touching, n)[owner]
         size = float((gap[touching] ** 2).sum())
         step = np.where(touching, gap + fresh * size / last * step, 0.0)
         last = size or 1.0
-        bent = problem.depth(step)
+        bent = depth(step)
         bent -= _means(bent, owner, touching, n)[owner]
         slope = float((bent * step)[touching].sum())
         if slope <= 0:
@@ -305,7 +298,7 @@ def _balance(problem: _Problem) -> FloatArray:
         fresh = 0.0 if newly.any() else 1.0
         pressure[newly] -= length * gap[newly]
         total = np.bincount(owner, pressure, n)
-        pressure *= np.where(total > 0, problem.force / np.where(total > 0, total, 1.0), 0.0)[owner]
+        pressure *= np.where(total > 0, force / np.where(total > 0, total, 1.0), 0.0)[owner]
         if np.abs(pressure - before).sum() <= _TOLERANCE * scale * len(pressure):
             return pressure
     raise ModelError(

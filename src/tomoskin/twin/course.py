@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import Generic, Self, TypeVar
 
 import numpy as np
@@ -61,24 +60,19 @@ class ScriptedPress(Scripted[PressSection]):
     path: Rows
 
     @property
-    def start(self) -> float:
-        """Seconds since the end of the lead-in."""
-        return self.given.start
-
-    @property
     def end(self) -> float:
         """The time when the force is gone, in s."""
-        return self.start + self.force[-1][0]
+        return self.given.start + self.force[-1][0]
 
     def at(self, time: float, friction: Friction) -> Probe | None:
         """The probe at ``time`` s, None where there is no force."""
-        since = time - self.start
-        force = float(along(self._force, since)[0])
+        since = time - self.given.start
+        force = float(along(self.force, since)[0])
         if not (0 <= since <= self.force[-1][0] and force > 0):
             return None
-        x, y = along(self._path, since).tolist()
+        x, y = along(self.path, since).tolist()
         probe = Probe(self.shape, x, y, force, self.given.angle)
-        return probe.moving(*_speed(self._path, since), friction[self.given.motion])
+        return probe.moving(*_speed(np.array(self.path), since), friction[self.given.motion])
 
     def stages(self) -> Iterator[tuple[str, float]]:
         """Key and length in s of each piece of the courses."""
@@ -89,10 +83,9 @@ class ScriptedPress(Scripted[PressSection]):
 
     def check_on(self, outline: Outline) -> None:
         """Raise ScriptError where the middle of the probe leaves the skin."""
-        times = np.union1d(
-            self._path[:, 0], np.linspace(0.0, self.path[-1][0], _ON_PATH if self.path[1:] else 1)
-        )
-        positions = np.array([along(self._path, time) for time in times])
+        rows = [row[0] for row in self.path]
+        times = np.union1d(rows, np.linspace(0.0, rows[-1], _ON_PATH if rows[1:] else 1))
+        positions = np.array([along(self.path, time) for time in times])
         inside = outline.contains(positions)
         if not inside.all():
             first = int(np.argmin(inside))
@@ -106,14 +99,6 @@ class ScriptedPress(Scripted[PressSection]):
                 where=f"{self.where} {'path' if times[first] else 'at'}",
                 hint="the middle of a probe must be inside the outline",
             )
-
-    @cached_property
-    def _force(self) -> FloatArray:
-        return np.array(self.force)
-
-    @cached_property
-    def _path(self) -> FloatArray:
-        return np.array(self.path)
 
 
 @dataclass(frozen=True)
@@ -139,18 +124,13 @@ class ScriptedBend(Scripted[BendSection | StretchSection]):
         return made
 
     @property
-    def start(self) -> float:
-        """When it begins, s since the end of the lead-in."""
-        return self.given.start
-
-    @property
     def end(self) -> float:
         """When the sheet is flat again, s."""
-        return self.start + self.course[-1][0]
+        return self.given.start + self.course[-1][0]
 
     def amount(self, time: float) -> float:
         """Rad or elongation at ``time`` s."""
-        return float(along(self._course, time - self.start)[0])
+        return float(along(self.course, time - self.given.start)[0])
 
     def shape(self, amount: float) -> Deformation:
         """What the sheet does at an ``amount``."""
@@ -172,10 +152,6 @@ class ScriptedBend(Scripted[BendSection | StretchSection]):
                 return {"kind": "joint", "angle": amount, "axis": 0.0}
             case BendSection(kind=kind, axis=axis):
                 return {"kind": kind, "angle": amount, "axis": axis}
-
-    @cached_property
-    def _course(self) -> FloatArray:
-        return np.array(self.course)
 
 
 def bent(bends: Iterable[ScriptedBend], time: float) -> Pose:
@@ -233,10 +209,10 @@ def check_stages(presses: Iterable[ScriptedPress], frame_time: float) -> None:
                 )
 
 
-def along(rows: FloatArray, time: float) -> FloatArray:
+def along(rows: Rows, time: float) -> FloatArray:
     """(n,) values of a course at ``time``; before and after it, those of its ends."""
-    columns = rows[:, 1:].T
-    return np.array([np.interp(time, rows[:, 0], values) for values in columns])
+    times, *columns = zip(*rows, strict=True)
+    return np.array([np.interp(time, times, values) for values in columns])
 
 
 def _speed(rows: FloatArray, time: float) -> tuple[float, float]:

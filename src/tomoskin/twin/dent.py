@@ -126,15 +126,9 @@ def _turn(angle: float) -> FloatArray:
     ])  # fmt: skip
 
 
-class _Blend(NamedTuple):
-    """Strain and depth (n·n, 4) of a probe as it presses now, and its grid: n, step, reach."""
-
-    table: FloatArray
-    grid: tuple[int, float, float]
-
-
 class _Placed(NamedTuple):
-    """The dent of a probe and its place: x, y, cosine and sine of the angle by which it is turned.
+    """Strain and depth (n·n, 4) of a probe as it presses now, its grid, n, step and reach, and its
+    place: x, y, cosine and sine of the angle by which it is turned.
 
     As the native engine takes it.
     """
@@ -173,8 +167,9 @@ def _blended(
     force: float,
     drag: tuple[float, float],
     blur: float,
-) -> _Blend:
-    """Where all is linear from one dent, else between two: either way the force is exact.
+) -> tuple[FloatArray, tuple[int, float, float]]:
+    """Table and grid of :class:`_Placed`: where all is linear from one dent, else between two.
+    Either way the force is exact.
 
     A body that locks makes every dent shallower, in the shape that it has.
     """
@@ -191,7 +186,7 @@ def _blended(
         total, grid = total + mixed, dent.grid
     table = np.ascontiguousarray(total.T)  # a point's values side by side, to be read at once
     table.flags.writeable = False
-    return _Blend(table, (grid.n, grid.step, grid.reach))
+    return table, (grid.n, grid.step, grid.reach)
 
 
 def _rungs(shape: Shape, force: float) -> list[tuple[float, float]]:

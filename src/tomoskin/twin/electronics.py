@@ -111,21 +111,18 @@ class TwinElectronics:
         """Make electronics that drive the sheet with ``current``, in A."""
         self.sheet, self._readout, self._current = sheet, readout, current
         self.settings = electronics
-        *parts, chance = np.random.SeedSequence(seed).spawn(4)
-        channels, self._random, self._contacts = map(np.random.default_rng, parts)
-        n = sheet.n_electrodes
+        of_channels, *chance = np.random.SeedSequence(seed).spawn(4)
+        channels, n = np.random.default_rng(of_channels), sheet.n_electrodes
         self._gain = 1.0 + electronics.gain_sd * channels.standard_normal(n)
         self._offset = electronics.offset_sd * channels.standard_normal(n)
         self._hum = electronics.hum * (1 + 0.2 * channels.standard_normal(n))
         self._phase = channels.uniform(0, 2 * np.pi) + 0.2 * channels.standard_normal(n)
         self._faults = Faults()
-        self._electrodes = Electrodes(n, current, electronics, chance)
-        self._contact = electronics.contact_sd * self._contacts.standard_normal(n)
-        self._time: float | None = None
+        self._electrodes = Electrodes(n, current, electronics, chance[2])
+        self._begin(*chance)
         self._aged = 0.0
         self._course: Course | None = None
         self._bending: Bending | None = None
-        self._before = np.zeros(n)
         self._lines: dict[SampleTable, tuple[tuple[object, ...], Lines]] = {}
         self._samples: dict[SampleTable, _Samples] = {}
 
@@ -148,13 +145,16 @@ class TwinElectronics:
 
     def renew(self, chance: np.random.SeedSequence) -> None:
         """Begin anew at no time, with noise and contacts from ``chance``; the channels stay."""
-        noise, contacts, electrodes = chance.spawn(3)
-        self._electrodes.renew(electrodes)
-        self._random = np.random.default_rng(noise)
-        self._contacts = np.random.default_rng(contacts)
-        n = len(self._contact)
+        self._begin(*chance.spawn(3))
+
+    def _begin(self, *chance: np.random.SeedSequence) -> None:
+        """``chance``: of noise, contacts and electrodes."""
+        self._random, self._contacts = map(np.random.default_rng, chance[:2])
+        self._electrodes.renew(chance[2])
+        n = self.sheet.n_electrodes
         self._contact = self.settings.contact_sd * self._contacts.standard_normal(n)
-        self._time, self._before = None, np.zeros(n)
+        self._time: float | None = None
+        self._before = np.zeros(n)
 
     def sample(self, table: SampleTable, time: float) -> NDArray[np.uint16]:
         """Counts of a scan begun at ``time`` s of the sheet as it is pressed then.
@@ -179,14 +179,14 @@ class TwinElectronics:
         middles = table.middles
         moves = self._moves(middles)
         if moves and all(move == moves[0] for move in moves):
-            self._set(*moves[0])
+            _set(self.sheet, *moves[0])
             moves = []
         if not moves:
             self._let_go_by(time)
             return self._potentials(table)
         lines = []
         for number, move in enumerate(moves):
-            self._set(*move)
+            _set(self.sheet, *move)
             self._let_go_by(time + float(middles[number]))
             lines.append(self._under(table.drives[number : number + 1], self.sheet.resistance()))
         read = np.concatenate([line.read for line in lines])
@@ -202,10 +202,6 @@ class TwinElectronics:
             (course(t) if course else sheet.presses, bending(t) if bending else sheet.pose)
             for t in times.tolist()
         ]
-
-    def _set(self, presses: tuple[Probe, ...], pose: Pose) -> None:
-        self.sheet.set_presses(presses)
-        self.sheet.set_pose(pose)
 
     def _let_go_by(self, time: float) -> None:
         """Let the sheet go on to ``time`` s."""
@@ -278,6 +274,11 @@ class TwinElectronics:
         if sd > 0 and dt > 0:
             chance = self._contacts.standard_normal(len(self._contact))
             self._contact = wandered(self._contact, sd, time, dt, chance)
+
+
+def _set(sheet: TwinSkin, presses: tuple[Probe, ...], pose: Pose) -> None:
+    sheet.set_presses(presses)
+    sheet.set_pose(pose)
 
 
 @lru_cache(maxsize=16)

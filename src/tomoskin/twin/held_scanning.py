@@ -33,6 +33,7 @@ PACKED = (wire.Format.PACKED, wire.Format.DRIVES_PACKED)
 OK: Verdict = (wire.Result.OK, 0)
 _MAX_SETTLING = 100_000
 _MOST_CONVERSIONS, _MOST_SAMPLE = 64, 0xFFFF
+_OF_RECORD = ("adc_bits", "tick_rate", "max_drives", "max_samples", "limits", "converter")
 _DRIVES_OF_PATTERN = 9
 """Drives that a PATTERN holds at most."""
 
@@ -55,17 +56,9 @@ class Board:
     @classmethod
     def of(cls, record: BoardRecord, needed: int, current: float, unique_id: bytes) -> Self:
         """A board of the table, of the smallest size that has the channels ``needed``."""
-        return cls(
-            channels=next((n for n in record.channels if n >= needed), record.channels[-1]),
-            adc_bits=record.adc_bits,
-            current=current,
-            tick_rate=record.tick_rate,
-            max_drives=record.max_drives,
-            max_samples=record.max_samples,
-            unique_id=unique_id,
-            limits=record.limits,
-            converter=record.converter,
-        )
+        channels = next((n for n in record.channels if n >= needed), record.channels[-1])
+        own = {name: getattr(record, name) for name in _OF_RECORD}
+        return cls(channels=channels, current=current, unique_id=unique_id, **own)
 
     @property
     def max_oversampling(self) -> int:
@@ -181,9 +174,7 @@ class HeldScanning:
         """None: the drive is direct."""
         self.drives: list[wire.Drive | None] = []
 
-    def set(
-        self, command: wire.SetScan | wire.SetPattern | wire.SetFormat | wire.SetMode
-    ) -> Verdict:
+    def set(self, command: Setting) -> Verdict:
         """Take over what the board accepts."""
         if isinstance(command, wire.SetScan):
             if (verdict := self._board.check_scan(command)) == OK:

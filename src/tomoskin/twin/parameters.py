@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import field
+from operator import le, lt
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from tomoskin.core import FloatArray, ModelError
@@ -26,15 +27,12 @@ def check_numbers(record: DataclassInstance, above: str = "", least: str = "") -
 
     ``above`` and ``least`` are field names, separated by blanks.
     """
-    where = type(record).__name__
-    for name in above.split():
-        value = getattr(record, name)
-        if not 0 < value < math.inf:
-            raise ModelError(f"expected {name} above 0, got {value}", where=where)
-    for name in least.split():
-        value = getattr(record, name)
-        if not 0 <= value < math.inf:
-            raise ModelError(f"expected {name} of 0 or more, got {value}", where=where)
+    for names, is_right, expected in ((above, lt, "above 0"), (least, le, "of 0 or more")):
+        for name in names.split():
+            value = getattr(record, name)
+            if not (is_right(0, value) and value < math.inf):
+                where = type(record).__name__
+                raise ModelError(f"expected {name} {expected}, got {value}", where=where)
 
 
 def wandered(value: N, sd: float, correlation_time: float, dt: float, chance: N) -> N:

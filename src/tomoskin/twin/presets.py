@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from importlib.resources import files
 from typing import Any, Self
+
+import msgspec
 
 from tomoskin.core import ModelError, no_such
 from tomoskin.sensing.signal import FIGURES
@@ -70,19 +72,10 @@ class TwinSettings:
 
 
 def _preset(table: Mapping[str, Mapping[str, Any]]) -> TwinSettings:
-    """Settings from the numbers of each stage; a series is a tuple."""
-
-    def numbers(stage: str) -> dict[str, Any]:
-        given = table.get(stage, {})
-        return {key: tuple(v) if isinstance(v, list) else v for key, v in given.items()}
-
-    own = table.get("electronics")
-    return TwinSettings(
-        contact=ContactSettings(**numbers("contact")),
-        material=MaterialSettings(**numbers("material")),
-        electronics=ElectronicsSettings() if own is None else replace(BOARD, **own),
-        bend=BendSettings(**numbers("bend")),
-    )
+    """Settings from the numbers of each stage; those of electronics that are given at all are on
+    :data:`BOARD`."""
+    own = {**asdict(BOARD), **table["electronics"]} if "electronics" in table else {}
+    return msgspec.convert({**table, "electronics": own}, TwinSettings)
 
 
 _FILE = tomllib.loads(files("tomoskin.twin").joinpath("presets.toml").read_text(encoding="utf-8"))

@@ -235,8 +235,7 @@ class TwinSkin:
     def conductivity(self) -> FloatArray:
         """(n_cells,) S now, or (n_cells, 2, 2) where directions differ."""
         self.advance(0.0)
-        if self._conductivity is None:
-            raise AssertionError("advance makes it")
+        assert self._conductivity is not None
         return self._conductivity
 
     def resistance(self) -> FloatArray:

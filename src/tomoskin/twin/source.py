@@ -32,11 +32,6 @@ class SheetTransport:
     def __init__(self, sheet: TwinSkin) -> None:
         self.sheet = sheet
 
-    @property
-    def presses(self) -> tuple[Probe, ...]:
-        """What presses on the sheet now."""
-        return self.sheet.presses
-
     def set_presses(self, presses: tuple[Probe, ...]) -> None:
         """Replace all presses; they show from the next frame on.
 

@@ -1,16 +1,17 @@
-"""Touches of known force, or depth → that of a touch, with an interval, frame by frame."""
+"""Touches of known force, or depth → that of a touch, with an interval, frame by frame; what such a
+model says of itself, and the kinds of calibration that it makes."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
-from tomoskin.core import Amount, DataError, Detection, FloatArray, IntArray
+from tomoskin.core import MEASURANDS, Amount, DataError, Detection, FloatArray, IntArray
 from tomoskin.learning.amount.curve import (
     SHALLOW,
     AmountCurve,
@@ -18,7 +19,13 @@ from tomoskin.learning.amount.curve import (
     basis,
     without_memory,
 )
-from tomoskin.learning.amount.labelled_presses import LabelledPresses, check_rising, columns_of
+from tomoskin.learning.amount.measurand import (
+    MEASURED,
+    LabelledPresses,
+    check_rising,
+    columns_of,
+)
+from tomoskin.learning.kind import Applied, Calibration, Conditions, FrameView, Kind
 from tomoskin.learning.touch.gaussian_process import nine_in_ten
 from tomoskin.model.skin import MaterialMemory, MemoryState, Skin, advanced, load_of
 from tomoskin.sensing.segment import Region
@@ -166,7 +173,7 @@ class AmountModel:
         ``spots`` is what they remembered after the frame before, None on a skin that nothing has
         touched; ``time`` is the frame's, s. A spot that is new has been pressed since that frame.
         """
-        spots = self._untouched if spots is None else spots
+        spots = spots or PressedSpots(np.zeros((0, 2)), -np.inf, MemoryState.fresh(self.memory, 0))
         dt = max(time - spots.time, 0.0) if len(spots) else 0.0
         if not detections:
             released = self._released(spots, np.arange(len(spots)), dt)
@@ -177,7 +184,7 @@ class AmountModel:
         under, rest = _goes_on(spots.xy, xy, 0.5 * self.radius)
         before = spots.memory
         if under != list(range(len(spots))):
-            before = before.joined(self._fresh).of_pieces(np.array(under))
+            before = before.joined(MemoryState.fresh(self.memory)).of_pieces(np.array(under))
         load, now = load_of(before, self.memory, depth, dt)
         terms = basis(xy, np.log(_radius(area) / self.radius), self.unit)
         amounts = self._amounts(terms, np.maximum(load, least), self._beyond(snr))
@@ -191,14 +198,6 @@ class AmountModel:
         """What those of ``spots`` that nothing touches remember ``dt`` s later."""
         memory = spots.memory.of_pieces(which)
         return advanced(memory, self.memory, np.zeros((1, len(which))), dt)
-
-    @cached_property
-    def _fresh(self) -> MemoryState:
-        return MemoryState.fresh(self.memory)
-
-    @cached_property
-    def _untouched(self) -> PressedSpots:
-        return PressedSpots(np.zeros((0, 2)), -np.inf, MemoryState.fresh(self.memory, 0))
 
     @property
     def errors(self) -> FloatArray:
@@ -327,3 +326,99 @@ def _goes_on(spots: FloatArray, xy: FloatArray, within: float) -> tuple[list[int
 
 def _radius(area: FloatArray) -> FloatArray:
     return np.asarray(np.sqrt(np.maximum(area, 1e-12) / np.pi))
+
+
+def report_of(model: AmountModel) -> dict[str, Any]:
+    """How well labelled touches are measured, each with its press left out, by name.
+
+    ``mean_error`` and ``median_error`` are relative, ``held_by_90_percent_intervals`` is a part,
+    ``memory`` is whether the sheet was found to remember, ``text`` is for people.
+    """
+    presses, of = model.presses, model.presses.of_what
+    errors, amount = np.abs(model.errors), presses.amount[presses.labelled]
+    number, unit = len(np.unique(presses.press[presses.labelled])), MEASURANDS[of.name].lower()
+    mean, median = float(errors.mean()), float(np.median(errors))
+    return {
+        "touches": len(errors),
+        "presses": number,
+        f"from_{unit}": float(amount.min()),
+        f"to_{unit}": float(amount.max()),
+        "mean_error": mean,
+        "median_error": median,
+        "held_by_90_percent_intervals": model.held,
+        "memory": bool(model.memory.play),
+        "remarks": [asdict(remark) for remark in model.remarks],
+        "text": f"{len(errors)} touches of {number} presses, {of.span(amount)}; left out of the "
+        f"learning their {of.plural} are missed by {100 * mean:.0f} % (median {100 * median:.0f} "
+        f"%), and their 90 % intervals hold {100 * model.held:.0f} %",
+    }
+
+
+def least_known(model: AmountModel, xy: FloatArray) -> FloatArray:
+    """(2,) m: that of the positions ``xy`` (n, 2) m at which a further press tells most.
+
+    It is where the curve's level is least certain for a touch of the usual size.
+    """
+    curve = model.curve
+    terms = basis(xy, np.zeros(len(xy)), model.unit)
+    levels = terms @ curve.mean.T
+    own = ((terms @ curve.covariance) * terms).sum(axis=2).T
+    middle = levels @ curve.weight
+    variance = (own + (levels - middle[:, None]) ** 2) @ curve.weight
+    return np.asarray(xy[int(np.argmax(variance))])
+
+
+class AmountApplied(Applied):
+    """Gives each touch its amount; what the pressed spots remember goes from frame to frame."""
+
+    def __init__(self, model: AmountModel) -> None:
+        self._model = model
+        self._name = model.presses.measurand
+        self._spots: PressedSpots | None = None
+
+    def locate(self, view: FrameView, detections: list[Detection]) -> list[Detection]:
+        """The same detections, with amounts."""
+        amounts, self._spots = self._model.read(self._spots, detections, view.time)
+        named: list[dict[str, Any]] = [{self._name: amount} for amount in amounts]
+        return [
+            replace(detection, **amount)
+            for detection, amount in zip(detections, named, strict=True)
+        ]
+
+
+def _check(calibration: Calibration[AmountModel], skin: Skin) -> None:
+    """Amounts rest on the sheet and on how touches are found on it, not on its images."""
+    model, kind = calibration.model, calibration.kind
+    if skin.touch.method != model.method:
+        raise DataError(
+            f'the calibration of {kind.subject} needs touches found by method "{model.method}", '
+            f'but this skin\'s method is "{skin.touch.method}"',
+            where="[touch] method",
+            hint=f'set method = "{model.method}" in the skin file, or calibrate again: '
+            f"tomoskin calibrate {kind.name}",
+        )
+    if not np.isclose(skin.conductivity, model.conductivity, rtol=1e-6):
+        raise calibration.mismatch("sheet", skin)
+
+
+def _apply(model: AmountModel, conditions: Conditions) -> Applied:
+    """Regions of an image have other peaks and areas than fitted touches: they get no amount."""
+    is_like = conditions.fitted == (model.method == "fit")
+    return AmountApplied(model) if is_like else Applied()
+
+
+FORCE, DEPTH = (
+    Kind(
+        name=of.name,
+        title=f"tomoskin {of.name} calibration",
+        subject=of.plural,
+        attachment=f"{of.name}.npz",
+        learn=AmountModel.learn,
+        check=_check,
+        exclude=lambda model, _measurements: model,  # touches found without some are touches too
+        apply=_apply,
+    )
+    for of in MEASURED.values()
+)
+"""Forces of touches from known weights, and depths from known travels of a tip; their models are
+:class:`AmountModel`."""

@@ -24,8 +24,7 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.special import softmax
 
 from tomoskin.core import FloatArray, IntArray
-from tomoskin.learning.amount.labelled_presses import LabelledPresses
-from tomoskin.learning.amount.measurand import Measurand
+from tomoskin.learning.amount.measurand import LabelledPresses, Measurand
 from tomoskin.model.skin import MaterialMemory, MemoryState, load_of
 
 _NOISE = np.geomspace(0.01, 0.6, 9)
@@ -229,13 +228,7 @@ def averaged_memory(
 
 def _memory(play: FloatArray, widths: tuple[float, ...], creep: FloatArray) -> MaterialMemory:
     """Of parts ``play`` with ``widths`` and ``creep`` with its times; small parts are left out."""
-    plays, creeps = (
-        [(part, size) for part, size in zip(parts.tolist(), sizes, strict=True) if part > _SMALL]
-        for parts, sizes in ((play, widths), (creep, _TIMES))
-    )
-    return MaterialMemory(
-        play=tuple(part for part, _ in plays),
-        play_widths=tuple(width for _, width in plays),
-        creep=tuple(part for part, _ in creeps),
-        creep_times=tuple(time for _, time in creeps),
-    )
+    kept: list[tuple[float, ...]] = []
+    for parts, sizes in ((play, np.array(widths)), (creep, np.array(_TIMES))):
+        kept += [tuple(column[parts > _SMALL].tolist()) for column in (parts, sizes)]
+    return MaterialMemory(*kept)

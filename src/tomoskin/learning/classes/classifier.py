@@ -11,9 +11,16 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import stdtrit
 
 from tomoskin.core import DataError, Detection, FloatArray, IntArray
-from tomoskin.learning.classes.alignment import Alignment, aligned, shows
 from tomoskin.learning.classes.examples import Codes, Examples
-from tomoskin.learning.classes.mixture import Mixture, Subspace, posterior, session_mean
+from tomoskin.learning.classes.mixture import (
+    Alignment,
+    Mixture,
+    Subspace,
+    aligned,
+    posterior,
+    session_mean,
+    shows,
+)
 from tomoskin.learning.kind import Applied, Conditions, FrameView, Kind
 from tomoskin.learning.touch.presses import frames
 from tomoskin.model.pattern import Pattern

@@ -73,9 +73,9 @@ def climbed(evidence: Callable[[float], float]) -> Likeness:
         best = higher
 
 
-def telling(n_rows: int, most: int) -> IntArray:
-    """At ``most`` so many of the rows, spread over them: they tell the length scale of all."""
-    return np.unique(np.linspace(0, n_rows - 1, min(n_rows, most)).astype(int))
+def telling(n: int, most: int) -> IntArray:
+    """At ``most`` so many of n rows or presses, spread over them, that tell something of all."""
+    return np.unique(np.linspace(0, n - 1, min(n, most)).astype(int))
 
 
 @dataclass(frozen=True)
@@ -194,7 +194,7 @@ class Process:
         n, centre = len(targets), targets.mean(axis=0)
         scale = float((targets - centre).std()) or 1.0
         targets = (targets - centre) / scale
-        chosen = np.unique(np.linspace(0, n - 1, min(n, _LEARNT_ON)).astype(int))
+        chosen = telling(n, _LEARNT_ON)
         few = {name: square[np.ix_(chosen, chosen)] for name, square in squares.items()}
         logs = _learn(terms, few, targets[chosen])
         kernel = _kernel(terms, logs, squares)

@@ -105,7 +105,7 @@ def likeliest_envelope(
 def evidence_of(envelope: Envelope, positions: FloatArray, features: FloatArray) -> float:
     """Log marginal likelihood of some presses at ``positions`` (n, 2), up to a constant of their
     ``features`` (n, k)."""
-    some = np.unique(np.linspace(0, len(positions) - 1, _TRIED_ON).astype(int))
+    some = telling(len(positions), _TRIED_ON)
     near = Likeness(LENGTHS[len(LENGTHS) // 2])(positions[some], positions[some])
     about = (features[some] - features[some].mean(axis=0)).T
     size = envelope(positions[some]).T

@@ -10,7 +10,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import FloatArray, IntArray
+from tomoskin.core import FloatArray
 from tomoskin.learning.touch.gaussian_process import (
     Likeness,
     climbed,
@@ -174,7 +174,7 @@ class Estimates:
         envelope: Envelope,
     ) -> Self:
         """Learn the maps; length scales by evidence, powers by left-out presses."""
-        n, few = len(positions), _some(len(positions))
+        n, few = len(positions), telling(len(positions), _MOST)
         likeness = _likeliest(positions, features)
         maps = ResponseMaps.of(likeness, positions, features, principal(features))
         channels = ChannelMaps.of(positions[few], features[few], envelope)
@@ -184,7 +184,7 @@ class Estimates:
             some, theirs = positions[~out], features[~out]
             learnt = ResponseMaps.of(likeness, some, theirs, principal(theirs))
             folds.append(GridLikelihood.of(learnt, grid))
-            spread = _some(len(some))
+            spread = telling(len(some), _MOST)
             single = ChannelLikelihood.of(channels.again(some[spread], theirs[spread]), grid)
             misfit[out], alone[out] = folds[-1].misfit(features[out]), single(features[out])
             unlike[out] = folds[-1].unlike(features[out], misfit[out])
@@ -251,11 +251,6 @@ def _folds(positions: FloatArray) -> list[BoolArray]:
     order = np.arange(n)
     fold = order * folds // n if _in_any_order(positions) else order % folds
     return [fold == k for k in range(folds)]
-
-
-def _some(n: int) -> IntArray:
-    """Presses of n, spread over the time in which they were made, that are not too many."""
-    return np.unique(np.linspace(0, n - 1, min(n, _MOST)).astype(int))
 
 
 def _in_any_order(positions: FloatArray) -> bool:

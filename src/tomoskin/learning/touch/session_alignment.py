@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Self
@@ -18,8 +18,8 @@ from tomoskin.learning.touch.gaussian_process import (
     moments,
     nearness,
     squared_distances,
+    telling,
 )
-from tomoskin.learning.touch.matching import CHANCE, distance, matched, prevalence
 from tomoskin.learning.touch.posterior import BoolArray
 from tomoskin.learning.touch.presses import Presses, labelled_touches
 from tomoskin.learning.touch.topographic import TopographicMap, coefficients_of, whitening
@@ -123,7 +123,7 @@ class SessionAlignment:
         needed.
     apart
         How far the distributions of the channels' changes are from those of the calibration, in
-        parts of what chance makes of the same ones; see :func:`.matching.distance`.
+        parts of what chance makes of the same ones; see :func:`distance`.
     holds
         Whether the positions can be believed.
     """
@@ -171,7 +171,9 @@ class SessionAlignment:
         if not fits or apart > CHANCE:
             found = session.found(weight if fits else None, touches)
         known = session.known
-        missed = _missed(found.positions[known], region.scaled(xy[known]))
+        missed = np.nan
+        if known.any():
+            missed = _way(found.positions[known], region.scaled(xy[known]))
         believed = found.moved < _MOVED and found.covered > _COVERED and found.unlike < _LIKE
         return cls(
             found.presses,
@@ -318,7 +320,7 @@ class _SessionMaps:
     def of(cls, locator: Locator, grid: FloatArray) -> Self:
         """Of some of the presses; folds of them say how sharp the maps are."""
         presses = locator.presses
-        chosen = np.unique(np.linspace(0, len(presses) - 1, _LEARNT_ON).astype(int))
+        chosen = telling(len(presses), _LEARNT_ON)
         dv, positions = presses.dv[chosen], locator.region.scaled(presses.xy[chosen])
         fold = np.arange(len(dv)) % _FOLDS
         parts = []
@@ -372,10 +374,6 @@ def _entropy(part: FloatArray) -> float:
     return float(-(part * np.log(np.maximum(part, 1e-300))).sum())
 
 
-def _missed(answers: FloatArray, labels: FloatArray) -> float:
-    return float(np.linalg.norm(answers - labels, axis=1).mean()) if len(labels) else np.nan
-
-
 def _correction(positions: FloatArray, known: BoolArray, labels: FloatArray) -> FloatArray:
     """(n, 2) by which ``positions`` (n, 2) are off, as ``labels`` of the ``known`` ones tell.
 
@@ -392,3 +390,70 @@ def _spread(weights: FloatArray, mean: FloatArray, grid: FloatArray) -> FloatArr
     off = weights @ grid - mean
     about = moments(weights, grid)[1] + off[:, :, None] * off[:, None]
     return np.asarray(about + _FLOOR**2 * np.eye(2))
+
+
+# Presses as another session would have measured them, channel by channel.
+
+_NEAR = 0.2
+"""Radius of what is called the same place, in radii of the region."""
+
+_FEWEST_VALUES = 10
+"""Values of a channel, before and now, below which it stays as it was."""
+
+CHANCE = 1.36
+"""Distance of two distributions that chance exceeds once in twenty times (Kolmogorov). Sessions of
+public skins are 2.4 to 5.7 apart, and touches of one session, wherever they are, 0.7 to 1.0."""
+
+
+def prevalence(presses: FloatArray, touches: FloatArray) -> FloatArray:
+    """(n,) how often touches come near each of ``presses`` (n, 2), over how often presses do.
+
+    ``touches`` (m, 2), both in radii of the region. The sum is one.
+    """
+    often, before = (nearness(presses, some, _NEAR).mean(axis=1) for some in (touches, presses))
+    weight = often / before
+    return np.asarray(weight / weight.sum())
+
+
+def matched(before: FloatArray, now: FloatArray, weight: FloatArray) -> FloatArray:
+    """``before`` (n, k) with each channel's distribution mapped onto that of ``now`` (m, k).
+
+    The ``weight`` (n,) of each press says how often touches are there now. A monotone mapping of
+    one channel keeps the order of its values, whatever the gains and the law of the material.
+    """
+    like = before.copy()
+    for channel, rows, values in _channels(before, now):
+        part = weight[rows]
+        below = (part.cumsum() - 0.5 * part) / max(part.sum(), np.finfo(float).tiny)
+        like[rows, channel] = np.quantile(values, below)
+    return like
+
+
+def distance(before: FloatArray, now: FloatArray, weight: FloatArray) -> float:
+    """How far the channels' distributions are apart: Kolmogorov's statistic, median over channels.
+
+    Arguments as for :func:`matched`; a weighted sample counts as (Σ w)² / Σ w² values.
+    """
+    count = 1 / float(weight @ weight)
+    scale = np.sqrt(count * len(now) / (count + len(now)))
+    apart = [_apart(before[rows, k], weight[rows], v) for k, rows, v in _channels(before, now)]
+    return float(scale * np.median(apart)) if apart else 0.0
+
+
+def _channels(before: FloatArray, now: FloatArray) -> Iterator[tuple[int, IntArray, FloatArray]]:
+    """Number of a channel, rows of ``before`` in the order of its values, and sorted values now."""
+    for channel in range(before.shape[1]):
+        values = now[np.isfinite(now[:, channel]), channel]
+        order = before[:, channel].argsort()
+        rows = order[np.isfinite(before[order, channel])]
+        if min(len(values), len(rows)) >= _FEWEST_VALUES:
+            yield channel, rows, np.sort(values)
+
+
+def _apart(ours: FloatArray, weight: FloatArray, theirs: FloatArray) -> float:
+    """Largest difference of two cumulative distributions of sorted values."""
+    both = np.concatenate([ours, theirs])
+    share = np.append(0.0, weight.cumsum() / weight.sum())
+    first = share[ours.searchsorted(both, side="right")]
+    second = theirs.searchsorted(both, side="right") / len(theirs)
+    return float(np.abs(first - second).max())

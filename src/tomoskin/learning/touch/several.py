@@ -14,7 +14,7 @@ from tomoskin.core import Detection, FloatArray, IntArray
 from tomoskin.learning.touch.gaussian_process import moments, squared_distances
 from tomoskin.learning.touch.locator import Locator, detection_at
 from tomoskin.learning.touch.maps import ResponseMaps
-from tomoskin.learning.touch.presses import Features, frames
+from tomoskin.learning.touch.presses import frames
 
 _PLACES = 160
 """Places that a touch is looked for at; what is between them is their mean."""
@@ -91,7 +91,7 @@ class Several:
         positions = grid[_spread_out(grid, _PLACES)]
         changes, variance = np.sinh(maps.features_at(positions)), maps.at(positions)[1]
         new = cls(locator, positions, changes, variance.mean(axis=0), -np.inf)
-        presses = new._features(locator.presses.dv)
+        presses = locator.features(locator.presses.dv)
         single = np.array([new._single(frame).max() for frame in presses])
         return cls(
             locator, positions, changes, new.variance, float(np.quantile(single, 1 - _USUAL))
@@ -108,7 +108,7 @@ class Several:
         strength = self.locator.strength(data)
         return [
             self._of_frame(frame, positions[k], covariance[k], float(strength[k]))
-            for k, frame in enumerate(self._features(data))
+            for k, frame in enumerate(self.locator.features(data))
         ]
 
     def _of_frame(
@@ -147,10 +147,6 @@ class Several:
             spread=self.locator.region.unit**2 * np.stack([cov for _, cov in pair]),
             gains=_GAINS[np.array(apart[1:]) % len(_GAINS)],
         )
-
-    def _features(self, dv: FloatArray) -> FloatArray:
-        features: Features = self.locator.features
-        return features(dv)
 
     def _single(self, frame: FloatArray) -> FloatArray:
         """(g · gains,) log-likelihood of one touch; index place · gains + gain."""
