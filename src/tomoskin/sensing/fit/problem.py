@@ -129,17 +129,14 @@ class Solver(Protocol):
     @property
     def table(self) -> ResponseTable:
         """The table of what one spot does."""
-        ...
 
     def keep(
         self, direct: FloatArray, timed: FloatArray, matrix: FloatArray, squares: FloatArray
     ) -> Any:
         """What it keeps of a :class:`WhitenedTable`; ``direct`` (narrow, rank)."""
-        ...
 
     def expanded(self, spots: FloatArray) -> FloatArray:
         """See :meth:`ResponseTable.expanded`."""
-        ...
 
     def settled(
         self, problem: Problem, spots: FloatArray, deficit: Deficit, most: int, known: Known = ()
@@ -150,12 +147,10 @@ class Solver(Protocol):
         What is unknown of the spots is taken as it is at the first ones, and anew where steps
         with that end.
         """
-        ...
 
     def standing(self, left: FloatArray, fit: Fit) -> FloatArray:
         """(k,) square of what each spot of a fit changes that the slopes of the others could not
         take up, in noise with unknown directions ``left`` (q, c)."""
-        ...
 
     def standing_out(
         self, matched: Matched, fit: Fit, limits: Limits
@@ -166,7 +161,6 @@ class Solver(Protocol):
         stands out (GLRT; Kay 1998, section 7.6.2, for a linear model), after what the spots of
         ``fit`` could take up.
         """
-        ...
 
     def judged(self, problem: Problem, fit: Fit, uneven: float) -> tuple[FloatArray, FloatArray]:
         """As :meth:`standing` in noise alone, and (4k, 4k) the covariance of all parameters.
@@ -177,7 +171,6 @@ class Solver(Protocol):
         residual has beyond noise, E[rᵀr] = degrees + u²‖(1 − JΣJᵀ)E‖², E the measurements'
         answers one by one.
         """
-        ...
 
     def searched(
         self,
@@ -192,7 +185,6 @@ class Solver(Protocol):
         ``before`` (k, 4) are the touches of the last frame, and ``deficit`` is what the table
         lacked of them. None where this solver cannot do it at that pace.
         """
-        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
