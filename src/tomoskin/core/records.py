@@ -14,7 +14,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core.errors import DataError, ModelError
+from tomoskin.core.errors import DataError, check_positive
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -214,8 +214,7 @@ class Image:
         """
         if self.unit == "relative":
             return self
-        if not (np.isfinite(conductivity) and conductivity > 0):
-            raise ModelError(f"expected a conductivity above 0, got {conductivity}")
+        check_positive(conductivity, "a conductivity")
         return Image(self.values / conductivity, "relative", self.mesh_id)
 
     def on_pixels(self, pixels: PixelMap) -> FloatArray:

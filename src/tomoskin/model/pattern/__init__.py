@@ -9,4 +9,9 @@ from tomoskin.model.pattern.pattern import (
     signed as signed,
     undirected as undirected,
 )
-from tomoskin.model.pattern.rows import Scan as Scan, match_rows as match_rows, sum_rows as sum_rows
+from tomoskin.model.pattern.rows import (
+    RECIPROCALS as RECIPROCALS,
+    Scan as Scan,
+    match_rows as match_rows,
+    sum_rows as sum_rows,
+)

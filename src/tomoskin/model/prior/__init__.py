@@ -9,7 +9,6 @@ from tomoskin.model.prior.penalty import (
 )
 from tomoskin.model.prior.priors import (
     PRIORS as PRIORS,
-    Identity as Identity,
     Noser as Noser,
     Prior as Prior,
     PriorLike as PriorLike,
@@ -19,7 +18,6 @@ from tomoskin.model.prior.priors import (
     penalty_of as penalty_of,
 )
 from tomoskin.model.prior.smooth import (
-    GaussianHighPass as GaussianHighPass,
     Laplace as Laplace,
     Matern as Matern,
     Structural as Structural,

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, issparse
 
-from tomoskin.core import FloatArray, ModelError, no_such
+from tomoskin.core import FloatArray, ModelError, check_positive, no_such
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.prior.penalty import Diagonal, Penalty, dense_penalty, sparse_penalty
 from tomoskin.model.prior.smooth import GaussianHighPass, Laplace, Matern, graph_laplacian
@@ -95,8 +95,7 @@ class SharpPrior(ABC):
 
     @property
     def _beta(self) -> float:
-        if not (np.isfinite(self.smoothing) and self.smoothing > 0):
-            raise ModelError(f"expected a smoothing above 0, got {self.smoothing}")
+        check_positive(self.smoothing, "a smoothing")
         return self.smoothing
 
 
