@@ -9,6 +9,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import IntFlag
+from functools import cached_property
 from types import MappingProxyType
 
 import numpy as np
@@ -236,23 +237,16 @@ class Image:
 class DeferredImage(Image):
     """An image whose values are computed when they are first asked for, in the thread that asks."""
 
-    __slots__ = ("_made", "_make")
-    _make: Callable[[], FloatArray]
-    _made: FloatArray | None
-
     def __init__(self, make: Callable[[], FloatArray], unit: str, mesh_id: str) -> None:
         """``make`` returns the values, always the same."""
-        for name, value in {"_make": make, "unit": unit, "mesh_id": mesh_id}.items():
+        vars(self)["_make"] = make
+        for name, value in {"unit": unit, "mesh_id": mesh_id}.items():
             object.__setattr__(self, name, value)
-        object.__setattr__(self, "_made", None)
 
-    @property
+    @cached_property
     def values(self) -> FloatArray:
         """(n_cells,) see :class:`Image`."""
-        made = self._made
-        if made is None:
-            made = self._make()
-            object.__setattr__(self, "_made", made)
+        made: FloatArray = vars(self)["_make"]()
         return made
 
     def __reduce__(self) -> tuple[type[Image], tuple[FloatArray, str, str]]:

@@ -60,9 +60,11 @@ def test_the_schema_does_not_contradict_itself():
     groups = [(m.name, m.fields) for m in SCHEMA.messages]
     groups += [(name, one.fields) for name, one in SCHEMA.structs.items()]
     for name, fields in groups:
-        assert not any(field.is_tail for field in fields[:-1]), name
+        assert not any(not field.length for field in fields[:-1]), name
         for field in fields:
-            assert field.item in SCALARS or (field.is_tail and field.item in SCHEMA.structs), name
+            assert field.item in SCALARS or (not field.length and field.item in SCHEMA.structs), (
+                name
+            )
             assert not field.enum or field.enum in SCHEMA.enums, name
             assert re.fullmatch(r"\w+(\[\d*\])?", field.type_name), name
 

@@ -37,11 +37,6 @@ class FieldSpec(msgspec.Struct, frozen=True, rename={"type_name": "type"}):
         return int(array[1] or 0) if array else 1
 
     @property
-    def is_tail(self) -> bool:
-        """Whether the field fills the rest of the payload."""
-        return self.length == 0
-
-    @property
     def size(self) -> int:
         """Bytes that it takes; 0 where it fills the payload."""
         return struct.calcsize("<" + SCALARS[self.item]) * self.length if self.length else 0

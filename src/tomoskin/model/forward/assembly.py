@@ -85,6 +85,7 @@ class Element:
             raise ModelError(f"expected elements of order 1 or 2, got {order}")
         mass = _FACET_MASS[mesh.dimension, order]
         n_nodes, cells, facets = len(mesh.points), mesh.cells, mesh.electrodes
+        sizes, ends = mesh.facet_sizes(np.concatenate(facets)), np.cumsum([*map(len, facets)])[:-1]
         if order == 2:
             edges = _Edges.of(mesh)
             n_nodes += len(edges.pairs)
@@ -94,7 +95,7 @@ class Element:
             cells=cells,
             gradients=_gradients(mesh, order),
             facets=facets,
-            facet_sizes=_facet_sizes(mesh),
+            facet_sizes=tuple(np.split(sizes, ends)),
             facet_mass=mass,
             facet_load=mass.sum(axis=1),  # the shape functions add up to one
         )
@@ -113,12 +114,6 @@ class Element:
         both = np.einsum("nqia,nqjb->nijab", g, g)
         both = both + np.triu(both.swapaxes(3, 4), 1)
         return np.asarray(both[..., *np.triu_indices(g.shape[3])])
-
-
-def _facet_sizes(mesh: Mesh) -> tuple[FloatArray, ...]:
-    """Per electrode, (n_facets,) length or area."""
-    ends = np.cumsum([len(electrode) for electrode in mesh.electrodes])[:-1]
-    return tuple(np.split(mesh.facet_sizes(np.concatenate(mesh.electrodes)), ends))
 
 
 @dataclass(frozen=True, eq=False)

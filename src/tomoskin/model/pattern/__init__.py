@@ -1,7 +1,6 @@
 """Drive and measurement tables: THE order of the rows, shared by firmware, decoder and Jacobian."""
 
 from tomoskin.model.pattern.pattern import (
-    NAMED as NAMED,
     Pattern as Pattern,
     check_drives as check_drives,
     electrodes_of as electrodes_of,

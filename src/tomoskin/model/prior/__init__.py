@@ -4,13 +4,10 @@ from tomoskin.model.prior.penalty import (
     Carried as Carried,
     Diagonal as Diagonal,
     Penalty as Penalty,
-    dense_penalty as dense_penalty,
-    sparse_penalty as sparse_penalty,
 )
 from tomoskin.model.prior.priors import (
     PRIORS as PRIORS,
     Noser as Noser,
-    Prior as Prior,
     PriorLike as PriorLike,
     SharpPrior as SharpPrior,
     Sparse as Sparse,

@@ -135,16 +135,10 @@ class Sparse(SharpPrior):
 
 def _edges(mesh: Mesh) -> FloatArray:
     """(n_pairs,) size of the facet that two neighbours share, over that of the domain."""
-    shared = _shared_facets(mesh)
-    d = mesh.dimension
-    return np.asarray(mesh.facet_sizes(shared) / mesh.volumes.sum() ** ((d - 1) / d))
-
-
-def _shared_facets(mesh: Mesh) -> NDArray[np.int64]:
-    """(n_pairs, k − 1) points that both cells of a pair have."""
     first, second = (mesh.cells[cells] for cells in mesh.neighbours.T)
     common = (first[:, :, None] == second[:, None, :]).any(axis=2)
-    return np.asarray(first[common].reshape(len(first), -1))
+    d, shared = mesh.dimension, first[common].reshape(len(first), -1)
+    return np.asarray(mesh.facet_sizes(shared) / mesh.volumes.sum() ** ((d - 1) / d))
 
 
 PriorLike = str | Prior | Any
