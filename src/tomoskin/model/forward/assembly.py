@@ -261,10 +261,6 @@ class SystemAssembly:
         values = np.add(values, contacts, out=values if values.dtype == contacts.dtype else None)
         return Compressed(values, self.indices, self.indptr)
 
-    def contacts(self, contact_impedance: NDArray[Any]) -> NDArray[Any]:
-        """(n_values,): what the contacts add to the system matrix, for z (n_electrodes,)."""
-        return np.asarray(self.contact @ (1.0 / contact_impedance))
-
     def _stiffness_map(self, local: FloatArray) -> csr_array:
         """``local`` (n_cells, k, k, c) → (n_values, c·n_cells)."""
         n_cells, _, _, c = local.shape
@@ -292,9 +288,6 @@ def _numbered(cells: IntArray, others: tuple[IntArray, IntArray], n: int) -> csr
     return csr_array((numbers, once.indices, once.indptr), shape=(n, n))
 
 
-Entries = tuple[IntArray, IntArray, FloatArray, IntArray]
-
-
 def electrode_forms(element: Element) -> list[tuple[IntArray, FloatArray]]:
     """Per electrode: its unknowns (n,), itself last, and the matrix of ∫(u − U)² over it.
 
@@ -318,7 +311,7 @@ def _electrode_form(element: Element, number: int) -> tuple[IntArray, FloatArray
     return np.append(nodes, element.n_nodes + number), form
 
 
-def _contact_entries(element: Element) -> Entries:
+def _contact_entries(element: Element) -> tuple[IntArray, IntArray, FloatArray, IntArray]:
     """Entries of all electrodes' forms; the ground electrode's potential is no unknown."""
     rows, cols, values, owner = [], [], [], []
     for number, (unknown, form) in enumerate(electrode_forms(element)):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Protocol, Self
@@ -172,19 +172,10 @@ class Solver(Protocol):
         answers one by one.
         """
 
-    def searched(
-        self,
-        problem: Problem,
-        matched: Matched,
-        policy: DetectionPolicy,
-        deficit: Deficit,
-        before: FloatArray,
-    ) -> Answer | None:
-        """What :class:`~tomoskin.sensing.fit.selection.ForwardSelection` finds, in one call.
-
-        ``before`` (k, 4) are the touches of the last frame, and ``deficit`` is what the table
-        lacked of them. None where this solver cannot do it at that pace.
-        """
+    @property
+    def searched(self) -> Search | None:
+        """What :class:`~tomoskin.sensing.fit.selection.ForwardSelection` finds, in one call; None
+        where this solver goes step by step."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -195,6 +186,11 @@ class Answer:
     fit: Fit
     others: tuple[FloatArray, FloatArray] | None
     turned_down: Fit | None
+
+
+Search = Callable[["Problem", "Matched", DetectionPolicy, Deficit, FloatArray], Answer | None]
+"""Of a frame with candidates: what the table lacked of the touches of the last frame, and these
+(k, 4). The answer is None where it cannot be had at the policy's pace."""
 
 
 @dataclass(frozen=True, slots=True)
