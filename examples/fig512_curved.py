@@ -28,12 +28,12 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.interpolate import PchipInterpolator
 
 import figures
 from imaging import NOSER, Imager
 from lab import Lab, open_lab, report
 from tomoskin.core import Detection, FloatArray, Image
-from tomoskin.learning import JointReference
 from tomoskin.model.mesh import Arm, Cylinder, Saddle
 from tomoskin.twin import Bent, Circle, Pose, Probe
 
@@ -108,18 +108,17 @@ def at_the_joint(lab: Lab, imager: Imager) -> tuple[list[Shown], list[float]]:
 
     And S, the largest change of the picture without a touch by the latter two.
     """
-    rows, angles = [], []
+    rows = []
     for degrees in ENCODER:
         lab.bend(arm(degrees))
         rows.append(lab.measure(f"joint at {degrees:.0f}°, nothing touches the skin", n=20))
-        angles += [math.radians(degrees)] * 20
-    joint = JointReference.of(np.concatenate(rows), angles)
+    joint = PchipInterpolator(np.radians(ENCODER), [some.mean(axis=0) for some in rows])
     lab.bend(arm(AT))
     there = lab.measure(f"joint at {AT:.0f}°, nothing touches the skin", n=20)
     loaded = lab.measure(f"joint at {AT:.0f}°, 18 mm probe, 5 N", probe(PLACE), n=20)
     references = {
         "joint 37°, own reference": there,
-        "joint 37°, by its encoder": joint.at(math.radians(AT)).mean[None],
+        "joint 37°, by its encoder": joint(math.radians(AT))[None],
         "joint 37°, reference at 0°": rows[0],
     }
     pictures = {name: imager.picture(idle, loaded) for name, idle in references.items()}

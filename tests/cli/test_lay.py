@@ -39,7 +39,7 @@ def test_it_writes_a_skin_file(tomoskin, surface: Path) -> None:
 @pytest.mark.parametrize(
     ("changes", "places", "words"),
     [
-        ({"unit": "inch"}, None, "--unit: expected mm, cm or m"),
+        ({"unit": "inch"}, None, "--unit: expected mm or cm or m"),
         ({"unit": "m"}, None, "millimetres"),
         ({}, "1,2\n", "places.csv, line 1: expected three numbers"),
         ({}, "1;2;3\n", "line 1: expected three numbers"),

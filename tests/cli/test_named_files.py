@@ -31,7 +31,7 @@ from tomoskin.model.skin import Skin
 
 Run = Callable[..., tuple[int, str, str]]
 COARSE = Skin.load("textile-disc-8").altered({"mesh": {"cells": 300}})
-BENDS = ("--bend", "0=0:8", "--bend", "30=8:16", "--bend", "60=16:24")
+BODY = ("--bend", "0=0:8", "--bend", "30=8:16", "--bend", "60=16:24")
 
 
 @dataclass(frozen=True)
@@ -72,8 +72,8 @@ CASES = {
     ("calibrate depth", "out"): Case(
         "calibrate depth {presses} --skin {skin} --out {out}", ".npz", ("--depth", "1=0:16")
     ),
-    ("calibrate bend", "out"): Case(
-        "calibrate bend {bends} --skin {skin} --out {out}", ".npz", BENDS
+    ("calibrate body", "out"): Case(
+        "calibrate body {bends} --skin {skin} --out {out}", ".npz", BODY
     ),
     ("calibrate mapping", "out"): Case(
         "calibrate mapping {presses} --skin {skin} --out {out}", ".toml"

@@ -92,6 +92,14 @@ def test_stop_ends_the_scan(board):
     talk.transport.close()
 
 
+def test_a_dead_time_that_is_not_waited_for_is_no_drive_that_is_on_for_too_long(board):
+    """The clock must not go back by it after an interrupt: the guard took that for hours."""
+    settings = replace(SETTINGS, settling=36e-6, oversampling=1, dead_time=50e-6)
+    with Link(port.SerialTransport(board.path), SCAN, settings) as link:
+        _, events = frames_of(link, 2000)
+    assert [event.kind for event in events] == ["connected"]
+
+
 def test_host_silence_switches_off(board):
     talk = Talk(port.open_serial(board.path, None))
     fault = fallen_silent(talk)

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.linalg import eigh
 
 from learning.labelled import RADIUS, ROWS, Floats, held, places, presses
 from tomoskin import Locator, Pattern, Skin
 from tomoskin.core import DataError
 from tomoskin.learning import LeftOut, Presses, growth_of_errors
+from tomoskin.learning.touch import maps
 from tomoskin.learning.touch.gaussian_process import Basis, Likeness, moments
 from tomoskin.learning.touch.maps import ResponseMaps
-from tomoskin.learning.touch.posterior import GridLikelihood, pooled
+from tomoskin.learning.touch.posterior import POWERS, GridLikelihood, pooled, powers_of
 from tomoskin.sensing.segment import Region
 
 
@@ -62,14 +65,44 @@ def test_the_posterior_of_maps_of_known_noise_holds_what_it_says() -> None:
     basis = Basis.of(likeness, xy)
     drawn = basis(xy) @ rng.normal(size=(len(basis.root.T), 6))
     features = drawn + 0.3 * rng.normal(size=drawn.shape)
-    maps = ResponseMaps.of(likeness, xy[:300], features[:300], np.eye(features.shape[1]))
+    learnt = ResponseMaps.of(likeness, xy[:300], features[:300], np.eye(features.shape[1]))
     side = np.linspace(-1.1, 1.1, 45)
     grid = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
     grid = grid[np.linalg.norm(grid, axis=1) < 1.0]
-    likelihood = GridLikelihood.of(maps, grid)
+    likelihood = GridLikelihood.of(learnt, grid)
     log_likelihood = likelihood.of_misfit(likelihood.misfit(features[300:]))
     mean, covariance = moments(pooled([log_likelihood], np.ones(1)), grid)
     assert held(mean - xy[300:], covariance) > 0.8
+
+
+def test_the_powers_of_a_pool_are_those_at_which_left_out_presses_are_likeliest() -> None:
+    """Every pair is tried one by one here."""
+    rng = np.random.default_rng(4)
+    grid, xy = places(90, 3) / RADIUS, places(40, 2) / RADIUS
+    away = ((xy[:, None] - grid) ** 2).sum(axis=2)
+    parts = [-(s * away) + rng.normal(0, 3, away.shape) for s in (10.0, 40.0)]
+    there = np.arange(len(xy)), away.argmin(axis=1)
+    tried = np.array(list(product(np.append(0.0, POWERS), repeat=2)))
+    score = [np.log(pooled(parts, powers)[there] + 1e-6).sum() for powers in tried]
+    assert powers_of(parts, grid, xy).tolist() == tried[int(np.argmax(score))].tolist()
+
+
+@pytest.mark.parametrize("n", [25, 200])
+def test_learning_solves_few_problems_as_large_as_all_rows(
+    n: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The length scale is told by some rows: six maps of all are learnt, in a few steps each."""
+    sizes: list[int] = []
+
+    def counted(a: Floats, *others: Floats, **options: object) -> tuple[Floats, Floats]:
+        sizes.append(len(a))
+        values, vectors = eigh(a, *others, **options)
+        return values, vectors
+
+    monkeypatch.setattr(maps, "eigh", counted)
+    dv, xy = presses(n, 0)
+    Locator.fit(np.hstack([dv, dv[:, ::-1] + dv, dv**3]), xy)
+    assert sizes.count(max(sizes)) <= 60
 
 
 def test_the_order_of_the_rows_does_not_matter(locator: Locator) -> None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from learning.labelled import RADIUS, ROWS, Floats, held, presses
-from tomoskin import Locator
+from tomoskin import Locator, Pattern
 from tomoskin.core import DataError
 from tomoskin.learning import Watch
 from tomoskin.learning.touch.calibration_health import STRANGE
@@ -153,3 +155,15 @@ def test_another_gain_of_every_channel_is_said(locator: Locator) -> None:
     watch(dv * gains)
     assert not watch.health.well
     assert any("times worse than its own presses" in text for text in watch.health.findings)
+
+
+@pytest.mark.data
+def test_rows_that_jump_cost_a_hydrogel_little_though_nobody_watches(data_dir: Path) -> None:
+    """A fifth of the rows is thirty times as large at once: maps of single rows count still."""
+    with np.load(data_dir / "eskin_hydrogel_round" / "round16_single550.npz") as kept:
+        dv, xy = kept["v_down"].astype(float) - kept["v_up"], 1e-3 * kept["xy_mm"].astype(float)
+        pattern = Pattern.from_tables(kept["inj"], kept["meas"])
+    calibrated = Locator.fit(dv[:300], xy[:300], pattern=pattern)
+    dv[:, np.random.default_rng(5).permutation(dv.shape[1])[:38]] *= 30
+    told = calibrated.predict(dv[350:450])[0]
+    assert np.linalg.norm(told - xy[350:450], axis=1).mean() < 0.009

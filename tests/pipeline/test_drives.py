@@ -158,24 +158,6 @@ def test_what_drives_follow_goes_to_the_touch_of_the_frame_that_is_there(turns, 
     assert all(further.id in {t.id for t in touches} for touches in turns.told)
 
 
-def test_a_touch_that_drives_took_for_lifted_is_there_again_where_they_show_most_of_it(
-    turns, touched
-):
-    for _ in range(6):
-        turns.turn(touched)
-    (one,) = watch_of(turns)._followed.values()
-    for _ in range(4):
-        one.take(one.moving, one.moving, 1.5, 0.0)
-    assert one.lifted is not None
-    state = one.moving.state.copy()
-    state[5] *= 0.4
-    part = replace(one.moving, state=state)  # which a sheet may show for long
-    for moving, lifted in ((part, True), (one.moving, False)):
-        for _ in range(3):
-            one.take(moving, moving, -20.0, -5.0)
-        assert (one.lifted is not None) == lifted
-
-
 def watch_of(turns) -> DriveWatch:
     return turns.pipeline._state._drives
 

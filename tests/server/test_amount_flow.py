@@ -220,8 +220,8 @@ def test_a_weight_that_is_named_after_it_lay_there_is_recorded_then(flow):
     assert not bench.lay(5.0)
     assert flow.now().phase == "name"
     assert set_weight(flow, 510.0, "g")
-    (one,) = flow.examples()
-    assert one.label.si == pytest.approx(5.0, rel=0.01)
+    ((_, label),) = flow.examples()
+    assert label.si == pytest.approx(5.0, rel=0.01)
     with pytest.raises(DataError, match="at least 5"):
         labelled_presses(flow.examples())
 

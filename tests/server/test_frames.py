@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tomoskin.core import Amount, Detection, Image, Touch
-from tomoskin.learning import BENDS, BendReading, DentMap
+from tomoskin.learning import BODY, BodyReading, DentMap
 from tomoskin.pipeline import FrameResult
 from tomoskin.server.frames import encode_result
 from tomoskin.twin import Finger, Press, Probe
@@ -158,8 +158,11 @@ def test_a_touch_carries_its_whole_covariance():
     ("state", "number"), [("idle", 0), ("bend", 1), ("bend and touch", 3), ("unknown", 4)]
 )
 def test_a_bend_goes_before_the_labels(state, number):
-    bend = BendReading(0.5, 0.01, 1.25, state, np.zeros(3))
-    found = decode(encode_result(make(5, (touch(1, [4]),), readings={BENDS.name: bend}), [], 0.0))
+    bend = BodyReading(
+        names=("angle",), values=np.array([0.5]), deviations=np.array([0.01]), angle=0.5, sd=0.01,
+        axis=1.25, state=state, moved=np.zeros(3),
+    )  # fmt: skip
+    found = decode(encode_result(make(5, (touch(1, [4]),), readings={BODY.name: bend}), [], 0.0))
     assert found["flags"] == 0b1001
     assert found["bend"] == (0.5, pytest.approx(0.01), 1.25, number)
     assert found["labels"] == [0, 0, 0, 0, 1]

@@ -12,7 +12,7 @@ from server.looks import look_in_both
 from server.serving import Site
 from server.watching import axe_finds, distance
 from tomoskin.board.source import open_source
-from tomoskin.learning import BENDS, CLASSES, BendExamples, BendModel, Classifier
+from tomoskin.learning import BODY, CLASSES, BodyExamples, BodyModel, Classifier
 from tomoskin.model.mesh import Hinge
 from tomoskin.pipeline import voltage_covariance
 from tomoskin.run import Runner
@@ -45,12 +45,12 @@ def learnt(prepared):
     """The skin with its bends, and with the states straight and bent."""
     dv, pattern = bends_of(prepared), prepared.pattern
     axes, time = np.full(len(ANGLES), math.pi / 2), 0.1 * np.arange(len(ANGLES))
-    examples = BendExamples.checked(dv, ANGLES, axes, time)
-    bends = BendModel.learn(examples, voltage_covariance(prepared, None))
+    examples = BodyExamples.checked(dv, time, angle=ANGLES, axis=axes)
+    bends = BodyModel.learn(examples, voltage_covariance(prepared, None))
     labels = ["bent" if angle else "straight" for angle in ANGLES]
     states = Classifier.fit(dv, labels, pattern=pattern, skin_id=prepared.skin.identity)
     classes = CLASSES.of(states, pattern, prepared.skin)
-    return prepared.calibrated(BENDS.of(bends, pattern)).calibrated(classes)
+    return prepared.calibrated(BODY.of(bends, pattern)).calibrated(classes)
 
 
 @pytest.fixture(scope="module")

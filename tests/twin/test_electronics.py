@@ -216,5 +216,5 @@ def test_impossible_settings(name):
 def test_noise_by_name():
     settings = TwinSettings.preset("textile", seed=4)
     assert settings.with_noise(2.0).electronics == replace(settings.electronics, noise=2.0)
-    with pytest.raises(ModelError, match='twin of ideal, textile, hydrogel, tank, got "wool"'):
+    with pytest.raises(ModelError, match='among ideal, textile, hydrogel, tank, got "wool"'):
         TwinSettings.preset("wool")

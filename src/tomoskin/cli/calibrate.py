@@ -17,8 +17,16 @@ import numpy as np
 import typer
 
 from tomoskin.cli.app import group
-from tomoskin.cli.calibrate_labels import ALONG_Y, amounts, bends, class_examples, labelled_presses
+from tomoskin.cli.calibrate_labels import (
+    ALONG_Y,
+    amounts,
+    body_examples,
+    class_examples,
+    labelled_presses,
+)
 from tomoskin.cli.calibrate_reports import (
+    body_facts,
+    body_lines,
     class_facts,
     class_lines,
     mapping_facts,
@@ -339,8 +347,14 @@ def classes(
     )
 
 
-@_kind("bend", "Frames of known bends, without touches.")
-def bend(
+@app.command("bend", hidden=True, context_settings={"ignore_unknown_options": True})
+def bend(_given: Annotated[list[str] | None, typer.Argument()] = None) -> None:
+    """Say what this command is called now."""
+    raise typer.BadParameter("is called tomoskin calibrate body now", param_hint="calibrate bend")
+
+
+@_kind("body", "A recorded motion of the body, without touches.")
+def body(
     labelled: Recorded,
     bend: Annotated[
         list[str] | None,
@@ -351,42 +365,39 @@ def bend(
             "truth.",
         ),
     ] = None,
+    states: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="TABLE.csv",
+            help="Encoder values: columns frame and one to three coordinates, as angle_deg, "
+            "stretch.",
+        ),
+        Reads(),
+    ] = None,
 ) -> LearningOutcome:
-    """Learn the bends of a skin: touches are then separated from them, and angles estimated."""
-    from tomoskin.learning import BENDS, BendExamples, BendModel
+    """Learn how a body moves under the skin: touches are then separated from it, and its state
+    estimated.
+
+    Without angles or encoder values the state has no unit.
+    """
+    from tomoskin.learning import BODY, BodyModel
     from tomoskin.pipeline import prepare, voltage_covariance
 
-    skin, data, straight = labelled.drawn, labelled.data, labelled.rest
-    if straight is None:
+    skin, rest = labelled.drawn, labelled.rest
+    if rest is None:
         raise DataError(
             "expected voltages with untouched frames, got none", where=str(labelled.path)
         )
     with Bar("preparing"):
         prepared = prepare(skin)
-    frames, angle, axis = bends(labelled.path, data, bend)
-    dv = data.voltages[frames] - straight.mean
-    examples = BendExamples.checked(dv, angle, axis, data.time[frames])
+    examples = body_examples(labelled.path, labelled.data, rest.mean, bend, states)
     with Bar("learning"):
-        model = BendModel.learn(examples, voltage_covariance(prepared, straight))
-    error = float(np.degrees(model.error))
-    facts = {
-        "frames": len(examples.angle),
-        "directions": model.n_modes,
-        "axes_deg": np.degrees(examples.axes).round(1).tolist(),
-        "error_deg": error,
-        "remembers": model.remembers,
-    }
-    lines = [
-        f"{facts['frames']} frames, {facts['directions']} directions; in cross-validation "
-        f"the RMS error of an angle is {error:.2f}°"
-    ]
-    if model.remembers:
-        lines.append("the sheet's memory is part of the calibration: process frames in their order")
-    if not examples.turns:
-        lines.append(
-            "the axis of a bend is estimated from three directions on; here the given axis is used"
-        )
-    return LearningOutcome(BENDS.of(model, labelled.pattern, skin).write, facts, lines)
+        model = BodyModel.learn(examples, voltage_covariance(prepared, rest))
+    for problem in model.doubts:
+        remark(f"{labelled.path}: {problem}")
+    facts = body_facts(model)
+    made = BODY.of(model, labelled.pattern, skin)
+    return LearningOutcome(made.write, facts, body_lines(model, facts))
 
 
 _MappedOut = Annotated[

@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import typer
@@ -16,7 +16,7 @@ from tomoskin.core import DataError, FloatArray
 
 if TYPE_CHECKING:
     from tomoskin.core import Arrays, Detection, Touch
-    from tomoskin.learning import Codes, Examples, LabelledPresses, Measurand
+    from tomoskin.learning import BodyExamples, Codes, Examples, LabelledPresses, Measurand
     from tomoskin.pipeline import Reconstruction
     from tomoskin.sensing.signal import Recording
 
@@ -178,19 +178,51 @@ def _goes_on(before: Touch, touch: Touch) -> bool:
     return before.id == touch.id and bool(apart**2 <= now.area / np.pi)
 
 
-Bends = tuple[list[int], FloatArray, FloatArray]
-"""Frames, and the angle and axis in each, rad."""
+def body_examples(
+    path: Path, data: Recording, rest: FloatArray, given: list[str] | None, table: Path | None
+) -> BodyExamples:
+    """Frames with the states of the body that options or a ``table`` name, else those of the
+    session's truth that nothing presses; of a file without any, all frames without a state."""
+    from tomoskin.learning import BodyExamples
+
+    known: dict[str, Any]
+    if given:
+        pairs = _named_bends(given, len(data))
+        frames = sorted(pairs)
+        angle, axis = np.array([pairs[frame] for frame in frames]).T
+        known = {"angle": angle, "axis": axis}
+    elif table is not None:
+        frames, known = _tabled(table, len(data))
+    else:
+        frames, known = _true_states(path, data)
+    return BodyExamples.checked(data.voltages[frames] - rest, data.time[frames], **known)
 
 
-def bends(path: Path, data: Recording, given: list[str] | None) -> Bends:
-    """Bends that options name, else those of the session's truth.
+def _tabled(table: Path, n: int) -> tuple[list[int], dict[str, Any]]:
+    """The states of a table with a column ``frame`` and one for each coordinate; angles that end
+    in _deg are kept in rad."""
+    try:
+        rows = np.atleast_1d(np.genfromtxt(table, delimiter=",", names=True, encoding="utf-8"))
+    except (ValueError, OSError) as error:
+        raise DataError(
+            f"expected a table of numbers, got another file: {error}", where=str(table)
+        ) from None
+    first, *names = rows.dtype.names or ("",)
+    frames = rows[first] if first == "frame" and names else np.array([-1.0])
+    if not np.isin(frames, np.arange(n)).all():
+        given = ", ".join([first, *names])
+        raise DataError(
+            f"expected columns frame (within 0:{n}) and coordinates, got {given}",
+            where=str(table),
+            hint="for example: frame,angle_deg,stretch",
+        )
+    state = np.column_stack([rows[k] * (math.pi / 180 if _in_degrees(k) else 1) for k in names])
+    kept = tuple(k.removesuffix("_deg") if _in_degrees(k) else k for k in names)
+    return frames.astype(int).tolist(), {"state": state, "names": kept}
 
-    From the truth come frames that nothing presses, with one bend or none.
-    """
-    pairs = _named_bends(given, len(data)) if given else _true_bends(path, data)
-    frames = sorted(pairs)
-    angle, axis = np.array([pairs[frame] for frame in frames]).T
-    return frames, angle, axis
+
+def _in_degrees(name: str) -> bool:
+    return name.startswith("angle") and name.endswith("_deg")
 
 
 def _named_bends(given: list[str], n: int) -> dict[int, tuple[float, float]]:
@@ -211,26 +243,23 @@ def _angles(text: str) -> tuple[float, float]:
     return angle
 
 
-def _true_bends(path: Path, data: Recording) -> dict[int, tuple[float, float]]:
+def _true_states(path: Path, data: Recording) -> tuple[list[int], dict[str, Any]]:
     from tomoskin.files.imports import is_session
     from tomoskin.files.session import SessionReader
 
-    truth, pairs = [], {}
+    truth = []
     if is_session(path):
         with SessionReader(path) as session:
             truth = list(session.truth())
+    if not any(item.bends for item in truth):
+        return list(range(len(data))), {}
     at = np.searchsorted([item.host_time for item in truth], data.time, side="right") - 1
-    for frame, number in enumerate(at.tolist()):
-        item = truth[number] if number >= 0 else None
-        if item is None or item.presses or len(item.bends) > 1:
-            continue
-        bend = item.bends[0] if item.bends else {"angle": 0.0, "axis": math.pi / 2}
-        if "angle" in bend:
-            pairs[frame] = float(bend["angle"]), float(bend["axis"])
-    if not pairs:
-        raise DataError(
-            "holds no angles of bends",
-            where=str(path),
-            hint="give them: --bend 0=0:20 --bend 30=40:60",
-        )
-    return pairs
+    frames = [k for k in np.flatnonzero(at >= 0).tolist() if not truth[at[k]].presses]
+    bends = [{key: b[key] for b in truth[at[k]].bends for key in b} for k in frames]
+    angle, stretch = (np.array([b.get(key, 0.0) for b in bends]) for key in ("angle", "strain"))
+    axis = np.array([b["axis"] if "angle" in b else math.pi / 2 for b in bends])
+    if not stretch.any():
+        return frames, {"angle": angle, "axis": axis}
+    about = axis[np.abs(angle).argmax()]
+    state = np.column_stack([stretch, angle] if angle.any() else [stretch])
+    return frames, {"state": state, "names": ("stretch", "angle")[: state.shape[1]], "axis": about}

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from tomoskin.learning import Classifier, Locator, MappingAnswer
+    from tomoskin.learning import BodyModel, Classifier, Locator, MappingAnswer
     from tomoskin.model.skin import Skin
 
 _SHOWN, _DRIFTED = 10, 2.0
@@ -151,5 +151,36 @@ def mapping_lines(facts: dict[str, Any]) -> list[str]:
         lines.append(
             f"frame {doubtful['frame']:>4}  uncertain: fits a press at x {x:+.0f} mm, y "
             f"{y:+.0f} mm better"
+        )
+    return lines
+
+
+def body_facts(model: BodyModel) -> dict[str, Any]:
+    """Coordinates of the body, and by how much left-out states are missed."""
+    return {
+        "frames": len(model.body.time),
+        "directions": model.n_modes,
+        "errors": dict(zip(model.body.names, model.error.tolist(), strict=True)),
+        "remembers": model.remembers,
+    }
+
+
+def body_lines(model: BodyModel, facts: dict[str, Any]) -> list[str]:
+    """What :func:`body_facts` gave, in sentences."""
+    errors = ", ".join(
+        f"{name} {np.degrees(error):.2f}°" if name.startswith("angle") else f"{name} {error:.3g}"
+        for name, error in facts["errors"].items()
+    )
+    lines = [
+        f"{facts['frames']} frames, {facts['directions']} directions; in cross-validation "
+        f"the RMS errors of the state are: {errors}"
+    ]
+    if model.remembers:
+        lines.append("the sheet's memory is part of the calibration: process frames in their order")
+    if not model.examples.names:
+        lines.append("nothing measured the state, so it has no unit: --states TABLE.csv gives one")
+    elif not model.body.turns and "angle" in model.body.names:
+        lines.append(
+            "the axis of a bend is estimated from three directions on; here the given axis is used"
         )
     return lines

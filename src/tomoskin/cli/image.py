@@ -309,7 +309,7 @@ def _document(
         "rule": result.choice.rule,
         "time_constant_s": prepared.skin.inverse.time_constant,
         "bends": [
-            {"frame": f, "angle_rad": b.angle, "sd_rad": b.sd, "axis_rad": b.axis, "state": b.state}
+            {"frame": f, **b.facts}
             for f, b in zip(result.frames.tolist(), result.bends, strict=False)
             if b
         ],

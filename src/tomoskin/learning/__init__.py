@@ -15,15 +15,12 @@ from tomoskin.learning.amount.measurand import (
     AmountLabel as AmountLabel,
     Measurand as Measurand,
 )
-from tomoskin.learning.bend.bend_model import (
-    BENDS as BENDS,
-    BendModel as BendModel,
-    BendReader as BendReader,
-    BendReading as BendReading,
-)
-from tomoskin.learning.bend.recorded_bends import (
-    BendExamples as BendExamples,
-    JointReference as JointReference,
+from tomoskin.learning.body.body_examples import BodyExamples as BodyExamples
+from tomoskin.learning.body.body_model import BodyModel as BodyModel
+from tomoskin.learning.body.body_reader import (
+    BODY as BODY,
+    BodyReader as BodyReader,
+    BodyReading as BodyReading,
 )
 from tomoskin.learning.classes.classifier import (
     CLASSES as CLASSES,

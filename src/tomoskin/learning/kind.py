@@ -166,15 +166,20 @@ class Conditions(Protocol):
 class Applied:
     """What a calibration does with each frame; a kind overrides what it needs.
 
-    ``moved`` V, or (n_meas,) V: what of the newest frame the baseline must not learn.
+    ``moved`` V, or (n_meas,) V: what of the newest frame the baseline must not learn. ``poses``
+    (p, n_meas) V: by how much a body may move it.
     """
 
     moved: FloatArray | float = 0.0
+    poses: FloatArray = np.zeros((0, 0))
 
     def locate(self, view: FrameView, detections: list[Detection]) -> list[Detection]:
         """Detections with better positions."""
         del view
         return detections
+
+    def renew(self, response: Response, gain: float) -> None:
+        """Go on with touches that are fitted on another sheet; see :class:`TouchFit`."""
 
     def read(self, view: FrameView, detections: list[Detection], *, touched: bool) -> Any | None:
         """What the frame says of the calibration's subject.

@@ -5,12 +5,12 @@ from typing import Any
 
 from tomoskin.core import DataError, StrPath, load_arrays
 from tomoskin.learning.amount.amount_report import DEPTH, FORCE
-from tomoskin.learning.bend.bend_model import BENDS
+from tomoskin.learning.body.body_reader import BODY
 from tomoskin.learning.classes.classifier import CLASSES
 from tomoskin.learning.kind import Calibration, Kind, Progress, silent
 from tomoskin.learning.touch.located_touch import TOUCH
 
-KINDS: tuple[Kind[Any], ...] = (TOUCH, FORCE, DEPTH, BENDS, CLASSES)
+KINDS: tuple[Kind[Any], ...] = (TOUCH, FORCE, DEPTH, BODY, CLASSES)
 """Every kind whose calibrations are applied to frames, in the order in which they are applied."""
 
 

@@ -23,9 +23,6 @@ _LIFTED = 5.0
 _MOST = 4.0
 """The most that one drive says of that: a single one may be wrong."""
 
-_THERE = 0.7
-"""Part of a touch that shows that it has not been lifted."""
-
 _FRAMES, _SECONDS = 2, 0.15
 """Frames, and seconds, within which a touch that has begun must show in frames, or it is withdrawn.
 The scan of the first one may have seen it come down, and quick ones tell little each."""
@@ -87,20 +84,13 @@ class _Followed:
 
         What shows a part of a touch would draw it elsewhere, and later drives would speak of what
         is there. So such a drive is left out, and the odds begin with it. The next one counts.
-        One that has been lifted is there after all where later drives say as much against it, and
-        show most of it: a sheet that does not come back at once shows a part for long.
         """
         self.doubtful = going > _MOST and not self.doubtful
         self.moving = moving = moved if self.doubtful else told
-        if self.lifted is not None:
-            self.odds = min(self.odds + max(gone, -_MOST), _LIFTED)
-            if self.odds < 0 and abs(moving.content) > _THERE * abs(self.full):
-                self.odds, self.lifted = 0.0, None
-            return
-        self.odds = max(self.odds + min(gone, _MOST), min(going, _MOST), 0.0)
-        left = RESIDUAL.holds(abs(moving.content), abs(self.full)) and self.frames is None
-        if left or self.odds > _LIFTED:
-            self.odds, self.lifted = _LIFTED, moving.time
+        if self.lifted is None:
+            self.odds = max(self.odds + min(gone, _MOST), min(going, _MOST), 0.0)
+            left = RESIDUAL.holds(abs(moving.content), abs(self.full)) and self.frames is None
+            self.lifted = moving.time if left or self.odds > _LIFTED else None
 
     def stands(self, touch: Touch, content: float, time: float) -> bool:
         """Whether a frame whose scan began at ``time`` s has a ``touch`` of a ``content`` m² that
@@ -189,13 +179,8 @@ class DriveWatch:
         before = self._followed
         new = [number for number, each in before.items() if each.frames is not None]
         middle = time + self._length * self._drives[-1] / 2
-        heirs = {}
-        for each in before.values() if touches else ():
-            far = [_off(each.moving, touch.detection, middle) for touch in touches]
-            number = touches[int(np.argmin(far))].id
-            if min(far) < GATE and (number not in heirs or number == each.touch.id):
-                heirs[number] = each
-        self._followed = {t.id: self._going_on(t, heirs.get(t.id), time) for t in touches}
+        heirs = self._heirs(touches, middle)
+        self._followed = {t.id: self._going_on(t, heirs.get(t.id), time, middle) for t in touches}
         for number in new if not touches else []:
             each = before[number]
             each.frames = (each.frames or 0) + 1
@@ -260,22 +245,32 @@ class DriveWatch:
             own = data - every + responses[n][0]
             each.take(moved[n], *self._filter.pushed(moved[n], rows, own, responses[n]))
 
-    def _going_on(self, touch: Touch, heir: _Followed | None, time: float) -> _Followed:
-        """A touch of a frame whose scan began at ``time`` s: as the drives have what is nearest to
-        it, its ``heir``, else as the frame has it."""
+    def _heirs(self, touches: Sequence[Touch], time: float) -> dict[int, _Followed]:
+        """What drives follow, by the number of the nearest of ``touches`` at a ``time`` s; one
+        follows its own where it may."""
+        heirs: dict[int, _Followed] = {}
+        for each in self._followed.values() if touches else ():
+            far = [_off(each.moving, touch.detection, time) for touch in touches]
+            number = touches[int(np.argmin(far))].id
+            if min(far) < GATE and (number not in heirs or number == each.touch.id):
+                heirs[number] = each
+        return heirs
+
+    def _going_on(
+        self, touch: Touch, heir: _Followed | None, time: float, middle: float
+    ) -> _Followed:
+        """A touch of a frame whose scan began at ``time`` s and was half done at ``middle`` s: as
+        the drives have what is nearest to it, its ``heir``, else as the frame has it."""
         before = self._followed
         known = before.get(touch.id)
         if known is None:
             known = next((each for each in before.values() if each.frames is not None), None)
-        middle = time + self._length * self._drives[-1] / 2
         moving = fit.MovingTouch.begin(
             middle, self.view.spot(touch.detection), _spread(touch.detection), self.view.model.prior
         )
         if known is not None and not known.stands(touch, moving.content, time):
             known.touch, known.frames = touch, None
             return known
-        if known is not None and known.lifted is None and time < known.begun:
-            return _Followed(touch, known.moving, known.full, odds=known.odds)  # it came down then
         if heir is not None and heir.lifted is None:
             return _Followed(touch, heir.moving, moving.content, odds=heir.odds)
         return _Followed(touch, moving, moving.content)

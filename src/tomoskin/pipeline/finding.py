@@ -61,6 +61,8 @@ class FitFinder:
     ----------
     model, spots
         The sheet on which touches are fitted, and what fits them.
+    volts
+        Ratio of measured and modelled voltages.
     like_touch
         Whether the newest frame may hold a touch, though none was found.
     rises
@@ -74,7 +76,7 @@ class FitFinder:
     ) -> None:
         self.model, self.like_touch, self.rises = model, False, False
         self.problem: str | None = None
-        self.spots, self._volts, self._pace, self._interval = spots, volts, pace, interval
+        self.spots, self.volts, self._pace, self._interval = spots, volts, pace, interval
 
     @classmethod
     def making(
@@ -107,7 +109,7 @@ class FitFinder:
             gain = _gain(self.model, prepared, reference)
             noise = yield from _noise(prepared, reference, gain)
             yield from self.spots.renewing(noise, gain)
-            self._volts = _voltage_ratio(self.model, reference)
+            self.volts = _voltage_ratio(self.model, reference)
             return self
         other = yield from FitFinder.making(
             prepared.spots, prepared, reference, self._pace, self._interval
@@ -142,7 +144,7 @@ class FitFinder:
     @property
     def others(self) -> FloatArray:
         """(k, n_meas) V: for each detection of the newest frame what all others change."""
-        return self._volts * self.spots.others()
+        return self.volts * self.spots.others()
 
 
 Finder = RegionFinder | FitFinder

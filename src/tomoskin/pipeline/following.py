@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from tomoskin.core import Detection, FloatArray, Image, ModelError, Touch, Voltages, reach
-from tomoskin.learning import BENDS, Differences, FrameView
+from tomoskin.learning import BODY, Differences, FrameView
 from tomoskin.model.pattern import Scan
 from tomoskin.pipeline import finding
+from tomoskin.pipeline.body_sheets import BodySheets
 from tomoskin.pipeline.conditioning import (
     BaselineDifferences,
     Conditioned,
@@ -111,6 +112,11 @@ class Following:
         conditions = finding.FitConditions(prepared, reference, fitted, interval)
         self._applied = {k: c.apply(conditions) for k, c in prepared.calibrations.items()}
         self._tuning = None if reference is None else tune(prepared, reference, excluded)
+        self._sheets: BodySheets | None = None
+        poses = [applied.poses for applied in self._applied.values() if len(applied.poses)]
+        plain = prepared.operator.difference == "plain"
+        if poses and reference and prepared.spots and fitted and plain:
+            self._sheets = BodySheets(prepared.spots, reference, poses[0])
         self._interval = interval if interval > 0 else prepared.longest_scan
         self._drives: DriveWatch | None = None
 
@@ -131,7 +137,7 @@ class Following:
 
     def with_settings(self, prepared: Prepared, tracker: Tracker) -> Following:
         """One for other settings of the same body that goes on where this one is."""
-        spots = self.prepared.spots
+        spots = self.prepared.spots if self._sheets is None else self._sheets.rest
         if spots is not None and prepared.spots is spots.even:
             prepared = replace(prepared, spots=spots)
         conditioning = self.conditioning
@@ -237,6 +243,8 @@ class Following:
         moved: FloatArray | float = 0.0
         for applied in self._applied.values():
             moved = moved + applied.moved
+        if self._sheets is not None and self._tuning is None and isinstance(moved, np.ndarray):
+            self._tuning = self._sheets.steps(self.prepared, moved)
         learnt = conditioning.learn(time, moved, touched=touched, noise=noise)
         if learnt.image and (reference := conditioning.reference) is not None:
             self._imaging.renew(conditioning.prepared, reference, conditioning.subspace())
@@ -256,12 +264,18 @@ class Following:
             if not self._is_outdated:
                 return
             conditioning, self._is_outdated = self.conditioning, False
-            self._renewal = self._finder.renewing(conditioning.prepared, conditioning.reference)
+            reference = conditioning.reference
+            if reference is not None and self._sheets is not None:
+                reference = self._sheets.shifted(reference)
+            self._renewal = self._finder.renewing(conditioning.prepared, reference)
         reach("new noise")
         try:
             next(self._renewal)
         except StopIteration as end:
             self._finder, self._renewal = end.value, None
+            if isinstance(self._finder, finding.FitFinder):
+                for applied in self._applied.values():
+                    applied.renew(self._finder.model.response, self._finder.volts)
 
     def _tune(self) -> None:
         """One step towards what the reference says; what there is serves meanwhile."""
@@ -274,9 +288,11 @@ class Following:
             self._tuning = None
             return
         if better is not None:
+            images = better.operator is not self.prepared.operator
             self.prepared, self._is_outdated = better, True
             self.conditioning.renew(better)
-            self._imaging = _imaging(self.conditioning, self.rest, self.conditioning.reference)
+            if images:
+                self._imaging = _imaging(self.conditioning, self.rest, self.conditioning.reference)
 
     def _result(
         self,
@@ -287,7 +303,8 @@ class Following:
         readings: dict[str, Any],
     ) -> FrameResult:
         shows = conditioned.differences is not None
-        bent = None if BENDS.name in readings else looks_bent(touches, self.prepared.mesh)
+        body = readings.get(BODY.name)
+        bent = body.problem if body else looks_bent(touches, self.prepared.mesh)
         return FrameResult(
             sequence=measured.sequence,
             host_time=measured.host_time,

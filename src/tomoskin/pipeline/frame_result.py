@@ -10,7 +10,7 @@ from typing import Any, Self
 import numpy as np
 
 from tomoskin.core import FloatArray, Image, Touch, Voltages
-from tomoskin.learning import BENDS, CLASSES, TOUCH, BendReading, CalibrationHealth, ClassReading
+from tomoskin.learning import BODY, CLASSES, TOUCH, BodyReading, CalibrationHealth, ClassReading
 from tomoskin.model.mesh import Mesh
 from tomoskin.sensing.signal import BaselineState, Health
 from tomoskin.sensing.track import TouchEvent
@@ -144,9 +144,9 @@ class FrameResult:
         )
 
     @property
-    def bend(self) -> BendReading | None:
+    def bend(self) -> BodyReading | None:
         """How the sheet is bent; None where its bends were not learnt."""
-        return self.readings.get(BENDS.name)
+        return self.readings.get(BODY.name)
 
     @property
     def class_reading(self) -> ClassReading | None:
@@ -201,7 +201,7 @@ def looks_bent(touches: Sequence[Touch], mesh: Mesh) -> str | None:
         return None
     return (
         f"{len(touches)} touches lie in a line across the sheet: if it is bent, they are its fold, "
-        "and others are misplaced; teach its bends with tomoskin calibrate bend"
+        "and others are misplaced; teach its motion with tomoskin calibrate body"
     )
 
 

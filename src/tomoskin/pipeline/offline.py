@@ -12,7 +12,7 @@ from threadpoolctl import threadpool_limits
 
 from tomoskin.core import DataError, FloatArray, Image, IntArray, Touch, Voltages, check_fits
 from tomoskin.imaging import AlphaChoice, Observation, SharpDifference
-from tomoskin.learning import BENDS, CLASSES, BendReading, ClassReading
+from tomoskin.learning import BODY, CLASSES, BodyReading, ClassReading
 from tomoskin.model.prior import TotalVariation
 from tomoskin.pipeline.following import Setting
 from tomoskin.pipeline.foreign import tuned_by_file
@@ -133,9 +133,9 @@ class Reconstruction:
         return self.model_agreement.cosine
 
     @property
-    def bends(self) -> tuple[BendReading | None, ...]:
+    def bends(self) -> tuple[BodyReading | None, ...]:
         """How the sheet was bent in each frame; empty where its bends were not learnt."""
-        return self.readings.get(BENDS.name, ())
+        return self.readings.get(BODY.name, ())
 
     @property
     def classes(self) -> tuple[ClassReading | None, ...]:

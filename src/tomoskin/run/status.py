@@ -3,7 +3,6 @@ took its time for; and all of it for a person and for a program."""
 
 from __future__ import annotations
 
-import math
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -18,7 +17,7 @@ import numpy as np
 from tomoskin.board.wire import Info
 from tomoskin.core import Frame, watch_stages
 from tomoskin.imaging import AlphaChoice
-from tomoskin.learning import BendReading, CalibrationHealth, ClassReading
+from tomoskin.learning import BodyReading, CalibrationHealth, ClassReading
 from tomoskin.pipeline import ReferenceState
 from tomoskin.run.sinks import SinkReport
 from tomoskin.sensing.signal import ElectrodeHealth
@@ -291,7 +290,7 @@ class Status:
     sinks: tuple[SinkReport, ...] = ()
     electrodes: tuple[ElectrodeHealth, ...] = ()
     replay: ReplayStatus | None = None
-    bend: BendReading | None = None
+    bend: BodyReading | None = None
     class_reading: ClassReading | None = None
     calibration: CalibrationHealth | None = None
     board: Info | None = None
@@ -313,5 +312,5 @@ class Status:
             f"p99 {1e3 * self.p99:.1f} ms, drift {100 * drift:.1f} %"
         )
         if self.bend is not None:
-            text += f", bend {math.degrees(self.bend.angle):.0f}° ({self.bend.state})"
+            text += f", {self.bend.text}"
         return text if self.class_reading is None else f"{text}, {self.class_reading.text}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +16,6 @@ from tomoskin.learning import (
     AmountLabel,
     AmountModel,
     LabelledPresses,
-    Measurand,
     least_known,
     report_of,
 )
@@ -136,12 +135,8 @@ class PlacementTaker:
         return first + int(middle)
 
 
-@dataclass(frozen=True, eq=False)
-class LabelledPlacement:
-    """A placement, and what is said of it."""
-
-    placement: Placement
-    label: AmountLabel
+LabelledPlacement = tuple[Placement, AmountLabel]
+"""A placement, and what is said of it."""
 
 
 class AmountFlow(GuidedFlow):
@@ -149,6 +144,8 @@ class AmountFlow(GuidedFlow):
 
     Attributes
     ----------
+    of
+        What is known of the presses.
     taken
         Placements so far, each with its label.
     label
@@ -159,10 +156,9 @@ class AmountFlow(GuidedFlow):
         Gives the amount in SI of the press on a simulated skin that knows it, else None.
     """
 
-    of: ClassVar[Measurand]
-
     def __init__(self, prepared: Prepared) -> None:
         super().__init__(prepared)
+        self.of = MEASURED[self.kind]
         self.label: AmountLabel | None = None
         self.asked: AmountLabel | None = None
         self.skin_says: Callable[[], float | None] = lambda: None
@@ -191,7 +187,7 @@ class AmountFlow(GuidedFlow):
         """Put the placement that waits on the list, once its amount has been said."""
         if self._waiting is None or self.label is None:
             return False
-        self.taken.append(LabelledPlacement(self._waiting, self.label))
+        self.taken.append((self._waiting, self.label))
         self._waiting = None
         return True
 
@@ -212,7 +208,7 @@ class AmountFlow(GuidedFlow):
     def estimate_from(self, examples: tuple[LabelledPlacement, ...]) -> Estimate:
         """Learn the amounts of touches from these presses."""
         if len(examples) < _FEWEST:
-            return Estimate(f"{_presses(_FEWEST - len(examples))} more for a first answer")
+            return Estimate(f"{counted(_FEWEST - len(examples))} more for a first answer")
         model = AmountModel.fit(labelled_presses(examples), self.prepared.skin)
         return Estimate(
             f"{report_of(model)['text']}. {_advice(model)}",
@@ -228,28 +224,27 @@ class AmountFlow(GuidedFlow):
 
     def details(self) -> dict[str, Any]:
         """What the page shows: the dot, and the presses so far."""
-        places = [one.placement.xy for one in self.taken]
+        places = [placement.xy for placement, _ in self.taken]
+        said = {"label": self.label, "asked": self.asked, "meant": self.asked and self.asked.meant}
         return {
             "phase": "name" if self._waiting else self._taker.phase,
             "dot": self._dots.next(places, self.estimate),
             "presses": places,
-            "labels": [one.label.text for one in self.taken],
-            "label": _shown(self.label),
-            "asked": _shown(self.asked),
-            "meant": _shown(self.asked and self.asked.meant),
+            "labels": [label.text for _, label in self.taken],
+            **{name: label and LabelNow.of(label) for name, label in said.items()},
         }
 
 
 class ForceFlow(AmountFlow):
-    """Known weights are laid on."""
+    """The flow in which known weights are laid on the skin."""
 
-    kind, teaches, of = "force", FORCE, MEASURED["force"]
+    kind, teaches = "force", FORCE
 
 
 class DepthFlow(AmountFlow):
     """A tip is lowered to known depths."""
 
-    kind, teaches, of = "depth", DEPTH, MEASURED["depth"]
+    kind, teaches = "depth", DEPTH
 
 
 def labelled_presses(examples: tuple[LabelledPlacement, ...]) -> LabelledPresses:
@@ -257,20 +252,21 @@ def labelled_presses(examples: tuple[LabelledPlacement, ...]) -> LabelledPresses
 
     Raises DataError as :meth:`LabelledPresses.of` does.
     """
-    detections = [d for one in examples for d in one.placement.detections]
-    length = [len(one.placement.detections) for one in examples]
+    placements, labels = zip(*examples, strict=True)
+    detections = [detection for one in placements for detection in one.detections]
+    length = [len(one.detections) for one in placements]
     amount = np.full(len(detections), np.nan)
-    still = np.cumsum([0, *length[:-1]]) + [one.placement.still for one in examples]
-    amount[still] = [one.label.si for one in examples]
+    still = np.cumsum([0, *length[:-1]]) + [one.still for one in placements]
+    amount[still] = [label.si for label in labels]
     press = np.repeat(np.arange(len(examples)), length)
-    time = np.concatenate([one.placement.time for one in examples])
-    return LabelledPresses.of(detections, amount, press, time, examples[0].label.of.name)
+    time = np.concatenate([one.time for one in placements])
+    return LabelledPresses.of(detections, amount, press, time, labels[0].of.name)
 
 
 def _advice(model: AmountModel) -> str:
     n = len(np.unique(model.presses.press[model.presses.labelled]))
     if n < _ENOUGH:
-        return f"Ten presses are a start: {_presses(_ENOUGH - n)} more."
+        return f"Ten presses are a start: {counted(_ENOUGH - n)} more."
     if model.remarks:
         return "These would be enough without the problems below."
     if n < _GOOD:
@@ -280,11 +276,3 @@ def _advice(model: AmountModel) -> str:
 
 def _of_press(number: int | None) -> str:
     return "" if number is None else f"Press {number + 1}: "
-
-
-def _shown(label: AmountLabel | None) -> LabelNow | None:
-    return None if label is None else LabelNow.of(label)
-
-
-def _presses(count: int) -> str:
-    return counted(count, "press", "presses")

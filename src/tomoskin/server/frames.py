@@ -30,7 +30,7 @@ from enum import IntFlag
 import numpy as np
 
 from tomoskin.core import Touch
-from tomoskin.learning import BendReading, DentMap
+from tomoskin.learning import BodyReading, DentMap
 from tomoskin.pipeline import FrameResult
 from tomoskin.sensing.track import amount_values
 from tomoskin.twin import Probe
@@ -48,7 +48,7 @@ class Flag(IntFlag):
 
 
 BEND_STATES = ("idle", "bend", "touch", "bend and touch", "unknown")
-"""States of a :class:`~tomoskin.learning.BendReading`, as they are numbered here."""
+"""States of a :class:`~tomoskin.learning.BodyReading`, as they are numbered here."""
 
 DENT_STEP = 2e-6
 """Metres by which a dent is counted: a page has up to 131 mm."""
@@ -118,10 +118,7 @@ def encode_result(
             _record("Truth", [(p.x, p.y, p.force, p.radius) for p in truth]),
             _bend(result.bend),
             _labels(touches, len(result.image.values)),
-            *(
-                np.rint(np.minimum(part / DENT_STEP, 65535)).astype("<u2").tobytes()
-                for part in dent or ()
-            ),
+            np.rint(np.minimum(np.array(dent or ()) / DENT_STEP, 65535)).astype("<u2").tobytes(),
         ]
     )
 
@@ -130,7 +127,7 @@ def _header(
     result: FrameResult, n_touches: int, n_truth: int, latency: float, dent: DentMap | None
 ) -> bytes:
     flags = Flag.READY * result.ready | Flag.NO_IMAGE * (not result.has_image)
-    flags |= Flag.ROWS_LEFT_OUT * (result.left_out > 0) | Flag.BENT * (result.bend is not None)
+    flags |= Flag.ROWS_LEFT_OUT * (result.left_out > 0) | Flag.BENT * bool(_bend(result.bend))
     values = (
         MAGIC,
         result.sequence % 2**32,
@@ -174,8 +171,8 @@ def _touches(touches: Sequence[Touch], now: float) -> bytes:
     return _record("Touch", rows)
 
 
-def _bend(bend: BendReading | None) -> bytes:
-    if bend is None:
+def _bend(bend: BodyReading | None) -> bytes:
+    if bend is None or bend.angle != bend.angle:  # the page shows angles only
         return b""
     return _record("Bend", (bend.angle, bend.sd, bend.axis, BEND_STATES.index(bend.state)))
 

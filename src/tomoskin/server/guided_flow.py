@@ -62,9 +62,9 @@ class Estimate:
     answer: Any = None
 
 
-def counted(count: int, one: str, many: str) -> str:
-    """A number of things in words."""
-    return f"{count} {one if count == 1 else many}"
+def counted(count: int) -> str:
+    """So many presses, for people."""
+    return f"{count} press{'' if count == 1 else 'es'}"
 
 
 class StoppedError(TomoskinError):

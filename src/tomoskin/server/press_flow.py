@@ -34,7 +34,7 @@ _FIRST = 10
 def estimate_touch(prepared: Prepared, presses: Sequence[GuidedPress]) -> Estimate:
     """A locator of the presses, and by how much it misses them. Raises DataError."""
     if len(presses) < _FEWEST_TOUCH:
-        return Estimate(f"{_presses(_FEWEST_TOUCH - len(presses))} more for a first estimate")
+        return Estimate(f"{counted(_FEWEST_TOUCH - len(presses))} more for a first estimate")
     dv, xy = _arrays(presses)
     locator = Locator.fit(dv, xy, pattern=prepared.pattern, skin=prepared.skin)
     errors = 1e3 * locator.errors
@@ -91,7 +91,7 @@ def estimate_mapping(
 ) -> Estimate:
     """The likeliest channel mapping and how sure it is; ``untouched`` mean, noise V. DataError."""
     if len(presses) < _FEWEST_MAPPING:
-        return Estimate(f"{_presses(_FEWEST_MAPPING - len(presses))} more for a first answer")
+        return Estimate(f"{counted(_FEWEST_MAPPING - len(presses))} more for a first answer")
     dv, xy = _arrays(presses)
     rest, noise = untouched or (None, None)
     solution = solve_channel_mapping(dv, xy, prepared.skin, reference=rest, noise=noise)
@@ -212,7 +212,3 @@ class MappingFlow(DotFlow):
 def _arrays(presses: Sequence[GuidedPress]) -> tuple[FloatArray, FloatArray]:
     dv = np.array([press.dv for press in presses])
     return dv, np.array([press.place for press in presses])
-
-
-def _presses(count: int) -> str:
-    return counted(count, "press", "presses")

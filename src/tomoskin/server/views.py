@@ -82,8 +82,9 @@ def state(status: Status) -> to_page.RunState:
         alpha=status.choice.alpha,
         rule=status.choice.rule,
         recording=None if status.recording is None else status.recording.name,
-        bend=bend
-        and to_page.BendNow.of(bend, angle_rad=bend.angle, sd_rad=bend.sd, axis_rad=bend.axis),
+        bend=None
+        if bend is None or bend.angle != bend.angle
+        else to_page.BendNow.of(bend, angle_rad=bend.angle, sd_rad=bend.sd, axis_rad=bend.axis),
         class_=status.class_reading,
         calibration=status.calibration and to_page.CalibrationNow.of(status.calibration),
     )

@@ -56,6 +56,10 @@ def test_a_surface_survives_the_file() -> None:
     ("surface", "words"),
     [
         ({"shape": "cylinder", "radius": "20 mm"}, r"\[surface\]: .* overlaps itself"),
+        (
+            {"shape": "cylinder", "radius": "60 mm", "layer": "60 mm"},
+            r"\[surface\]: expected a layer thinner than the radius, 60 mm, .* got 60 mm",
+        ),
         ({"shape": "cap", "radius": "30 mm"}, r"\[surface\]: .* is covered at"),
         ({"shape": "cap"}, r"\[surface\] radius: is missing"),
         ({"radius": "70 mm"}, r"\[surface\] radius: needs shape"),

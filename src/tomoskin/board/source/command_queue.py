@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from tomoskin.board.source.settings import Configuration, Timing
-from tomoskin.board.wire import Command, SetBaud, encode
+from tomoskin.board.wire import Command, Ping, SetBaud, encode
 from tomoskin.core import DriveSamples, Event, Frame, SourceError
 
 _MODULUS = 2**32
@@ -183,6 +183,11 @@ class CommandQueue:
         numbered = self._numbered(command)
         self._send(numbered, now)
         return numbered.request
+
+    def keep_alive(self, now: float) -> None:
+        """Let a board that scans know that the host is there, where it is time to."""
+        if now >= self.last_sent + self._timing.ping:
+            self.send(Ping(0), now)
 
     def repeat(self, now: float) -> None:
         """Send the pending command again, when it is time; SourceError after too many tries."""

@@ -107,7 +107,8 @@ class Link(AbstractContextManager["Link"]):
 
     def keep_alive(self) -> None:
         """Let the board know that the host is there, while :meth:`poll` is not called for long."""
-        self.session.keep_alive(self._clock())
+        if self.running:
+            self.session.commands.keep_alive(self._clock())
         with contextlib.suppress(SourceError):  # gone: the next poll says so
             self._flush()
 

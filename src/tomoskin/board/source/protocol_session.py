@@ -119,7 +119,7 @@ class ProtocolSession:
         self.commands.repeat(now)
         if self.stage is not Stage.RUNNING:
             return []
-        self.keep_alive(now)
+        self.commands.keep_alive(now)
         if self.is_silent or now < self._last_frame + self._silence:
             return []
         if not self._overdue:  # a busy host may not have read yet what has come
@@ -130,11 +130,6 @@ class ProtocolSession:
         self.is_silent = True
         text = f"no frame for {now - self._last_frame:.1f} s: check the board's power and cable"
         return [Event(now, "silent", text)]
-
-    def keep_alive(self, now: float) -> None:
-        """Let a board that scans know that the host is there, where it is time to."""
-        if self.stage is Stage.RUNNING and now >= self.commands.last_sent + self._timing.ping:
-            self.commands.send(wire.Ping(0), now)
 
     def deadline(self) -> float:
         """Time of the next ``tick`` that matters."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any, Self, TypeVar
@@ -32,10 +32,8 @@ _DENT = 1e-4
 _ANY_TURN = math.pi**2 / 3
 """Variance of an angle of which nothing is known, rad²."""
 
-_AROUND = np.arange(12) * math.pi / 6
-_SPREAD = np.sqrt(-2 * np.log([[0.75], [0.25]] * 6)) * np.column_stack(
-    [np.cos(_AROUND), np.sin(_AROUND)]
-)
+_TURN = np.arange(12)[:, None] * math.pi / 6 + (0, -math.pi / 2)
+_SPREAD = np.sqrt(-2 * np.log([[0.75], [0.25]] * 6)) * np.cos(_TURN)
 """Points of an ellipse, in standard deviations along its axes: each stands for a twelfth."""
 
 _UNCALIBRATED = {
@@ -317,7 +315,7 @@ class Contacts:
             measured=(math.nan if stream.replayed else when) if measured is None else measured,
         )
         own = stream.place and stream.place.own
-        return contacts._without_self() if own and own.leaves_out else contacts
+        return replace(contacts, **_foreign(contacts)) if own and own.leaves_out else contacts
 
     def outdated(self, problem: str) -> Self:
         """The same, but no touches, which are not true any more, and why."""
@@ -325,13 +323,6 @@ class Contacts:
             self, valid=False, problem=problem, tracked=(), happened=(), voltages=None,
             reference=None, change=None, image=None,
         )  # fmt: skip
-
-    def _without_self(self) -> Self:
-        """The same without touches by the robot's own links, and what happened to them."""
-        tracked = tuple(c.touch for c in self.touches if not c.is_self)
-        happened = zip(self.happened, self._changed, strict=True)
-        kept = tuple(event for event, contact in happened if not contact.is_self)
-        return replace(self, tracked=tracked, happened=kept)
 
     @property
     def age_s(self) -> float:
@@ -367,11 +358,6 @@ class Contacts:
     def touches(self) -> tuple[Contact, ...]:
         """The touches in space, in the order of their identities."""
         return Contact.each(self.tracked, self.stream.surface, self.link)
-
-    @property
-    def _changed(self) -> tuple[Contact, ...]:
-        """Of each thing that happened the touch in space."""
-        return Contact.each([e.touch for e in self.happened], self.stream.surface, self.link)
 
     @cached_property
     def link(self) -> LinkPose | None:
@@ -410,8 +396,23 @@ class Contacts:
         """Each thing that happened to a touch, with that touch, as plain values by name."""
         return [
             {"time_s": event.host_time, "event": event.kind} | self.header() | contact.content()
-            for event, contact in zip(self.happened, self._changed, strict=True)
+            for event, contact in _happened(self)
         ]
+
+
+def _happened(contacts: Contacts) -> Iterator[tuple[TouchEvent, Contact]]:
+    """What happened to touches, each with that touch in space."""
+    events = contacts.happened
+    touches = [event.touch for event in events]
+    return zip(events, Contact.each(touches, contacts.stream.surface, contacts.link), strict=True)
+
+
+def _foreign(contacts: Contacts) -> dict[str, Any]:
+    """The touches that are not by the robot's own links, and what happened to them."""
+    return {
+        "tracked": tuple(c.touch for c in contacts.touches if not c.is_self),
+        "happened": tuple(event for event, c in _happened(contacts) if not c.is_self),
+    }
 
 
 def without_frame(stream: Stream, problem: str, host_time: float) -> Contacts:

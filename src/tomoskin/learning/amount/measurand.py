@@ -131,7 +131,7 @@ class AmountLabel:
 
     @property
     def si(self) -> float:
-        """The amount in SI."""
+        """The amount in the SI unit of its kind."""
         return self.value * self.of.units[self.unit]
 
     @property

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Protocol, Self, TypeVar
+from typing import Self
 
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve, eigh
 from scipy.linalg.lapack import dpotri
 from scipy.optimize import minimize
 
-from tomoskin.core import FloatArray
+from tomoskin.core import FloatArray, IntArray
 
 LENGTHS = (0.16, 0.22, 0.32, 0.45, 0.65)
 """Length scales of a response that are tried, in radii of the region."""
@@ -60,29 +60,22 @@ def nearness(a: FloatArray, b: FloatArray, length: float) -> FloatArray:
     return np.asarray(np.exp(-0.5 * squared_distances(a, b) / length**2))
 
 
-class _Likely(Protocol):
-    """What has a log marginal likelihood."""
-
-    @property
-    def evidence(self) -> float:
-        """Log marginal likelihood, up to a constant."""
-        ...
-
-
-L = TypeVar("L", bound=_Likely)
-
-
-def climbed(maps: Callable[[float], L]) -> L:
-    """What ``maps`` makes of the length scale of the largest evidence, climbed to from the middle
-    one of :data:`LENGTHS`."""
-    of = cache(maps)
+def climbed(evidence: Callable[[float], float]) -> Likeness:
+    """The likeness of the length scale of the largest ``evidence``, climbed to from the middle one
+    of :data:`LENGTHS`."""
+    of = cache(evidence)
     best = len(LENGTHS) // 2
     while True:
         near = range(max(best - 1, 0), min(best + 2, len(LENGTHS)))
-        higher = max(near, key=lambda number: of(LENGTHS[number]).evidence)
+        higher = max(near, key=lambda number: of(LENGTHS[number]))
         if higher == best:
-            return of(LENGTHS[best])
+            return Likeness(LENGTHS[best])
         best = higher
+
+
+def telling(n_rows: int, most: int) -> IntArray:
+    """At ``most`` so many of the rows, spread over them: they tell the length scale of all."""
+    return np.unique(np.linspace(0, n_rows - 1, min(n_rows, most)).astype(int))
 
 
 @dataclass(frozen=True)
@@ -114,9 +107,9 @@ class Basis:
     root: FloatArray
 
     @classmethod
-    def of(cls, likeness: Likeness, positions: FloatArray) -> Self:
-        """Basis for responses at ``positions`` (n, 2)."""
-        centres = positions[_pivots(likeness, positions)]
+    def of(cls, likeness: Likeness, positions: FloatArray, most: int = _MOST) -> Self:
+        """Basis of at ``most`` so many functions for responses at ``positions`` (n, 2)."""
+        centres = positions[_pivots(likeness, positions, most)]
         values, vectors = eigh(likeness(centres, centres))
         keep = values > _ROUNDING * values[-1]
         return cls(likeness, centres, vectors[:, keep] / np.sqrt(values[keep]))
@@ -126,10 +119,10 @@ class Basis:
         return np.asarray(self.likeness(positions, self.centres) @ self.root)
 
 
-def _pivots(likeness: Likeness, positions: FloatArray) -> list[int]:
+def _pivots(likeness: Likeness, positions: FloatArray, most: int) -> list[int]:
     """Rows whose likeness to all others explains the rest."""
     unexplained = np.full(len(positions), likeness.variance)
-    factor = np.zeros((len(positions), min(_MOST, len(positions))))
+    factor = np.zeros((len(positions), min(most, len(positions))))
     chosen: list[int] = []
     while len(chosen) < factor.shape[1]:
         pivot = int(unexplained.argmax())

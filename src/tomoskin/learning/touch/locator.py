@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 
 from tomoskin.core import Detection, FloatArray
 from tomoskin.learning.kind import Progress, silent
+from tomoskin.learning.touch.gaussian_process import squared_distances
 from tomoskin.learning.touch.per_channel import Envelope, likeliest_envelope, rings
 from tomoskin.learning.touch.posterior import Estimates
 from tomoskin.learning.touch.presses import Features, Presses, Strength, frames, mean_about
@@ -164,14 +165,15 @@ class Locator:
         grid = region.lattice(_PLACES)
         estimates = Estimates.of(data, positions, grid, envelope)
         progress(1, _STEPS)
-        stacking = Stacking.of(data, estimates.left_out, positions)
+        between = squared_distances(data, data)
+        stacking = Stacking.of(data, between, estimates.left_out, positions)
         progress(2, _STEPS)
         errors = stacking.left_out - positions
         calibrated = CalibratedCovariance.of(errors, estimates.left_out_spread)
         covariance = calibrated(estimates.left_out_spread)
         held = float(np.mean(squared_lengths(errors, covariance) < NINE_IN_TEN))
         remarks = (
-            *twins(data, positions, region.unit),
+            *twins(between, positions, region.unit),
             *outliers(stacking.left_out, positions, covariance, region.unit),
         )
         progress(3, _STEPS)

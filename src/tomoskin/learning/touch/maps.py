@@ -16,7 +16,10 @@ _PSEUDO_ROWS = 60.0
 """Weight of the prior of both covariances, which is their own diagonal."""
 
 _SIGNAL_AT_FIRST = 0.7
-_ITERATIONS, _ENOUGH, _LEAST = 30, 2e-3, 1.0
+_ITERATIONS = 8
+"""Of the expectation maximisation: thirty locate no better on noPattern, radial, cam09_05 and the 8
+electrodes of eskin_hydrogel_round."""
+
 _FLOOR = 1e-6
 
 
@@ -65,14 +68,9 @@ class Coregion:
         total = total + _FLOOR * total.mean()
         signal = np.diag(_SIGNAL_AT_FIRST * total * data.n / data.weights.sum())
         noise = np.diag((1 - _SIGNAL_AT_FIRST) * total)
-        last = -np.inf
-        for step in range(_ITERATIONS):
+        for _ in range(_ITERATIONS):
             gain, q = _modes(signal, noise)
             rows = data.rows @ q
-            evidence = _evidence(data, gain, q, rows)
-            if step > 5 and evidence - last < max(_ENOUGH * data.n, _LEAST):
-                break
-            last = evidence
             ratio = data.weights[:, None] * gain
             part = ratio / (1 + ratio)
             inside, left = part * rows, rows - part * rows
@@ -82,7 +80,8 @@ class Coregion:
             noise = _back(back, left.T @ left, part.sum(axis=0)) + data.rest
             signal, noise = _shrunk(signal, m), _shrunk(noise, data.n)
             noise[np.diag_indices(k)] += _FLOOR * np.diag(noise).mean()
-        return cls(gain, q, evidence)
+        gain, q = _modes(signal, noise)
+        return cls(gain, q, _evidence(data, gain, q))
 
 
 def _modes(signal: FloatArray, noise: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -90,8 +89,8 @@ def _modes(signal: FloatArray, noise: FloatArray) -> tuple[FloatArray, FloatArra
     return np.maximum(gain, 0.0), q
 
 
-def _evidence(data: Projected, gain: FloatArray, q: FloatArray, rows: FloatArray) -> float:
-    ratio = 1 + data.weights[:, None] * gain
+def _evidence(data: Projected, gain: FloatArray, q: FloatArray) -> float:
+    rows, ratio = data.rows @ q, 1 + data.weights[:, None] * gain
     quadratic = (np.log(ratio) + rows**2 / ratio).sum() + (q * (data.rest @ q)).sum()
     return float(data.n * np.linalg.slogdet(q)[1] - 0.5 * quadratic)
 

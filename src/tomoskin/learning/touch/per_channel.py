@@ -16,6 +16,7 @@ from tomoskin.learning.touch.gaussian_process import (
     Likeness,
     climbed,
     squared_distances,
+    telling,
 )
 from tomoskin.model.pattern import Pattern
 
@@ -86,11 +87,19 @@ def rings(pattern: Pattern, rim: FloatArray) -> Iterator[Envelope]:
 def likeliest_envelope(
     envelopes: Iterator[Envelope], positions: FloatArray, features: FloatArray
 ) -> Envelope:
-    """The envelope of the largest marginal likelihood; none, unless one explains much more."""
+    """The envelope of the largest marginal likelihood; none, unless one explains much more.
+
+    Some rows tell which are likely, all of them which one is likeliest.
+    """
+    some = telling(features.shape[1], _TELL)
+    by_some = {
+        one: evidence_of(one.of_rows(some), positions, features[:, some]) for one in envelopes
+    }
+    likely = sorted(by_some, key=lambda envelope: by_some[envelope])[-_LIKELY:]
     none = Envelope()
-    likely = {one: evidence_of(one, positions, features) for one in (none, *envelopes)}
-    best = max(likely, key=lambda envelope: likely[envelope])
-    return best if likely[best] > likely[none] + SURE else none
+    by_all = {one: evidence_of(one, positions, features) for one in (none, *likely)}
+    best = max(by_all, key=lambda envelope: by_all[envelope])
+    return best if by_all[best] > by_all[none] + SURE else none
 
 
 def evidence_of(envelope: Envelope, positions: FloatArray, features: FloatArray) -> float:
@@ -113,8 +122,12 @@ _RATIOS = np.array([0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0])
 
 _FLOOR = 1e-9
 
-_TELL = 48
-"""Rows that tell the length scale of all."""
+_TELL, _FUNCTIONS = 48, 48
+"""Rows that tell the length scale and the likely envelopes, and functions in the basis of a row's
+map at most: the work grows with their cube."""
+
+_LIKELY = 6
+"""Envelopes that some rows find likeliest are compared by all."""
 
 _FREEDOM = 4.0
 """Degrees of freedom of one row's error: a press may be told wrong by a few rows."""
@@ -155,23 +168,24 @@ class ChannelMaps:
         The length scale, of some rows for all, and the noise of each are those of the largest
         evidence.
         """
-        some = np.arange(0, features.shape[1], max(features.shape[1] // _TELL, 1))
+        some = telling(features.shape[1], _TELL)
 
-        def of_some(length: float) -> ChannelMaps:
-            basis = Basis.of(Likeness(length), positions)
-            return cls._of(basis, positions, features[:, some], envelope.of_rows(some))
+        def evidence(length: float) -> float:
+            likeness, their = Likeness(length), envelope.of_rows(some)
+            return cls._of(likeness, positions, features[:, some], their).evidence
 
-        return cls._of(climbed(of_some).basis, positions, features, envelope)
+        return cls._of(climbed(evidence), positions, features, envelope)
 
     @classmethod
     def _of(
         cls,
-        basis: Basis,
+        likeness: Likeness,
         positions: FloatArray,
         features: FloatArray,
         envelope: Envelope,
         ratio: FloatArray | None = None,
     ) -> Self:
+        basis = Basis.of(likeness, positions, _FUNCTIONS)
         n, mean = len(features), features.mean(axis=0)
         about = (features - mean).T
         design = envelope(positions).T[:, :, None] * basis(positions)
@@ -199,8 +213,7 @@ class ChannelMaps:
 
     def again(self, positions: FloatArray, features: FloatArray) -> Self:
         """Maps of other presses with the same settings."""
-        basis = Basis.of(self.basis.likeness, positions)
-        return self._of(basis, positions, features, self.envelope, self.ratio)
+        return self._of(self.basis.likeness, positions, features, self.envelope, self.ratio)
 
     def at(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Mean and variance, both (g, k), of the features of a press at ``positions`` (g, 2)."""
@@ -240,8 +253,8 @@ class ChannelLikelihood:
 
     def __call__(self, features: FloatArray) -> FloatArray:
         """(n, g) log-likelihood of each place, up to a constant of the frame."""
-        short = len(self.mean) - features.shape[1]
-        wide = np.pad(features, ((0, 0), (0, short))).astype(_SINGLE)
+        wide = np.zeros((len(features), len(self.mean)), _SINGLE)
+        wide[:, : features.shape[1]] = features
         return np.stack([self._of_one(frame) for frame in wide])
 
     def _of_one(self, frame: NDArray[np.float32]) -> FloatArray:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
 from typing import Self
 
 import numpy as np
@@ -17,6 +16,7 @@ from tomoskin.learning.touch.gaussian_process import (
     climbed,
     moments,
     squared_distances,
+    telling,
 )
 from tomoskin.learning.touch.maps import ResponseMaps, principal
 from tomoskin.learning.touch.per_channel import ChannelLikelihood, ChannelMaps, Envelope
@@ -102,16 +102,26 @@ def powers_of(
 ) -> FloatArray:
     """The power of each likelihood at which held-out presses at ``xy`` are likeliest.
 
-    ``log_likelihoods`` (n, g) each, of presses that the maps have not seen.
+    ``log_likelihoods`` two (n, g), of presses that the maps have not seen. A pool's sum over the
+    grid is a product of what each power makes of both.
     """
-    nearest = squared_distances(xy, grid).argmin(axis=1)
-    rows = np.arange(len(xy))
-    choices = [np.array(powers) for powers in product(np.append(0.0, POWERS), repeat=2)]
-    score = [
-        np.log(pooled(log_likelihoods, powers)[rows, nearest] + _LEAST).sum() for powers in choices
+    nearest = squared_distances(xy, grid).argmin(axis=1)[:, None, None]
+    tried = np.append(0.0, POWERS)
+    logs = [
+        tried[:, None] * (part - part.max(axis=1, keepdims=True))[:, None]
+        for part in log_likelihoods
     ]
-    return choices[int(np.argmax(score))]
+    first, second = (np.exp(part) for part in logs)
+    there = [np.take_along_axis(part, nearest, axis=2) for part in logs]
+    own = np.exp(there[0] + there[1].transpose(0, 2, 1))
+    total = np.maximum(first @ second.transpose(0, 2, 1), np.finfo(float).tiny)
+    score = np.log(own / total + _LEAST).sum(axis=0)
+    best = np.unravel_index(score.argmax(), score.shape)
+    return tried[list(best)]
 
+
+_TELL = 96
+"""Rows that tell the length scale of the maps: half as many chose worse on radial."""
 
 _MOST = 200
 """Presses that maps of single rows are learnt from: more tell a row little more of its noise, and
@@ -164,25 +174,22 @@ class Estimates:
         envelope: Envelope,
     ) -> Self:
         """Learn the maps; length scales by evidence, powers by left-out presses."""
-        n = len(positions)
-        directions = principal(features)
-        maps = climbed(
-            lambda length: ResponseMaps.of(Likeness(length), positions, features, directions)
-        )
-        few = _some(n)
+        n, few = len(positions), _some(len(positions))
+        likeness = _likeliest(positions, features)
+        maps = ResponseMaps.of(likeness, positions, features, principal(features))
         channels = ChannelMaps.of(positions[few], features[few], envelope)
         misfit, alone, folds = np.empty((n, len(grid))), np.empty((n, len(grid))), []
         unlike = np.empty((n, 2))
         for out in _folds(positions):
             some, theirs = positions[~out], features[~out]
-            learnt = ResponseMaps.of(maps.basis.likeness, some, theirs, principal(theirs))
+            learnt = ResponseMaps.of(likeness, some, theirs, principal(theirs))
             folds.append(GridLikelihood.of(learnt, grid))
-            few = _some(len(some))
-            single = ChannelLikelihood.of(channels.again(some[few], theirs[few]), grid)
+            spread = _some(len(some))
+            single = ChannelLikelihood.of(channels.again(some[spread], theirs[spread]), grid)
             misfit[out], alone[out] = folds[-1].misfit(features[out]), single(features[out])
             unlike[out] = folds[-1].unlike(features[out], misfit[out])
         parts = [folds[0].of_misfit(misfit), alone]
-        powers = powers_of(parts, grid, positions)
+        powers = powers_of([part[few] for part in parts], grid, positions[few])
         left_out = moments(pooled(parts, powers), grid)
         per_channel = ChannelLikelihood.of(channels, grid) if powers[1] else None
         usual = np.maximum(np.median(unlike, axis=0), (_LEAST, _SHAPE))
@@ -220,6 +227,17 @@ class Estimates:
         ½ Σ log(1 + signal / noise) (MacKay 1992).
         """
         return np.asarray(self.grid[int(self.likelihood.volume.argmax())])
+
+
+def _likeliest(positions: FloatArray, features: FloatArray) -> Likeness:
+    """The likeness of the maps' largest evidence, as some of the rows tell."""
+    some = telling(features.shape[1], _TELL)
+    alone = np.eye(len(some))
+    return climbed(
+        lambda length: (
+            ResponseMaps.of(Likeness(length), positions, features[:, some], alone).evidence
+        )
+    )
 
 
 def _folds(positions: FloatArray) -> list[BoolArray]:

@@ -117,11 +117,12 @@ class Stacking:
     def of(
         cls,
         features: FloatArray,
+        between: FloatArray,
         estimates: FloatArray,
         xy: FloatArray,
     ) -> Self:
-        """Learn from ``features`` (n, k), held-out ``estimates`` (n, 2) and places ``xy``."""
-        between = squared_distances(features, features)
+        """Learn from ``features`` (n, k), their squared distances ``between`` each other (n, n),
+        held-out ``estimates`` (n, 2) and places ``xy``."""
         unit = _usual(between)
         squares = {
             "features": between / unit,
@@ -177,10 +178,10 @@ class Remark:
     reason: str
 
 
-def twins(features: FloatArray, positions: FloatArray, unit: float) -> list[Remark]:
-    """Presses with the same data as an earlier one, at another place."""
-    between = squared_distances(features, features)
-    usual = float(np.median(between)) or 1.0
+def twins(between: FloatArray, positions: FloatArray, unit: float) -> list[Remark]:
+    """Presses with the same data as an earlier one, at another place, by the squared distances
+    ``between`` their features (n, n)."""
+    usual = _usual(between)
     apart = squared_distances(positions, positions)
     pairs = np.argwhere(np.triu((between < _SAME * usual) & (apart > _APART**2), 1))
     remarks: dict[int, Remark] = {}

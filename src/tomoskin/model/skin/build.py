@@ -163,6 +163,11 @@ def _outline(given: OutlineSection) -> Outline:
 
 
 def _surface(given: SurfaceSection, folder: Path) -> Surface:
+    if given.radius is not None and (given.layer or 0.0) >= given.radius:
+        raise GeometryError(
+            f"expected a layer thinner than the radius, {1e3 * given.radius:.4g} mm, since it lies "
+            f"within the body; got {1e3 * (given.layer or 0.0):.4g} mm"
+        )
     match given:
         case SurfaceSection(shape="cylinder", radius=float(radius)):
             return Cylinder(radius, given.axis)

@@ -1,4 +1,4 @@
-"""tomoskin calibrate bend, and images of a skin that bends."""
+"""tomoskin calibrate body, and images of a skin on a body that moves."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tomoskin.cli import main
 from tomoskin.core import DataError
 from tomoskin.files.imports import read_recording
 from tomoskin.files.session import SessionReader
-from tomoskin.learning import BENDS
+from tomoskin.learning import BODY
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Pipeline, prepare
 
@@ -55,7 +55,7 @@ def recorded(tmp_path_factory):
         script.write_text(SCRIPT.format(duration=duration, seed=len(name), profile=profile) + more)
         out = folder / f"{name}.mcap"
         _done("simulate", *skin, "--script", str(script), "--out", str(out))
-    _done("calibrate", "bend", str(folder / "known.mcap"), "--out", str(folder / "c.npz"))
+    _done("calibrate", "body", str(folder / "known.mcap"), "--out", str(folder / "c.npz"))
     return folder
 
 
@@ -66,8 +66,8 @@ def _done(*arguments):
 
 
 def test_angles_and_touches_of_a_session_that_bends(recorded, tomoskin):
-    model = BENDS.read(recorded / "c.npz").model
-    assert np.degrees(model.error) < 2.0
+    model = BODY.read(recorded / "c.npz").model
+    assert np.degrees(model.error[0]) < 2.0
     code, out, err = tomoskin(
         "image", recorded / "used.mcap", "--calibration", recorded / "c.npz", "--json"
     )
@@ -110,7 +110,7 @@ def test_a_recording_that_lacks_rows_keeps_its_bends(recorded, tomoskin):
 def test_options_say_the_angles_where_the_file_does_not(recorded, tomoskin):
     bends = ("--bend", "0=0:18", "--bend", "25@90=24:28", "--bend", "50=31:34")
     code, out, err = tomoskin(
-        "calibrate", "bend", recorded / "known.mcap", "--out", recorded / "d.npz", *bends
+        "calibrate", "body", recorded / "known.mcap", "--out", recorded / "d.npz", *bends
     )
     assert code == 0, err
     assert "25 frames" in out
@@ -118,11 +118,15 @@ def test_options_say_the_angles_where_the_file_does_not(recorded, tomoskin):
 
 @pytest.mark.parametrize(
     ("bend", "message"),
-    [("much=0:9", "expected DEG=A:B"), ("30=0:9999", "within 0:"), ("30=0:9", "6 bent frames")],
+    [
+        ("much=0:9", "expected DEG=A:B"),
+        ("30=0:9999", "within 0:"),
+        ("30=0:9", "two or more values"),
+    ],
 )
 def test_angles_that_cannot_be_are_refused(recorded, tomoskin, bend, message):
     known, out = recorded / "known.mcap", recorded / "e.npz"
-    code, _, err = tomoskin("calibrate", "bend", known, "--out", out, "--bend", bend)
+    code, _, err = tomoskin("calibrate", "body", known, "--out", out, "--bend", bend)
     assert code in (1, 2)
     assert message in err
 
@@ -140,7 +144,7 @@ def test_a_file_that_is_no_calibration_is_refused(recorded, tomoskin, lost):
 
 
 def test_a_calibration_of_another_scan_is_refused(recorded):
-    calibration = BENDS.read(recorded / "c.npz")
+    calibration = BODY.read(recorded / "c.npz")
     with pytest.raises(DataError, match="another scan"):
         calibration.check(Skin.load("textile-disc-16"))
 
@@ -148,7 +152,7 @@ def test_a_calibration_of_another_scan_is_refused(recorded):
 def test_the_live_pipeline_reads_the_bend_and_sees_no_touch_in_it(recorded):
     with SessionReader(recorded / "used.mcap") as session:
         frames = [item.frame for item in session.frames()]
-        prepared = prepare(session.skin).calibrated(BENDS.read(recorded / "c.npz"))
+        prepared = prepare(session.skin).calibrated(BODY.read(recorded / "c.npz"))
     pipeline = Pipeline(prepared)
     results = [result for frame in frames if (result := pipeline.push(frame)) is not None]
     bends = [result.bend for result in results if result.bend is not None]
@@ -157,3 +161,53 @@ def test_the_live_pipeline_reads_the_bend_and_sees_no_touch_in_it(recorded):
     late = results[-4:]
     assert not any(result.touches for result in late)
     assert any(result.touches for result in results)
+
+
+@pytest.fixture
+def bare(recorded):
+    """The known bends as voltages alone."""
+    known = read_recording(recorded / "known.mcap")
+    path = recorded / "bare.npz"
+    np.savez(
+        path, voltages=known.voltages, drive=known.drive, measure=known.measure, time_s=known.time
+    )
+    return path
+
+
+def test_without_states_the_body_has_none_with_a_unit(bare, recorded, tomoskin):
+    code, out, err = tomoskin(
+        "calibrate", "body", bare, "--skin", "textile-disc-8", "--out", recorded / "latent.npz"
+    )
+    assert code == 0, err
+    assert "no unit" in out
+    assert BODY.read(recorded / "latent.npz").model.body.names[0] == "latent 1"
+
+
+def test_states_come_from_a_table_of_an_encoder(bare, recorded, tomoskin):
+    model = BODY.read(recorded / "c.npz").model
+    table, out = recorded / "encoder.csv", recorded / "encoder.npz"
+    frames = np.searchsorted(read_recording(bare).time, model.body.time)
+    lines = [
+        f"{k},{np.degrees(a):.3f}" for k, a in zip(frames, model.body.state[:, 0], strict=True)
+    ]
+    table.write_text("\n".join(["frame,angle_deg", *lines]))
+    given = ("--skin", "textile-disc-8", "--states", table, "--out", out)
+    code, _, err = tomoskin("calibrate", "body", bare, *given)
+    assert code == 0, err
+    assert BODY.read(out).model.body.size == pytest.approx(model.body.size, abs=1e-3)
+
+
+@pytest.mark.parametrize("text", ["angle_deg\n3", "frame,angle_deg\n9999,3", "frame,a\n1,2,3"])
+def test_a_table_that_holds_no_states_is_refused(bare, recorded, tomoskin, text):
+    table = recorded / "wrong.csv"
+    table.write_text(text)
+    given = ("--skin", "textile-disc-8", "--states", table, "--out", recorded / "w.npz")
+    code, _, err = tomoskin("calibrate", "body", bare, *given)
+    assert code == 1
+    assert "expected" in err
+
+
+def test_the_older_command_names_the_new_one(bare, tomoskin):
+    code, _, err = tomoskin("calibrate", "bend", bare, "--out", "c.npz")
+    assert code == 2
+    assert "tomoskin calibrate body" in err

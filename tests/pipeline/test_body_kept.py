@@ -15,7 +15,7 @@ from tomoskin import run as room, server
 from tomoskin.cli import main
 from tomoskin.core import Frame, Mark
 from tomoskin.files.session import SessionReader, as_recorded, replayed, session_info
-from tomoskin.learning import BENDS, TOUCH, BendExamples, BendModel, BendReading, Locator
+from tomoskin.learning import BODY, TOUCH, BodyExamples, BodyModel, BodyReading, Locator
 from tomoskin.pipeline import Pipeline, prepare
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
 from tomoskin.run.recordings import PreRoll
@@ -29,9 +29,10 @@ def bending(prepared):
     angle = np.radians([0, 10, 20, 30, 20, 10, 0] * 3)
     shape = 1e-2 * random.standard_normal(rows)
     dv = angle[:, None] * shape + 1e-4 * random.standard_normal((len(angle), rows))
-    examples = BendExamples.checked(dv, angle, np.full(len(angle), 0.5), np.arange(len(angle)) / 10)
-    bends = BendModel.learn(examples, 1e-8 * np.eye(rows))
-    return prepared.calibrated(BENDS.of(bends, prepared.pattern))
+    time, axis = np.arange(len(angle)) / 10, np.full(len(angle), 0.5)
+    examples = BodyExamples.checked(dv, time, angle=angle, axis=axis)
+    bends = BodyModel.learn(examples, 1e-8 * np.eye(rows))
+    return prepared.calibrated(BODY.of(bends, prepared.pattern))
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +51,7 @@ def test_a_replay_reads_bends_and_touches_again_to_the_bit(run, bending):
         kept = as_recorded(session)
         again = list(replayed(kept, session))
         first = list(replayed(bending, session))
-    assert BENDS.name in kept.calibrations
+    assert BODY.name in kept.calibrations
     live = recorded_touches(run)
     got = {r.sequence: touches_of(r) for r in again if r.ready}
     assert len(live) > 20
@@ -68,20 +69,23 @@ def test_without_them_the_touches_would_be_others(run):
 
 
 def test_what_a_session_holds_is_said(run):
-    assert session_info(run).attached == (BENDS.attachment,)
+    assert session_info(run).attached == (BODY.attachment,)
 
 
 def test_a_recording_begun_late_begins_with_frames_of_a_straight_sheet(prepared):
     pipeline, pre_roll = Pipeline(prepared), PreRoll()
     samples = np.full(prepared.scan.n_samples, 300, dtype=np.uint16)
     result = pipeline.push(Frame(0, 0, 0.0, 1, 0, 0, samples))
-    bent = BendReading(0.5, 0.01, 0.0, "bend", np.zeros(prepared.pattern.n_meas))
+    bent = BodyReading(
+        names=("angle",), values=np.array([0.5]), deviations=np.array([0.01]), angle=0.5, sd=0.01,
+        axis=0.0, state="bend", moved=np.zeros(prepared.pattern.n_meas),
+    )  # fmt: skip
     states = {"idle": replace(bent, angle=0.0, state="idle"), "bend": bent}
     for number in range(300):
         state = "bend" if number > 200 else "idle"
         frame = Frame(number, number, 0.01 * number, 1, 0, 0, samples)
         pre_roll.frame(frame, Mark.NONE if number else Mark.REFERENCE, 0)
-        readings = {BENDS.name: states[state]}
+        readings = {BODY.name: states[state]}
         pre_roll.result(replace(result, ready=True, has_image=True, readings=readings))
     frames, _, again = pre_roll.begin(0)
     assert again

@@ -1,1 +1,0 @@
-"""Bends told apart from touches: their directions in the data, their angle, their references."""
