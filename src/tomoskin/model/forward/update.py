@@ -22,7 +22,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from tomoskin.core import IntArray, ModelError
 from tomoskin.model.forward.arguments import Touch, Touches
@@ -51,6 +51,11 @@ class LocalUpdate:
     def __init__(self, base: Solution) -> None:
         self._base, self._model, self._conductivity = base, base.model, base.conductivity
         self._stored = np.zeros(base.model.assembly.n_points, dtype=bool)
+
+    def voltages(self, cells: ArrayLike, conductivity: ArrayLike) -> NDArray[Any]:
+        """(n_meas,) V with ``cells`` (n,) changed to ``conductivity`` (n,), as
+        :meth:`voltages_of` has those of many touches."""
+        return np.asarray(self.voltages_of([(cells, conductivity)])[0])
 
     def transfer_resistances_of(self, touches: Sequence[Touch]) -> NDArray[Any]:
         """(n_touches, n_electrodes, n_electrodes) Ω of touches, each alone: ``cells`` (n,) changed
