@@ -204,7 +204,7 @@ def _rows(
     ) as (link, _):
         while len(frames) < count:
             frames += [item for item in link.poll(0.05) if isinstance(item, Frame)]
-        mode = link.configuration.mode
+        mode = link.session.configuration.mode
     samples = np.array([frame.samples for frame in frames[:count]], dtype=float)
     last, first = frames[count - 1], frames[0]
     rate = (last.sequence - first.sequence) / ((last.ticks - first.ticks) / TICKS)

@@ -36,7 +36,7 @@ def machine() -> dict[str, str]:
         "numpy": np.__version__,
         "scipy": scipy.__version__,
         "engine": engine.name,
-        "vectors": engine.vectors,
+        "vectors": "those of scipy's build" if engine.core is None else engine.core.vector_code,
     }
 
 

@@ -122,13 +122,14 @@ def test_the_twin_is_the_third_board() -> None:
             frames = frames_of(link, 20)
             volts.append(np.mean([readout(frame).values for frame in frames], axis=0))
     assert volts[1] == pytest.approx(volts[0], abs=1e-4)
-    assert link.info is not None
-    assert link.board is not None
-    assert (link.info.channels, link.info.adc_bits, link.info.max_samples) == (24, 11, 900)
-    assert link.board.text == "Third board"
+    info, board = link.session.info, link.session.board
+    assert info is not None
+    assert board is not None
+    assert (info.channels, info.adc_bits, info.max_samples) == (24, 11, 900)
+    assert board.text == "Third board"
     conversions = scan.n_samples * (settings.oversampling // 2 + 1)
     seconds = len(scan.drives) * (settings.settling + settings.dead_time) + 2e-6 * conversions
-    assert link.configuration.scan_time == pytest.approx(seconds)
+    assert link.session.configuration.scan_time == pytest.approx(seconds)
     assert frames[9].ticks - frames[8].ticks == pytest.approx(1e6 * seconds, abs=1)
 
 

@@ -64,8 +64,8 @@ def test_handshake_scan_and_values(board):
     transport = port.open_serial(board.path, None)
     with Link(transport, SCAN, SETTINGS) as link:
         frames, events = frames_of(link, 50)
-        assert link.info.unique_id == b"host\0\0\0\0"
-        assert link.info.channels == 16
+        assert link.session.info.unique_id == b"host\0\0\0\0"
+        assert link.session.info.channels == 16
         assert link.counters.corrupt == 0
         # a host that sleeps for long leaves no room on the pty: the board says what it drops
         assert link.frames.lost == frames[-1].drops

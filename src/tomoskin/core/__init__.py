@@ -16,6 +16,7 @@ from tomoskin.core.errors import (
     SourceError as SourceError,
     TomoskinError as TomoskinError,
     WireError as WireError,
+    check_positive as check_positive,
     meant as meant,
     meant_or_known as meant_or_known,
     no_such as no_such,

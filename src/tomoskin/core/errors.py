@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from difflib import get_close_matches
 from typing import TypeVar
@@ -101,3 +102,11 @@ class SourceError(TomoskinError):
 
 class SinkError(TomoskinError):
     """A sink of results that cannot be opened, or that went away."""
+
+
+def check_positive(
+    value: float, what: str, error: type[TomoskinError] = ModelError, unit: str = ""
+) -> None:
+    """Raise an ``error`` unless ``value`` is a finite number above 0 of that ``unit``."""
+    if not 0 < value < math.inf:
+        raise error(f"expected {what} above 0{unit}, got {value}")

@@ -9,12 +9,13 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import IntFlag
+from functools import cached_property
 from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core.errors import DataError, ModelError
+from tomoskin.core.errors import DataError, check_positive
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -214,8 +215,7 @@ class Image:
         """
         if self.unit == "relative":
             return self
-        if not (np.isfinite(conductivity) and conductivity > 0):
-            raise ModelError(f"expected a conductivity above 0, got {conductivity}")
+        check_positive(conductivity, "a conductivity")
         return Image(self.values / conductivity, "relative", self.mesh_id)
 
     def on_pixels(self, pixels: PixelMap) -> FloatArray:
@@ -237,23 +237,16 @@ class Image:
 class DeferredImage(Image):
     """An image whose values are computed when they are first asked for, in the thread that asks."""
 
-    __slots__ = ("_made", "_make")
-    _make: Callable[[], FloatArray]
-    _made: FloatArray | None
-
     def __init__(self, make: Callable[[], FloatArray], unit: str, mesh_id: str) -> None:
         """``make`` returns the values, always the same."""
-        for name, value in {"_make": make, "unit": unit, "mesh_id": mesh_id}.items():
+        vars(self)["_make"] = make
+        for name, value in {"unit": unit, "mesh_id": mesh_id}.items():
             object.__setattr__(self, name, value)
-        object.__setattr__(self, "_made", None)
 
-    @property
+    @cached_property
     def values(self) -> FloatArray:
         """(n_cells,) see :class:`Image`."""
-        made = self._made
-        if made is None:
-            made = self._make()
-            object.__setattr__(self, "_made", made)
+        made: FloatArray = vars(self)["_make"]()
         return made
 
     def __reduce__(self) -> tuple[type[Image], tuple[FloatArray, str, str]]:

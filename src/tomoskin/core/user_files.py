@@ -9,7 +9,7 @@ import os
 import secrets
 import stat
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
@@ -27,6 +27,8 @@ RECORDING = {".mcap": "a recording"}
 """The one ending of session files, which are never written over."""
 
 _ELSE = "choose another name"
+
+_SPACE = "check that the disk is connected and has space"
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,26 +185,22 @@ def _is_recording(path: Path) -> bool:
 
 
 @contextmanager
-def read_refusals(path: StrPath, kind: type[TomoskinError] = DataError) -> Iterator[None]:
+def disk_refusals(
+    path: StrPath, kind: type[TomoskinError] = DataError, done: str = "written", hint: str = _SPACE
+) -> Iterator[None]:
+    """What the disk refuses in the block is an error of that ``kind`` that names ``path``."""
+    try:
+        yield
+    except OSError as error:
+        reason = f"cannot be {done}: {error.strerror or error}"
+        raise kind(reason, where=str(path), hint=hint) from error
+
+
+def read_refusals(
+    path: StrPath, kind: type[TomoskinError] = DataError
+) -> AbstractContextManager[None]:
     """What the disk refuses to read in the block is an error of that ``kind``."""
-    try:
-        yield
-    except OSError as error:
-        reason = error.strerror or error
-        raise kind(f"cannot be read: {reason}", where=str(path)[:80]) from error
-
-
-@contextmanager
-def disk_refusals(path: StrPath) -> Iterator[None]:
-    """What the disk refuses in the block is a DataError that names ``path``."""
-    try:
-        yield
-    except OSError as error:
-        raise DataError(
-            f"cannot be written: {error.strerror or error}",
-            where=str(path),
-            hint="check that the disk is connected and has space",
-        ) from error
+    return disk_refusals(str(path)[:80], kind, "read", hint="")
 
 
 @contextmanager

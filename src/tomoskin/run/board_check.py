@@ -152,7 +152,7 @@ def _measure(
     shape = scan.drives.shape[0], -1
     mean = samples.mean(axis=0).reshape(shape) / settings.oversampling
     sd = samples.std(axis=0, ddof=1).reshape(shape) / np.sqrt(settings.oversampling)
-    return _Readings(mean, sd, info, link.board)
+    return _Readings(mean, sd, info, link.session.board)
 
 
 _PATIENCE = 60.0

@@ -135,8 +135,9 @@ class Flow:
         """What one read of the link brought: frames, drives of the next one, and events."""
         intake, out = self.intake, self.out
         frames = intake.take(link, items, self._clock())
-        if link.info is not self.board:
-            self._note_board(link.info, link.board.text if link.board else "")
+        info, board = link.session.info, link.session.board
+        if info is not self.board:
+            self._note_board(info, board.text if board else "")
         if items:
             for event in intake.repeats.push(items[-1].host_time, items):
                 out.put(event)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import astuple, dataclass, replace
+from dataclasses import astuple, dataclass, fields, replace
 from typing import Self
 
 from tomoskin.board import wire
@@ -98,7 +98,7 @@ class Board:
             "oversampling": 1 <= command.oversampling <= self.max_oversampling,
             "prescaler": command.prescaler in PRESCALERS,
         }
-        names = [field.name for field in wire.SCHEMA.by_name["SET_SCAN"].fields]
+        names = [field.name for field in fields(wire.SetScan)]
         wrong = next((name for name, fine in good.items() if not fine), None)
         return OK if wrong is None else (wire.Result.BAD_VALUE, names.index(wrong))
 

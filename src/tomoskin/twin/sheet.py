@@ -102,7 +102,8 @@ class _Network:
         if sigma.ndim == 1:
             cells = np.flatnonzero(sigma != self.base.conductivity)
             if 0 < len(cells) <= _FEW * len(sigma):
-                return self.base.local.transfer_resistance(cells, sigma[cells])
+                (changed,) = self.base.local.transfer_resistances_of([(cells, sigma[cells])])
+                return np.asarray(changed)
         return np.asarray(self._terminals.transfer_resistance(sigma))
 
 

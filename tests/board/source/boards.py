@@ -180,7 +180,7 @@ def frame_of(link, sequence, samples=None, configuration=None):
         sequence,
         0,
         0.0,
-        link.configuration.identity if configuration is None else configuration,
+        link.session.configuration.identity if configuration is None else configuration,
         0,
         0,
         counts,

@@ -51,8 +51,8 @@ def test_the_mode_is_set_and_read_back_before_start(clock):
     ]
     mode = next(command for command in board.commands if isinstance(command, SetMode))
     assert (mode.mode, mode.frequency, mode.periods) == (DriveMode.CHOPPED, 500, 1)
-    assert mode.configuration == link.configuration.identity
-    assert link.board.text == "simulated board"
+    assert mode.configuration == link.session.configuration.identity
+    assert link.session.board.text == "simulated board"
 
 
 def test_a_board_that_holds_another_mode_is_refused(clock):
@@ -87,7 +87,7 @@ def test_an_older_board_is_set_up_in_its_own_words_or_refused(clock, minor):
     link = linked(direct, clock)
     link.connect()
     assert not {"GetBoard", "SetMode", "GetMode"} & set(direct.names)
-    assert link.board is None
+    assert link.session.board is None
     with pytest.raises(SourceError, match=rf"from protocol 1.2 on; this one speaks 1.{minor}"):
         linked(board(), clock, chop_frequency=500).connect()
 

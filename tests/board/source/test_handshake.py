@@ -54,7 +54,7 @@ def test_the_order_of_the_handshake(clock):
         scan.configuration
         == pattern.configuration
         == start.configuration
-        == link.configuration.identity
+        == link.session.configuration.identity
     )
     assert (scan.n_drives, scan.settling, scan.dead_time) == (8, 200, 5)
     assert (scan.oversampling, scan.prescaler, scan.current_limit) == (4, 64, 100_000)

@@ -92,7 +92,7 @@ def test_the_first_frames_count_too(link, board):
 
 def test_the_sequence_wraps(link, board):
     top = 2**32 - 1
-    link._session.frames._expected = top
+    link.session.frames._expected = top
     board.say(frame_of(link, top), frame_of(link, 0), frame_of(link, 1))
     items = drain(link, board)
     assert len(frames(items)) == 3
@@ -110,7 +110,8 @@ def test_frames_behind_the_sequence_are_stale(link, board):
 def test_foreign_frames_never_pass_and_are_said_once(link, board, kind):
     if kind == "configuration":
         foreign = [
-            frame_of(link, n, configuration=link.configuration.identity ^ 1) for n in range(5)
+            frame_of(link, n, configuration=link.session.configuration.identity ^ 1)
+            for n in range(5)
         ]
     else:
         foreign = [frame_of(link, n, samples=np.zeros(47, np.uint16)) for n in range(5)]

@@ -85,7 +85,7 @@ def test_a_board_that_is_reset_after_that_is_found_again(clock: ManualClock) -> 
     board.limit = RATES[0]
     for _ in range(1000):
         link.poll(0.05)
-        if board.rate == RATES[0] and link.running and not link._session.is_silent:
+        if board.rate == RATES[0] and link.running and not link.session.is_silent:
             break
     assert frames(scan(link, board, 100))
     assert board.rate == board.board_rate == RATES[0]

@@ -20,9 +20,9 @@ def _field(field):
             Drive, st.integers(0, 255), st.integers(0, 255), st.integers(0, 2**32 - 1)
         )
         return st.lists(drive, max_size=9).map(tuple)
-    if field.is_tail and field.item == "u8":
+    if not field.length and field.item == "u8":
         return st.binary(max_size=55)
-    if field.is_tail:
+    if not field.length:
         counts = st.integers(0, 65535) | st.sampled_from([0, 1, 255, 256])
         return st.lists(counts, max_size=300).map(lambda c: np.array(c, dtype=np.uint16))
     if field.length > 1:

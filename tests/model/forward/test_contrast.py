@@ -70,7 +70,7 @@ def test_an_island_of_another_conductivity(island: str) -> None:
         exact = sixty_digits.voltages(MESH, PATTERN, sigma, Z)
         answers = [
             right_or_refused(lambda s=sigma: model.solve(s).voltages, exact),
-            right_or_refused(lambda s=sigma: local.voltages(cells, s[cells]), exact),
+            right_or_refused(lambda s=sigma: local.voltages_of([(cells, s[cells])])[0], exact),
         ]
         if 1e-6 < factor < 1e6:
             assert all(answers), "a contrast that occurs must be solved"
@@ -107,8 +107,8 @@ def test_voltages_that_are_zero_by_symmetry_are_no_lost_digits() -> None:
     pattern = Pattern.from_tables([[0, 2], [1, 3]], [[1, 3], [0, 2]])
     state = ForwardModel(square, pattern, 0.01).at(1.0)
     assert np.abs(state.voltages).max() < 1e-12
-    assert state.local.voltages([0], [1.0]) == pytest.approx(0.0, abs=1e-12)
-    changed = state.local.voltages([100], [3.0])
+    assert state.local.voltages_of([([0], [1.0])])[0] == pytest.approx(0.0, abs=1e-12)
+    changed = state.local.voltages_of([([100], [3.0])])[0]
     assert changed == pytest.approx(
         state.model.solve(np.where(np.arange(800) == 100, 3.0, 1.0)).voltages, rel=1e-9
     )

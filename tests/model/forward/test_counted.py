@@ -96,10 +96,10 @@ def test_touches_beyond_the_first_solve_nothing_on_the_sheet(model) -> None:
     """The local update works in the patch: its columns are solved once for all touches of it."""
     local = model.at(1.0).local
     cells = np.arange(12)
-    local.voltages(cells, np.full(12, 0.8))
+    local.voltages_of([(cells, np.full(12, 0.8))])
     once = Counter(model.engine.asked)
     for value in (0.7, 0.6, 0.5):
-        local.voltages(cells, np.full(12, value))
+        local.voltages_of([(cells, np.full(12, value))])
     assert model.engine.asked == once
     assert once["factorise"] == 1
 

@@ -20,7 +20,6 @@ from tomoskin.model.mesh import (
     FacePatch,
     Mesh,
     Outline,
-    Patch,
     Polygon,
     Rectangle,
     WallPatch,
@@ -29,7 +28,7 @@ from tomoskin.model.mesh import (
     simplex_measure,
     triangulate,
 )
-from tomoskin.model.mesh.extrude import Body
+from tomoskin.model.mesh.extrude import Body, Patch
 from tomoskin.model.pattern import Pattern
 
 HEIGHT = 0.04

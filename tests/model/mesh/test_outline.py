@@ -107,7 +107,7 @@ def test_round_ellipse_is_a_disc() -> None:
 
 def test_rectangle_is_centred_and_begins_lower_left() -> None:
     sheet = Rectangle(0.2, 0.1)
-    assert (sheet.width, sheet.height) == (0.2, 0.1)
+    assert np.ptp(sheet.vertices, axis=0).tolist() == pytest.approx([0.2, 0.1])
     assert sheet.point(0.0)[0] == pytest.approx([-0.1, -0.05])
     assert sheet.point(0.2)[0] == pytest.approx([0.1, -0.05])
     assert sheet.centre == pytest.approx([0, 0], abs=1e-15)

@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given, strategies as st
 
 from tomoskin.core import PatternError
-from tomoskin.model.pattern import NAMED, Pattern, named
+from tomoskin.model.pattern import Pattern, named
+from tomoskin.model.pattern.pattern import NAMED
 
 counts = st.integers(4, 24)
 

@@ -15,7 +15,8 @@ from tomoskin.core import FloatArray, ModelError
 from tomoskin.imaging import LinearProblem, OneStep
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.pattern import Pattern
-from tomoskin.model.prior import PRIORS, Matern, Penalty, Structural, dense_penalty, sparse_penalty
+from tomoskin.model.prior import PRIORS, Matern, Penalty, Structural
+from tomoskin.model.prior.penalty import dense_penalty, sparse_penalty
 
 MODEL = ForwardModel(disc(8), Pattern.adjacent(8), 0.01)
 FORMS: dict[str, Any] = {"dense": lambda q: q, "sparse": csr_array}

@@ -19,10 +19,10 @@ from tomoskin.model.prior import (
     Laplace,
     Matern,
     Noser,
-    Prior,
     Structural,
     penalty_of,
 )
+from tomoskin.model.prior.priors import Prior
 from tomoskin.model.skin import Skin
 
 

@@ -61,7 +61,7 @@ def test_ellipse_and_rectangle() -> None:
     assert Skin.from_toml(ellipse).outline == Ellipse(0.1, 0.05)
     sheet = Skin.from_toml(ellipse.replace("ellipse", "rectangle")).outline
     assert isinstance(sheet, Rectangle)
-    assert (sheet.width, sheet.height) == (0.2, 0.1)
+    assert np.ptp(sheet.vertices, axis=0).tolist() == pytest.approx([0.2, 0.1])
 
 
 def test_polygon_with_electrodes_one_by_one() -> None:

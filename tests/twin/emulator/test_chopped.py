@@ -176,10 +176,10 @@ def examine(board: Powered) -> None:
         while len(frames) < 12:
             assert time.monotonic() < end
             frames += [item for item in link.poll(0.05) if isinstance(item, Frame)]
-        info = link.info
+        info = link.session.info
         assert info is not None
-        assert link.board is not None
-        assert link.board.text == kind.text
+        assert link.session.board is not None
+        assert link.session.board.text == kind.text
     ahead, back = analytic(kind, kind.settings.oversampling // 2)
     for number, frame in enumerate(frames[:12]):
         assert frame.sequence == number

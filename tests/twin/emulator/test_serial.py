@@ -51,11 +51,11 @@ def test_opening_the_port_resets_the_board_each_time(programs: Programs, tmp_pat
         for opened in (1, 2):
             with Link(SerialTransport(board.path), SCAN, SETTINGS) as link:
                 frames = frames_of(link, 3)
-                assert link.info is not None
-                assert link.info.reset is Reset.EXTERNAL
+                assert link.session.info is not None
+                assert link.session.info.reset is Reset.EXTERNAL
                 assert [frame.sequence for frame in frames[:3]] == [0, 1, 2]
                 # HELLO was awaited: what the bootloader swallows would have been asked again
-                assert link._session.commands._request == 9
+                assert link.session.commands._request == 9
             seen = Watch.read(watch)
             assert seen.resets == opened
             while Watch.read(watch).cycle < seen.cycle + 0.01 * CLOCK:

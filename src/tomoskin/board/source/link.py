@@ -10,9 +10,9 @@ from contextlib import AbstractContextManager
 from tomoskin.board.source.agreement import Rated, RateFollower
 from tomoskin.board.source.clock import ClockWatch
 from tomoskin.board.source.protocol_session import ProtocolSession, Received, Stage
-from tomoskin.board.source.settings import Configuration, ScanSettings, Timing
+from tomoskin.board.source.settings import ScanSettings, Timing
 from tomoskin.board.source.transport import Diagnosable, Played, Transport
-from tomoskin.board.wire import Ack, BoardLimits, Decoder, Info, Stop
+from tomoskin.board.wire import Ack, Decoder, Info, Stop
 from tomoskin.core import Frame, SourceError
 from tomoskin.model.pattern import Scan
 
@@ -28,6 +28,8 @@ class Link(AbstractContextManager["Link"]):
 
     Attributes
     ----------
+    session
+        The protocol session: what it says of the board, and of the scan as the board does it.
     diagnosis
         Why no board answers, once it should have; None where it does, or nobody can tell.
     counters, frames
@@ -57,8 +59,8 @@ class Link(AbstractContextManager["Link"]):
         self._timing = timing or Timing()
         self._decoder = Decoder()
         self._rate = RateFollower(transport) if isinstance(transport, Rated) else None
-        self._session = ProtocolSession(scan, settings, self._timing, self._clock(), transport.name)
-        self.counters, self.frames = self._decoder.counters, self._session.frames.counters
+        self.session = ProtocolSession(scan, settings, self._timing, self._clock(), transport.name)
+        self.counters, self.frames = self._decoder.counters, self.session.frames.counters
         self._watch = ClockWatch()
         self._closed = False
         self._heard = b""
@@ -67,22 +69,7 @@ class Link(AbstractContextManager["Link"]):
     @property
     def running(self) -> bool:
         """Whether the board scans for this link."""
-        return self._session.stage is Stage.RUNNING
-
-    @property
-    def info(self) -> Info | None:
-        """What the board said of itself, once it has."""
-        return self._session.info
-
-    @property
-    def board(self) -> BoardLimits | None:
-        """The board's name and bounds, once it has said them; None before protocol 1.2."""
-        return self._session.board
-
-    @property
-    def configuration(self) -> Configuration:
-        """What this scan asks of the board, fitted to the board once that is known."""
-        return self._session.configuration
+        return self.session.stage is Stage.RUNNING
 
     @property
     def waited(self) -> float:
@@ -102,26 +89,26 @@ class Link(AbstractContextManager["Link"]):
         """
         now = self._clock()
         try:
-            items = self._session.tick(now)
+            items = self.session.tick(now)
         except SourceError as error:
             raise self.diagnosis or error from None
         if self.counters.messages:
             self.diagnosis = None
         elif (
             self.diagnosis is None
-            and self._session.stage is Stage.SETTING_UP
+            and self.session.stage is Stage.SETTING_UP
             and isinstance(self.transport, Diagnosable)
         ):
             self.diagnosis = self.transport.diagnose(self._heard)
         self._flush()
-        patience = min(timeout, self._session.deadline() - now)
+        patience = min(timeout, self.session.deadline() - now)
         items += self._listen(max(patience, 0.0))
         return items
 
     def keep_alive(self) -> None:
         """Let the board know that the host is there, while :meth:`poll` is not called for long."""
         if self.running:
-            self._session.commands.keep_alive(self._clock())
+            self.session.commands.keep_alive(self._clock())
         with contextlib.suppress(SourceError):  # gone: the next poll says so
             self._flush()
 
@@ -129,8 +116,8 @@ class Link(AbstractContextManager["Link"]):
         """Poll until the board scans; what it said of itself. Raises as :meth:`poll` does."""
         while not self.running:
             self.poll(self._timing.answer)
-        assert self.info is not None
-        return self.info
+        assert self.session.info is not None
+        return self.session.info
 
     def close(self) -> None:
         """Stop the board, as far as it can still be reached, and give the transport back."""
@@ -145,9 +132,9 @@ class Link(AbstractContextManager["Link"]):
     def stop(self) -> None:
         """Stop the board, as far as it can still be reached; the transport stays open."""
         with contextlib.suppress(SourceError):  # gone already: its heartbeat stops it
-            self._session.frames.close()
-            self._session.commands.clear()
-            request = self._session.commands.send(Stop(0), self._clock())
+            self.session.frames.close()
+            self.session.commands.clear()
+            request = self.session.commands.send(Stop(0), self._clock())
             self._flush()
             end = self._clock() + self._timing.goodbye
             while (now := self._clock()) < end:
@@ -168,23 +155,23 @@ class Link(AbstractContextManager["Link"]):
             self._heard = (self._heard + data)[:_HEARD]
         if data and self._played and self._played.after_seek():
             self._decoder.forget()
-            self._session.frames.expect_any()
-            self._session.drives.forget()
+            self.session.frames.expect_any()
+            self.session.drives.forget()
         items = []
         for message in self._decoder.feed(data, now):
-            items += self._session.receive(message, now)
-        if (info := self._session.info) is not None:
+            items += self.session.receive(message, now)
+        if (info := self.session.info) is not None:
             frames = [item for item in items if isinstance(item, Frame)]
             doubts = [self._watch.push(frame, info.tick_rate) for frame in frames]
             items += filter(None, doubts)
         if self._rate:
-            self._rate.follow(self._session.commands.take_rate(), silent=self._session.is_silent)
+            self._rate.follow(self.session.commands.take_rate(), silent=self.session.is_silent)
             slower = self._rate.slower(self.counters, running=self.running)
-            items += [] if slower is None else [self._session.fall_back(slower, now)]
+            items += [] if slower is None else [self.session.fall_back(slower, now)]
         self._flush()
         return items
 
     def _flush(self) -> None:
-        data = self._session.commands.take()
+        data = self.session.commands.take()
         if data:
             self.transport.write(data)

@@ -39,8 +39,8 @@ class _Layout:
 
     @classmethod
     def of(cls, spec: MessageSpec) -> _Layout:
-        fixed = [field for field in spec.fields if not field.is_tail]
-        tail = next((field for field in spec.fields if field.is_tail), None)
+        fixed = [field for field in spec.fields if field.length]
+        tail = next((field for field in spec.fields if not field.length), None)
         enums = (
             (number, ENUMS[field.enum])
             for number, field in enumerate(fixed, start=1)

@@ -7,7 +7,6 @@ import json
 import re
 import struct
 import tomllib
-from functools import cached_property
 from importlib.resources import files
 from typing import Any, Literal, Self
 
@@ -36,11 +35,6 @@ class FieldSpec(msgspec.Struct, frozen=True, rename={"type_name": "type"}):
         """1 for a scalar, n for a fixed array, 0 for one that fills the payload."""
         array = re.search(r"\[(\d*)\]$", self.type_name)
         return int(array[1] or 0) if array else 1
-
-    @property
-    def is_tail(self) -> bool:
-        """Whether the field fills the rest of the payload."""
-        return self.length == 0
 
     @property
     def size(self) -> int:
@@ -89,21 +83,22 @@ class MessageSpec(msgspec.Struct, frozen=True):
         return self.direction == "to_device"
 
 
-class _Protocol(msgspec.Struct, frozen=True):
-    name: str
-    major: int
-    minor: int
+_LIMITS = {"to_device_bytes": "to_device", "from_device_bytes": "from_device"}
 
 
-class Schema(msgspec.Struct, frozen=True, dict=True):
+class Schema(msgspec.Struct, frozen=True, rename=_LIMITS):
     """Everything that board and host must agree on.
 
-    ``limits`` are the largest payload and checksum together, by direction, in bytes; ``hash`` is a
-    u32 over everything but the sentences, which board and host compare.
+    Boards and hosts of another ``major`` version do not understand each other; a host understands
+    boards of its own and of older ``minor`` versions. The bytes are the largest payload and
+    checksum together, by direction; ``hash`` is a u32 over everything but the sentences, which
+    board and host compare.
     """
 
-    protocol: _Protocol
-    limits: dict[Literal["to_device", "from_device"], int]
+    major: int
+    minor: int
+    to_device_bytes: int
+    from_device_bytes: int
     enums: dict[str, EnumSpec]
     structs: dict[str, StructSpec]
     messages: tuple[MessageSpec, ...]
@@ -113,32 +108,7 @@ class Schema(msgspec.Struct, frozen=True, dict=True):
     def read(cls, text: str) -> Self:
         """Read the text of a schema file."""
         raw = tomllib.loads(text)
-        return msgspec.convert(raw | {"hash": _hash(raw)}, cls)
-
-    @property
-    def major(self) -> int:
-        """Boards and hosts of another major version do not understand each other."""
-        return self.protocol.major
-
-    @property
-    def minor(self) -> int:
-        """A host understands boards of its own and of older minor versions."""
-        return self.protocol.minor
-
-    @property
-    def to_device_bytes(self) -> int:
-        """The most that a board takes."""
-        return self.limits["to_device"]
-
-    @property
-    def from_device_bytes(self) -> int:
-        """The most that a board sends."""
-        return self.limits["from_device"]
-
-    @cached_property
-    def by_name(self) -> dict[str, MessageSpec]:
-        """The messages of the schema by their names."""
-        return {message.name: message for message in self.messages}
+        return msgspec.convert(raw | raw["protocol"] | raw["limits"] | {"hash": _hash(raw)}, cls)
 
 
 def _hash(raw: dict[str, Any]) -> int:

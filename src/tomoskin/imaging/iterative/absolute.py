@@ -3,13 +3,13 @@ difference imaging with a sharp prior: total variation or L1."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tomoskin.core import FloatArray, Image, ModelError
+from tomoskin.core import FloatArray, Image, ModelError, check_positive
 from tomoskin.imaging.iterative.newton import Descent, Goal, descend
 from tomoskin.imaging.iterative.unknowns import (
     Contacts,
@@ -87,6 +87,7 @@ class Absolute:
         return f"{self.descent}; misfit {self.misfit:.4g} of {self.n_values} values"
 
 
+@dataclass(frozen=True, eq=False)
 class AbsoluteImaging:
     """Iterative Gauss–Newton in the logarithm of the conductivity, so that it stays positive.
 
@@ -114,24 +115,17 @@ class AbsoluteImaging:
         For alpha ≤ 0, a prior that does not fit, or complex contact impedances.
     """
 
-    def __init__(
-        self,
-        model: ForwardModel,
-        prior: PriorLike = "laplace",
-        *,
-        alpha: float,
-        contacts: Contacts = "fixed",
-        steps: int = STEPS,
-        tolerance: float = TOLERANCE,
-    ) -> None:
-        if not (np.isfinite(alpha) and alpha > 0):
-            raise ModelError(f"expected alpha above 0, got {alpha}")
-        self.model = model
-        self.prior = prior
-        self.alpha = alpha
-        self.contacts = contacts
-        self.steps = steps
-        self.tolerance = tolerance
+    model: ForwardModel
+    prior: PriorLike = "laplace"
+    _: KW_ONLY
+    alpha: float
+    contacts: Contacts = "fixed"
+    steps: int = STEPS
+    tolerance: float = TOLERANCE
+
+    def __post_init__(self) -> None:
+        """Refuse an impossible alpha."""
+        check_positive(self.alpha, "alpha")
 
     def __call__(self, observation: Observation, background: float | None = None) -> Absolute:
         """Conductivity that explains ``observation``.
@@ -310,8 +304,8 @@ class SharpDifference:
         alpha: float | None = None,
         conductivity: ArrayLike = 1.0,
     ) -> None:
-        if alpha is not None and not (np.isfinite(alpha) and alpha > 0):
-            raise ModelError(f"expected alpha above 0, got {alpha}")
+        if alpha is not None:
+            check_positive(alpha, "alpha")
         state = model.at(conductivity)
         if state.conductivity.ndim > 1 or np.iscomplexobj(state.conductivity):
             raise ModelError(

@@ -123,10 +123,8 @@ def descend(
         gain = 1.0 - step.objective / steps[-1].objective
         steps.append(step)
         if gain < tolerance:
-            reason, converged = (
-                (f"the last step lowered the objective by {gain:.1e} of its value"),
-                True,
-            )
+            reason = f"the last step lowered the objective by {gain:.1e} of its value"
+            converged = True
             break
     return Descent(here.unknowns, here.force, (*begin.steps, *steps), reason, converged)
 

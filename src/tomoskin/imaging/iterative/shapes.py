@@ -19,7 +19,7 @@ from scipy.linalg import solve_triangular
 from scipy.spatial.distance import cdist
 from scipy.special import expit, ndtr
 
-from tomoskin.core import FloatArray, IntArray, ModelError
+from tomoskin.core import FloatArray, IntArray, ModelError, check_positive
 from tomoskin.imaging.iterative.absolute import Absolute, medium
 from tomoskin.imaging.iterative.newton import Goal, descend
 from tomoskin.imaging.iterative.unknowns import (
@@ -276,8 +276,7 @@ class ShapeImaging:
     ) -> None:
         if not (np.isfinite(contrast) and contrast > 1):
             raise ModelError(f"expected a contrast above 1, got {contrast}")
-        if not (np.isfinite(drift) and drift > 0):
-            raise ModelError(f"expected a drift above 0, got {drift}")
+        check_positive(drift, "a drift")
         if not (len(softness) and np.isfinite(softness).all() and min(softness) > 0):
             raise ModelError(f"expected softness above 0, step by step, got {list(softness)}")
         self.model = model

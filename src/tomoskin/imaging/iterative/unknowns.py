@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array, eye_array
 
-from tomoskin.core import DataError, FloatArray, ModelError, numeric, refuse_first
+from tomoskin.core import DataError, FloatArray, ModelError, check_positive, numeric, refuse_first
 from tomoskin.model.forward import ForwardModel, State
 from tomoskin.model.prior import Carried, Diagonal, Penalty
 
@@ -195,8 +195,7 @@ class Unknowns:
 
     def __post_init__(self) -> None:
         """Refuse what has no logarithm."""
-        if not (np.isfinite(self.background) and self.background > 0):
-            raise ModelError(f"expected a background above 0, got {self.background}")
+        check_positive(self.background, "a background")
         if np.iscomplexobj(self.model.contact_impedance):
             raise ModelError("expected real contact impedances, got complex ones")
         if self.contacts not in ("fixed", "one", "each"):

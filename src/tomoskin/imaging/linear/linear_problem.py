@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
-from tomoskin.core import DataError, FloatArray, ModelError, refuse_first
+from tomoskin.core import DataError, FloatArray, ModelError, check_positive, refuse_first
 from tomoskin.imaging.linear.operator import Operator
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.pattern import Pattern
@@ -131,8 +131,7 @@ class LinearProblem:
         ModelError
             When alpha is not above 0, or so small that the system is singular.
         """
-        if not (np.isfinite(alpha) and alpha > 0):
-            raise ModelError(f"expected alpha above 0, got {alpha}")
+        check_positive(alpha, "alpha")
         spread, gram = self.carried
         system = gram.copy()
         system[np.diag_indices_from(system)] += alpha**2 / self.weights

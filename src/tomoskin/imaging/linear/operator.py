@@ -19,59 +19,6 @@ MOST_EXCLUDED = 0.25
 """Above this fraction of excluded measurements a frame gives no image: mostly prior."""
 
 
-def expected(
-    dv: NDArray[Any],
-    missing: NDArray[np.bool_],
-    ignored: NDArray[np.bool_],
-    precision: NDArray[Any],
-) -> NDArray[Any]:
-    """Difference data with the missing rows as the others lead one to expect them.
-
-    Parameters
-    ----------
-    dv
-        (n_meas,) difference data; what stands in missing rows is not used.
-    missing
-        (n_meas,) bool.
-    ignored
-        (n_meas,) bool: rows that the operator excludes itself.
-    precision
-        (n_meas, n_meas) P.
-    """
-    if not missing.any():
-        return dv
-    kept = ~(missing | ignored)
-    filled = dv.copy()
-    filled[missing] = -_solved(precision, missing, precision[np.ix_(missing, kept)] @ dv[kept])
-    return filled
-
-
-def downdated(
-    matrix: NDArray[Any],
-    precision: NDArray[Any],
-    lost: NDArray[np.bool_],
-    excluded: NDArray[np.bool_],
-) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Matrix and precision without the ``lost`` rows, zero in all that are ``excluded``."""
-    replaced = _solved(precision, lost, precision[lost])
-    smaller = matrix - matrix[:, lost] @ replaced
-    smaller[:, excluded] = 0.0
-    inner = precision - precision[:, lost] @ replaced
-    inner[excluded] = 0.0
-    inner[:, excluded] = 0.0
-    return smaller, inner
-
-
-def _solved(precision: NDArray[Any], missing: NDArray[np.bool_], rhs: NDArray[Any]) -> NDArray[Any]:
-    block = precision[np.ix_(missing, missing)]
-    try:
-        return np.asarray(cho_solve(cho_factor(block, check_finite=False), rhs))
-    except LinAlgError as error:
-        raise DataError(
-            f"too few rows remain without rows {np.flatnonzero(missing).tolist()}",
-        ) from error
-
-
 class Operator:
     """Difference data of one pattern → image on one mesh. Made once; it does not change.
 
@@ -158,7 +105,7 @@ class Operator:
         n = self.matrix.shape[1]
         if dv.ndim not in (1, 2) or dv.shape[-1] != n:
             raise DataError(f"expected difference data of shape ({n},), got {dv.shape}")
-        counted = np.where(self.left_out, 0.0, dv) if self._leaves_out else dv
+        counted = np.where(self.left_out, 0.0, dv) if self.left_out.any() else dv
         finite = np.isfinite(counted)
         if not finite.all():
             bad = np.unique(np.nonzero(~finite)[-1]).tolist()
@@ -204,8 +151,21 @@ class Operator:
         left_out = self.left_out | lost
         if left_out.all():
             raise DataError("expected at least one row that is not left out, got none")
-        matrix, precision = downdated(self.matrix, self.precision, lost, left_out)
+        replaced = self._solved(lost, self.precision[lost])
+        matrix = self.matrix - self.matrix[:, lost] @ replaced
+        precision = self.precision - self.precision[:, lost] @ replaced
+        matrix[:, left_out] = precision[left_out] = precision[:, left_out] = 0.0
         return self.remade(matrix, precision, left_out)
+
+    def _solved(self, missing: NDArray[np.bool_], rhs: NDArray[Any]) -> NDArray[Any]:
+        """The precision's block of ``missing`` rows, inverted, times ``rhs``."""
+        block = self.precision[np.ix_(missing, missing)]
+        try:
+            return np.asarray(cho_solve(cho_factor(block, check_finite=False), rhs))
+        except LinAlgError as error:
+            raise DataError(
+                f"too few rows remain without rows {np.flatnonzero(missing).tolist()}",
+            ) from error
 
     def remade(
         self,
@@ -229,14 +189,16 @@ class Operator:
         Its image is the one of the operator :meth:`without` these rows: for rows that are
         missing in a frame or two, where a new operator would not pay.
         """
-        return expected(dv, missing & ~self.left_out, self.left_out, self.precision)
+        missing = missing & ~self.left_out
+        if not missing.any():
+            return dv
+        kept, filled = ~(missing | self.left_out), dv.copy()
+        across = self.precision[np.ix_(missing, kept)]
+        filled[missing] = -self._solved(missing, across @ dv[kept])
+        return filled
 
     def _image(self, values: NDArray[Any]) -> Image:
         return Image(values, self.unit, self.model.mesh.identity)
-
-    @cached_property
-    def _leaves_out(self) -> bool:
-        return bool(self.left_out.any())
 
     @cached_property
     def _single(self) -> NDArray[Any]:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh, qr, solve_triangular
 
-from tomoskin.core import FloatArray, ModelError, finished
+from tomoskin.core import FloatArray, ModelError, check_positive, finished
 from tomoskin.imaging.linear.linear_problem import LinearProblem
 from tomoskin.imaging.linear.operator import Operator
 
@@ -105,8 +105,7 @@ class Spectrum:
 
         Raises ModelError when alpha is not above 0.
         """
-        if not (np.isfinite(alpha) and alpha > 0):
-            raise ModelError(f"expected alpha above 0, got {alpha}")
+        check_positive(alpha, "alpha")
         weighed = np.isfinite(self.values)
         return np.where(weighed, 1.0 / (np.where(weighed, self.values, 0.0) + alpha**2), 1.0)
 

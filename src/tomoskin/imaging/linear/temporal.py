@@ -20,7 +20,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import DataError, FloatArray, Image, ModelError
+from tomoskin.core import DataError, FloatArray, Image, ModelError, check_positive
 from tomoskin.imaging.linear.operator import Operator
 from tomoskin.imaging.linear.spectrum import Spectrum
 
@@ -155,8 +155,7 @@ class Temporal:
 
         Then each mode ← pole · mode + gain · data. Raises DataError.
         """
-        if not (np.isfinite(interval) and interval > 0):
-            raise DataError(f"expected an interval above 0 s, got {interval}")
+        check_positive(interval, "an interval", DataError, " s")
         kept = _kept(interval, self.time_constant)
         trust = self.modes.trust
         gain = _gain(_steady_variance(trust, 1.0 - kept**2), trust)

@@ -15,7 +15,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
-from tomoskin.core import DataError, FloatArray, Image, IntArray, ModelError, TomoskinError
+from tomoskin.core import (
+    DataError,
+    FloatArray,
+    Image,
+    IntArray,
+    ModelError,
+    TomoskinError,
+    check_positive,
+)
 from tomoskin.imaging.linear.operator import Operator
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Mesh
@@ -161,8 +169,7 @@ def _checked(
         raise DataError(f"expected positions of shape (n, {d}), got shape {table.shape}")
     if not np.isfinite(table).all():
         raise DataError("expected finite positions, got values that are not finite")
-    if not (np.isfinite(radius) and radius > 0):
-        raise ModelError(f"expected a radius above 0 m, got {radius}")
+    check_positive(radius, "a radius", unit=" m")
     if not (np.isfinite(contrast) and contrast > -1 and contrast != 0):
         raise ModelError(f"expected a contrast above -1 and not 0, got {contrast}")
     if difference not in ("plain", "normalised"):

@@ -19,7 +19,7 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import brentq
 from scipy.sparse import csr_array
 
-from tomoskin.core import FloatArray, ModelError, refuse_first
+from tomoskin.core import FloatArray, ModelError, check_positive, refuse_first
 from tomoskin.imaging.linear.operator import Operator
 from tomoskin.imaging.trained.merit import Balls, Targets, centre_of, deviations, noise_figure
 from tomoskin.model.forward import ForwardModel
@@ -93,8 +93,7 @@ class Trainer:
 
     def weight_for(self, figure: float) -> float:
         """The weight whose operator has that noise figure."""
-        if not (np.isfinite(figure) and figure > 0):
-            raise ModelError(f"expected a noise figure above 0, got {figure}")
+        check_positive(figure, "a noise figure")
 
         def excess(decade: float) -> float:
             matrix, _ = self.matrix(10.0**decade)

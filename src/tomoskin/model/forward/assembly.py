@@ -85,6 +85,7 @@ class Element:
             raise ModelError(f"expected elements of order 1 or 2, got {order}")
         mass = _FACET_MASS[mesh.dimension, order]
         n_nodes, cells, facets = len(mesh.points), mesh.cells, mesh.electrodes
+        sizes, ends = mesh.facet_sizes(np.concatenate(facets)), np.cumsum([*map(len, facets)])[:-1]
         if order == 2:
             edges = _Edges.of(mesh)
             n_nodes += len(edges.pairs)
@@ -94,7 +95,7 @@ class Element:
             cells=cells,
             gradients=_gradients(mesh, order),
             facets=facets,
-            facet_sizes=_facet_sizes(mesh),
+            facet_sizes=tuple(np.split(sizes, ends)),
             facet_mass=mass,
             facet_load=mass.sum(axis=1),  # the shape functions add up to one
         )
@@ -113,12 +114,6 @@ class Element:
         both = np.einsum("nqia,nqjb->nijab", g, g)
         both = both + np.triu(both.swapaxes(3, 4), 1)
         return np.asarray(both[..., *np.triu_indices(g.shape[3])])
-
-
-def _facet_sizes(mesh: Mesh) -> tuple[FloatArray, ...]:
-    """Per electrode, (n_facets,) length or area."""
-    ends = np.cumsum([len(electrode) for electrode in mesh.electrodes])[:-1]
-    return tuple(np.split(mesh.facet_sizes(np.concatenate(mesh.electrodes)), ends))
 
 
 @dataclass(frozen=True, eq=False)
@@ -266,10 +261,6 @@ class SystemAssembly:
         values = np.add(values, contacts, out=values if values.dtype == contacts.dtype else None)
         return Compressed(values, self.indices, self.indptr)
 
-    def contacts(self, contact_impedance: NDArray[Any]) -> NDArray[Any]:
-        """(n_values,): what the contacts add to the system matrix, for z (n_electrodes,)."""
-        return np.asarray(self.contact @ (1.0 / contact_impedance))
-
     def _stiffness_map(self, local: FloatArray) -> csr_array:
         """``local`` (n_cells, k, k, c) → (n_values, c·n_cells)."""
         n_cells, _, _, c = local.shape
@@ -297,9 +288,6 @@ def _numbered(cells: IntArray, others: tuple[IntArray, IntArray], n: int) -> csr
     return csr_array((numbers, once.indices, once.indptr), shape=(n, n))
 
 
-Entries = tuple[IntArray, IntArray, FloatArray, IntArray]
-
-
 def electrode_forms(element: Element) -> list[tuple[IntArray, FloatArray]]:
     """Per electrode: its unknowns (n,), itself last, and the matrix of ∫(u − U)² over it.
 
@@ -323,7 +311,7 @@ def _electrode_form(element: Element, number: int) -> tuple[IntArray, FloatArray
     return np.append(nodes, element.n_nodes + number), form
 
 
-def _contact_entries(element: Element) -> Entries:
+def _contact_entries(element: Element) -> tuple[IntArray, IntArray, FloatArray, IntArray]:
     """Entries of all electrodes' forms; the ground electrode's potential is no unknown."""
     rows, cols, values, owner = [], [], [], []
     for number, (unknown, form) in enumerate(electrode_forms(element)):

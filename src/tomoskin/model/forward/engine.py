@@ -113,11 +113,6 @@ class Engine:
     name: str = "scipy"
     core: Any = None
 
-    @property
-    def vectors(self) -> str:
-        """Which vector instructions factorise and solve."""
-        return "those of scipy's build"
-
     def analyse(self, indptr: NDArray[np.int32], indices: NDArray[np.int32]) -> Factorise:
         """What factorises symmetric matrices of this structure, given their values."""
         return lambda values: _factorise(Compressed(values, indices, indptr))

@@ -36,11 +36,6 @@ class Native(Engine):
 
     name: str = "native"
 
-    @property
-    def vectors(self) -> str:
-        """The widest that the processor has."""
-        return str(self.core.vector_code)
-
     def analyse(self, indptr: NDArray[np.int32], indices: NDArray[np.int32]) -> Factorise:
         """Order the unknowns and lay out the factor, once for all matrices of this structure."""
         symbolic = self.core.Symbolic(len(indptr) - 1, indptr, indices)
@@ -77,15 +72,6 @@ class Native(Engine):
         )
         return made
 
-    def check(self) -> None:
-        """Raise ModelError when it has another interface than is called here."""
-        found = getattr(self.core, "interface", 1)
-        if found != INTERFACE:
-            raise ModelError(
-                f"it was built for another tomoskin (interface {found}, expected {INTERFACE}); "
-                "build it again: make native"
-            )
-
 
 def choose_engine() -> Engine:
     """Return the engine that TOMOSKIN_ENGINE asks for; without it the native one if it works.
@@ -116,10 +102,13 @@ def _native() -> Engine:
     """Return the native engine after a trial, else scipy's with what went wrong as its reason."""
     try:
         core = importlib.import_module("tomoskin_core")
-        engine = Native(f"tomoskin_core {core.__version__} is installed", core=core)
-        engine.check()
+        if (built_for := getattr(core, "interface", 1)) != INTERFACE:
+            raise ModelError(
+                f"it was built for another tomoskin (interface {built_for}, expected {INTERFACE}); "
+                "build it again: make native"
+            )
+        return Native(f"tomoskin_core {core.__version__} is installed", core=core)
     except ModuleNotFoundError:
         return Engine("tomoskin_core is not installed")
     except Exception as error:
         return Engine(f"tomoskin_core does not work here: {error}")
-    return engine

@@ -198,11 +198,9 @@ class Terminals:
 
     def _network(self, forms: FloatArray, axes: int) -> Any:
         """The native layout, for the ``forms`` (n_cells, k, k, components) of so many axes."""
-        assembly, core = self._model.assembly, self._model.engine.core
-        if core is None:
-            raise AssertionError("the layout needs the native engine")
+        assembly = self._model.assembly
         i, j = np.triu_indices(forms.shape[1], 1)
-        return core.Terminals(
+        return self._model.engine.core.Terminals(
             assembly.indptr,
             assembly.indices,
             self._model.contacts,

@@ -60,7 +60,7 @@ class System:
     @cached_property
     def contacts(self) -> NDArray[Any]:
         """What the contacts add to the values of the system matrix."""
-        return self.assembly.contacts(self.contact_impedance)
+        return np.asarray(self.assembly.contact @ (1.0 / self.contact_impedance))
 
     @cached_property
     def by_drive(self) -> tuple[IntArray, IntArray]:

@@ -52,36 +52,20 @@ class LocalUpdate:
         self._base, self._model, self._conductivity = base, base.model, base.conductivity
         self._stored = np.zeros(base.model.assembly.n_points, dtype=bool)
 
-    def warm_up(self, cells: ArrayLike | None = None) -> None:
-        """Compute the columns for ``cells`` (all of them without an argument) beforehand."""
-        all_cells = self._model.assembly.element.cells
-        chosen = all_cells if cells is None else all_cells[np.asarray(cells)]
-        nodes = np.unique(chosen)
-        while len(missing := nodes[~self._stored[nodes]]):
-            self._need(missing)
+    def voltages(self, cells: ArrayLike, conductivity: ArrayLike) -> NDArray[Any]:
+        """(n_meas,) V with ``cells`` (n,) changed to ``conductivity`` (n,), as
+        :meth:`voltages_of` has those of many touches."""
+        return np.asarray(self.voltages_of([(cells, conductivity)])[0])
 
-    def transfer_resistance(self, cells: ArrayLike, conductivity: ArrayLike) -> NDArray[Any]:
-        """(n_electrodes, n_electrodes) Ω with ``cells`` (n,) changed to ``conductivity`` (n,).
+    def transfer_resistances_of(self, touches: Sequence[Touch]) -> NDArray[Any]:
+        """(n_touches, n_electrodes, n_electrodes) Ω of touches, each alone: ``cells`` (n,) changed
+        to a conductivity (n,).
 
         Raises
         ------
         ModelError
             For cells that do not exist or stand twice, a conductivity that is not positive, or
-            a change that leaves the system singular to working precision.
-        """
-        return np.asarray(self.transfer_resistances_of([(cells, conductivity)])[0])
-
-    def voltages(self, cells: ArrayLike, conductivity: ArrayLike) -> NDArray[Any]:
-        """(n_meas,) V with ``cells`` changed; see :meth:`transfer_resistance`."""
-        return np.asarray(self.voltages_of([(cells, conductivity)])[0])
-
-    def transfer_resistances_of(self, touches: Sequence[Touch]) -> NDArray[Any]:
-        """(n_touches, n_electrodes, n_electrodes) Ω of touches (cells, conductivity), each alone.
-
-        Raises
-        ------
-        ModelError
-            See :meth:`transfer_resistance`; it names the touch.
+            a change that leaves the system singular to working precision; it names the touch.
         """
         grounded, lost = self._changed(touches)
         checked_voltages(self._model, grounded, lost)

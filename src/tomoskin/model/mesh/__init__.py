@@ -4,7 +4,6 @@ from tomoskin.model.mesh.boundary import ElectrodeArc as ElectrodeArc, check_arc
 from tomoskin.model.mesh.draped import Draped as Draped
 from tomoskin.model.mesh.extrude import (
     FacePatch as FacePatch,
-    Patch as Patch,
     WallPatch as WallPatch,
     extrude as extrude,
     ring as ring,

@@ -37,51 +37,6 @@ _EDGE = 1e-12
 """A barycentric coordinate this far below zero is rounding: the pixel lies on the edge."""
 
 
-def pixel_map(
-    points: FloatArray,
-    cells: IntArray,
-    mesh_id: str,
-    *,
-    step: float,
-    height: float | None = None,
-) -> PixelMap:
-    """Square pixels of side ``step`` m over the extent in x and y, each with its cell.
-
-    A pixel belongs to the cell that its centre lies in, on an edge to the one of lower number.
-    Triangles lie in the plane; of tetrahedra the slice z = ``height`` m is taken.
-
-    Raises
-    ------
-    GeometryError
-        For a curved sheet, a height that is missing, not wanted or outside, or a step that is
-        not above 0 or makes more than ``MOST_PIXELS`` pixels.
-    """
-    height = _checked_height(points, cells, height)
-    x, y = _raster(points[np.unique(cells)][:, :2], step)
-    corner = points[cells]
-    touched = np.arange(len(cells))
-    if height is not None:
-        span = corner[:, :, 2]
-        touched = np.flatnonzero((span.min(axis=1) <= height) & (span.max(axis=1) >= height))
-        corner = corner[touched]
-    cell, column, row = _candidates(corner[:, :, :2], x, y, step)
-    position = np.column_stack([x[column], y[row]])
-    if height is not None:
-        position = np.column_stack([position, np.full(len(position), height)])
-    inside = _inside(corner, cell, position)
-    owner = np.full((len(y), len(x)), len(cells))
-    np.minimum.at(owner, (row[inside], column[inside]), touched[cell[inside]])
-    owner[owner == len(cells)] = -1
-    return PixelMap(owner, x, y, mesh_id)
-
-
-def step_for(points: FloatArray, cells: IntArray, count: int) -> float:
-    """Side of a pixel, m, when ``count`` of them span the longer extent. Raises GeometryError."""
-    if count < 1:
-        raise GeometryError(f"expected at least 1 pixel, got {count}")
-    return float(np.ptp(points[np.unique(cells)][:, :2], axis=0).max()) / count
-
-
 def _checked_height(points: FloatArray, cells: IntArray, height: float | None) -> float | None:
     flat = cells.shape[1] == 3
     if flat and points.shape[1] == 3:
@@ -262,11 +217,35 @@ class Mesh:
     ) -> PixelMap:
         """Raster of square pixels: ``count`` along the longer side, or of side ``step`` m.
 
-        Of tetrahedra it is the slice at height ``z`` m. Raises GeometryError for a curved sheet,
-        or a size or height that is impossible.
+        A pixel belongs to the cell that its centre lies in, on an edge to the one of lower number.
+        Of tetrahedra it is the slice at height ``z`` m.
+
+        Raises
+        ------
+        GeometryError
+            For a curved sheet, a height that is missing, not wanted or outside, or a size that is
+            not above 0 or makes more than ``MOST_PIXELS`` pixels.
         """
-        side = step_for(self.points, self.cells, count) if step is None else step
-        return pixel_map(self.points, self.cells, self.identity, step=side, height=z)
+        cells = self.cells
+        if step is None and count < 1:
+            raise GeometryError(f"expected at least 1 pixel, got {count}")
+        height, used = _checked_height(self.points, cells, z), self.points[np.unique(cells)][:, :2]
+        side = float(np.ptp(used, axis=0).max()) / count if step is None else step
+        x, y = _raster(used, side)
+        corner, touched = self.points[cells], np.arange(len(cells))
+        if height is not None:
+            span = corner[:, :, 2]
+            touched = np.flatnonzero((span.min(axis=1) <= height) & (span.max(axis=1) >= height))
+            corner = corner[touched]
+        cell, column, row = _candidates(corner[:, :, :2], x, y, side)
+        position = np.column_stack([x[column], y[row]])
+        if height is not None:
+            position = np.column_stack([position, np.full(len(position), height)])
+        inside = _inside(corner, cell, position)
+        owner = np.full((len(y), len(x)), len(cells))
+        np.minimum.at(owner, (row[inside], column[inside]), touched[cell[inside]])
+        owner[owner == len(cells)] = -1
+        return PixelMap(owner, x, y, self.identity)
 
 
 @dataclass(frozen=True, eq=False)

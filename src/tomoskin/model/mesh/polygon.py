@@ -122,16 +122,6 @@ class Rectangle(Polygon):
         x, y = width / 2, height / 2
         super().__init__(np.array([[-x, -y], [x, -y], [x, y], [-x, y]]))
 
-    @property
-    def width(self) -> float:
-        """The extent of the rectangle along x, in m."""
-        return float(self.vertices[1, 0] - self.vertices[0, 0])
-
-    @property
-    def height(self) -> float:
-        """The extent of the rectangle along y, in m."""
-        return float(self.vertices[2, 1] - self.vertices[1, 1])
-
 
 def inside(ring: FloatArray, xy: FloatArray) -> NDArray[np.bool_]:
     """(n,) True where ``xy`` (n, 2) lies inside the polygon ``ring`` (k, 2): even-odd rule.

@@ -80,12 +80,15 @@ _SPAN = 1e-3
 """Currents combine into a drive to within this part of it; weaker parts of them do not count."""
 
 
+RECIPROCALS = ((2, 3, 0, 1), 1.0), ((3, 2, 0, 1), -1.0), ((2, 3, 1, 0), -1.0), ((3, 2, 1, 0), 1.0)
+"""Orders of a row's ends, and the signs, in which it is the reciprocal of another one."""
+
 _FORMS = (
     (((0, 1, 2, 3), 1.0),),
     (((1, 0, 2, 3), -1.0), ((0, 1, 3, 2), -1.0), ((1, 0, 3, 2), 1.0)),
-    (((2, 3, 0, 1), 1.0), ((3, 2, 0, 1), -1.0), ((2, 3, 1, 0), -1.0), ((3, 2, 1, 0), 1.0)),
+    RECIPROCALS,
 )
-"""Orders of a row's ends and signs: as itself, with pairs reversed, as its reciprocal."""
+"""The same of a row as itself, with pairs reversed, as its reciprocal."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,14 +4,10 @@ from tomoskin.model.prior.penalty import (
     Carried as Carried,
     Diagonal as Diagonal,
     Penalty as Penalty,
-    dense_penalty as dense_penalty,
-    sparse_penalty as sparse_penalty,
 )
 from tomoskin.model.prior.priors import (
     PRIORS as PRIORS,
-    Identity as Identity,
     Noser as Noser,
-    Prior as Prior,
     PriorLike as PriorLike,
     SharpPrior as SharpPrior,
     Sparse as Sparse,
@@ -19,7 +15,6 @@ from tomoskin.model.prior.priors import (
     penalty_of as penalty_of,
 )
 from tomoskin.model.prior.smooth import (
-    GaussianHighPass as GaussianHighPass,
     Laplace as Laplace,
     Matern as Matern,
     Structural as Structural,

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, issparse
 
-from tomoskin.core import FloatArray, ModelError, no_such
+from tomoskin.core import FloatArray, ModelError, check_positive, no_such
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.prior.penalty import Diagonal, Penalty, dense_penalty, sparse_penalty
 from tomoskin.model.prior.smooth import GaussianHighPass, Laplace, Matern, graph_laplacian
@@ -95,8 +95,7 @@ class SharpPrior(ABC):
 
     @property
     def _beta(self) -> float:
-        if not (np.isfinite(self.smoothing) and self.smoothing > 0):
-            raise ModelError(f"expected a smoothing above 0, got {self.smoothing}")
+        check_positive(self.smoothing, "a smoothing")
         return self.smoothing
 
 
@@ -136,16 +135,10 @@ class Sparse(SharpPrior):
 
 def _edges(mesh: Mesh) -> FloatArray:
     """(n_pairs,) size of the facet that two neighbours share, over that of the domain."""
-    shared = _shared_facets(mesh)
-    d = mesh.dimension
-    return np.asarray(mesh.facet_sizes(shared) / mesh.volumes.sum() ** ((d - 1) / d))
-
-
-def _shared_facets(mesh: Mesh) -> NDArray[np.int64]:
-    """(n_pairs, k − 1) points that both cells of a pair have."""
     first, second = (mesh.cells[cells] for cells in mesh.neighbours.T)
     common = (first[:, :, None] == second[:, None, :]).any(axis=2)
-    return np.asarray(first[common].reshape(len(first), -1))
+    d, shared = mesh.dimension, first[common].reshape(len(first), -1)
+    return np.asarray(mesh.facet_sizes(shared) / mesh.volumes.sum() ** ((d - 1) / d))
 
 
 PriorLike = str | Prior | Any

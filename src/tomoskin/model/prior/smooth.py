@@ -12,7 +12,7 @@ from scipy.linalg import inv
 from scipy.sparse import coo_array, csr_array
 from scipy.spatial.distance import cdist
 
-from tomoskin.core import FloatArray, ModelError
+from tomoskin.core import FloatArray, ModelError, check_positive
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.prior.penalty import (
     Carried,
@@ -202,8 +202,7 @@ def matern_correlation(
     ModelError
         For a ``length`` m that is not positive, or a smoothness that is not 0.5, 1.5 or 2.5.
     """
-    if not (np.isfinite(length) and length > 0):
-        raise ModelError(f"expected a correlation length above 0 m, got {length}")
+    check_positive(length, "a correlation length", unit=" m")
     if smoothness not in CORRELATIONS:
         names = ", ".join(map(str, CORRELATIONS))
         raise ModelError(f"expected a smoothness among {names}, got {smoothness}")

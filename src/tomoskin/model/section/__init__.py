@@ -13,7 +13,6 @@ from tomoskin.model.section.kinds import (
     ValueKind as ValueKind,
     Whole as Whole,
     literal as literal,
-    show as show,
 )
 from tomoskin.model.section.section import (
     Document as Document,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Protocol, Self
@@ -129,17 +129,14 @@ class Solver(Protocol):
     @property
     def table(self) -> ResponseTable:
         """The table of what one spot does."""
-        ...
 
     def keep(
         self, direct: FloatArray, timed: FloatArray, matrix: FloatArray, squares: FloatArray
     ) -> Any:
         """What it keeps of a :class:`WhitenedTable`; ``direct`` (narrow, rank)."""
-        ...
 
     def expanded(self, spots: FloatArray) -> FloatArray:
         """See :meth:`ResponseTable.expanded`."""
-        ...
 
     def settled(
         self, problem: Problem, spots: FloatArray, deficit: Deficit, most: int, known: Known = ()
@@ -150,12 +147,10 @@ class Solver(Protocol):
         What is unknown of the spots is taken as it is at the first ones, and anew where steps
         with that end.
         """
-        ...
 
     def standing(self, left: FloatArray, fit: Fit) -> FloatArray:
         """(k,) square of what each spot of a fit changes that the slopes of the others could not
         take up, in noise with unknown directions ``left`` (q, c)."""
-        ...
 
     def standing_out(
         self, matched: Matched, fit: Fit, limits: Limits
@@ -166,7 +161,6 @@ class Solver(Protocol):
         stands out (GLRT; Kay 1998, section 7.6.2, for a linear model), after what the spots of
         ``fit`` could take up.
         """
-        ...
 
     def judged(self, problem: Problem, fit: Fit, uneven: float) -> tuple[FloatArray, FloatArray]:
         """As :meth:`standing` in noise alone, and (4k, 4k) the covariance of all parameters.
@@ -177,22 +171,11 @@ class Solver(Protocol):
         residual has beyond noise, E[rᵀr] = degrees + u²‖(1 − JΣJᵀ)E‖², E the measurements'
         answers one by one.
         """
-        ...
 
-    def searched(
-        self,
-        problem: Problem,
-        matched: Matched,
-        policy: DetectionPolicy,
-        deficit: Deficit,
-        before: FloatArray,
-    ) -> Answer | None:
-        """What :class:`~tomoskin.sensing.fit.selection.ForwardSelection` finds, in one call.
-
-        ``before`` (k, 4) are the touches of the last frame, and ``deficit`` is what the table
-        lacked of them. None where this solver cannot do it at that pace.
-        """
-        ...
+    @property
+    def searched(self) -> Search | None:
+        """What :class:`~tomoskin.sensing.fit.selection.ForwardSelection` finds, in one call; None
+        where this solver goes step by step."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -203,6 +186,11 @@ class Answer:
     fit: Fit
     others: tuple[FloatArray, FloatArray] | None
     turned_down: Fit | None
+
+
+Search = Callable[["Problem", "Matched", DetectionPolicy, Deficit, FloatArray], Answer | None]
+"""Of a frame with candidates: what the table lacked of the touches of the last frame, and these
+(k, 4). The answer is None where it cannot be had at the policy's pace."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -103,9 +103,8 @@ class ForwardSelection:
     def explained(self, before: FloatArray) -> Fit:
         """The most likely touches, confirmed by the exact model; ``before`` (k, 4) are those of the
         last frame."""
-        answer = self.problem.solver.searched(
-            self.problem, self.matched, self.policy, self.deficit, before
-        )
+        search = self.problem.solver.searched
+        answer = search and search(self.problem, self.matched, self.policy, self.deficit, before)
         fit = self.step_by_step(before) if answer is None else answer.fit
         if answer and answer.others:
             self.openings.remember(fit, answer.others)

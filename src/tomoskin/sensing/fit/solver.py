@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 from scipy.linalg.lapack import dposv, dtrtrs
@@ -12,7 +12,6 @@ from scipy.spatial import cKDTree
 from tomoskin.core import FloatArray
 from tomoskin.model.mesh import Mesh
 from tomoskin.sensing.fit.expectation import Expectation, Known, newcomers
-from tomoskin.sensing.fit.policy import DetectionPolicy
 from tomoskin.sensing.fit.problem import RIDGE, Limits, Matched, Problem
 from tomoskin.sensing.fit.spot import CONTENT, N_PARAMETERS, X, Y
 from tomoskin.sensing.fit.spot_fit import Deficit, Fit, SpotPrior
@@ -51,6 +50,7 @@ class NumpySolver:
     table: ResponseTable
     sheet: SheetDomain
     prior: SpotPrior
+    searched: ClassVar[None] = None
 
     def keep(
         self, direct: FloatArray, timed: FloatArray, matrix: FloatArray, squares: FloatArray
@@ -172,16 +172,6 @@ class NumpySolver:
         scatter = max(1.0, fit.misfit / fit.degrees)
         covariance = scatter * fit.covariance + max(beyond, uneven**2) * (moved @ moved.T)
         return self.standing(fit.unknown[:0], fit), covariance
-
-    def searched(
-        self,
-        problem: Problem,
-        matched: Matched,
-        policy: DetectionPolicy,
-        deficit: Deficit,
-        before: FloatArray,
-    ) -> None:
-        """See :class:`Solver`: this one goes step by step."""
 
     def standing(self, left: FloatArray, fit: Fit) -> FloatArray:
         """The minimum near ``spots``; see :class:`Solver`."""

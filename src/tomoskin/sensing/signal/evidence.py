@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from tomoskin.core import FloatArray, IntArray
-from tomoskin.model.pattern import Pattern, Scan
+from tomoskin.model.pattern import RECIPROCALS, Pattern, Scan
 from tomoskin.sensing.signal.health import ElectrodeHealth, Mask, Roles
 
 SIGMAS = 6.0
@@ -120,22 +120,14 @@ class Reciprocity:
     @classmethod
     def of(cls, pattern: Pattern) -> Reciprocity:
         """All pairs of a pattern; there may be none."""
-        number_of = {}
-        rows = np.hstack([pattern.drive, pattern.measure])
-        for number, row in enumerate(rows.tolist()):
-            number_of[tuple(row)] = number
-        solution = []
-        for number, (source, sink, plus, minus) in enumerate(rows.tolist()):
-            for a, b, c, d, sign in (
-                (plus, minus, source, sink, 1.0),
-                (minus, plus, source, sink, -1.0),
-                (plus, minus, sink, source, -1.0),
-                (minus, plus, sink, source, 1.0),
-            ):
-                other = number_of.get((a, b, c, d), -1)
-                if other > number:
-                    solution.append((number, other, sign))
-        table = np.array(solution, dtype=float).reshape(-1, 3)
+        rows = np.hstack([pattern.drive, pattern.measure]).tolist()
+        number_of = {tuple(row): number for number, row in enumerate(rows)}
+        exchanged = [
+            (number, number_of.get(tuple(row[end] for end in order), -1), sign)
+            for number, row in enumerate(rows)
+            for order, sign in RECIPROCALS
+        ]
+        table = np.array([one for one in exchanged if one[1] > one[0]], float).reshape(-1, 3)
         first, second = table[:, :2].astype(np.int64).T
         roles = Roles.of(pattern)
         touches = (roles.drives | roles.reads)[:, first]
