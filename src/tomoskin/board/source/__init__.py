@@ -10,6 +10,7 @@ from tomoskin.board.source.boards import (
     BoardRecord as BoardRecord,
     Converter as Converter,
     FirmwareFiles as FirmwareFiles,
+    board_named as board_named,
 )
 from tomoskin.board.source.clock import (
     TICK_RATES as TICK_RATES,
