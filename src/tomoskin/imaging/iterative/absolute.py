@@ -124,7 +124,7 @@ class AbsoluteImaging:
     tolerance: float = TOLERANCE
 
     def __post_init__(self) -> None:
-        """Refuse an impossible alpha."""
+        """Refuse an alpha that is not above zero."""
         check_positive(self.alpha, "alpha")
 
     def __call__(self, observation: Observation, background: float | None = None) -> Absolute:
