@@ -177,7 +177,7 @@ def test_the_reflex_of_the_documentation_acts_on_newtons(monkeypatch, force_file
 
     def pressed_once_valid(skin, timeout):
         contacts = wait(skin, timeout)
-        if contacts.valid and not opened[0].presses:
+        if contacts.valid and not opened[0].sheet.presses:
             opened[0].set_presses((PRESS,))
         return contacts
 

@@ -141,8 +141,8 @@ def test_few_changed_cells_are_solved_by_the_local_update(skin, monkeypatch):
     asked = []
     monkeypatch.setattr(
         type(sheet._network.base.local),
-        "transfer_resistance",
-        lambda _, cells, sigma: asked.append((cells, sigma)) or exact,
+        "transfer_resistances_of",
+        lambda _, touches: asked.extend(touches) or [exact],
     )
     sheet.resistance()
     ((cells, sigma),) = asked

@@ -94,7 +94,8 @@ def test_an_older_board_is_set_up_in_its_own_words_or_refused(clock, minor):
 
 def test_a_chopped_scan_has_an_identity_of_its_own_whatever_the_board_chooses(clock):
     direct, slow, fast = (
-        linked(ScriptedBoard(clock), clock, chop_frequency=f).configuration for f in (0, 400, 500)
+        linked(ScriptedBoard(clock), clock, chop_frequency=f).session.configuration
+        for f in (0, 400, 500)
     )
     assert len({direct, slow, fast}) == 3
 

@@ -89,8 +89,8 @@ def test_a_board_that_is_already_scanning_is_taken_over(clock):
     second = linked(transport, clock, oversampling=1)
     items = poll_until(second, frames)
     assert frames(items)[0].sequence == 0
-    assert frames(items)[0].configuration == second.configuration.identity
-    assert second.configuration.identity != first.configuration.identity
+    assert frames(items)[0].configuration == second.session.configuration.identity
+    assert second.session.configuration.identity != first.session.configuration.identity
 
 
 def test_a_long_pattern_goes_in_chunks_that_fit(clock):
@@ -341,7 +341,7 @@ def test_connected_is_an_event(clock):
 
 def test_the_same_scan_has_the_same_identity_and_another_has_another(clock):
     one, same, other = (
-        linked(ScriptedBoard(clock), clock, oversampling=n).configuration for n in (4, 4, 8)
+        linked(ScriptedBoard(clock), clock, oversampling=n).session.configuration for n in (4, 4, 8)
     )
     assert one == same != other
 
