@@ -197,7 +197,18 @@ def test_states_come_from_a_table_of_an_encoder(bare, recorded, tomoskin):
     assert BODY.read(out).model.body.size == pytest.approx(model.body.size, abs=1e-3)
 
 
-@pytest.mark.parametrize("text", ["angle_deg\n3", "frame,angle_deg\n9999,3", "frame,a\n1,2,3"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "angle_deg\n3",
+        "frame,angle_deg\n9999,3",
+        "frame,a\n1,2,3",
+        "frame,a\n1,x",
+        "frame;a\n1;2",
+        "frame,angle_deg\n1,\n2,3",
+    ],
+)
 def test_a_table_that_holds_no_states_is_refused(bare, recorded, tomoskin, text):
     table = recorded / "wrong.csv"
     table.write_text(text)

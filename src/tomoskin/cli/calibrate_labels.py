@@ -201,22 +201,26 @@ def body_examples(
 def _tabled(table: Path, n: int) -> tuple[list[int], dict[str, Any]]:
     """The states of a table with a column ``frame`` and one for each coordinate; angles that end
     in _deg are kept in rad."""
-    try:
-        rows = np.atleast_1d(np.genfromtxt(table, delimiter=",", names=True, encoding="utf-8"))
-    except (ValueError, OSError) as error:
-        raise DataError(
-            f"expected a table of numbers, got another file: {error}", where=str(table)
-        ) from None
-    first, *names = rows.dtype.names or ("",)
-    frames = rows[first] if first == "frame" and names else np.array([-1.0])
-    if not np.isin(frames, np.arange(n)).all():
-        given = ", ".join([first, *names])
+    from tomoskin.files.imports import read_columns
+
+    columns = read_columns(table)
+    names = [name for name in columns if name != "frame"]
+    frames = columns.get("frame", np.array([-1.0]))
+    if not (names and np.isin(frames, np.arange(n)).all()):
+        given = ", ".join(filter(None, columns)) or "none"
         raise DataError(
             f"expected columns frame (within 0:{n}) and coordinates, got {given}",
             where=str(table),
             hint="for example: frame,angle_deg,stretch",
         )
-    state = np.column_stack([rows[k] * (math.pi / 180 if _in_degrees(k) else 1) for k in names])
+    state = np.column_stack([columns[k] * (math.pi / 180 if _in_degrees(k) else 1) for k in names])
+    if not np.isfinite(state).all():
+        row = int(np.argmin(np.isfinite(state).all(axis=1)))
+        raise DataError(
+            f"expected a number in every column, got none for frame {frames[row]:.0f}",
+            where=str(table),
+            hint="leave out the lines of frames whose state is not known",
+        )
     kept = tuple(k.removesuffix("_deg") if _in_degrees(k) else k for k in names)
     return frames.astype(int).tolist(), {"state": state, "names": kept}
 

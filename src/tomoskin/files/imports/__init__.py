@@ -2,6 +2,7 @@
 
 from tomoskin.files.imports.interchange import (
     column_names as column_names,
+    read_columns as read_columns,
     write_interchange as write_interchange,
 )
 from tomoskin.files.imports.reader import is_session as is_session, read_recording as read_recording

@@ -14,6 +14,7 @@ import re
 from array import array
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -34,6 +35,7 @@ from tomoskin.core import (
     whole_number,
 )
 from tomoskin.files.imports.tables import checked_currents, voltages_of
+from tomoskin.files.imports.text_logs import text_lines
 from tomoskin.sensing.signal import Recording
 
 OWN = "board_known"
@@ -129,8 +131,7 @@ def read_table(lines: Iterable[str], source: str) -> Recording:
         number; the message names line and column.
     """
     rows = _rows(lines, source)
-    header = [name.strip() for name in next(rows)]
-    _check_separator(header, source)
+    header = _header(rows, source)
     matches = [_COLUMN.fullmatch(name) for name in header]
     unknown = [
         name
@@ -168,6 +169,18 @@ def read_table(lines: Iterable[str], source: str) -> Recording:
     return replace(recording, idle=idle, board_known=_CLOCK in by_name)
 
 
+def read_columns(path: StrPath) -> dict[str, FloatArray]:
+    """Each column (n,) of a table of numbers in text, by its name in the first line.
+
+    A field without a number is NaN. Raises DataError as :func:`read_table` does.
+    """
+    source = str(path)
+    rows = _rows(text_lines(Path(path)), source)
+    header = _header(rows, source)
+    table = _values(rows, header, source).reshape(-1, len(header))
+    return {name: _real(table[:, n], name, source) for n, name in enumerate(header)}
+
+
 def column_names(drive: IntArray, measure: IntArray) -> list[str]:
     """Names of the columns of a table of rows."""
     tables = np.hstack([drive, measure]).tolist()
@@ -184,13 +197,15 @@ def _idle(marks: FloatArray, source: str) -> int:
     return max(1, idle)
 
 
-def _check_separator(header: list[str], source: str) -> None:
+def _header(rows: Iterator[list[str]], source: str) -> list[str]:
+    header = [name.strip() for name in next(rows, [""])]
     if any(";" in name or "\t" in name for name in header):
         raise DataError(
             "expected commas between columns and decimal points in numbers, got semicolons or tabs",
             where=f"{source}, line 1",
             hint="export it with decimal points: 1.5, not 1,5",
         )
+    return header
 
 
 def _rows(lines: Iterable[str], source: str) -> Iterator[list[str]]:
