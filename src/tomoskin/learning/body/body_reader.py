@@ -13,6 +13,7 @@ from tomoskin.core import Detection, FloatArray
 from tomoskin.learning.body.body_model import BodyModel
 from tomoskin.learning.kind import Applied, Conditions, FrameView, Kind, TouchFit
 from tomoskin.sensing.fit import Response, spots_of
+from tomoskin.sensing.signal import independent
 from tomoskin.sensing.track import RESIDUAL
 
 _BENT = 3.0
@@ -113,8 +114,8 @@ class BodyReader:
         self._modes = model.whiten(model.directions.T).T
         self._memory = model.memory()
         span = model.body.state / model.body.size
-        self._low, self._high = span.min(axis=0), span.max(axis=0)
-        self._low, self._high = np.minimum(self._low, 0.0), np.maximum(self._high, 0.0)
+        self._low = np.minimum(span.min(axis=0), 0.0)
+        self._high = np.maximum(span.max(axis=0), 0.0)
         self._x = np.zeros(span.shape[1])
         self._left = self._pressed = np.zeros((model.n_modes, model.n_modes))
         self._time = -np.inf
@@ -167,7 +168,7 @@ class BodyReader:
         change, free = self._touches(detections)
         data = model.whiten(dv) - change
         self._press(change)
-        blind = _basis(np.hstack([model.whiten(common.T).T, free]))
+        blind = independent(np.hstack([model.whiten(common.T).T, free]))
         data, modes = (part - blind @ (blind.T @ part) for part in (data, modes))
         information = modes.T @ modes
         z = np.asarray(np.linalg.lstsq(information, modes.T @ data, rcond=1e-9)[0], np.float64)
@@ -231,14 +232,6 @@ class BodyReader:
         rows = self.gain * np.column_stack([change, slopes, towards]).T
         whitened = whiten(rows)
         return whitened[0], whitened[1:].T
-
-
-def _basis(columns: FloatArray) -> FloatArray:
-    """Orthonormal columns that span the same."""
-    size = np.linalg.norm(columns, axis=0)
-    kept = columns[:, size > 0] / size[size > 0]
-    basis, singular, _ = np.linalg.svd(kept, full_matrices=False)
-    return np.asarray(basis[:, singular > 1e-7])
 
 
 def _bend(

@@ -17,6 +17,7 @@ from tomoskin.sensing.signal.difference import (
     difference as difference,
     difference_noise as difference_noise,
     in_phase as in_phase,
+    independent as independent,
 )
 from tomoskin.sensing.signal.evidence import Reciprocity as Reciprocity
 from tomoskin.sensing.signal.health import (

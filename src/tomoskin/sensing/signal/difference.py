@@ -103,7 +103,7 @@ class NuisanceSubspace:
         DataError
             When too few measurements remain.
         """
-        basis = _independent(directions)
+        basis = independent(directions)
         carried = precision @ basis
         try:
             factor = cho_factor(basis.T @ carried, check_finite=False)
@@ -142,7 +142,7 @@ class NuisanceSubspace:
         return np.asarray(matrix - (matrix @ self.directions) @ self.weights)
 
 
-def _independent(directions: FloatArray) -> FloatArray:
+def independent(directions: FloatArray) -> FloatArray:
     """Orthonormal columns that span the same."""
     size = np.linalg.norm(directions, axis=0)
     kept = directions[:, size > 0] / size[size > 0]
