@@ -22,7 +22,10 @@ def main():
     node, wanted = Node("listener"), set(sys.argv[1:])
     while True:
         for topic, kinds in node.get_topic_names_and_types():
-            if topic in wanted and (of := node.get_publishers_info_by_topic(topic)):
+            if topic not in wanted:
+                continue
+            of = node.get_publishers_info_by_topic(topic)
+            if of and of[0].node_name in node.get_node_names():  # its graph may come later
                 wanted.discard(topic)
                 say(
                     topic=topic,
