@@ -201,8 +201,7 @@ class Memory:
         """(n, p) plays since the reference and (n, l) low passes over a whole recording (n, d),
         from its rest on."""
         steps = [self.push(row, now) for row, now in zip(x, time.tolist(), strict=True)]
-        plays, late = (np.array(part) for part in zip(*steps, strict=True))
-        return self._past(plays, late)
+        return self._past(*map(np.array, zip(*steps, strict=True)))
 
     def _after(self, x: FloatArray, time: float) -> tuple[FloatArray, FloatArray]:
         now, kept = x[:, None], np.exp(-max(time - self._time, 0.0) / self._lags)
@@ -419,16 +418,14 @@ def _fits(examples: BodyExamples, z: FloatArray) -> Iterator[tuple[Any, ...]]:
 
 
 def _widths(x: FloatArray, time: FloatArray, z: FloatArray) -> FloatArray:
-    """(d,) half widths that err least: the same for all coordinates, then each in turn."""
+    """(d,) half widths that err least: the same for all coordinates, then each in turn, twice."""
     d = x.shape[1]
-    best, least = np.zeros(d), np.inf
-    for chosen in [np.ones(d, bool), *np.eye(d, dtype=bool)] * 2 if d > 1 else [np.ones(1, bool)]:
+    best, each = np.ones(d), np.eye(d, dtype=bool)[d == 1 :]
+    for chosen in (np.ones(d, bool), *each, *each):
         tried = [np.where(chosen, one, best) for one in _WIDTHS]
         plays, late = Memory(1, np.vstack([plays_of(one) for one in tried]), x).over(x, time)
-        for widths, own in zip(tried, np.split(plays, len(tried), axis=1), strict=True):
-            missed = _missed(_regressed(joined(_DEGREES[-1], x, own, late), z)[1])
-            if missed < least:
-                best, least = widths, missed
+        pasts = (joined(_DEGREES[-1], x, own, late) for own in np.split(plays, len(tried), axis=1))
+        best = tried[int(np.argmin([_missed(_regressed(one, z)[1]) for one in pasts]))]
     return best
 
 
