@@ -7,7 +7,7 @@ import pytest
 
 from tomoskin.core import DataError
 from tomoskin.learning import BodyExamples, BodyModel, BodyReader
-from tomoskin.learning.body.body_model import Memory
+from tomoskin.learning.body.body_model import Memory, plays_of
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import prepare
 from tomoskin.sensing.fit import SpotModel
@@ -78,16 +78,35 @@ def test_rows_that_are_lacking_are_left_out_of_what_was_learnt():
 
 
 def test_a_sheet_begins_where_the_motion_that_was_learnt_left_it():
-    """Plays stand at the end that the way back pushed them to, and follow from there."""
+    """A play stands at the end that the way back pushed it to, and follows from there."""
     x = np.array([[0.5], [1.0], [0.5], [0.0]])
-    plays = Memory.plays_after(x)
-    assert plays[:, 0] == pytest.approx([0.03, 0.08, 0.16, 0.3])
-    memory = Memory(1, 3, plays)
-    assert memory.features(np.zeros(1), 0.0) == pytest.approx(0.0)
-    powers, past = np.split(memory.features(np.array([0.2]), 0.0)[:9], [3])
-    assert powers == pytest.approx([0.2, 0.04, 0.008])
-    assert past == pytest.approx([0.14, 0.04, 0.0, 0.0, 0.0, 0.0])
-    assert Memory.plays_after(-x) == pytest.approx(-plays)
+    for sign in (1.0, -1.0):
+        memory = Memory(3, np.array([[0.08]]), sign * x)
+        assert memory.features(np.zeros((1, 1)), 0.0) == pytest.approx(0.0)
+        powers, past = np.split(memory.features(np.array([[0.2 * sign]]), 0.0)[0, :6], [3])
+        assert powers == pytest.approx([0.2 * sign, 0.04, 0.008 * sign])
+        assert past == pytest.approx([0.04 * sign, 0.0, 0.0])
+
+
+def test_what_one_coordinate_does_takes_along_what_another_left_behind():
+    """A point drawn by a rope: it turns towards where it is drawn."""
+    widths = plays_of(np.array([0.1, 0.2]))
+    assert widths.tolist() == [[0.1, 0.2], [0.1, np.inf], [np.inf, 0.2]]
+    memory = Memory(1, widths, np.zeros((1, 2)))
+    course = np.vstack([np.linspace([0, 0], [1, 0], 50), np.linspace([1, 0], [1, 1], 50)])
+    plays = memory.over(course, np.arange(100.0))[0]
+    assert plays[49] == pytest.approx([0.9, 0.0, 0.9, 0.0])
+    assert plays[99] == pytest.approx([1.0, 0.8, 0.9, 0.8], abs=3e-3)
+
+
+def test_plays_are_learnt_as_wide_as_the_sheet_has_them():
+    """Those of two coordinates that strain the sheet together, each by its own amount."""
+    widths = plays_of(np.array([0.15, 0.045]))
+    dv, time, state = two_coordinates(0, 400)
+    x = state / state.max(axis=0)
+    dv = dv + 0.3 * Memory(1, widths, x).over(x, time)[0][:, :2] @ SHAPES[[1, 2]]
+    examples = BodyExamples.checked(dv, time, state=state, names=("angle", "stretch"))
+    assert BodyModel.learn(examples, COVARIANCE).widths == pytest.approx(widths)
 
 
 def test_what_lags_behind_by_a_play_is_undone():

@@ -7,7 +7,7 @@ import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -147,8 +147,8 @@ def _check_moves(values: FloatArray, names: tuple[str, ...]) -> None:
             )
 
 
-_WIDTHS = (0.03, 0.08, 0.16, 0.3)
-"""Half widths of the plays, in parts of the largest of each coordinate."""
+_WIDTHS = (0.02, 0.03, 0.045, 0.065, 0.1, 0.15, 0.22, 0.33)
+"""Half widths of a play, in parts of the largest of a coordinate, among which the data choose."""
 
 _LAGS = (1.0, 30.0)
 """Time constants of what comes late, s."""
@@ -158,70 +158,76 @@ _DEGREES = (1, 2, 3)
 
 
 class Memory:
-    """Features of states x (d,), in parts of the largest: powers, and where it ``remembers`` the
-    past, alone and together with the state of the moment.
+    """Features of states x (d,), in parts of the largest: powers, and where it has plays what the
+    sheet remembers, alone and together with the state of the moment.
 
     What a sheet does late is a sum of plays and low passes of its strain (Krejčí & Kuhnen 2001,
-    IEE Proc. Control Theory Appl. 148, 185), which follows the state.
+    IEE Proc. Control Theory Appl. 148, 185). Strain is a vector, and its play is dragged as a
+    whole where it lags by more than its width: what one coordinate does takes along what another
+    has left behind. Where one coordinate alone strains the sheet, its play is its own.
 
     Parameters
     ----------
-    n, degree
-        Of the coordinates, and of the highest power.
-    plays
-        (w, d) where the plays stand at the reference; without them, nothing is remembered.
+    degree
+        The highest power.
+    widths
+        (p, d) half widths of the plays, infinite for coordinates that do not count in one; without
+        a row, nothing is remembered.
+    before
+        (n, d) states that the sheet went through before its reference.
     """
 
-    def __init__(self, n: int, degree: int, plays: FloatArray | None = None) -> None:
-        self._powers = [
-            list(chosen)
-            for power in range(1, degree + 1)
-            for chosen in itertools.combinations_with_replacement(range(n), power)
-        ]
-        self.remembers = plays is not None
-        self._plays = np.zeros((len(_WIDTHS), n)) if plays is None else plays
+    def __init__(self, degree: int, widths: FloatArray, before: FloatArray) -> None:
+        self._degree, self._widths, self._time = degree, widths, np.inf
+        self._lags = np.array(_LAGS if len(widths) else ())[:, None]
+        self._late = 0.0 * self._lags * before[0]
+        self._plays = self._start = np.zeros_like(widths)
+        for row in (*before, 0.0 * before[0]):
+            self._plays = self._after(row[None], 0.0)[0][0]
         self._start = self._plays
-        self._late = np.zeros((len(_LAGS), n))
-        self._time: float | None = None
 
     def features(self, x: FloatArray, time: float) -> FloatArray:
-        """(f,) features of a state ``x`` (d,) that may be at ``time`` s; all 0 at rest."""
-        powers = np.array([x[chosen].prod() for chosen in self._powers])
-        if not self.remembers:
-            return powers
-        plays, late = self._after(x, time)
-        past = np.concatenate([(plays - self._start).ravel(), late.ravel()])
-        return np.concatenate([powers, past, np.outer(x, past).ravel()])
+        """(n, f) features of states ``x`` (n, d), any of which may be at ``time`` s; all 0 at
+        rest."""
+        return joined(self._degree, x, *self._past(*self._after(x, time)))
 
-    def push(self, x: FloatArray, time: float) -> None:
+    def push(self, x: FloatArray, time: float) -> tuple[FloatArray, FloatArray]:
         """Take the state ``x`` (d,) that was at ``time`` s; frames in order."""
-        self._plays, self._late = self._after(x, time)
-        self._time = time
+        plays, late = self._after(x[None], time)
+        self._plays, self._late, self._time = plays[0], late[0], time
+        return self._plays, self._late
+
+    def over(self, x: FloatArray, time: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(n, p) plays since the reference and (n, l) low passes over a whole recording (n, d),
+        from its rest on."""
+        steps = [self.push(row, now) for row, now in zip(x, time.tolist(), strict=True)]
+        return self._past(*map(np.array, zip(*steps, strict=True)))
 
     def _after(self, x: FloatArray, time: float) -> tuple[FloatArray, FloatArray]:
-        step = 0.0 if self._time is None else max(time - self._time, 0.0)
-        width = np.array(_WIDTHS)[:, None]
-        kept = np.exp(-step / np.array(_LAGS))[:, None]
-        return np.clip(self._plays, x - width, x + width), x + (self._late - x) * kept
+        now, kept = x[:, None], np.exp(-max(time - self._time, 0.0) / self._lags)
+        away = now - self._plays
+        size = np.sqrt(np.sum((away / self._widths) ** 2, axis=2, keepdims=True))
+        return now - away / np.maximum(size, 1.0), now + (self._late - now) * kept
 
-    @classmethod
-    def over(
-        cls, x: FloatArray, time: FloatArray, degree: int, plays: FloatArray | None = None
-    ) -> FloatArray:
-        """(n, f) features of a whole recording (n, d), from its rest on."""
-        memory, rows = cls(x.shape[1], degree, plays), []
-        for row, now in zip(x, time.tolist(), strict=True):
-            rows.append(memory.features(row, now))
-            memory.push(row, now)
-        return np.array(rows)
+    def _past(self, plays: FloatArray, late: FloatArray) -> tuple[FloatArray, FloatArray]:
+        return (plays - self._start)[:, np.isfinite(self._widths)], late.reshape(len(late), -1)
 
-    @classmethod
-    def plays_after(cls, x: FloatArray) -> FloatArray:
-        """(w, d) where the plays stand once a body has been through ``x`` (n, d) and is back."""
-        memory = cls(x.shape[1], 1)
-        for row in (*x, np.zeros(x.shape[1])):
-            memory.push(row, 0.0)
-        return memory._plays
+
+def joined(degree: int, x: FloatArray, *past: FloatArray) -> FloatArray:
+    """(n, f) features of states ``x`` (n, d) and of their ``past``, each (n, k)."""
+    powers = (
+        x[:, chosen].prod(axis=1)
+        for power in range(1, degree + 1)
+        for chosen in map(list, itertools.combinations_with_replacement(range(x.shape[1]), power))
+    )
+    late = np.hstack(past)
+    return np.column_stack([*powers, late, *(one[:, None] * late for one in x.T)])
+
+
+def plays_of(widths: FloatArray) -> FloatArray:
+    """(p, d) half widths of the play of all coordinates together, and of each alone."""
+    alone = np.where(np.eye(len(widths), dtype=bool), widths, np.inf)
+    return np.vstack([widths, alone]) if len(widths) > 1 else alone
 
 
 _ABOVE = 1.1
@@ -256,9 +262,9 @@ class BodyModel:
         (n_meas, n_meas) V² of one frame less the reference.
     directions
         (n_meas, k) V: where the body moves the data, orthonormal in units of the noise.
-    degree, plays
-        Of the polynomials, and where the plays of :class:`Memory` stand at the reference; None
-        where the sheet's past does not count.
+    degree, widths
+        Of the polynomials, and (p, d) of the plays of :class:`Memory`: none where the sheet's past
+        does not count.
     weights
         (f, k) from features (:class:`Memory`) to amplitudes of the directions.
     errors
@@ -270,7 +276,7 @@ class BodyModel:
     covariance: FloatArray
     directions: FloatArray
     degree: int
-    plays: FloatArray | None
+    widths: FloatArray
     weights: FloatArray
     errors: FloatArray
 
@@ -306,12 +312,11 @@ class BodyModel:
         directions = np.linalg.pinv(whiten.matrix) @ rows[:count].T
         z = whitened @ rows[:count].T
         fits = [(one, *fit) for one in _with_states(examples, z) for fit in _fits(one, z)]
-        best = fits[0]
-        for fit in fits[1:]:
+        body, *best = fits[0]
+        for one, *fit in fits[1:]:
             if _missed(fit[-1]) < _WORTH * _missed(best[-1]):
-                best = fit
-        body, degree, plays, weights, errors = best
-        return cls(examples, body, covariance, directions, degree, plays, weights, errors)
+                body, best = one, fit
+        return cls(examples, body, covariance, directions, *best)
 
     def without(self, rows: IntArray) -> BodyModel:
         """Learnt again from the rows that are left without ``rows`` (k,), indices.
@@ -325,11 +330,11 @@ class BodyModel:
     @property
     def remembers(self) -> bool:
         """Whether the sheet's past counts."""
-        return self.plays is not None
+        return len(self.widths) > 0
 
     def memory(self) -> Memory:
         """Of a sheet at its reference."""
-        return Memory(len(self.body.names), self.degree, self.plays)
+        return Memory(self.degree, self.widths, self.body.state / self.body.size)
 
     @property
     def n_modes(self) -> int:
@@ -350,8 +355,8 @@ class BodyModel:
 
     def expanded(self, memory: Memory, x: FloatArray, time: float) -> tuple[FloatArray, FloatArray]:
         """(k,) amplitudes at a state ``x`` (d,), in parts of the largest, and slopes (k, d)."""
-        ends = [x, *(x + _SLOPE * np.eye(len(x)))]
-        rows = np.array([memory.features(end, time) for end in ends]) @ self.weights
+        ends = np.vstack([x, x + _SLOPE * np.eye(len(x))])
+        rows = memory.features(ends, time) @ self.weights
         return rows[0], ((rows[1:] - rows[0]) / _SLOPE).T
 
     @cached_property
@@ -382,7 +387,8 @@ class BodyModel:
     def changes(self, state: FloatArray, time: FloatArray) -> FloatArray:
         """(n, n_meas) V that the body adds to the reference in a course of states (n, d) at
         ``time`` (n,) s, from rest on: where an encoder tells them."""
-        features = Memory.over(state / self.body.size, time, self.degree, self.plays)
+        x = state / self.body.size
+        features = joined(self.degree, x, *self.memory().over(x, time))
         return np.asarray(features @ self.weights @ self.directions.T)
 
 
@@ -402,30 +408,38 @@ def _missed(errors: FloatArray) -> float:
     return float(np.maximum(np.mean(errors**2, axis=0), 1.0).mean())
 
 
-def _fits(
-    examples: BodyExamples, z: FloatArray
-) -> Iterator[tuple[int, FloatArray | None, FloatArray, FloatArray]]:
-    """Degree, plays, weights and left-out errors: without a memory, and with one."""
-    x = examples.state / examples.size
-    for degree, plays in itertools.product(_DEGREES, (None, Memory.plays_after(x))):
-        yield degree, plays, *_regressed(Memory.over(x, examples.time, degree, plays), z)
+def _fits(examples: BodyExamples, z: FloatArray) -> Iterator[tuple[Any, ...]]:
+    """Degree, widths of plays, weights and left-out errors: without a memory, and with one."""
+    x, time = examples.state / examples.size, examples.time
+    widths = plays_of(_widths(x, time, z))
+    pasts = [(one, *Memory(1, one, x).over(x, time)) for one in (widths[:0], widths)]
+    for degree, (own, *past) in itertools.product(_DEGREES, pasts):
+        yield degree, own, *_regressed(joined(degree, x, *past), z)
+
+
+def _widths(x: FloatArray, time: FloatArray, z: FloatArray) -> FloatArray:
+    """(d,) half widths that err least: the same for all coordinates, then each in turn, twice."""
+    d = x.shape[1]
+    best, each = np.ones(d), np.eye(d, dtype=bool)[d == 1 :]
+    for chosen in (np.ones(d, bool), *each, *each):
+        tried = [np.where(chosen, one, best) for one in _WIDTHS]
+        plays, late = Memory(1, np.vstack([plays_of(one) for one in tried]), x).over(x, time)
+        pasts = (joined(_DEGREES[-1], x, own, late) for own in np.split(plays, len(tried), axis=1))
+        best = tried[int(np.argmin([_missed(_regressed(one, z)[1]) for one in pasts]))]
+    return best
 
 
 def _regressed(features: FloatArray, targets: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Weights and left-out errors of the ridge that errs least."""
     scale = np.abs(features).max(axis=0) + 1e-12
     x = features / scale
-    fold = np.arange(len(x)) * _FOLDS // len(x)
-    candidates = []
-    for ridge in _RIDGES:
-        errors = np.zeros_like(targets)
-        for k in range(_FOLDS):
-            out = fold == k
-            errors[out] = targets[out] - x[out] @ _ridge(x[~out], targets[~out], ridge)
-        candidates.append((float(np.mean(errors**2)), ridge, errors))
-    _, ridge, errors = min(candidates, key=lambda one: one[0])
-    return _ridge(x, targets, ridge) / scale[:, None], errors
-
-
-def _ridge(x: FloatArray, y: FloatArray, ridge: float) -> FloatArray:
-    return np.asarray(np.linalg.solve(x.T @ x + ridge * np.eye(x.shape[1]), x.T @ y))
+    square, onto = x.T @ x, x.T @ targets
+    errors = np.zeros((len(_RIDGES), *targets.shape))
+    for out in np.array_split(np.arange(len(x)), _FOLDS):
+        values, vectors = np.linalg.eigh(square - x[out].T @ x[out])
+        along = vectors.T @ (onto - x[out].T @ targets[out])
+        weights = along / (np.maximum(values, 0.0)[:, None] + _RIDGES[:, None, None])
+        errors[:, out] = targets[out] - x[out] @ vectors @ weights
+    best = int(np.argmin(np.mean(errors**2, axis=(1, 2))))
+    chosen = np.linalg.solve(square + _RIDGES[best] * np.eye(len(square)), onto)
+    return chosen / scale[:, None], errors[best]

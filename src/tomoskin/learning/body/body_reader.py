@@ -111,7 +111,7 @@ class BodyReader:
 
     def __init__(self, model: BodyModel, response: Response, gain: float = 1.0) -> None:
         self._model, self.response, self.gain = model, response, gain
-        self._modes = model.whiten(model.directions.T).T
+        self.modes = model.whiten(model.directions.T).T
         self._memory = model.memory()
         span = model.body.state / model.body.size
         self._low = np.minimum(span.min(axis=0), 0.0)
@@ -164,7 +164,7 @@ class BodyReader:
     ) -> tuple[FloatArray, FloatArray, bool]:
         """(k,) amplitudes of the directions, (k, k) their inverse covariance, and whether much of
         the frame is explained by nothing."""
-        model, modes = self._model, self._modes
+        model, modes = self._model, self.modes
         change, free = self._touches(detections)
         data = model.whiten(dv) - change
         self._press(change)
@@ -187,7 +187,7 @@ class BodyReader:
         if not change.any():
             self._left, self._pressed = self._left + self._pressed, 0.0 * self._pressed
             return
-        along = RESIDUAL.part / 2 * (self._modes.T @ change)
+        along = RESIDUAL.part / 2 * (self.modes.T @ change)
         self._pressed = float(along @ along) * np.eye(len(along))
 
     def _solved(
@@ -225,7 +225,7 @@ class BodyReader:
         """(r,) what they change, whitened, and (r, c) its derivatives."""
         whiten = self._model.whiten
         if not detections:
-            return np.zeros(len(self._modes)), np.zeros((len(self._modes), 0))
+            return np.zeros(len(self.modes)), np.zeros((len(self.modes), 0))
         conductivity = float(np.mean(self.response.state.conductivity))
         spots = np.array([_spot_of(detection, conductivity) for detection in detections])
         change, slopes, towards = self.response.expanded(spots)
@@ -276,8 +276,7 @@ class BodyApplied(Applied):
     def __init__(self, model: BodyModel, fit: TouchFit) -> None:
         self._reader = BodyReader(model, fit.response, fit.gain)
         self._detect = fit.detect
-        self.poses = model.whiten(model.examples.dv) @ model.whiten(model.directions.T).T
-        self.poses = self.poses @ model.directions.T
+        self.poses = model.whiten(model.examples.dv) @ self._reader.modes @ model.directions.T
 
     def renew(self, response: Response, gain: float) -> None:
         """Go on with touches on another sheet."""
