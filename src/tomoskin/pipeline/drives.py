@@ -160,9 +160,8 @@ class DriveWatch:
             self._follow(rows, data, time)
         if late:
             return None
-        there = [each for each in self._followed.values() if each.lifted is None]
         withdrawn, self._withdrawn = self._withdrawn, ()
-        touches = tuple([self._shown(each, time) for each in there])
+        touches = tuple([self._shown(e, time) for e in self._followed.values() if e.lifted is None])
         return DriveResult(drive, host_time, touches, withdrawn)
 
     def among(self, touches: Sequence[Touch]) -> tuple[Touch, ...]:

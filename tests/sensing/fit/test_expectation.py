@@ -11,7 +11,7 @@ from scipy.stats import multivariate_normal
 
 from sensing.fit.test_finder import model
 from sensing.fit.test_table import TWO, expected, problem
-from tomoskin.sensing.fit.expectation import Expectation, less, newcomers
+from tomoskin.sensing.fit.expectation import Expectation, ResidualResponse, less, newcomers
 from tomoskin.sensing.fit.spot_fit import Deficit
 
 
@@ -55,3 +55,28 @@ def test_a_touch_where_it_is_expected_is_likelier_than_a_newcomer() -> None:
 def test_who_is_left() -> None:
     assert less((0, None, 2), 0) == (None, 2)
     assert less((0, None, 2), 2) == (0, None)
+
+
+def slid(count: int) -> ResidualResponse:
+    """What a touch has left that slid past ``count`` footprints, which look nearly alike."""
+    response, slopes = ResidualResponse(0.1), 0.01 * np.eye(4, 8, 1)
+    response.directions(np.eye(8))
+    for number in range(count):
+        change = 20.0 * np.eye(1, 8) + 0.1 * np.eye(1, 8, 5 + number % 3)
+        shapes = np.vstack([change, slopes[1:]])
+        response.after(np.array([[0.02 * number, 0.0, -4.0, -1e-4]]), lambda _, s=shapes: s)
+    return response
+
+
+def test_what_a_slide_has_left_is_not_forgotten_while_it_shows_as_a_whole() -> None:
+    response, left = slid(6), 3.0 * np.eye(1, 8)[0]  # half a deviation of each
+    for _ in range(10):
+        response.idle(response.without(left))
+    assert np.linalg.norm(response.without(left)) < 1.0
+    for _ in range(20):  # it fades
+        response.idle(response.without(0.0 * left))
+    assert response.doubts == ()
+
+
+def test_a_long_slide_leaves_something_where_it_began() -> None:
+    assert len(slid(30).doubts) == 30

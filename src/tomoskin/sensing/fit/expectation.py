@@ -85,8 +85,8 @@ _AWAY, _STRONGER, _WEAKER = 2e-3, 1.1, 0.95
 """A footprint is made anew where its touch is by so many m elsewhere or by so much stronger, and no
 weaker: a touch that has just begun is known badly, and so is one that is lifted."""
 
-_FOOTPRINTS = 16
-"""Footprints that are kept, the newest."""
+_FOOTPRINTS = 40
+"""Footprints that are kept, the newest: half a metre of a slide, as many as the tracker's."""
 
 _OTHERWISE = np.array([1.0, 5e-3, 5e-3, 0.3])
 """What is left lies elsewhere than the touch, m, and has another radius, as a logarithm: standard
@@ -143,8 +143,7 @@ class FootprintChange:
         """Whether the touch (4,) that stands here is known better by now than the footprint is."""
         size = spot[CONTENT] / self.spot[CONTENT]
         self.touched, self.quiet = max(self.touched, min(size, 1.0)), 0.0
-        moved = math.dist(self.spot[:2], spot[:2]) > _AWAY
-        return size > _STRONGER or (moved and size > _WEAKER)
+        return size > (_WEAKER if math.dist(self.spot[:2], spot[:2]) > _AWAY else _STRONGER)
 
     def doubt(self, since: float) -> float:
         """Deviation of the part that is left, so many seconds ``since`` an idle frame: a touch has
@@ -261,6 +260,8 @@ class ResidualResponse:
         for foot, more in zip(self._feet, parts.reshape(-1, len(_OTHERWISE)), strict=True):
             foot.learn(more, *shares)
             foot.quiet += self._seconds
-        shown = [float(np.linalg.norm(foot.parts @ foot.rows)) for foot in self._feet]
-        pairs = zip(self._feet, shown, strict=True)
-        self._feet = [foot for foot, size in pairs if size > 1.0 or foot.quiet < RESIDUAL.gone]
+        shown = np.array([foot.parts @ foot.rows for foot in self._feet])
+        faint = np.square(shown).sum(axis=1) <= 1.0
+        faint &= np.array([foot.quiet for foot in self._feet]) >= RESIDUAL.gone
+        if np.square(shown[faint].sum(axis=0)).sum() <= 1.0:  # those of one slide add up
+            self._feet = [foot for foot, over in zip(self._feet, faint, strict=True) if not over]
