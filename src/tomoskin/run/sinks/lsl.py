@@ -15,6 +15,9 @@ MOST_TOUCHES = 5
 """Touches that a sample has room for, the strongest first."""
 
 _FIELDS = (("id", ""), ("x", "m"), ("y", "m"), ("peak", "image"))
+_MARK = {"self": ""}
+"""1 where a link of the robot itself touches, 0 where none does."""
+
 _WHERE = "sink lsl"
 _IRREGULAR = 0.0
 
@@ -38,7 +41,7 @@ class LslSink(Sink):
             for number in range(1, MOST_TOUCHES + 1)
             for name, unit in _FIELDS
         ]
-        for name, unit in MEASURANDS.items():
+        for name, unit in {**MEASURANDS, **_MARK}.items():
             touches += [(f"{name} {number}", unit) for number in range(1, MOST_TOUCHES + 1)]
         touches.append(("valid", ""))
         double, string = self._lsl.cf_double64, self._lsl.cf_string
@@ -59,7 +62,7 @@ class LslSink(Sink):
             if item.reference is not None:
                 self._push("dv", item.voltages - item.reference, item)
         if item.is_due:
-            self._push("touches", _touch_row(item), item)
+            self._push("touches", touch_sample(item), item)
 
     def close(self) -> None:
         """Withdraw the streams that were announced."""
@@ -96,13 +99,14 @@ def open_lsl(argument: str) -> LslSink:
     return LslSink(argument or "tomoskin")
 
 
-def _touch_row(contacts: Contacts) -> FloatArray:
-    """Each touch, forces, depths, then 1 where touches are valid and 0 where they are not."""
+def touch_sample(contacts: Contacts) -> FloatArray:
+    """Each touch, forces, depths, own touches, then 1 where touches are valid, else 0."""
     row = np.full((MOST_TOUCHES, len(_FIELDS)), np.nan)
-    amounts = np.full((len(MEASURANDS), MOST_TOUCHES), np.nan)
+    more = np.full((len(MEASURANDS) + 1, MOST_TOUCHES), np.nan)
     for number, contact in enumerate(contacts.strongest(MOST_TOUCHES)):
-        detection = contact.touch.detection
-        row[number] = contact.touch.id, detection.x, detection.y, detection.peak
-        for name, amount in contact.touch.amounts.items():
-            amounts[[*MEASURANDS].index(name), number] = amount.value
-    return np.concatenate((row.ravel(), amounts.ravel(), [float(contacts.valid)]))
+        touch, detection = contact.touch, contact.touch.detection
+        row[number] = touch.id, detection.x, detection.y, detection.peak
+        amounts = (touch.amounts.get(name) for name in MEASURANDS)
+        told = *(amount and amount.value for amount in amounts), contact.is_self
+        more[:, number] = [np.nan if value is None else value for value in told]
+    return np.concatenate((row.ravel(), more.ravel(), [float(contacts.valid)]))
