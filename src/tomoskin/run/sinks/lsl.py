@@ -15,9 +15,6 @@ MOST_TOUCHES = 5
 """Touches that a sample has room for, the strongest first."""
 
 _FIELDS = (("id", ""), ("x", "m"), ("y", "m"), ("peak", "image"))
-_MARK = {"self": ""}
-"""1 where a link of the robot itself touches, 0 where none does."""
-
 _WHERE = "sink lsl"
 _IRREGULAR = 0.0
 
@@ -36,19 +33,13 @@ class LslSink(Sink):
         # both are the machine's monotonic clock, but LSL may count from elsewhere
         self._offset = clock_ahead(self._lsl.local_clock)
         rows = [(label, "V") for label in row_labels(stream.pattern)]
-        touches = [
-            (f"{name} {number}", unit)
-            for number in range(1, MOST_TOUCHES + 1)
-            for name, unit in _FIELDS
-        ]
-        for name, unit in {**MEASURANDS, **_MARK}.items():
-            touches += [(f"{name} {number}", unit) for number in range(1, MOST_TOUCHES + 1)]
-        touches.append(("valid", ""))
-        double, string = self._lsl.cf_double64, self._lsl.cf_string
-        self._announce(stream, "voltages", "EIT", rows, double)
-        self._announce(stream, "dv", "EIT", rows, double)
-        self._announce(stream, "touches", "Touch", touches, double)
-        self._announce(stream, "events", "Markers", [("event", "")], string)
+        numbers, more = range(1, MOST_TOUCHES + 1), (*MEASURANDS.items(), ("self", ""))
+        touches = [(f"{name} {number}", unit) for number in numbers for name, unit in _FIELDS]
+        touches += [(f"{name} {number}", unit) for name, unit in more for number in numbers]
+        self._announce(stream, "voltages", "EIT", rows)
+        self._announce(stream, "dv", "EIT", rows)
+        self._announce(stream, "touches", "Touch", [*touches, ("valid", "")])
+        self._announce(stream, "events", "Markers", [("event", "")])
 
     def publish(self, item: Item) -> None:
         """Push the samples of ``item``."""
@@ -72,17 +63,13 @@ class LslSink(Sink):
         self._outlets[name].push_sample(sample, time_of(item) + self._offset)
 
     def _announce(
-        self,
-        stream: Stream,
-        name: str,
-        kind: str,
-        channels: Sequence[tuple[str, str]],
-        number_format: int,
+        self, stream: Stream, name: str, kind: str, channels: Sequence[tuple[str, str]]
     ) -> None:
         full = f"{stream.naming.namespace.replace('/', '-')}-{name}"
         # one identity for a stream of a skin: receivers find it again after a restart
         identity = f"{full}-{stream.skin}"
-        info = self._lsl.StreamInfo(full, kind, len(channels), _IRREGULAR, number_format, identity)
+        content = self._lsl.cf_string if kind == "Markers" else self._lsl.cf_double64
+        info = self._lsl.StreamInfo(full, kind, len(channels), _IRREGULAR, content, identity)
         described = info.desc().append_child("channels")
         for label, unit in channels:
             channel = described.append_child("channel")
