@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from tomoskin.core import FloatArray, Touch
     from tomoskin.learning import Calibration, CalibrationHealth, Locator
     from tomoskin.model.skin import Skin
-    from tomoskin.sensing.signal import Recording
 
 _BLOCK = 256
 _NINETY = 1645.0
@@ -46,7 +45,7 @@ def locate(
     from tomoskin.files.exports import write_touches
     from tomoskin.files.imports import is_session
     from tomoskin.learning import TOUCH
-    from tomoskin.sensing.track import COLUMNS, touch_rows
+    from tomoskin.sensing.track import columns_of, touch_rows
 
     with Bar("learning") as bar:
         loaded = TOUCH.read(calibration, bar)
@@ -59,7 +58,7 @@ def locate(
     timed = list(zip(frames, data.time[frames].tolist(), located, strict=True))
     if touches is not None:
         write_touches(touches, timed, overwrite=force)
-    document = [dict(zip(COLUMNS, row, strict=True)) for row in touch_rows(timed)]
+    document = [dict(zip(columns_of(), row, strict=True)) for row in touch_rows(timed)]
     tell(document, _lines([(k, touch) for k, _, some in timed for touch in some]), json=json)
 
 
