@@ -20,9 +20,6 @@ _BESIDE = 0.05
 """A label may lie so far beyond the outline, in radii of the region: it is taken for its rim."""
 
 
-_FARTHEST = 5.0
-"""m from the origin of the sheet, beyond which a label is in another unit."""
-
 _MOST = 1e12
 """No instrument has a unit in which a change is a larger number: it counts as missing."""
 
@@ -75,9 +72,9 @@ class Presses:
         data, labels = frames(dv), np.asarray(xy, dtype=np.float64)
         if labels.shape != (len(data), 2):
             raise DataError(f"expected xy of shape ({len(data)}, 2), got {labels.shape}")
-        bad = np.flatnonzero(~(np.abs(labels) <= _FARTHEST).all(axis=1))
-        hint = "give labels in metres: millimetres have to be divided by 1000"
-        _name(bad, f"have labels that are no position within {_FARTHEST:g} m", hint)
+        wrong = ~(np.abs(labels) <= Region.FARTHEST).all(axis=1)
+        bad = np.flatnonzero(wrong)
+        _name(bad, "have labels that are not a position", "give labels in metres")
         if strength is None:
             return cls(data, labels)
         force = np.asarray(strength, dtype=np.float64)
