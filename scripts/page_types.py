@@ -23,7 +23,7 @@ _HEAD = """\
  * settings_messages.py, requests.py and frames.py of src/tomoskin/server: change those. */
 """
 _GETTERS = {"u1": "Uint8", "u2": "Uint16", "u4": "Uint32", "f4": "Float32", "f8": "Float64"}
-_UNNAMED = ("magic", "pad")
+_UNNAMED = ("magic",)
 
 
 def types() -> str:

@@ -216,9 +216,3 @@ def test_a_table_that_holds_no_states_is_refused(bare, recorded, tomoskin, text)
     code, _, err = tomoskin("calibrate", "body", bare, *given)
     assert code == 1
     assert "expected" in err
-
-
-def test_the_older_command_names_the_new_one(bare, tomoskin):
-    code, _, err = tomoskin("calibrate", "bend", bare, "--out", "c.npz")
-    assert code == 2
-    assert "tomoskin calibrate body" in err

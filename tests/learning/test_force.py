@@ -172,7 +172,7 @@ def test_the_calibration_of_another_skin_is_refused():
 
 def test_grams_are_not_newtons():
     touches, forces, number, time = presses(1)
-    with pytest.raises(DataError, match="these values are probably grams") as raised:
+    with pytest.raises(DataError, match="1 N is the weight of 102 g, so the unit") as raised:
         LabelledPresses.of(touches, 102 * forces, number, time)
     assert "--unit g" in str(raised.value)
 
@@ -224,7 +224,7 @@ def test_a_file_of_before_still_opens(tmp_path):
 
 def test_depths_in_another_unit_or_beyond_the_layer_are_refused():
     touches, depths, number, time = dips(1)
-    with pytest.raises(DataError, match="these values are probably millimetres"):
+    with pytest.raises(DataError, match="50 mm, so the unit is probably another"):
         LabelledPresses.of(touches, 1e3 * depths, number, time, "depth")
     with pytest.raises(DataError, match="the unit is probably another"):
         LabelledPresses.of(touches, 1e-3 * depths, number, time, "depth")

@@ -136,6 +136,12 @@ def test_a_touch_says_whether_a_scan_has_confirmed_it():
     assert [data[at + 64 * k + 7] for k in range(2)] == [1, 0]
 
 
+def test_a_touch_says_whether_the_robot_itself_makes_it():
+    data = encode_result(make(5, (touch(1, [0]), touch(7, [1]))), [], 0.0, own={7})
+    at = len(data) - 8 - 2 * 64
+    assert [data[at + 64 * k + 6] for k in range(2)] == [0, 1]
+
+
 def test_a_touch_carries_its_force_and_its_depth():
     none, forced, deep = touch(1, [0]), touch(2, [1]), touch(3, [2])
     forced = replace(forced, detection=replace(forced.detection, force=Amount(4.0, 3.5, 4.75)))

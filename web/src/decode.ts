@@ -24,7 +24,8 @@ function touchAt(data: DataView, at: number) {
 }
 
 /** Lengths m, deviations NaN where unknown; `force`, `depth` null where no calibration gives them; `several`:
- * how many it stands for: 0 one, 1 perhaps several, n > 1 that have come too close. */
+ * how many it stands for: 0 one, 1 perhaps several, n > 1 that have come too close; `own`: 1 where a link of the
+ * robot itself makes it. */
 export type Touch = Readonly<ReturnType<typeof touchAt>>;
 
 export type Truth = Readonly<ReturnType<typeof wire.readTruth>>;

@@ -865,6 +865,7 @@ export const readTouch = (data: DataView, at: number) => ({
   id: data.getUint32(at, true),
   kind: data.getUint8(at + 4),
   several: data.getUint8(at + 5),
+  own: data.getUint8(at + 6),
   provisional: data.getUint8(at + 7),
   x: data.getFloat32(at + 8, true),
   y: data.getFloat32(at + 12, true),

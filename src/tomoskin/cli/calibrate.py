@@ -347,12 +347,6 @@ def classes(
     )
 
 
-@app.command("bend", hidden=True, context_settings={"ignore_unknown_options": True})
-def bend(_given: Annotated[list[str] | None, typer.Argument()] = None) -> None:
-    """Say what this command is called now."""
-    raise typer.BadParameter("is called tomoskin calibrate body now", param_hint="calibrate bend")
-
-
 @_kind("body", "A recorded motion of the body, without touches.")
 def body(
     labelled: Recorded,

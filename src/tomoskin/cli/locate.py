@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from tomoskin.core import FloatArray, Touch
     from tomoskin.learning import Calibration, CalibrationHealth, Locator
     from tomoskin.model.skin import Skin
-    from tomoskin.sensing.signal import Recording
 
 _BLOCK = 256
 _NINETY = 1645.0
@@ -46,6 +45,7 @@ def locate(
     from tomoskin.files.exports import write_touches
     from tomoskin.files.imports import is_session
     from tomoskin.learning import TOUCH
+    from tomoskin.sensing.track import columns_of, touch_rows
 
     with Bar("learning") as bar:
         loaded = TOUCH.read(calibration, bar)
@@ -55,11 +55,11 @@ def locate(
         frames, located = _in_flow(given, given.skin, loaded)
     else:
         frames, located = _alone(given, loaded, several=several)
+    timed = list(zip(frames, data.time[frames].tolist(), located, strict=True))
     if touches is not None:
-        rows = zip(frames, located, strict=True)
-        timed = ((k, float(data.time[k]), t) for k, t in rows)
         write_touches(touches, timed, overwrite=force)
-    _report(data, frames, located, json=json)
+    document = [dict(zip(columns_of(), row, strict=True)) for row in touch_rows(timed)]
+    tell(document, _lines([(k, touch) for k, _, some in timed for touch in some]), json=json)
 
 
 Located = tuple[list[int], list[tuple["Touch", ...]]]
@@ -133,26 +133,6 @@ def _single(loaded: Calibration[Locator], dv: FloatArray) -> Iterator[tuple[Touc
             detection = detection_at(position, covariance, peak)
             yield (Touch(id=1, kind="touch", since=0.0, detection=detection),)
     _say_health(replace(watch.health, presses=0))  # strangeness has been said of all frames
-
-
-def _report(
-    data: Recording, frames: list[int], touches: list[tuple[Touch, ...]], *, json: bool
-) -> None:
-    rows = [(frame, touch) for frame, some in zip(frames, touches, strict=True) for touch in some]
-    document = [
-        {
-            "frame": frame,
-            "time_s": float(data.time[frame]),
-            "x_m": touch.detection.x,
-            "y_m": touch.detection.y,
-            "sd_x_m": touch.detection.sd_x,
-            "sd_y_m": touch.detection.sd_y,
-            "strength": touch.detection.peak,
-            "kind": touch.said,
-        }
-        for frame, touch in rows
-    ]
-    tell(document, _lines(rows), json=json)
 
 
 def _lines(rows: list[tuple[int, Touch]]) -> Iterator[str]:

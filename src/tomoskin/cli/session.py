@@ -47,6 +47,9 @@ EXPORTS = {
 }
 """What each ending gives; more is in docs/session-file.md."""
 
+_OF_ROBOTS = (".mcap", ".lerobot", ".rrd")
+"""Endings of what says where a robot's links were, or which touches are its own."""
+
 
 def _mended(out: Path | None, given: Given, called: str) -> list[Output]:
     """The file that a repair makes."""
@@ -153,7 +156,8 @@ def export(
         Path | None,
         typer.Option(
             metavar="robot.toml",
-            help="The robot that wore the skins: X.mcap and X.lerobot say where its links were.",
+            help="The robot that wore the skins: X.mcap and X.lerobot say where its links were. "
+            "They and --touches mark touches by the robot itself, or leave them out as it does.",
         ),
         Reads(),
     ] = None,
@@ -166,9 +170,14 @@ def export(
     from tomoskin.run import with_joints
 
     write = WRITERS[out.suffix.lower()]
+    misplaced, beside = "", "X.lerobot"
     if like is not None and out.suffix.lower() != ".lerobot":
+        misplaced = "--like"
+    elif robot is not None and touches is None and out.suffix.lower() not in _OF_ROBOTS:
+        misplaced, beside = "--robot", "--touches, X.mcap, X.lerobot or X.rrd"
+    if misplaced:
         raise typer.BadParameter(
-            f"expected it together with X.lerobot, got {out}", param_hint="--like"
+            f"expected it together with {beside}, got {out}", param_hint=misplaced
         )
     worn = None if robot is None else with_joints(Robot.load(robot))
     names = (skin,) if skin else skins_in(file)

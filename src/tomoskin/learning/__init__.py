@@ -10,6 +10,7 @@ from tomoskin.learning.amount.amount_model import (
 from tomoskin.learning.amount.amount_process import AmountProcess as AmountProcess
 from tomoskin.learning.amount.dent_map import DentMap as DentMap, dent_map as dent_map
 from tomoskin.learning.amount.measurand import (
+    FEWEST_LABELS as FEWEST_LABELS,
     MEASURED as MEASURED,
     AmountLabel as AmountLabel,
     LabelledPresses as LabelledPresses,

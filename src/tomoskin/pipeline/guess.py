@@ -183,11 +183,12 @@ def order_fault(recording: Recording, resistance: FloatArray) -> str | None:
     """What is wrong with the order of the rows, in a sentence; None where nothing shows.
 
     ``recording`` has its rows as they are in the file; ``resistance`` (n, n) Ω is between the
-    electrodes of the untouched skin's model. Nothing is said of files of differences.
+    electrodes of the untouched skin's model. Nothing is said of files of differences, nor of more
+    electrodes than the skin has.
     """
-    if recording.is_change:
-        return None
     n = len(resistance)
+    if recording.is_change or electrodes_of(recording.drive, recording.measure) > n:
+        return None
     drive = recording.drive if recording.spread else signed(recording.drive, n)
     currents = np.zeros((len(drive), n))
     currents[:, : drive.shape[1]] = drive

@@ -11,6 +11,7 @@ import numpy as np
 from tomoskin.core import DataError, Detection, FloatArray, Touch, WireError
 from tomoskin.learning import (
     DEPTH,
+    FEWEST_LABELS,
     FORCE,
     MEASURED,
     AmountLabel,
@@ -25,7 +26,7 @@ from tomoskin.server.page_messages import Figures, LabelNow, Phase, Point
 from tomoskin.server.press_taker import OFTEN
 from tomoskin.server.requests import SetLabel
 
-_FEWEST, _ENOUGH, _GOOD = 5, 10, 20
+_ENOUGH, _GOOD = 10, 20
 """Presses from which amounts are learnt, that are enough to begin with, and that are good."""
 
 
@@ -207,8 +208,8 @@ class AmountFlow(GuidedFlow):
 
     def estimate_from(self, examples: tuple[LabelledPlacement, ...]) -> Estimate:
         """Learn the amounts of touches from these presses."""
-        if len(examples) < _FEWEST:
-            return Estimate(f"{counted(_FEWEST - len(examples))} more for a first answer")
+        if len(examples) < FEWEST_LABELS:
+            return Estimate(f"{counted(FEWEST_LABELS - len(examples))} more for a first answer")
         model = AmountModel.fit(labelled_presses(examples), self.prepared.skin)
         return Estimate(
             f"{report_of(model)['text']}. {_advice(model)}",

@@ -6,10 +6,10 @@ header, 40 bytes      ``TSK1``, sequence u32, host_time f64, n_cells u32, n_meas
 image                 f32 [n_cells], change of conductivity in the scene's unit
 voltages, reference   f32 [n_meas] each, V
 touches, 64 bytes     id u32, kind u8 (0 decrease, 1 increase), several u8 (0 no, 1 may be
-each                  several, n > 1: n that have merged), 1 pad, provisional u8 (1: no whole
-                      scan has confirmed it), x, y, sd_x, sd_y (NaN unknown), area, peak,
-                      since (s ago), cov_xy (m²), force and its interval (N), depth and its
-                      interval (m; NaN uncalibrated) f32
+each                  several, n > 1: n that have merged), own u8 (1: a link of the robot
+                      itself makes it), provisional u8 (1: no whole scan has confirmed it), x,
+                      y, sd_x, sd_y (NaN unknown), area, peak, since (s ago), cov_xy (m²), force
+                      and its interval (N), depth and its interval (m; NaN uncalibrated) f32
 truth, 16 bytes each  x, y (m), force (N), radius (m) f32: the presses on the twin
 bend, 16 bytes        with flag bit 3 only: angle, its deviation, axis (rad) f32, state u32 (a
                       place in :data:`BEND_STATES`)
@@ -24,7 +24,7 @@ bit 2 some rows are left out of the image; bit 3 bends of this skin were learnt.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from enum import IntFlag
 
 import numpy as np
@@ -53,8 +53,10 @@ BEND_STATES = ("idle", "bend", "touch", "bend and touch", "unknown")
 DENT_STEP = 2e-6
 """Metres by which a dent is counted: a page has up to 131 mm."""
 
+_OF_DETECTION = ("x", "y", "sd_x", "sd_y", "area", "peak")
 _MEASURES = (
-    *("x", "y", "sd_x", "sd_y", "area", "peak", "since", "cov_xy"),
+    *_OF_DETECTION,
+    *("since", "cov_xy"),
     *("force", "force_low", "force_high", "depth", "depth_low", "depth_high"),
 )
 RECORDS = {
@@ -77,7 +79,7 @@ RECORDS = {
             ("id", "<u4"),
             ("kind", "u1"),
             ("several", "u1"),
-            ("pad", "u1"),
+            ("own", "u1"),
             ("provisional", "u1"),
             *((name, "<f4") for name in _MEASURES),
         ]
@@ -92,7 +94,11 @@ _MOST = 255
 
 
 def encode_result(
-    result: FrameResult, truth: Sequence[Probe], latency: float, dent: DentMap | None = None
+    result: FrameResult,
+    truth: Sequence[Probe],
+    latency: float,
+    dent: DentMap | None = None,
+    own: Container[int] = (),
 ) -> bytes:
     """Message of one result.
 
@@ -106,6 +112,8 @@ def encode_result(
         Seconds from the frame's last byte to its touches.
     dent
         The dent of its touches at the nodes of the mesh, where a page asks for it.
+    own
+        Identities of the touches that links of the robot itself make.
     """
     touches = result.touches[:_MOST]
     return b"".join(
@@ -114,7 +122,7 @@ def encode_result(
             result.image.values.astype("<f4").tobytes(),
             result.voltages.astype("<f4").tobytes(),
             result.reference.astype("<f4").tobytes(),
-            _touches(touches, result.host_time),
+            _touches(touches, result.host_time, own),
             _record("Truth", [(p.x, p.y, p.force, p.radius) for p in truth]),
             _bend(result.bend),
             _labels(touches, len(result.image.values)),
@@ -147,20 +155,15 @@ def _record(name: str, values: object) -> bytes:
     return np.array(values, RECORDS[name]).tobytes()
 
 
-def _touches(touches: Sequence[Touch], now: float) -> bytes:
+def _touches(touches: Sequence[Touch], now: float, own: Container[int]) -> bytes:
     rows = [
         (
             t.id % 2**32,
             t.kind == "increase",
             min(len(t.merged), _MOST) or t.detection.close,
-            0,
+            t.id in own,
             t.provisional,
-            t.detection.x,
-            t.detection.y,
-            t.detection.sd_x,
-            t.detection.sd_y,
-            t.detection.area,
-            t.detection.peak,
+            *(getattr(t.detection, name) for name in _OF_DETECTION),
             now - t.since,
             t.detection.cov_xy,
             *amount_values(t.detection.force)[:3],

@@ -15,6 +15,7 @@ import numpy as np
 
 from tomoskin.board.source import Transport
 from tomoskin.core import DataError, GeometryError, TomoskinError, WireError
+from tomoskin.files.messages import own_touches
 from tomoskin.files.session import read_timeline
 from tomoskin.learning import DEPTH, DentMap, dent_map
 from tomoskin.model.skin import Skin
@@ -186,7 +187,8 @@ class Hub(Host):
         asked = bool(self._dents.pages)
         if self._made is None or self._made[0] is not shown or self._made[1] is not asked:
             dent = self._dents.of(shown.result) if asked else None
-            made = encode_result(shown.result, shown.truth, shown.latency, dent)
+            own = own_touches(self.runner.flow.out.stream, shown.result)
+            made = encode_result(shown.result, shown.truth, shown.latency, dent, own)
             self._made = shown, asked, made
         return self._made[2]
 

@@ -58,6 +58,12 @@ class ScriptSection(Section, section="script"):
     preset: str | None = key(_PRESET, _PRESET_MEANING, default=None)
 
 
+def _ramp(meaning: str, default: str) -> float:
+    """A time at a constant rate, for which a profile may stand instead."""
+    lasts: float = key(_LASTS, meaning, default=default, unless="profile")
+    return lasts
+
+
 class PressSection(Section, section="press", many=True):
     """A probe that presses on the sheet, from `start` until its force has ended."""
 
@@ -94,19 +100,9 @@ class PressSection(Section, section="press", many=True):
     )
     start: float = key(_TIME, "When the probe touches the sheet.")
     force: float | None = key(_FORCE, "Force during `hold`.", unless="profile")
-    rise: float = key(
-        _LASTS,
-        "Time from 0 N to the force, at a constant rate.",
-        default="200 ms",
-        unless="profile",
-    )
+    rise: float = _ramp("Time from 0 N to the force, at a constant rate.", "200 ms")
     hold: float | None = key(_LASTS, "Time at the force.", unless="profile")
-    fall: float = key(
-        _LASTS,
-        "Time from the force to 0 N, at a constant rate.",
-        default="200 ms",
-        unless="profile",
-    )
+    fall: float = _ramp("Time from the force to 0 N, at a constant rate.", "200 ms")
     profile: Course | None = key(
         _course(force=_FORCE),
         "Instead of `force`, `rise`, `hold` and `fall`: force at times since `start`, linear "
@@ -119,19 +115,9 @@ class _Bending(Section):
     """When a sheet is bent or stretched."""
 
     start: float = key(_TIME, "Time at which it begins.")
-    rise: float = key(
-        _LASTS,
-        "Time until the whole bend or stretch, at a constant rate.",
-        default="1 s",
-        unless="profile",
-    )
+    rise: float = _ramp("Time until the whole bend or stretch, at a constant rate.", "1 s")
     hold: float | None = key(_LASTS, "Time at the whole bend or stretch.", unless="profile")
-    fall: float = key(
-        _LASTS,
-        "Time until none of it is left, at a constant rate.",
-        default="1 s",
-        unless="profile",
-    )
+    fall: float = _ramp("Time until none of it is left, at a constant rate.", "1 s")
 
 
 class BendSection(_Bending, section="bend", many=True):

@@ -79,7 +79,7 @@ def test_voltages_and_their_change(told):
 
 def test_touches_and_events(told):
     assert told["touches"][:4] == [4, 0.1, -0.2, -0.5]
-    assert told["touches"][4:] == [None] * 26 + [1]  # the last says that they are valid
+    assert told["touches"][4:] == [None] * 31 + [1]  # the last says that they are valid
     assert told["event"] == ['{"kind":"connected","text":"board 01"}']
 
 

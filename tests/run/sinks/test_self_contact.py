@@ -11,10 +11,13 @@ import pytest
 from files.session.runs import SKIN, TOUCH
 from run.sinks.conftest import EPOCH, result_at
 from tomoskin.core import SkinError
-from tomoskin.files.messages import Contacts, Stream
+from tomoskin.files.exports import Export, export_touches
+from tomoskin.files.messages import FIELDS, Contacts, Naming, Slots, Stream, own_touches
+from tomoskin.files.session import SessionReader, SessionWriter
 from tomoskin.model.robot import Robot
 from tomoskin.pipeline import prepare
 from tomoskin.run import Member, RobotRun
+from tomoskin.run.sinks.lsl import touch_sample
 from tomoskin.sensing.track import TouchEvent
 
 URDF = """<robot name="arm"><link name="upper"/><link name="fore"/><link name="hand">
@@ -42,15 +45,24 @@ def touch_at(x, number=1, sd=1e-3):
 
 
 @pytest.fixture
-def contacts(tmp_path):
-    """Contacts of a frame: the hand stands at ``across``, 2 mm above the sheet."""
+def arm(tmp_path):
+    """Robot: the hand stands at ``across``, 2 mm above the sheet."""
 
-    def make(*touches, across=0.03, up=0.0, choice="mark", happened=()):
+    def make(across=0.03, up=0.0, choice="mark"):
         (tmp_path / "arm.urdf").write_text(URDF)
         (tmp_path / "robot.toml").write_text(ROBOT.replace("CHOICE", choice))
         states = {"across": across, "up": up}.__getitem__
-        robot = Robot.load(tmp_path / "robot.toml").moved_by(lambda _: states)
-        stream = Stream.of(PREPARED, "twin", EPOCH, robot.skins[0].place)
+        return Robot.load(tmp_path / "robot.toml").moved_by(lambda _: states)
+
+    return make
+
+
+@pytest.fixture
+def contacts(arm):
+    """Contacts of a frame."""
+
+    def make(*touches, happened=(), **stands):
+        stream = Stream.of(PREPARED, "twin", EPOCH, arm(**stands).skins[0].place)
         return Contacts.of(stream, result_at(1.0, *touches, events=happened))
 
     return make
@@ -86,6 +98,57 @@ def test_own_touches_can_be_left_out_with_what_happens_to_them(contacts):
 
 def happening_marks(contacts):
     return [happening["self"] for happening in contacts.happenings()]
+
+
+def test_samples_of_lsl_and_slots_of_policies_have_the_mark(contacts):
+    frame = contacts(touch_at(0.03), touch_at(-0.03, 2), touch_at(0.03, 3))
+    unplaced = replace(frame, stream=replace(frame.stream, place=None))
+    for of, marked in ((frame, [1, 0, 1]), (unplaced, [np.nan] * 3)):
+        sample = touch_sample(of)
+        order = np.argsort(sample[:12:4])  # the strongest touches are first there
+        assert sample[-6:-1][:3][order] == pytest.approx(marked, nan_ok=True)
+        assert np.isnan(sample[-3:-1]).all()
+        table = Slots().after(of).table
+        known = np.isfinite(marked)
+        assert table[:3, FIELDS.index("self_valid")].tolist() == known.tolist()
+        assert table[:3, FIELDS.index("self")].tolist() == np.where(known, marked, 0).tolist()
+
+
+@pytest.mark.parametrize("choice", ["mark", "leave-out"])
+def test_tables_and_the_page_of_the_skin_have_the_mark(arm, tmp_path, choice):
+    touches = touch_at(0.03), touch_at(-0.03, 2)
+    with SessionWriter(tmp_path / "x-pad.mcap", SKIN, epoch=EPOCH) as writer:
+        writer.touches(1.0, 7, touches)
+    robot, table = arm(choice=choice), tmp_path / "x.csv"
+    with SessionReader(tmp_path / "x-pad.mcap") as session:
+        export_touches(Export(session, robot=robot), table)
+        stream = Export(session, robot=robot).stream
+        assert own_touches(stream, result_at(1.0, *touches)) == {1}
+        export_touches(Export(session), tmp_path / "alone.csv")
+    rows = [line.split(",") for line in table.read_text().splitlines()]
+    marked = [(row[2], row[-1]) for row in rows]
+    assert marked == [("id", "self"), ("1", "true"), ("2", "false")][:: 1 + (choice != "mark")]
+    assert "self" not in (tmp_path / "alone.csv").read_text()
+
+
+def test_all_who_listen_share_one_look_at_the_links(contacts):
+    asked = []
+    frame = contacts(touch_at(0.03), touch_at(-0.03, 2))
+    states = frame.stream.place.joints(0.0)
+
+    def joints(utc):
+        return lambda joint: asked.append((utc, joint)) or states(joint)
+
+    stream = replace(frame.stream, place=replace(frame.stream.place, joints=joints))
+    result = result_at(1.0, *frame.tracked)
+    for name in ("one", "two", "three"):
+        assert marks(Contacts.of(stream.named(Naming(name)), result)) == [True, False]
+    once = len(asked)
+    assert once > 0
+    assert own_touches(stream, result) == {1}
+    assert len(asked) == once == len(set(asked))
+    marks(Contacts.of(stream, result_at(2.0, *frame.tracked)))
+    assert len(asked) == 2 * once
 
 
 @pytest.mark.parametrize("choice", ["mark", "leave-out"])

@@ -24,6 +24,8 @@ function doubt(touch: Touch): string | undefined {
   return touch.several ? "may be several touches, too close to separate" : undefined;
 }
 
+const notes = (touch: Touch) => [touch.own && "by the robot itself", doubt(touch)].filter(Boolean).join(", ");
+
 function Strength({ touch, scale }: { touch: Touch; scale: Scale }) {
   const name = shownAs.value;
   const amount = name === "change" ? null : touch[name];
@@ -71,7 +73,7 @@ function Row({ touch, scale }: { touch: Touch; scale: Scale }) {
   return (
     <tr data-testid="touch-row" data-id={touch.id}>
       <th scope="row">
-        <span class="chip" title={doubt(touch)}>
+        <span class={touch.own ? "chip own" : "chip"} title={notes(touch)}>
           {touch.id}
           {touch.several > 0 && "+"}
         </span>
@@ -120,7 +122,7 @@ function Announcer() {
       const positions = touches.map(
         (touch) =>
           `touch ${touch.id} at ${millimetres(touch.x, 0)}, ${millimetres(touch.y, 0)} ` +
-          ["millimetres", touch.force && amountInWords(touch.force, "force"), touch.depth && amountInWords(touch.depth, "depth"), doubt(touch)]
+          ["millimetres", touch.force && amountInWords(touch.force, "force"), touch.depth && amountInWords(touch.depth, "depth"), notes(touch)]
             .filter(Boolean)
             .join(", "),
       );

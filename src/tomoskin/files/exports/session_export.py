@@ -16,6 +16,7 @@ from tomoskin.files.exports.published import write_bag, write_rerun
 from tomoskin.files.exports.session_table import write_csv, write_hdf5, write_parquet, write_touches
 from tomoskin.files.exports.vtu import write_series
 from tomoskin.files.imports import write_interchange
+from tomoskin.files.messages import Contacts
 from tomoskin.files.session import (
     OWN_FILES,
     SessionReader,
@@ -76,10 +77,24 @@ def _scale(job: Export) -> tuple[Mesh, str, float]:
 
 
 def export_touches(job: Export, path: StrPath) -> None:
-    """Write a table of the touches; of a session without any, those that a replay finds."""
-    rows, surface = list(session_touches(job.session)), job.session.skin.surface
-    measured, begun = measured_in(rows), first_scan(job.session)
-    write_touches(path, rows, surface, measured=measured, begun=begun, overwrite=job.overwrite)
+    """Write a table of the touches; of a session without any, those that a replay finds.
+
+    Where the robot is known that wore the skin, it says which are the robot's own.
+    """
+    rows, own = list(session_touches(job.session)), None
+    if job.robot is not None:
+        frames = [Contacts(job.stream, -1, time, True, None, None, t).kept() for _, time, t in rows]
+        rows = [(*row[:2], frame.tracked) for row, frame in zip(rows, frames, strict=True)]
+        own = [contact.is_self for frame in frames for contact in frame.touches]
+    write_touches(
+        path,
+        rows,
+        job.session.skin.surface,
+        measured=measured_in(rows),
+        begun=first_scan(job.session),
+        own=own,
+        overwrite=job.overwrite,
+    )
 
 
 WRITERS: dict[str, Callable[[Export, Path], None]] = {

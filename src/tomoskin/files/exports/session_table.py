@@ -4,7 +4,7 @@ it in one HDF5 file (extra ``hdf5``)."""
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import msgspec
@@ -117,6 +117,7 @@ def write_touches(
     *,
     measured: Measurands = (),
     begun: float | None = None,
+    own: Sequence[bool | None] | None = None,
     overwrite: bool = False,
 ) -> int:
     """Write touches of (frame, time, touches); return the number of rows.
@@ -125,7 +126,8 @@ def write_touches(
     is the recording's own.
 
     ``measured`` adds columns of forces or depths, empty where a touch has none; ``begun``, the
-    time of the recording's own first frame, adds the time since then.
+    time of the recording's own first frame, adds the time since then; ``own``, of every row, adds
+    whether a link of the robot itself touched, empty where that is not known.
 
     A standard deviation that is not known is an empty field; the kind is :attr:`Touch.said`. On
     a ``surface`` that is not flat each row ends with the touch's position on it.
@@ -133,11 +135,15 @@ def write_touches(
     Raises as :func:`written` does.
     """
     names = columns_of(surface, measured=measured, begun=begun)
-    rows: list[Iterable[str]] = [names]
+    rows: list[list[str]] = []
     for row in touch_rows(frames, surface, measured=measured, begun=begun):
         rows.append([_touch_text(name, value) for name, value in zip(names, row, strict=True)])
-    write_rows(path, rows, overwrite=overwrite)
-    return len(rows) - 1
+    if own is not None:
+        names = *names, "self"
+        for texts, mark in zip(rows, own, strict=True):
+            texts.append("" if mark is None else str(mark).lower())
+    write_rows(path, [names, *rows], overwrite=overwrite)
+    return len(rows)
 
 
 def _touch_text(name: str, value: object) -> str:

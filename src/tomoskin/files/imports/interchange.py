@@ -138,10 +138,10 @@ def read_table(lines: Iterable[str], source: str) -> Recording:
         for name, match in zip(header, matches, strict=True)
         if match is None and name not in (*_KN_CLOCK, *_IGNORED)
     ]
-    if unknown or len(set(header)) != len(header):
+    if unknown:
         raise DataError(
-            f"expected columns v_SOURCE_SINK_PLUS_MINUS, {', '.join(_KN_CLOCK)}, each once, got "
-            f'"{(unknown or header)[0]}"',
+            f"expected columns v_SOURCE_SINK_PLUS_MINUS, {', '.join(_KN_CLOCK)}, got "
+            f'"{unknown[0]}"',
             where=f"{source}, line 1",
         )
     kinds = {match[1] for match in matches if match}
@@ -204,6 +204,10 @@ def _header(rows: Iterator[list[str]], source: str) -> list[str]:
             "expected commas between columns and decimal points in numbers, got semicolons or tabs",
             where=f"{source}, line 1",
             hint="export it with decimal points: 1.5, not 1,5",
+        )
+    if twice := [name for number, name in enumerate(header) if name in header[:number]]:
+        raise DataError(
+            f'expected each column once, got "{twice[0]}" more than once', where=f"{source}, line 1"
         )
     return header
 

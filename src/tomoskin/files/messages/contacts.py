@@ -9,7 +9,7 @@ import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import cached_property, lru_cache, partial
 from typing import Any, Self, TypeVar
 
 import numpy as np
@@ -68,10 +68,15 @@ class LinkPose:
     pose: Pose | None
     problem: str | None = None
     near: Callable[[], _Near] = field(default=lambda: (None, None), repr=False)
+    _marks: dict[Touch, bool | None] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
+    @lru_cache(maxsize=64)
     def of(cls, place: Place | None, utc: float | None) -> Self | None:
-        """At a time, s since 1970; None of a skin that lies on no link."""
+        """At a time, s since 1970; None of a skin that lies on no link.
+
+        All sinks of a frame are given the same record, so that each thing is looked up once.
+        """
         if place is None or place.own is None:
             return None
         pose, problem = _or_why(place.in_root, utc)
@@ -81,6 +86,17 @@ class LinkPose:
     def others(self) -> _Near:
         """What tells whether another link was near; None where it is not known, and why."""
         return self.near()
+
+    def mark(self, contact: Contact) -> bool | None:
+        """Whether another link was near a third of the ellipse of ``contact`` or more.
+
+        None where that is not known. A link that is so near presses as a rule, so a third will do.
+        """
+        if contact.touch not in self._marks:
+            near = self.others[0]
+            points = contact.ellipse
+            self._marks[contact.touch] = near and bool(3 * near(points).sum() >= len(points))
+        return self._marks[contact.touch]
 
     def content(self) -> dict[str, Any]:
         """The pose and what is wrong with it, as plain values by name."""
@@ -157,18 +173,16 @@ class Contact:
 
     @property
     def is_self(self) -> bool | None:
-        """Whether a link of the robot itself is near a third of its ellipse or more.
+        """Whether a link of the robot itself touches, see :meth:`LinkPose.mark`."""
+        return None if self.link is None else self.link.mark(self)
 
-        None where that is not known. A link that is so near presses as a rule, so a third will do.
-        """
-        near = self.link and self.link.others[0]
-        if not near:
-            return None
+    @property
+    def ellipse(self) -> FloatArray:
+        """(n, 3) m: points that stand for where it may be, along the surface."""
         spread = self.covariance
         values, vectors = np.linalg.eigh(np.zeros((3, 3)) if spread is None else spread)
         axes = vectors * np.sqrt(np.maximum(values, 0.0))
-        points = self.position + _SPREAD @ axes[:, 1:].T  # the first is along the normal
-        return bool(3 * near(points).sum() >= len(points))
+        return np.asarray(self.position + _SPREAD @ axes[:, 1:].T)  # the first is along the normal
 
     @property
     def orientation(self) -> Vector:
@@ -314,8 +328,18 @@ class Contacts:
             noise=result.baseline.deviation if result.ready and result.baseline else None,
             measured=(math.nan if stream.replayed else when) if measured is None else measured,
         )
-        own = stream.place and stream.place.own
-        return replace(contacts, **_foreign(contacts)) if own and own.leaves_out else contacts
+        return contacts.kept()
+
+    def kept(self) -> Self:
+        """The same without touches by the robot's own links, where the robot leaves these out."""
+        own = self.stream.place and self.stream.place.own
+        if not (own and own.leaves_out):
+            return self
+        return replace(
+            self,
+            tracked=tuple(c.touch for c in self.touches if not c.is_self),
+            happened=tuple(event for event, c in _happened(self) if not c.is_self),
+        )
 
     def outdated(self, problem: str) -> Self:
         """The same, but no touches, which are not true any more, and why."""
@@ -359,7 +383,7 @@ class Contacts:
         """The touches in space, in the order of their identities."""
         return Contact.each(self.tracked, self.stream.surface, self.link)
 
-    @cached_property
+    @property
     def link(self) -> LinkPose | None:
         """Where the link of the robot was at that time; None where the skin lies on none."""
         return LinkPose.of(self.stream.place, self.utc)
@@ -400,19 +424,18 @@ class Contacts:
         ]
 
 
+def own_touches(stream: Stream, result: FrameResult) -> set[int]:
+    """Identities of the touches of a frame that links of the robot itself make."""
+    link = LinkPose.of(stream.place, stream.utc(_when(result.scanned, result.host_time)))
+    touches = Contact.each(result.touches, stream.surface, link) if link else ()
+    return {contact.touch.id for contact in touches if contact.is_self}
+
+
 def _happened(contacts: Contacts) -> Iterator[tuple[TouchEvent, Contact]]:
     """What happened to touches, each with that touch in space."""
     events = contacts.happened
     touches = [event.touch for event in events]
     return zip(events, Contact.each(touches, contacts.stream.surface, contacts.link), strict=True)
-
-
-def _foreign(contacts: Contacts) -> dict[str, Any]:
-    """The touches that are not by the robot's own links, and what happened to them."""
-    return {
-        "tracked": tuple(c.touch for c in contacts.touches if not c.is_self),
-        "happened": tuple(event for event, c in _happened(contacts) if not c.is_self),
-    }
 
 
 def without_frame(stream: Stream, problem: str, host_time: float) -> Contacts:

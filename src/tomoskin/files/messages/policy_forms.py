@@ -25,7 +25,7 @@ SLOTS = 5
 FIELDS = (
     *("valid", "present", "id", "x", "y", "z", "dx", "dy", "dz", "nx", "ny", "nz"),
     *("sd_x", "sd_y", "sd_z", "force_valid", "force", "strength"),
-    *("depth_valid", "depth"),
+    *("depth_valid", "depth", "self_valid", "self"),
 )
 """Columns of a slot; :meth:`Slots.table` says what they mean."""
 
@@ -60,7 +60,8 @@ class Slots:
         something touches, and ``present`` 1 where something does. ``x`` to ``nz`` are position,
         its change since the touch began, both along the surface, and normal in the frame of the
         contacts, m; ``force`` is in N against the normal, and ``force_valid`` 1 where it is
-        calibrated; ``strength`` is in the image's unit; ``depth``, m, is as ``force``.
+        calibrated; ``strength`` is in the image's unit; ``depth``, m, is as ``force``. ``self`` is
+        1 where a link of the robot itself touches, and ``self_valid`` where that is known.
     """
 
     ids: tuple[int, ...] = (0,) * SLOTS
@@ -106,9 +107,9 @@ def _row(contact: Contact, onset: FloatArray) -> list[float]:
         (0.0, 0.0) if amount is None else (1.0, amount.value)
         for amount in (touch.detection.force, touch.detection.depth)
     )
-    moved = position - onset
+    moved, own = position - onset, contact.is_self
     return [1.0, touch.id, *position, *moved, *contact.normal, *deviation, *force,
-            touch.detection.peak, *depth]  # fmt: skip
+            touch.detection.peak, *depth, own is not None, bool(own)]  # fmt: skip
 
 
 def last_before(times: FloatArray, moments: FloatArray, count: int) -> IntArray:

@@ -34,8 +34,8 @@ class Measurand:
         The one of these in which people are told of it.
     least, most
         Where all labels are less, or one is more, their unit is another one, SI.
-    slip
-        What is wrong with labels beyond ``most``, in words.
+    usual
+        What a touch has, in words.
     labels
         What labels are, in words.
     bends
@@ -51,7 +51,7 @@ class Measurand:
     shown: str
     least: float
     most: float
-    slip: str
+    usual: str
     labels: str
     bends: tuple[float, ...] = (1.0,)
     halves: tuple[float, ...] = field(default=tuple(np.geomspace(0.02, 50.0, 41)))
@@ -62,7 +62,8 @@ class Measurand:
 
     def span(self, values: FloatArray) -> str:
         """From the smallest to the largest of ``values``, SI."""
-        return f"{values.min() / self.units[self.shown]:.2g} to {self.text(values.max(), 2)}"
+        least, most = (self.text(value) for value in (values.min(), values.max()))
+        return most if least == most else f"{least.removesuffix(f' {self.shown}')} to {most}"
 
     @cached_property
     def key(self) -> str:
@@ -82,8 +83,7 @@ _FORCE = Measurand(
     shown="N",
     least=1e-3,
     most=100.0,
-    slip="a touch has 0.1 to 50 N, so these values are probably grams: convert them with --unit g, "
-    "1 N is the weight of 102 g",
+    usual="a touch has 0.1 to 50 N, and 1 N is the weight of 102 g",
     labels="weights",
 )
 """Newtons: a sheet that bears more than a hundred is not what this is for."""
@@ -95,8 +95,7 @@ _DEPTH = Measurand(
     shown="mm",
     least=1e-5,
     most=0.1,
-    slip="a sheet gives way by 0.05 to 50 mm, so these values are probably millimetres: convert "
-    "them with --unit mm",
+    usual="a sheet gives way by 0.05 to 50 mm",
     labels="depths",
     bends=tuple(np.linspace(0.6, 1.8, 13)),
     halves=(10.0,),
@@ -150,7 +149,8 @@ class AmountLabel:
         return AmountLabel(self.value, _PROBABLE[self.unit]) if unusual else None
 
 
-FEWEST = 5
+FEWEST_LABELS = 5
+"""Touches with a known amount without which nothing is learnt."""
 
 _ALIKE, _FEW_RANKS = 0.05, 8
 _RISES = 0.2
@@ -283,9 +283,9 @@ def _check_order(of: Measurand, amount: FloatArray, press: IntArray, time: Float
 
 
 def _check_amounts(of: Measurand, amount: FloatArray) -> None:
-    if len(amount) < FEWEST:
+    if len(amount) < FEWEST_LABELS:
         raise DataError(
-            f"expected at least {FEWEST} touches with a known {of.name}, got {len(amount)}",
+            f"expected at least {FEWEST_LABELS} touches with a known {of.name}, got {len(amount)}",
             where=of.where,
             hint=f"label more touches: ten presses with some {of.labels} are a start, twenty are "
             "good",
@@ -296,14 +296,10 @@ def _check_amounts(of: Measurand, amount: FloatArray) -> None:
             where=of.where,
             hint="leave out the label where nothing presses",
         )
-    if amount.max() > of.most:
+    if not of.least <= amount.max() <= of.most:
         raise DataError(
-            f"expected {of.plural} up to {of.text(of.most)}, got {of.span(amount)}: {of.slip}",
-            where=of.where,
-        )
-    if amount.max() < of.least:
-        raise DataError(
-            f"expected {of.plural} that show, got {of.span(amount)}: the unit is probably another",
+            f"expected {of.plural} up to {of.text(of.most)}, got {of.span(amount)}: {of.usual}, so "
+            "the unit is probably another",
             where=of.where,
             hint=f"name it: --unit {' or --unit '.join(of.units)}",
         )

@@ -33,19 +33,13 @@ class LslSink(Sink):
         # both are the machine's monotonic clock, but LSL may count from elsewhere
         self._offset = clock_ahead(self._lsl.local_clock)
         rows = [(label, "V") for label in row_labels(stream.pattern)]
-        touches = [
-            (f"{name} {number}", unit)
-            for number in range(1, MOST_TOUCHES + 1)
-            for name, unit in _FIELDS
-        ]
-        for name, unit in MEASURANDS.items():
-            touches += [(f"{name} {number}", unit) for number in range(1, MOST_TOUCHES + 1)]
-        touches.append(("valid", ""))
-        double, string = self._lsl.cf_double64, self._lsl.cf_string
-        self._announce(stream, "voltages", "EIT", rows, double)
-        self._announce(stream, "dv", "EIT", rows, double)
-        self._announce(stream, "touches", "Touch", touches, double)
-        self._announce(stream, "events", "Markers", [("event", "")], string)
+        numbers, more = range(1, MOST_TOUCHES + 1), (*MEASURANDS.items(), ("self", ""))
+        touches = [(f"{name} {number}", unit) for number in numbers for name, unit in _FIELDS]
+        touches += [(f"{name} {number}", unit) for name, unit in more for number in numbers]
+        self._announce(stream, "voltages", "EIT", rows)
+        self._announce(stream, "dv", "EIT", rows)
+        self._announce(stream, "touches", "Touch", [*touches, ("valid", "")])
+        self._announce(stream, "events", "Markers", [("event", "")])
 
     def publish(self, item: Item) -> None:
         """Push the samples of ``item``."""
@@ -59,7 +53,7 @@ class LslSink(Sink):
             if item.reference is not None:
                 self._push("dv", item.voltages - item.reference, item)
         if item.is_due:
-            self._push("touches", _touch_row(item), item)
+            self._push("touches", touch_sample(item), item)
 
     def close(self) -> None:
         """Withdraw the streams that were announced."""
@@ -69,17 +63,13 @@ class LslSink(Sink):
         self._outlets[name].push_sample(sample, time_of(item) + self._offset)
 
     def _announce(
-        self,
-        stream: Stream,
-        name: str,
-        kind: str,
-        channels: Sequence[tuple[str, str]],
-        number_format: int,
+        self, stream: Stream, name: str, kind: str, channels: Sequence[tuple[str, str]]
     ) -> None:
         full = f"{stream.naming.namespace.replace('/', '-')}-{name}"
         # one identity for a stream of a skin: receivers find it again after a restart
         identity = f"{full}-{stream.skin}"
-        info = self._lsl.StreamInfo(full, kind, len(channels), _IRREGULAR, number_format, identity)
+        content = self._lsl.cf_string if kind == "Markers" else self._lsl.cf_double64
+        info = self._lsl.StreamInfo(full, kind, len(channels), _IRREGULAR, content, identity)
         described = info.desc().append_child("channels")
         for label, unit in channels:
             channel = described.append_child("channel")
@@ -96,13 +86,14 @@ def open_lsl(argument: str) -> LslSink:
     return LslSink(argument or "tomoskin")
 
 
-def _touch_row(contacts: Contacts) -> FloatArray:
-    """Each touch, forces, depths, then 1 where touches are valid and 0 where they are not."""
+def touch_sample(contacts: Contacts) -> FloatArray:
+    """Each touch, forces, depths, own touches, then 1 where touches are valid, else 0."""
     row = np.full((MOST_TOUCHES, len(_FIELDS)), np.nan)
-    amounts = np.full((len(MEASURANDS), MOST_TOUCHES), np.nan)
+    more = np.full((len(MEASURANDS) + 1, MOST_TOUCHES), np.nan)
     for number, contact in enumerate(contacts.strongest(MOST_TOUCHES)):
-        detection = contact.touch.detection
-        row[number] = contact.touch.id, detection.x, detection.y, detection.peak
-        for name, amount in contact.touch.amounts.items():
-            amounts[[*MEASURANDS].index(name), number] = amount.value
-    return np.concatenate((row.ravel(), amounts.ravel(), [float(contacts.valid)]))
+        touch, detection = contact.touch, contact.touch.detection
+        row[number] = touch.id, detection.x, detection.y, detection.peak
+        amounts = (touch.amounts.get(name) for name in MEASURANDS)
+        told = *(amount and amount.value for amount in amounts), contact.is_self
+        more[:, number] = [np.nan if value is None else value for value in told]
+    return np.concatenate((row.ravel(), more.ravel(), [float(contacts.valid)]))
