@@ -170,14 +170,14 @@ def export(
     from tomoskin.run import with_joints
 
     write = WRITERS[out.suffix.lower()]
-    misplaced, beside = "", "X.lerobot"
+    misplaced, partners = "", "X.lerobot"
     if like is not None and out.suffix.lower() != ".lerobot":
         misplaced = "--like"
     elif robot is not None and touches is None and out.suffix.lower() not in _OF_ROBOTS:
-        misplaced, beside = "--robot", "--touches, X.mcap, X.lerobot or X.rrd"
+        misplaced, partners = "--robot", "--touches, X.mcap, X.lerobot or X.rrd"
     if misplaced:
         raise typer.BadParameter(
-            f"expected it together with {beside}, got {out}", param_hint=misplaced
+            f"expected it together with {partners}, got {out}", param_hint=misplaced
         )
     worn = None if robot is None else with_joints(Robot.load(robot))
     names = (skin,) if skin else skins_in(file)

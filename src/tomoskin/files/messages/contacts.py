@@ -7,17 +7,18 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache, partial
-from typing import Any, Self, TypeVar
+from functools import cached_property
+from typing import Any, Self
 
 import numpy as np
 
-from tomoskin.core import MEASURANDS, Detection, Event, FloatArray, Image, SkinError, Touch
+from tomoskin.core import MEASURANDS, Detection, Event, FloatArray, Image, Touch
+from tomoskin.files.messages.link_pose import LinkPose
 from tomoskin.files.messages.stream import Stream
 from tomoskin.model.mesh import Surface
-from tomoskin.model.robot import NearLink, Place, Pose, quaternion
+from tomoskin.model.robot import quaternion
 from tomoskin.pipeline import FrameResult
 from tomoskin.sensing.track import TouchEvent
 
@@ -44,76 +45,6 @@ _UNCALIBRATED = {
 """What a row says of a touch whose force and depth nothing tells."""
 
 Vector = tuple[float, ...]
-T = TypeVar("T")
-_Near = tuple[NearLink | None, str | None]
-
-
-@dataclass(frozen=True, eq=False)
-class LinkPose:
-    """Where the link of a robot that a skin lies on was at some time, and what was near it.
-
-    Attributes
-    ----------
-    root
-        Name of the robot's root frame.
-    pose
-        Of the link in that frame; None where it is not known.
-    problem
-        Why it is not known, or None.
-    near
-        Looks at where the other links were: see :meth:`~tomoskin.model.robot.Place.near`.
-    """
-
-    root: str
-    pose: Pose | None
-    problem: str | None = None
-    near: Callable[[], _Near] = field(default=lambda: (None, None), repr=False)
-    _marks: dict[Touch, bool | None] = field(default_factory=dict, init=False, repr=False)
-
-    @classmethod
-    @lru_cache(maxsize=64)
-    def of(cls, place: Place | None, utc: float | None) -> Self | None:
-        """At a time, s since 1970; None of a skin that lies on no link.
-
-        All sinks of a frame are given the same record, so that each thing is looked up once.
-        """
-        if place is None or place.own is None:
-            return None
-        pose, problem = _or_why(place.in_root, utc)
-        return cls(place.own.urdf.root, pose, problem, partial(_or_why, place.near, utc))
-
-    @cached_property
-    def others(self) -> _Near:
-        """What tells whether another link was near; None where it is not known, and why."""
-        return self.near()
-
-    def mark(self, contact: Contact) -> bool | None:
-        """Whether another link was near a third of the ellipse of ``contact`` or more.
-
-        None where that is not known. A link that is so near presses as a rule, so a third will do.
-        """
-        if contact.touch not in self._marks:
-            near = self.others[0]
-            points = contact.ellipse
-            self._marks[contact.touch] = near and bool(3 * near(points).sum() >= len(points))
-        return self._marks[contact.touch]
-
-    def content(self) -> dict[str, Any]:
-        """The pose and what is wrong with it, as plain values by name."""
-        pose = self.pose and {
-            "frame_id": self.root,
-            "position": self.pose.position.tolist(),
-            "orientation": self.pose.quaternion(),
-        }
-        return {"root": pose, "root_problem": self.problem}
-
-
-def _or_why(of: Callable[[float | None], T], utc: float | None) -> tuple[T | None, str | None]:
-    """What was ``of`` that time; None where it is not known, and why."""
-    try:
-        return of(utc), None
-    except SkinError as error:
-        return None, str(error)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -174,7 +105,7 @@ class Contact:
     @property
     def is_self(self) -> bool | None:
         """Whether a link of the robot itself touches, see :meth:`LinkPose.mark`."""
-        return None if self.link is None else self.link.mark(self)
+        return None if self.link is None else self.link.mark(self.touch, lambda: self.ellipse)
 
     @property
     def ellipse(self) -> FloatArray:
