@@ -50,7 +50,7 @@ def test_weights_in_grams_become_newtons_in_the_table(tomoskin, tmp_path, files)
         "calibrate", "force", path, "--skin", skin, "--unit", "g", "--out", out
     )
     assert (code, err) == (0, "")
-    assert "10 presses, 0.98 to 15 N" in said
+    assert "10 presses, 0.981 to 14.7 N" in said
     assert "the tip that pressed" in said
     code, _, err = tomoskin(
         "image", path, "--skin", skin, "--calibration", out, "--touches", table
@@ -86,7 +86,8 @@ def test_depths_in_millimetres_become_columns_of_the_table(tomoskin, tmp_path, f
     assert "10 presses, 0.1 to 1.5 mm" in said
     code, _, err = tomoskin(*command, *spans, "--unit", "m", "--force")
     assert code == 1
-    assert "these values are probably millimetres" in err
+    assert "expected depths up to 100 mm, got 100 to 1500 mm" in err
+    assert "the unit is probably another (name it: --unit mm" in err
     code, _, err = tomoskin(
         "image", path, "--skin", skin, "--calibration", out, "--touches", table
     )  # fmt: skip
@@ -131,7 +132,8 @@ def test_grams_read_as_newtons_are_noticed(tomoskin, tmp_path, files):
     path, skin = files
     code, _, err = tomoskin("calibrate", "force", path, "--skin", skin, "--out", tmp_path / "f.npz")
     assert code == 1
-    assert "these values are probably grams" in err
+    assert "expected forces up to 100 N, got 100 to 1500 N" in err
+    assert "1 N is the weight of 102 g, so the unit is probably another" in err
 
 
 def test_labels_by_hand(tomoskin, tmp_path, files):

@@ -60,8 +60,7 @@ class LinkPose:
         """
         if touch not in self._marks:
             near = self.others[0]
-            points = ellipse()
-            self._marks[touch] = near and bool(3 * near(points).sum() >= len(points))
+            self._marks[touch] = near and bool(3 * near(points := ellipse()).sum() >= len(points))
         return self._marks[touch]
 
     def content(self) -> dict[str, Any]:

@@ -58,7 +58,8 @@ class Measurand:
 
     def text(self, value: float, digits: int = 3) -> str:
         """The amount ``value``, SI, for people."""
-        return f"{value / self.units[self.shown]:.{digits}g} {self.shown}"
+        rounded = float(f"{value / self.units[self.shown]:.{digits}g}")
+        return f"{rounded:g} {self.shown}"
 
     def span(self, values: FloatArray) -> str:
         """From the smallest to the largest of ``values``, SI."""
