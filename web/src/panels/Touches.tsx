@@ -73,7 +73,7 @@ function Row({ touch, scale }: { touch: Touch; scale: Scale }) {
   return (
     <tr data-testid="touch-row" data-id={touch.id}>
       <th scope="row">
-        <span class={touch.own ? "chip own" : "chip"} title={notes(touch)}>
+        <span class={touch.own ? "chip itself" : "chip"} title={notes(touch)}>
           {touch.id}
           {touch.several > 0 && "+"}
         </span>
