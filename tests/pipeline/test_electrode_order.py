@@ -117,6 +117,11 @@ def said(path: Path) -> str:
     return order_fault(recording, resistance()) or found.agreement.doubt(volts=False) or ""
 
 
+def test_nothing_is_said_of_more_electrodes_than_the_skin_has(tmp_path: Path) -> None:
+    recording = read_recording(FORMATS["interchange"](tmp_path, voltages(SAME, SAME)))
+    assert order_fault(recording, resistance()[: N // 2, : N // 2]) is None
+
+
 @pytest.mark.parametrize("name", FORMATS)
 def test_what_stands_in_another_order_is_named(tmp_path: Path, name: str) -> None:
     write, whole = FORMATS[name], voltages(SAME, SAME)

@@ -11,6 +11,7 @@ from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
+from threadpoolctl import threadpool_limits
 
 from tomoskin.core import DataError, FloatArray, IntArray
 from tomoskin.sensing.fit import Whitener
@@ -311,7 +312,8 @@ class BodyModel:
             )
         directions = np.linalg.pinv(whiten.matrix) @ rows[:count].T
         z = whitened @ rows[:count].T
-        fits = [(one, *fit) for one in _with_states(examples, z) for fit in _fits(one, z)]
+        with threadpool_limits(1):  # small products: in a crowded machine threads wait tenfold
+            fits = [(one, *fit) for one in _with_states(examples, z) for fit in _fits(one, z)]
         body, *best = fits[0]
         for one, *fit in fits[1:]:
             if _missed(fit[-1]) < _WORTH * _missed(best[-1]):
