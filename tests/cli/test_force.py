@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 
 import numpy as np
 import pytest
@@ -52,10 +53,11 @@ def test_weights_in_grams_become_newtons_in_the_table(tomoskin, tmp_path, files)
     assert (code, err) == (0, "")
     assert "10 presses, 0.981 to 14.7 N" in said
     assert "the tip that pressed" in said
-    code, _, err = tomoskin(
+    code, said, err = tomoskin(
         "image", path, "--skin", skin, "--calibration", out, "--touches", table
     )  # fmt: skip
     assert (code, err) == (0, "")
+    assert re.search(r"^forces from [\d.]+ to [\d.]+ N$", said, re.MULTILINE)
     with path.open("rb") as file, np.load(file) as kept:
         true = 9.80665e-3 * kept["force_n"]
     with table.open(newline="") as file:

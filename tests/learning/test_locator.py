@@ -233,7 +233,10 @@ def test_labels_outside_the_skin_are_refused() -> None:
     dv = np.random.default_rng(0).normal(size=(20, n_meas))
     xy = 0.5 * places(20, 0)
     with pytest.raises(DataError, match="outside the skin") as caught:
-        Locator.fit(dv, 1e3 * xy, skin=skin)
+        Locator.fit(dv, 10 * xy, skin=skin)
+    assert "metres" in str(caught.value)
+    with pytest.raises(DataError, match="no position within 10 m") as caught:
+        Locator.fit(dv, 1e3 * xy)  # millimetres
     assert "metres" in str(caught.value)
     with pytest.raises(DataError, match="shape"):
         Locator.fit(dv[:, 1:], xy, skin=skin)

@@ -222,6 +222,10 @@ def image(
 
 
 def _lines(result: Reconstruction, spans: tuple[Span, ...], prepared: Prepared) -> list[str]:
+    import numpy as np
+
+    from tomoskin.learning import MEASURED
+
     number = "1 touch" if len(spans) == 1 else f"{len(spans)} touches"
     lines = [f"{len(result.frames) + len(result.unseen)} frames, {number}"]
     if len(result.unseen):
@@ -239,6 +243,10 @@ def _lines(result: Reconstruction, spans: tuple[Span, ...], prepared: Prepared) 
         counts = Counter(names).items()
         lines.append(", ".join(f"{name}: {count} frames" for name, count in counts))
     lines += span_lines(spans, result.unit)
+    amounts = [touch.amounts for touches in result.touches for touch in touches]
+    for name, of in MEASURED.items():
+        if told := [one[name].value for one in amounts if name in one]:
+            lines.append(f"{of.plural} from {of.span(np.array(told))}")
     if spans:
         lines.append(
             "times count from the first frame; --touches X.csv writes each touch in each frame"

@@ -19,6 +19,8 @@ _SHOWN = 10
 _BESIDE = 0.05
 """A label may lie so far beyond the outline, in radii of the region: it is taken for its rim."""
 
+_FARTHEST = 10.0
+"""m; a label farther out than any sheet is in another unit."""
 
 _MOST = 1e12
 """No instrument has a unit in which a change is a larger number: it counts as missing."""
@@ -72,9 +74,9 @@ class Presses:
         data, labels = frames(dv), np.asarray(xy, dtype=np.float64)
         if labels.shape != (len(data), 2):
             raise DataError(f"expected xy of shape ({len(data)}, 2), got {labels.shape}")
-        wrong = ~(np.abs(labels) <= Region.FARTHEST).all(axis=1)
+        wrong = ~(np.abs(labels) <= _FARTHEST).all(axis=1)
         bad = np.flatnonzero(wrong)
-        _name(bad, "have labels that are not a position", "give labels in metres")
+        _name(bad, "have labels that are no position within 10 m", "give labels in metres")
         if strength is None:
             return cls(data, labels)
         force = np.asarray(strength, dtype=np.float64)
