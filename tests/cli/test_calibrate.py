@@ -204,10 +204,11 @@ def test_what_holds_no_labels_or_wrong_ones_is_refused(tomoskin, tmp_path, press
     with np.load(presses) as kept:
         arrays = dict(kept)
     np.savez(presses, **(arrays | {"xy_m": 1e3 * arrays["xy_m"]}))
-    code, _, err = tomoskin("calibrate", "touch", presses, "--skin", SKIN, "--out", out)
-    assert code == 1
-    assert "outside the skin" in err
-    assert not out.exists()
+    for skin in ((), ("--skin", SKIN)):
+        code, _, err = tomoskin("calibrate", "touch", presses, *skin, "--out", out)
+        assert code == 1
+        assert "no position within 10 m (give labels in metres)" in err
+        assert not out.exists()
     code, _, err = tomoskin("locate", presses, "--calibration", presses)
     assert code == 1
     assert "not a calibration" in err
