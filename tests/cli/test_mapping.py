@@ -93,4 +93,4 @@ def test_another_skin_or_no_label_is_refused(tomoskin: Run, tmp_path: Path, pres
     np.savez(presses, **(arrays | {"xy_m": 1e3 * arrays["xy_m"]}))
     code, _, err = tomoskin("calibrate", "mapping", presses, "--skin", NAME, "--out", out)
     assert code == 1
-    assert "outside the skin" in err
+    assert "within 10 m (give labels in metres)" in err

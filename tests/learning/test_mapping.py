@@ -152,7 +152,7 @@ def test_electrodes_are_followed_along_the_rim() -> None:
 
 def test_what_cannot_be_is_refused() -> None:
     dv, xy = np.ones((3, 40)), np.full((3, 2), 0.02)
-    with pytest.raises(DataError, match="outside the skin"):
+    with pytest.raises(DataError, match="within 10 m"):
         solve_channel_mapping(dv, 1e3 * xy, SKIN)
     with pytest.raises(DataError, match="40 rows"):
         solve_channel_mapping(dv[:, :8], xy, SKIN)
