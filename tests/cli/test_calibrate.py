@@ -212,3 +212,14 @@ def test_what_holds_no_labels_or_wrong_ones_is_refused(tomoskin, tmp_path, press
     code, _, err = tomoskin("locate", presses, "--calibration", presses)
     assert code == 1
     assert "not a calibration" in err
+
+
+def test_measurements_that_never_have_a_value_are_named(tomoskin, tmp_path, presses):
+    out = tmp_path / "c.npz"
+    with np.load(presses) as kept:
+        arrays = dict(kept)
+    arrays["dv"][:, [3, 17]] = np.nan
+    np.savez(presses, **arrays)
+    code, said, _ = tomoskin("calibrate", "touch", presses, "--skin", SKIN, "--out", out)
+    assert code == 0
+    assert "measurements without a value in any press: 3, 17\n" in said

@@ -39,6 +39,7 @@ def touch_facts(
         "one_force": left_out.one_force,
         "drift": left_out.drift,
         "growth": growth_of_errors(locator, older),
+        "never_measured": np.flatnonzero(~np.isfinite(locator.presses.dv).any(axis=0)).tolist(),
         "next_press_mm": (1e3 * locator.next_place()).tolist(),
         "remarks": [
             {"frame": frames[r.row - before] if r.row >= before else None, "reason": r.reason}
@@ -62,6 +63,8 @@ def touch_lines(facts: dict[str, Any]) -> list[str]:
             "all presses were about equally hard: softer and harder ones have larger errors; add "
             "some of both with --onto"
         )
+    if missing := facts["never_measured"]:
+        lines.append(f"measurements without a value in any press: {', '.join(map(str, missing))}")
     for doubtful in facts["remarks"][:_SHOWN]:
         frame = doubtful["frame"]
         who = "an older press" if frame is None else f"frame {frame:>4}"
