@@ -148,12 +148,20 @@ export interface ReplayStatus {
   readonly ended: boolean;
 }
 
-/** How the sheet is bent, as ``tomoskin image --json`` says it. */
+/** How the body stands: its bend, where an angle was learnt, and its other coordinates. */
 export interface BendNow {
-  readonly angle_rad: number;
-  readonly sd_rad: number;
-  readonly axis_rad: number;
+  readonly angle_rad: number | null;
+  readonly sd_rad: number | null;
+  readonly axis_rad: number | null;
   readonly state: string;
+  readonly coordinates: readonly CoordinateNow[];
+}
+
+/** A coordinate of the body, with its deviation, in its own unit. */
+export interface CoordinateNow {
+  readonly name: string;
+  readonly value: number;
+  readonly sd: number;
 }
 
 /** What one frame shows. */

@@ -146,13 +146,22 @@ class SlowFrame(MessagePart, frozen=True):
     text: str
 
 
-class BendNow(MessagePart, frozen=True):
-    """How the sheet is bent, as ``tomoskin image --json`` says it."""
+class CoordinateNow(MessagePart, frozen=True):
+    """A coordinate of the body, with its deviation, in its own unit."""
 
-    angle_rad: float
-    sd_rad: float
-    axis_rad: float
+    name: str
+    value: float
+    sd: float
+
+
+class BendNow(MessagePart, frozen=True):
+    """How the body stands: its bend, where an angle was learnt, and its other coordinates."""
+
+    angle_rad: float | None
+    sd_rad: float | None
+    axis_rad: float | None
     state: str
+    coordinates: tuple[CoordinateNow, ...]
 
 
 class CalibrationNow(MessagePart, frozen=True):

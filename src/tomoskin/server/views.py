@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import starmap
 from typing import Any
 
 import numpy as np
@@ -82,9 +83,14 @@ def state(status: Status) -> to_page.RunState:
         alpha=status.choice.alpha,
         rule=status.choice.rule,
         recording=None if status.recording is None else status.recording.name,
-        bend=None
-        if bend is None or bend.angle != bend.angle
-        else to_page.BendNow.of(bend, angle_rad=bend.angle, sd_rad=bend.sd, axis_rad=bend.axis),
+        bend=bend
+        and to_page.BendNow.of(
+            bend,
+            angle_rad=bend.angle,
+            sd_rad=bend.sd,
+            axis_rad=bend.axis,
+            coordinates=tuple(starmap(to_page.CoordinateNow, bend.besides_angle)),
+        ),
         class_=status.class_reading,
         calibration=status.calibration and to_page.CalibrationNow.of(status.calibration),
     )

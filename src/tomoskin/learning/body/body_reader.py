@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from tomoskin.core import Detection, FloatArray
-from tomoskin.learning.body.body_model import BodyModel
+from tomoskin.learning.body.body_model import TENSOR, BodyModel
 from tomoskin.learning.kind import Applied, Conditions, FrameView, Kind, TouchFit
 from tomoskin.sensing.fit import Response, spots_of
 from tomoskin.sensing.signal import independent
@@ -74,6 +74,12 @@ class BodyReading:
     state: str
     moved: FloatArray
     problem: str | None = None
+
+    @property
+    def besides_angle(self) -> list[tuple[str, float, float]]:
+        """Name, value and deviation of each coordinate that the bend does not tell."""
+        own = zip(self.names, self.values.tolist(), self.deviations.tolist(), strict=True)
+        return [one for one in own if one[0] not in ("angle", *TENSOR)]
 
     @property
     def facts(self) -> dict[str, Any]:
