@@ -207,7 +207,7 @@ def test_what_holds_no_labels_or_wrong_ones_is_refused(tomoskin, tmp_path, press
     for skin in ((), ("--skin", SKIN)):
         code, _, err = tomoskin("calibrate", "touch", presses, *skin, "--out", out)
         assert code == 1
-        assert "no position within 10 m (give labels in metres)" in err
+        assert "no label within 10 m (give labels in metres)" in err
         assert not out.exists()
     code, _, err = tomoskin("locate", presses, "--calibration", presses)
     assert code == 1

@@ -235,7 +235,7 @@ def test_labels_outside_the_skin_are_refused() -> None:
     with pytest.raises(DataError, match="outside the skin") as caught:
         Locator.fit(dv, 10 * xy, skin=skin)
     assert "metres" in str(caught.value)
-    with pytest.raises(DataError, match="no position within 10 m") as caught:
+    with pytest.raises(DataError, match="no label within 10 m") as caught:
         Locator.fit(dv, 1e3 * xy)  # millimetres
     assert "metres" in str(caught.value)
     with pytest.raises(DataError, match="shape"):

@@ -245,8 +245,8 @@ def _lines(result: Reconstruction, spans: tuple[Span, ...], prepared: Prepared) 
     lines += span_lines(spans, result.unit)
     amounts = [touch.amounts for touches in result.touches for touch in touches]
     for name, of in MEASURED.items():
-        if told := [one[name].value for one in amounts if name in one]:
-            lines.append(f"{of.plural} from {of.span(np.array(told))}")
+        if values := [one[name].value for one in amounts if name in one]:
+            lines.append(f"{of.plural} from {of.span(np.array(values))}")
     if spans:
         lines.append(
             "times count from the first frame; --touches X.csv writes each touch in each frame"

@@ -76,7 +76,7 @@ class Presses:
             raise DataError(f"expected xy of shape ({len(data)}, 2), got {labels.shape}")
         wrong = ~(np.abs(labels) <= _FARTHEST).all(axis=1)
         bad = np.flatnonzero(wrong)
-        _name(bad, "have labels that are no position within 10 m", "give labels in metres")
+        _name(bad, "have no label within 10 m", "give labels in metres")
         if strength is None:
             return cls(data, labels)
         force = np.asarray(strength, dtype=np.float64)
