@@ -145,6 +145,44 @@ def test_a_scan_that_saw_a_touch_come_down_looks_like_noise_but_its_release_is_n
     assert not turns.told[-1]
 
 
+@pytest.fixture(scope="module")
+def both(prepared):
+    sheet = np.minimum(pressed(prepared, 0.03, 0.02), pressed(prepared, -0.05, -0.04))
+    return samples_of(prepared, sheet)
+
+
+def test_a_second_touch_is_told_while_the_first_is_provisional(turns, touched, both):
+    turns.turn(touched, both, since=5)
+    told = turns.told
+    assert max(map(len, told[:5])) == 1
+    first, second = told[-1]
+    assert first.provisional
+    assert second.provisional
+    assert second.id == first.id + 1
+    for _ in range(6):
+        turns.turn(both)
+    assert all(len(touches) == 2 for touches in turns.told)
+    assert {t.id for t in turns.frames[-1].touches} == {first.id, second.id}
+    where = {t.id: t.detection for t in turns.told[-1]}
+    assert np.hypot(where[first.id].x - 0.03, where[first.id].y - 0.02) < 0.01
+    assert np.hypot(where[second.id].x + 0.05, where[second.id].y + 0.04) < 0.01
+
+
+def test_a_second_touch_that_frames_do_not_confirm_beside_the_first_is_withdrawn(
+    turns, touched, both
+):
+    drive, number = turns.drive, turns.pipeline.numbered
+    turns.turn(np.where((drive == 5) | (drive == 6), both, touched))
+    assert number + 2 in {touch.id for touches in turns.told for touch in touches}
+    turns.drives.clear()
+    for _ in range(9):
+        turns.turn(touched)
+    assert {touch.id for touches in turns.told for touch in touches} == {number + 1}
+    withdrawn = [touch.id for result in turns.drives for touch in result.withdrawn]
+    assert withdrawn == [number + 2]
+    assert turns.pipeline.numbered == number + 2
+
+
 def test_what_drives_follow_goes_to_the_touch_of_the_frame_that_is_there(turns, touched):
     """A fit of half a scan has put it elsewhere, and the next one shows it as a further touch."""
     for _ in range(6):
@@ -153,7 +191,7 @@ def test_what_drives_follow_goes_to_the_touch_of_the_frame_that_is_there(turns, 
     d = touch.detection
     elsewhere = replace(touch, detection=replace(d, x=d.x - 0.05, sd_x=0.05, sd_y=0.05))
     further = replace(touch, id=touch.id + 1)
-    watch_of(turns).confirm([elsewhere, further], (turns.number - 1) * SECONDS)
+    watch_of(turns).confirm([elsewhere, further], (turns.number - 1) * SECONDS, further.id)
     turns.turn(touched)
     assert all(further.id in {t.id for t in touches} for touches in turns.told)
 

@@ -23,9 +23,14 @@ _LIFTED = 5.0
 _MOST = 4.0
 """The most that one drive says of that: a single one may be wrong."""
 
-_FRAMES, _SECONDS = 2, 0.15
-"""Frames, and seconds, within which a touch that has begun must show in frames, or it is withdrawn.
-The scan of the first one may have seen it come down, and quick ones tell little each."""
+_ALONE, _BESIDE = 0.15, 0.2
+"""Seconds after which the scan of a frame must show a touch that has begun, or it is withdrawn:
+quick ones tell little each, and it takes longer beside another touch. So long after a touch has
+begun, drives look for a further one."""
+
+_SETTLED, _PAST = 3, 16
+"""Drives after which a touch is known so well that another one shows beside it, and those of which
+its states are kept."""
 
 _CALM = 8
 """Frames since touches came or went in which more noise may be what these look like: a scan that
@@ -63,8 +68,9 @@ class _Followed:
     """A touch as frames have it, and as drives have it; ``full``: its content in the frame, and
     ``begun``: the device time, s, at which a provisional one has.
 
-    ``odds``: their logarithm that it is lifted, and the device time, s, at which it was; ``frames``
-    of a provisional one: those without it; ``doubtful``: whether the newest drive is left out.
+    ``odds``: their logarithm that it is lifted, and the device time, s, at which it was;
+    ``doubtful``: whether the newest drive is left out; ``past``: what it was before each drive,
+    the newest first.
     """
 
     touch: Touch
@@ -74,7 +80,7 @@ class _Followed:
     odds: float = 0.0
     doubtful: bool = False
     lifted: float | None = None
-    frames: int | None = None
+    past: tuple[fit.MovingTouch, ...] = ()
 
     def take(
         self, moved: fit.MovingTouch, told: fit.MovingTouch, gone: float, going: float
@@ -85,12 +91,14 @@ class _Followed:
         What shows a part of a touch would draw it elsewhere, and later drives would speak of what
         is there. So such a drive is left out, and the odds begin with it. The next one counts.
         """
+        self.past = (moved, *self.past)[:_PAST]
         self.doubtful = going > _MOST and not self.doubtful
         self.moving = moving = moved if self.doubtful else told
         if self.lifted is None:
             self.odds = max(self.odds + min(gone, _MOST), min(going, _MOST), 0.0)
-            left = RESIDUAL.holds(abs(moving.content), abs(self.full)) and self.frames is None
-            self.lifted = moving.time if left or self.odds > _LIFTED else None
+            is_left = RESIDUAL.holds(abs(moving.content), abs(self.full))
+            if self.odds > _LIFTED or (is_left and not self.touch.provisional):
+                self.lifted = moving.time
 
     def stands(self, touch: Touch, content: float, time: float) -> bool:
         """Whether a frame whose scan began at ``time`` s has a ``touch`` of a ``content`` m² that
@@ -127,7 +135,6 @@ class DriveWatch:
         self._blocked = True
         self._making: Generator[None, None, fit.DriveEvidence] | None = None
         self._initiation: fit.Initiation | None = None
-        self._evidence: fit.DriveEvidence | None = None
         self._filter: fit.DriveFilter | None = None
         self._followed: dict[int, _Followed] = {}
         self._calm = 0
@@ -148,16 +155,20 @@ class DriveWatch:
         and host time, s, of its start and of its last byte; ``numbered``: the last identity given.
         ``late``: a newer one is there, so touches are not followed through this one.
         """
-        if not self._ready() or self._evidence is None or self._filter is None:
+        initiation = self._initiation if self._ready() else None
+        if initiation is None:
             return None
-        rows, (time, host_time) = self._evidence.rows[drive], clock
+        rows, (time, host_time), onset = initiation.rows[drive], clock, None
         data = self.view.change(dv)[rows]
-        if not self._followed and self._initiation is not None:
-            onset = self._initiation.push(drive, data, late=late)
-            if onset is not None:
-                self._begin(onset, time, host_time, numbered + 1)
+        if not self._followed:
+            onset = initiation.push(drive, data, late=late)
         elif not late:
-            self._follow(rows, data, time)
+            onset = self._follow(initiation, rows, data, time)
+        if onset is not None:
+            initiation.forget()
+            for each in self._followed.values():  # the further one has drawn them to itself
+                each.moving = each.past[: onset.drives + 1][-1]
+            self._begin(onset, time, host_time, max([numbered, *self._followed]) + 1)
         if late:
             return None
         withdrawn, self._withdrawn = self._withdrawn, ()
@@ -172,25 +183,25 @@ class DriveWatch:
         new = [each.touch for each in followed if each.touch.provisional and each.lifted is None]
         return *[touch for touch in touches if touch.id not in lifted], *new
 
-    def confirm(self, touches: Sequence[Touch], time: float) -> int:
-        """Take the ``touches`` of a frame whose scan began at ``time`` s of the board; how many
-        provisional ones are withdrawn."""
+    def confirm(self, touches: Sequence[Touch], time: float, numbered: int) -> int:
+        """Take the ``touches`` of a frame whose scan began at ``time`` s of the board; the last
+        identity that is given then, by frames (``numbered``) or to what is withdrawn."""
         before = self._followed
-        new = [number for number, each in before.items() if each.frames is not None]
         middle = time + self._length * self._drives[-1] / 2
         heirs = self._heirs(touches, middle)
+        shown = [heirs.get(t.id, before.get(t.id)) for t in touches]
+        waiting = [e for e in before.values() if e.touch.provisional and e not in shown]
         self._followed = {t.id: self._going_on(t, heirs.get(t.id), time, middle) for t in touches}
-        for number in new if not touches else []:
-            each = before[number]
-            each.frames = (each.frames or 0) + 1
-            if each.frames < _FRAMES or time - each.begun < _SECONDS:
+        for number, each in enumerate(waiting, start=numbered + 1):
+            each.touch = replace(each.touch, id=number)
+            if time - each.begun < (_BESIDE if touches else _ALONE):
                 self._followed[number] = each
             else:
-                self._withdrawn += (each.touch,)
+                numbered, self._withdrawn = number, (*self._withdrawn, each.touch)
         self._calm = self._calm + 1 if before.keys() == self._followed.keys() else 0
-        if before and not self._followed and self._initiation is not None:
+        if not self._calm and self._initiation is not None:
             self._initiation.forget()
-        return len(new) - len(self._followed) if not touches else 0
+        return numbered
 
     def _ready(self) -> bool:
         """Whether the noise is that of now, or less; some pieces of work where it is not."""
@@ -201,7 +212,7 @@ class DriveWatch:
             is_newer &= self._calm >= _CALM
         if is_newer and (says_less or self._making is None):  # else it is made first
             begun = self._initiation is not None and self._initiation.begun
-            if not begun:  # a frame into which a touch comes down looks like more noise
+            if not (begun or self._followed):  # a touch that comes down looks like more noise
                 self._blocked |= says_less
             self._key, model = key, self.view.model
             noise, stays = self.view.noise()
@@ -214,7 +225,7 @@ class DriveWatch:
             try:
                 next(self._making)
             except StopIteration as end:
-                self._evidence, self._making, self._blocked = end.value, None, False
+                self._making, self._blocked = None, False
                 self._initiation = self._renewed(end.value)
         return not self._blocked or bool(self._followed)
 
@@ -231,29 +242,43 @@ class DriveWatch:
         kind = "decrease" if moving.content < 0 else "increase"
         since = host_time - onset.drives * self._length
         touch, self._calm = Touch(number, kind, since, detection, provisional=True), 0
-        self._followed[number] = _Followed(touch, moving, moving.content, time, frames=0)
+        self._followed[number] = _Followed(touch, moving, moving.content, time)
 
-    def _follow(self, rows: slice, data: FloatArray, time: float) -> None:
-        """Let each touch take its part of the data: what the others do not change."""
+    def _follow(
+        self, initiation: fit.Initiation, rows: slice, data: FloatArray, time: float
+    ) -> fit.Onset | None:
+        """Let each touch take its part of the data: what the others do not change. A further touch,
+        once one has begun soon after another: beside one that stays, frames tell of it, since one
+        that turns on its way looks like a further one too."""
         if self._filter is None:
-            return
+            return None
         moved = {n: f.moving.at(time + self._length / 2) for n, f in self._followed.items()}
         responses = {n: self._filter.response(touch.state, rows) for n, touch in moved.items()}
         every = np.sum([change for change, _ in responses.values()], axis=0)
+        doubts = {n: fit.doubt_of(moved[n].covariance, known) for n, known in responses.items()}
+        doubt = np.sum([*doubts.values()], axis=0)
+        is_settled = any(time - each.begun < _BESIDE for each in self._followed.values())
         for n, each in self._followed.items():
-            own = data - every + responses[n][0]
-            each.take(moved[n], *self._filter.pushed(moved[n], rows, own, responses[n]))
+            own, others = data - every + responses[n][0], doubt - doubts[n]
+            told, *odds = self._filter.pushed(moved[n], rows, own, responses[n], others)
+            each.take(moved[n], told, *odds)
+            is_settled &= each.lifted is None and odds[0] <= 0 and len(each.past) > _SETTLED
+        if not is_settled:  # what goes, or is hardly known, looks like a change
+            initiation.forget()
+            return None
+        return initiation.push_beside(rows, data - every, self._filter.noise[rows, rows] + doubt)
 
     def _heirs(self, touches: Sequence[Touch], time: float) -> dict[int, _Followed]:
         """What drives follow, by the number of the nearest of ``touches`` at a ``time`` s; one
-        follows its own where it may."""
+        follows its own where it may. None where drives do not know one of them, since what they
+        follow has taken that in."""
         heirs: dict[int, _Followed] = {}
         for each in self._followed.values() if touches else ():
             far = [_off(each.moving, touch.detection, time) for touch in touches]
             number = touches[int(np.argmin(far))].id
             if min(far) < GATE and (number not in heirs or number == each.touch.id):
                 heirs[number] = each
-        return heirs
+        return heirs if len(heirs) == len(touches) else {}
 
     def _going_on(
         self, touch: Touch, heir: _Followed | None, time: float, middle: float
@@ -261,29 +286,24 @@ class DriveWatch:
         """A touch of a frame whose scan began at ``time`` s and was half done at ``middle`` s: as
         the drives have what is nearest to it, its ``heir``, else as the frame has it."""
         before = self._followed
-        known = before.get(touch.id)
-        if known is None:
-            known = next((each for each in before.values() if each.frames is not None), None)
+        known = before.get(touch.id, heir)
         moving = fit.MovingTouch.begin(
             middle, self.view.spot(touch.detection), _spread(touch.detection), self.view.model.prior
         )
         if known is not None and not known.stands(touch, moving.content, time):
-            known.touch, known.frames = touch, None
+            known.touch = touch
             return known
         if heir is not None and heir.lifted is None:
-            return _Followed(touch, heir.moving, moving.content, odds=heir.odds)
+            return replace(heir, touch=touch, full=moving.content)
         return _Followed(touch, moving, moving.content)
 
     def _shown(self, each: _Followed, time: float) -> Touch:
         """A touch where it is at the end of a drive that began at ``time`` s."""
-        if each.frames is None and not self._follows:
+        if not (each.touch.provisional or self._follows):
             return each.touch
         now = each.moving.at(time + self._length)
-        where, spread = now.position()
-        spot = now.spot
-        spot[:2] = where
         frame = each.touch.detection
-        detection = self.view.shown(spot, spread, frame.snr)
+        detection = self.view.shown(now.spot, now.position()[1], frame.snr)
         return replace(each.touch, detection=replace(detection, force=frame.force))
 
 

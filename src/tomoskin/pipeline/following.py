@@ -167,8 +167,8 @@ class Following:
         reach("tracking")
         touches = self._tracker.update(detections, measured.time, measured.host_time)
         if self._drives is not None:  # no number is given twice
-            responses = self._tracker.responses
-            self._tracker.ledger.numbered += self._drives.confirm(responses, measured.time)
+            ledger, responses = self._tracker.ledger, self._tracker.responses
+            ledger.numbered = self._drives.confirm(responses, measured.time, ledger.numbered)
         if self._finder.learn(touched=bool(self._tracker.traces)):
             self._tracker.residuals.forget()
         readings = {}

@@ -15,6 +15,7 @@ from tomoskin.sensing.fit import (
     DriveFilter,
     Initiation,
     MovingTouch,
+    Onset,
     spots_of,
 )
 
@@ -52,6 +53,28 @@ def test_a_touch_is_told_in_the_second_drive_that_shows_it() -> None:
     off = onset.middle - AT
     assert off @ np.linalg.solve(onset.covariance, off) < 9.2
     assert onset.spot[3] < 0
+
+
+def test_a_further_touch_shows_in_what_drives_are_off_the_followed_ones() -> None:
+    rows, frames = evidence().rows, noise(16, 2 * DRIVES + 4, 7)
+    offs = [frame + (k >= 2 * DRIVES) * pressed(AT) for k, frame in enumerate(frames)]
+
+    def told(part: float) -> list[Onset | None]:
+        """By drive, where so large a ``part`` of the variance is doubt of the followed ones."""
+        initiation, own = watch(), [rows[k % DRIVES] for k in range(len(offs))]
+        known = (1 + part) * covariance()
+        return [
+            initiation.push_beside(here, off[here], known[here, here])
+            for here, off in zip(own, offs, strict=True)
+        ]
+
+    *none, first, _, _ = told(0.0)
+    assert none == [None] * (2 * DRIVES + 1)
+    assert first is not None
+    assert first.drives == 1
+    off = first.middle - AT
+    assert off @ np.linalg.solve(first.covariance, off) < 9.2
+    assert not any(told(1e6))
 
 
 def test_windows_have_the_size_that_the_whole_has() -> None:

@@ -137,7 +137,8 @@ class Onset(NamedTuple):
 
 
 class Initiation:
-    """The newest measurements of an untouched skin, and whether a touch has begun in them.
+    """Whether a touch has begun in the newest measurements of an untouched skin, or beside touches
+    that are followed.
 
     Parameters
     ----------
@@ -151,15 +152,17 @@ class Initiation:
 
     def __init__(self, evidence: DriveEvidence, threshold: float, sign: str) -> None:
         self._evidence, self._threshold, self._sign = evidence, threshold, sign
+        self.rows = evidence.rows
         self._data = np.zeros(len(evidence.precision))
         self._matched = np.zeros(len(evidence.precision))
-        self._sizes: dict[tuple[int, ...], tuple[FloatArray, FloatArray]] = {}
+        self._sizes = lru_cache(maxsize=_ORDERS)(evidence.sizes)
         self.forget()
 
     def forget(self) -> None:
-        """Begin anew with an untouched skin: drives that were read tell nothing."""
+        """Begin anew: drives that were read tell nothing."""
         self._order: tuple[int, ...] = ()
         self._since: int | None = None
+        self._beside = np.zeros((2, 0, len(self._evidence.spots)))
 
     @property
     def begun(self) -> bool:
@@ -169,16 +172,13 @@ class Initiation:
     def go_on(self, other: Initiation) -> None:
         """Go on where an ``other`` one of the same skin is."""
         self._data, self._order, self._since = other._data, other._order, other._since
+        self._beside = other._beside
         self._matched = self._evidence.precision @ self._data
 
     def push(self, drive: int, data: FloatArray, *, late: bool = False) -> Onset | None:
-        """Take the ``data`` (m,) V of a drive; a touch, once one has begun.
-
-        A touch comes down while a drive is read: that drive shows a part of it, and counts for its
-        existence but not for its position. So a touch is not told before the drive after that.
-        ``late``: a newer drive is there already, which tells what both show.
-        """
-        evidence, rows = self._evidence, self._evidence.rows[drive]
+        """Take the ``data`` (m,) V of a drive of an untouched skin; a touch, once one has begun.
+        ``late``: a newer drive is there already, which tells what both show."""
+        evidence, rows = self._evidence, self.rows[drive]
         self._matched += evidence.precision[:, rows] @ (data - self._data[rows])
         self._data[rows] = data
         self._order = order = (drive, *(d for d in self._order if d != drive))
@@ -187,13 +187,33 @@ class Initiation:
         if late or len(order) < len(evidence.firsts):
             return None
         onto = evidence.matched(self._matched)[list(order)].cumsum(axis=0)
+        return self._begun(onto, *self._sizes(order))
+
+    def push_beside(self, rows: slice, off: FloatArray, covariance: FloatArray) -> Onset | None:
+        """Take by what a drive is ``off`` (m,) V the touches that are followed, with the
+        ``covariance`` (m, m) V² of that; a further touch, once one has begun.
+
+        Without one that is white, and each drive tells something new (Willsky & Jones 1976).
+        """
+        both = np.vstack([off, self._evidence.signatures[:, rows]]).T
+        white, _ = dtrtrs(_root(covariance), both, lower=1)
+        newest = np.stack([white[:, 0] @ white[:, 1:], np.square(white[:, 1:]).sum(axis=0)])
+        beside = np.concatenate([newest[:, None], self._beside], axis=1)
+        self._beside = beside = beside[:, : len(self.rows)]
+        if self._since is not None:
+            self._since = min(self._since + 1, beside.shape[1] - 1)
+        onto, size = beside.cumsum(axis=1)
+        return self._begun(onto, size, np.sqrt(size))
+
+    def _begun(self, onto: FloatArray, size: FloatArray, deviation: FloatArray) -> Onset | None:
+        """A touch, from what the newest one, two, … drives match ``onto`` candidates (k, n), the
+        ``size`` of that at a content of 1, and the ``deviation`` of its noise.
+
+        A touch comes down while a drive is read: that drive shows a part of it, and counts for its
+        existence but not for its position. So a touch is not told before the drive after that.
+        """
         if self._sign != "both":
             onto = np.minimum(onto, 0.0) if self._sign == "decrease" else np.maximum(onto, 0.0)
-        if order not in self._sizes:
-            if len(self._sizes) >= _ORDERS:
-                self._sizes.clear()
-            self._sizes[order] = evidence.sizes(order)
-        size, deviation = self._sizes[order]
         ratio = np.abs(onto) / deviation
         if self._since is None:
             best = int(ratio.argmax())
@@ -317,6 +337,13 @@ def _cost(data: FloatArray, root: FloatArray) -> float:
     return float(white @ white) / 2 + float(np.log(root.diagonal()).sum())
 
 
+def doubt_of(spread: FloatArray, response: Response) -> FloatArray:
+    """(m, m) V² by which a touch with the covariance ``spread`` (8, 8) may answer otherwise than
+    its ``response``."""
+    change, slopes = response
+    return np.asarray(slopes @ spread @ slopes.T + np.diag((_OTHERWISE * change) ** 2))
+
+
 @lru_cache(maxsize=16)
 def _moving(seconds: float) -> tuple[FloatArray, FloatArray]:
     """(8, 8) by which a state goes on, and the noise of position and velocity meanwhile: those of
@@ -353,18 +380,22 @@ class DriveFilter:
     noise: FloatArray
 
     def pushed(
-        self, touch: MovingTouch, rows: slice, data: FloatArray, known: Response | None = None
+        self,
+        touch: MovingTouch,
+        rows: slice,
+        data: FloatArray,
+        known: Response | None = None,
+        others: FloatArray | float = 0.0,
     ) -> tuple[MovingTouch, float, float]:
         """The touch after the ``data`` (m,) V of a drive at its time, where its response may be
-        ``known``; and the logarithms of how much likelier these are if it has been lifted before
-        the drive, and if while it was read."""
+        ``known``, and the doubt of ``others`` (m, m) V²; and the logarithms of how much likelier
+        these are if it has been lifted before the drive, and if while it was read."""
         before, spread = touch.state, touch.covariance
-        own, state = self.noise[rows, rows], before
+        own, state = self.noise[rows, rows] + others, before
         gone = going = 0.0
         for step in range(_STEPS):
             change, slopes = self.response(state, rows) if step or known is None else known
-            across = slopes @ spread
-            both = across @ slopes.T + own + np.diag((_OTHERWISE * change) ** 2)
+            across, both = slopes @ spread, own + doubt_of(spread, (change, slopes))
             off, root = data - change - slopes @ (before - state), _root(both)
             if not step:
                 stands, half = _cost(off, root), change / 2  # a measurement shows it, or none of it
