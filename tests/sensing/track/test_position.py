@@ -35,14 +35,31 @@ def test_a_strong_touch_is_where_its_detection_is(rate: float) -> None:
     assert got == [(x, x / 2) for x in path]
 
 
-def test_a_slide_is_uncertain_along_its_course() -> None:
-    """By 12 mm, since the sheet responds behind it; across, only by noise. So it stays."""
+def test_a_slide_is_uncertain_by_how_far_the_sheet_is_dragged() -> None:
+    """By 12 mm in the plane, not quite along its course. So it stays."""
     run = Run()([[detection(0.001 * k)] for k in range(40)] + [[detection(0.039)]] * 80)
     for touches in (run.touches[39], run.touches[-1]):
         shown = touches[0].detection
-        assert (shown.sd_x, shown.sd_y) == pytest.approx((math.hypot(0.012, 0.001), 0.001))
+        assert math.hypot(shown.sd_x, shown.sd_y) == pytest.approx(math.hypot(0.012, 2**0.5 * 1e-3))
+        assert shown.sd_x == shown.sd_y
     resting = Run()([[detection(0.0)]] * 40).touches[-1][0].detection
     assert (resting.sd_x, resting.sd_y) == pytest.approx((0.001, 0.001))
+
+
+def test_a_slide_that_jumps_back_and_passes_its_beginning_is_still_a_slide() -> None:
+    course = [0.0] * 20 + [-0.012 + 0.003 * k for k in range(10)]
+    run = Run()([[detection(x)] for x in course])
+    assert all(touches[0].detection.sd_x > 0.007 for touches in run.touches[20:])
+
+
+def test_a_press_that_is_first_seen_faintly_has_not_slid() -> None:
+    """It comes down, and is known better with each frame: where that began says nothing more."""
+    course = [(0.009, 0.010), (0.004, 0.005)] + [(0.0, 0.002)] * 40
+    run = Run()([[detection(x, sd_x=sd, sd_y=sd)] for x, sd in course])
+    shown = run.touches[-1][0].detection
+    assert (shown.sd_x, shown.sd_y) == pytest.approx((0.002, 0.002))
+    away = run([[detection(0.002 * k, sd_x=0.002, sd_y=0.002)] for k in range(15)])
+    assert away.touches[-1][0].detection.sd_x > 0.008, "what comes later is a slide"
 
 
 def test_a_faint_detection_far_off_is_noise() -> None:

@@ -148,9 +148,9 @@ _DEPTHS = 0.05, 1.0
 _MOVED = 40
 """Spots that tell of an uneven sheet's table."""
 
-_RIM = 0.07
+_RIM = 0.12
 """By which part of the distance between electrodes a press at the very rim is misplaced, as a
-standard deviation: on the twin's textile, seed 71, presses were found 1 to 3 mm too far inside."""
+standard deviation: on the twin's textile presses are found 1 to 4 mm too far inside."""
 
 _APART = 1.5
 """Median radii that two spots of a pair are apart, at the least."""

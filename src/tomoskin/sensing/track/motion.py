@@ -73,7 +73,7 @@ class TrackState(NamedTuple):
 
 
 class TrackObservation(NamedTuple):
-    """Position of a detection, m, and its covariance, m², wandering included."""
+    """A position, m, and its covariance, m²."""
 
     x: float
     y: float
@@ -154,7 +154,7 @@ def distance(state: TrackState, seen: TrackObservation) -> tuple[float, float]:
 
 
 def observe(detection: Detection, settings: TrackSettings) -> TrackObservation:
-    """Position of a detection and its covariance."""
+    """Position of a detection and its covariance, wandering included."""
     more, unknown = settings.wander**2, _UNKNOWN**2
     xx, yy, xy = detection.sd_x**2, detection.sd_y**2, detection.cov_xy
     if not (math.isfinite(xx + yy + xy) and xx * yy > xy * xy):

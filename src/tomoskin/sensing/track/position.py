@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Self
 
 from tomoskin.core import Detection
-from tomoskin.sensing.track.motion import region_radius
+from tomoskin.sensing.track.motion import TrackObservation, region_radius
 from tomoskin.sensing.track.policy import RESIDUAL
 
 # Deviations are those of fits to the moving plant, seeds 1 to 3 (docs/theory/tracking.md).
@@ -74,8 +74,14 @@ _ELSEWHERE = 200.0
 """Places on a sheet where noise and drift may look like a touch."""
 
 _DRAG = 0.012
-"""How far behind a sliding press the sheet responds at the most, m: play (Prandtl 1928), which
-does not depend on the speed, and stays when the press stops."""
+"""How far behind a sliding press the sheet responds, m: play (Prandtl 1928), which does not depend
+on the speed or the way, and stays when the press stops. It is not quite along the course."""
+
+_STANDS = 2.0
+"""Squared distance, in variances in the plane of both positions, up to which a touch stands."""
+
+_BETTER = 0.5
+"""Part of the variance of a position, from which on a later one says better where it stands."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,36 +90,35 @@ class Position:
 
     Attributes
     ----------
-    x, y, xx, yy, xy
-        m and m²: mean of the detections that it rests on, and of their covariances.
+    place
+        Mean of the detections that it rests on, and of their covariances.
     unseen
         Variance along each axis by which the touch may have moved meanwhile, m².
     bias
         Deviation along each axis of what is off all the time, m.
     strength
         As the sheet remembers it.
-    behind
-        Where the sheet responds to a press that has slid, at the worst, m.
+    stood
+        Where it stood before it slid, but no farther off than the sheet is dragged.
+    slid
+        Deviation in the plane of a press that has slid, m.
     time
         Device time of the newest detection, s.
     """
 
-    x: float
-    y: float
-    xx: float
-    yy: float
-    xy: float
+    place: TrackObservation
     unseen: float
     bias: float
     strength: float
-    behind: tuple[float, float]
+    stood: TrackObservation
+    slid: float
     time: float
 
     @classmethod
-    def of(cls, detection: Detection, size: float, time: float) -> Self:
-        """Of one detection, ``size`` strong."""
-        x, y, xx, yy = detection.x, detection.y, detection.sd_x**2, detection.sd_y**2
-        return cls(x, y, xx, yy, detection.cov_xy, 0.0, detection.bias, size, (x, y), time)
+    def of(cls, detection: Detection, size: float, time: float, slid: float = 0.0) -> Self:
+        """Of one detection, ``size`` strong, of a touch that has ``slid``."""
+        place = _place(detection)
+        return cls(place, 0.0, detection.bias, size, place, slid, time)
 
     def after(self, detection: Detection, size: float, time: float) -> Self:
         """With a further detection, ``size`` strong.
@@ -128,19 +133,26 @@ class Position:
         astray = region * (strength / size - 1.0) ** 2 if size > 0 else math.inf
         trust = unseen / (unseen + astray) if astray > 0 else 1.0
         trust *= 1.0 - self._chance(detection, unseen, region)
-        x, y = self.x + trust * (detection.x - self.x), self.y + trust * (detection.y - self.y)
-        return type(self)(
-            x,
-            y,
-            self.xx + trust * (detection.sd_x**2 - self.xx),
-            self.yy + trust * (detection.sd_y**2 - self.yy),
-            self.xy + trust * (detection.cov_xy - self.xy),
-            (1.0 - trust) * unseen,
-            detection.bias,
-            strength,
-            _dragged(self.behind, x, y),
-            time,
-        )
+        both = zip(self.place, _place(detection), strict=True)
+        place = TrackObservation(*[old + trust * (new - old) for old, new in both])
+        left, (stood, slid) = (1.0 - trust) * unseen, self._slide(place, since)
+        return type(self)(place, left, detection.bias, strength, stood, slid, time)
+
+    def _slide(self, place: TrackObservation, since: float) -> tuple[TrackObservation, float]:
+        """Where it ``stood``, and how far it has ``slid``, once it is at a ``place``.
+
+        A press that comes down is first seen faintly. As long as it may have stood still, where it
+        stood is said by the frames that see it well. A slide is remembered for as long as a sheet
+        recovers: as it begins, the response jumps back, and passes where the press stood again.
+        """
+        x, y = place.x - self.stood.x, place.y - self.stood.y
+        away, now = math.hypot(x, y), place.xx + place.yy
+        before = self.stood.xx + self.stood.yy
+        if not away**2 > _STANDS * (before + now):
+            slid = self.slid * math.exp(-since / RESIDUAL.recovery)
+            return (place if now < _BETTER * before else self.stood), slid
+        part = max(1.0 - _DRAG / away, 0.0)
+        return self.stood._replace(x=self.stood.x + part * x, y=self.stood.y + part * y), _DRAG
 
     def _chance(self, detection: Detection, unseen: float, region: float) -> float:
         """Probability that this is noise elsewhere (data association: Bar-Shalom & Tse 1975).
@@ -148,31 +160,32 @@ class Position:
         Noise is larger than the touch with a probability of ½ erfc(snr / 2), in each place of the
         size of its ``region`` m²; near by it cannot be told from the touch.
         """
-        spread = unseen + 0.5 * (self.xx + self.yy + detection.sd_x**2 + detection.sd_y**2)
+        x, y, xx, _, yy = self.place
+        spread = unseen + 0.5 * (xx + yy + detection.sd_x**2 + detection.sd_y**2)
         if not (spread > 0 and region > 0 and math.isfinite(detection.snr)):
             return 0.0
-        square = (detection.x - self.x) ** 2 + (detection.y - self.y) ** 2
+        square = (detection.x - x) ** 2 + (detection.y - y) ** 2
         noise = _ELSEWHERE * 0.5 * math.erfc(detection.snr / 2.0) * spread / region
         return noise / (noise + math.exp(max(-0.5 * square / spread, -700.0)))
 
     @property
     def wavers(self) -> float:
         """Deviation in the plane of what differs from frame to frame, m."""
-        return math.sqrt(self.xx + self.yy + 2.0 * self.unseen)
+        return math.sqrt(self.place.xx + self.place.yy + 2.0 * self.unseen)
 
     def of_detection(self, detection: Detection) -> Detection:
         """The ``detection`` at this position, with all that may be off."""
-        along_x, along_y = self.x - self.behind[0], self.y - self.behind[1]
-        more = self.unseen + self.bias**2
+        x, y, xx, xy, yy = self.place
+        more = self.unseen + self.bias**2 + 0.5 * self.slid**2
         return Detection(  # of all fields: dataclasses.replace takes several times as long
-            x=self.x,
-            y=self.y,
-            sd_x=math.sqrt(self.xx + more + along_x**2),
-            sd_y=math.sqrt(self.yy + more + along_y**2),
+            x=x,
+            y=y,
+            sd_x=math.sqrt(xx + more),
+            sd_y=math.sqrt(yy + more),
             area=detection.area,
             peak=detection.peak,
             cells=detection.cells,
-            cov_xy=self.xy + along_x * along_y,
+            cov_xy=xy,
             snr=detection.snr,
             close=detection.close,
             weak=detection.weak,
@@ -182,10 +195,6 @@ class Position:
         )
 
 
-def _dragged(behind: tuple[float, float], x: float, y: float) -> tuple[float, float]:
-    """What hangs ``behind``, once the touch is at ``x``, ``y``."""
-    away = math.hypot(x - behind[0], y - behind[1])
-    if away <= _DRAG:
-        return behind
-    part = _DRAG / away
-    return x - part * (x - behind[0]), y - part * (y - behind[1])
+def _place(d: Detection) -> TrackObservation:
+    """Where one frame shows a touch."""
+    return TrackObservation(d.x, d.y, d.sd_x**2, d.cov_xy, d.sd_y**2)

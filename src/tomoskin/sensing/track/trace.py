@@ -233,7 +233,7 @@ class Trace:
         """It stands for other fingers from now on: what it was says nothing of them."""
         self.parted = time
         self.strength = self.fresh = TouchStrength.of(self.detection)
-        self.held = Position.of(self.detection, content_of(self.detection), time)
+        self.held = Position.of(self.detection, content_of(self.detection), time, self.held.slid)
 
     def become(self, other: Trace) -> None:
         """Go on from where ``other`` is."""
