@@ -9,7 +9,8 @@ from tomoskin.core import Detection, Touch
 from tomoskin.sensing.track import merging, policy
 from tomoskin.sensing.track.association import FrameOfTouches, ObservedDetection, associate, follow
 from tomoskin.sensing.track.identity import IdentityLedger
-from tomoskin.sensing.track.motion import SlideCorrection, TrackSettings, begin
+from tomoskin.sensing.track.motion import TrackSettings, begin
+from tomoskin.sensing.track.sliding import SlideCorrection
 from tomoskin.sensing.track.trace import (
     Alone,
     Happening,
