@@ -222,7 +222,8 @@ def rub(labelled: Recorded) -> LearningOutcome:
     }
     lines = [f"{len(frames)} frames with a touch, {rubbing.text}"]
     if lag:
-        lines.append(f'the sheet lags behind the finger: set slide_lag = "{lag:.0f} mm" in [touch]')
+        setting = f'slide_lag = "{lag:.0f} mm" in [touch] of the skin file'
+        lines.append(f"the sheet lags behind the finger: set {setting}")
     made = TOUCH.of(locator, labelled.pattern, skin)
     return LearningOutcome(made.write, facts, lines)
 

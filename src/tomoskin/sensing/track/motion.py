@@ -8,7 +8,6 @@ from functools import lru_cache
 from typing import NamedTuple
 
 from tomoskin.core import Detection
-from tomoskin.sensing.track.policy import HELD
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,11 +32,6 @@ class TrackSettings:
     speed: float = 0.1
     turning: float = 1.0
     wander: float = 0.004
-
-    @property
-    def least_snr(self) -> float:
-        """Below which there is no detection."""
-        return HELD * self.snr
 
 
 _UNKNOWN = 0.004

@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, Touch
 
-_DIRECTIONS = 16
-_WAYS = np.append(np.exp(2j * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS), 0.0)
+_WAYS = np.append(np.exp(0.125j * np.pi * np.arange(16)), 0.0)
 _AXES = np.stack([_WAYS.real, _WAYS.imag])
 """What a finger may do: directions in which it slides, as x + iy and as (2, k); the last stands."""
 
@@ -28,7 +27,7 @@ _AXES = np.stack([_WAYS.real, _WAYS.imag])
 _SPEED, _UNSTEADY = 0.06, 1e-4
 """Speed of a finger that slides, m/s; what a second adds to the variance of its position, m²."""
 
-_GOES_ON, _CHANGED = 1.0, np.append(np.full(_DIRECTIONS, 0.8 / _DIRECTIONS), 0.2)
+_GOES_ON, _CHANGED = 1.0, np.where(_WAYS, 0.05, 0.2)
 """Seconds for which a finger goes on as it does; how probable each is once it does not."""
 
 _NOISE, _UNEVEN = 0.002, 0.25

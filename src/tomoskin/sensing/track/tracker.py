@@ -146,7 +146,7 @@ class Tracker:
         if self.settings.still and trace.missing is None:
             self._report_onset(trace)
             return
-        if trace.missing is not None or policy.is_forgotten(trace.detection, self.settings.snr):
+        if trace.missing is not None or not policy.may_begin(trace.detection, self.settings.snr):
             self.traces.remove(trace)
             return
         seconds = self._clock.now - trace.since
