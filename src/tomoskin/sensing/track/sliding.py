@@ -122,8 +122,8 @@ def likeliest_lag(times: FloatArray, seen: FloatArray) -> float:
             finger = finger.after(time, place)
         likely.append(finger.evidence)
     best = int(np.argmax(likely[:-1]))
-    told = likely[best] > max(likely[0] + _TOLD, likely[-1])
-    return float(_LAGS[best]) if told else 0.0
+    clear = likely[best] > max(likely[0] + _TOLD, likely[-1])
+    return float(_LAGS[best]) if clear else 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
