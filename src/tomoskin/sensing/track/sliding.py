@@ -14,11 +14,10 @@ from dataclasses import dataclass, field, replace
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tomoskin.core import FloatArray, Touch
+from tomoskin.core import ComplexArray, FloatArray, Touch
 
-_WAYS = np.append(np.exp(0.125j * np.pi * np.arange(16)), 0.0)
+_WAYS: ComplexArray = np.append(np.exp(0.125j * np.pi * np.arange(16)), 0.0)
 _AXES = np.stack([_WAYS.real, _WAYS.imag])
 """What a finger may do: directions in which it slides, as x + iy and as (2, k); the last stands."""
 
@@ -71,7 +70,7 @@ class SlidingFinger:
     lag: float
     time: float
     moved: tuple[float, complex]
-    places: NDArray[np.complexfloating]
+    places: ComplexArray
     odds: FloatArray
     variances: FloatArray
     evidence: float = 0.0
@@ -87,25 +86,24 @@ class SlidingFinger:
         seconds = time - self.time
         if 0 < seconds < _STEP:
             return self
-        landed = self.landed(self.lag, time, seen)
-        anew = replace(landed, evidence=self.evidence - _UNLIKELY)
+        anew = replace(self.landed(self.lag, time, seen), evidence=self.evidence - _UNLIKELY)
         if not 0 < seconds < _PAUSE:
             return anew
-        moved = landed.moved if abs(seen - self.moved[1]) > _NEAR else self.moved
+        moved = anew.moved if abs(seen - self.moved[1]) > _NEAR else self.moved
         grown = self.variances + seconds * _UNSTEADY * abs(_WAYS)
         total = grown + _NOISE**2
         goes = seconds * _SPEED * _WAYS
-        off = abs(landed.places - goes - self.places[:, None]) ** 2 / total
+        off = abs(anew.places - goes - self.places[:, None]) ** 2 / total
         if off.min() > _UNLIKELY or time - moved[0] > _RECENT:
             return replace(anew, moved=moved)
         stays = math.exp(-seconds / _GOES_ON)
         changes = (1 - stays) * _CHANGED + stays * np.eye(len(_WAYS))
         joint = self.odds[:, None] * changes * np.exp(-0.5 * np.minimum(off, _UNLIKELY)) / total
         odds, gain = joint.sum(axis=0), grown / total
-        places = (1 - gain) * (joint.T @ self.places / odds + goes) + gain * landed.places
-        likely = odds.sum()
+        places = (1 - gain) * (joint.T @ self.places / odds + goes) + gain * anew.places
+        likely, known = odds.sum(), gain * _NOISE**2
         evidence = self.evidence + math.log(likely)
-        return type(self)(self.lag, time, moved, places, odds / likely, gain * _NOISE**2, evidence)
+        return type(self)(self.lag, time, moved, places, odds / likely, known, evidence)
 
 
 def likeliest_lag(times: FloatArray, seen: FloatArray) -> float:
@@ -143,9 +141,8 @@ class SlideCorrection:
 
     def after(self, touches: Sequence[Touch], time: float) -> Self:
         """With a frame at ``time`` s of the device, in which ``touches`` were."""
-        if not self.lag:
-            return self
-        return type(self)(self.lag, {touch.id: self._gone_on(touch, time) for touch in touches})
+        fingers = {touch.id: self._gone_on(touch, time) for touch in touches if self.lag}
+        return type(self)(self.lag, fingers)
 
     def of_finger(self, touch: Touch) -> Touch:
         """``touch`` of the newest frame where the finger is; itself where it stands."""
