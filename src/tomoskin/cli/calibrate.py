@@ -222,8 +222,7 @@ def rub(labelled: Recorded) -> LearningOutcome:
     }
     lines = [f"{len(frames)} frames with a touch, {rubbing.text}"]
     if lag:
-        setting = f'slide_lag = "{lag:.0f} mm" in [touch] of the skin file'
-        lines.append(f"the sheet lags behind the finger: set {setting}")
+        lines.append(f'the sheet lags: set slide_lag = "{lag:.0f} mm" in [touch] of the skin file')
     made = TOUCH.of(locator, labelled.pattern, skin)
     return LearningOutcome(made.write, facts, lines)
 
