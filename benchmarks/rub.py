@@ -9,14 +9,16 @@ from pathlib import Path
 
 import numpy as np
 
-from bench_rig import scan_time, stage
+from bench_rig import INSIDE_90, scan_time, stage
 from life import Condition, Worn, touches
 from locator import Set, disc, held, mean_error, plain
-from report import Report, progress, recordings, table
+from report import Floats, Report, progress, recordings, table
 from sliding import LEAD, SPEED, START, Way, recorded
-from tomoskin import Skin
+from tomoskin import Locator, Skin
+from tomoskin.core import Detection, Touch
 from tomoskin.learning import Rubbing
 from tomoskin.sensing.segment import Region
+from tomoskin.sensing.track import SlideCorrection, likeliest_lag
 
 SKINS = {
     "eskin_varsens16/noPattern": (258, "clockwise"),
@@ -81,7 +83,7 @@ def _slid() -> Report:
     skin, rows = Skin.load(SLID), []
     for seed in SLIDES:
         progress(f"slide {seed}")
-        slid, asked = _slide(seed), _pressed(skin, PRESSES, seed)
+        (slid, times), asked = _slide(seed), _pressed(skin, PRESSES, seed)
         few = _pressed(skin, LABELS[1], seed + 100)
         unknown = np.full(slid.xy.shape, np.nan)
         found = Rubbing.of(slid.dv, skin)
@@ -93,6 +95,9 @@ def _slid() -> Report:
         for name, one in (("no labels", locator), (f"{LABELS[1]} labels", both)):
             for what, which in (("presses", asked), ("frames that slide", behind)):
                 row[f"{name}: {what}"] = f"{mean_error(one, which):.1f}, {held(one, which):.0%}"
+        lag = likeliest_lag(times, locator.predict(slid.dv)[0])
+        row["lag found, mm"] = round(1e3 * lag)
+        row["no labels: frames that slide, with that lag"] = _followed(locator, slid, times, lag)
         rows.append(row)
     return table(
         f"a finger that slides on {SLID} of the twin",
@@ -104,8 +109,24 @@ def _slid() -> Report:
     )
 
 
-def _slide(seed: int) -> Set:
-    """Frames less the untouched ones before, and where the finger was in the middle of each."""
+def _followed(locator: Locator, slid: Set, times: Floats, lag: float) -> str:
+    """Mean error and part in the ellipses of touches that are moved by the lag."""
+    slides, inside, errors = SlideCorrection(lag), [], []
+    for now, at, (x, y), cov in zip(times, slid.xy, *locator.predict(slid.dv), strict=True):
+        sd_x, sd_y = np.sqrt(np.diag(cov)).tolist()
+        seen = Detection(x, y, sd_x, sd_y, 1e-3, -1.0, np.empty(0, int), cov_xy=cov[0, 1])
+        touch = Touch(1, "decrease", 0.0, seen)
+        slides = slides.after([touch], now)
+        d = slides.of_finger(touch).detection
+        error = np.array([d.x, d.y]) - at
+        spread = np.array([[d.sd_x**2, d.cov_xy], [d.cov_xy, d.sd_y**2]])
+        errors.append(np.linalg.norm(error))
+        inside.append(error @ np.linalg.solve(spread, error) < INSIDE_90)
+    return f"{1e3 * np.mean(errors):.1f}, {np.mean(inside):.0%}"
+
+
+def _slide(seed: int) -> tuple[Set, Floats]:
+    """Frames less the untouched ones before, where the finger was in the middle of each, and s."""
     prepared = stage(ELECTRODES)
     skin = prepared.skin
     force = float(np.random.default_rng((seed, 999)).uniform(*FORCES))
@@ -116,7 +137,8 @@ def _slide(seed: int) -> Set:
     volts = np.array([prepared.readout(frame).values for frame in frames])
     slid = (since > 0) & (since < way.end)
     xy = np.array([way.at(time) for time in since[slid]])
-    return Set(volts[slid] - volts[since < -UNTOUCHED].mean(axis=0), xy, skin.pattern(), skin)
+    dv = volts[slid] - volts[since < -UNTOUCHED].mean(axis=0)
+    return Set(dv, xy, skin.pattern(), skin), since[slid]
 
 
 def _pressed(skin: Skin, n: int, seed: int) -> Set:

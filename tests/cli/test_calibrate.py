@@ -2,10 +2,12 @@
 
 import csv
 import json
+import re
 
 import numpy as np
 import pytest
 
+from tomoskin import ForwardModel
 from tomoskin.model.pattern import Pattern
 from tomoskin.model.skin import Skin
 
@@ -106,6 +108,36 @@ def test_for_programs(tomoskin, tmp_path, presses, touched):
     code, out, _ = tomoskin("locate", touched[0], "--calibration", calibration, "--json")
     assert code == 0
     assert len(json.loads(out)) == 30
+
+
+def rubbed_with_a_lag(lag):
+    """Changes (n, n_meas) of a finger that goes to and fro at 60 mm/s, whose response lies ``lag``
+    m behind it, and s."""
+    rng, skin = np.random.default_rng(6), Skin.load(SKIN).altered({"mesh": {"cells": 800}})
+    angle = 2.4 * np.arange(24) + rng.uniform(-0.3, 0.3, 24)
+    corners = rng.uniform(0.03, 0.085, (24, 1)) * np.column_stack([np.cos(angle), np.sin(angle)])
+    legs = np.diff(corners, axis=0)
+    length = np.linalg.norm(legs, axis=1)
+    steps = [np.arange(0, way, 0.003)[:, None] for way in length]
+    units = legs / length[:, None]
+    seen = np.vstack(
+        [a + (s - lag) * u for a, s, u in zip(corners[:-1], steps, units, strict=True)]
+    )
+    away = ((seen[:, None] - skin.mesh().centroids) ** 2).sum(axis=2)
+    model = ForwardModel(skin.mesh(), PATTERN, contact_impedance=skin.contact_impedance)
+    dv = -np.exp(-0.5 * away / 0.012**2) @ model.jacobian(skin.conductivity).T
+    return dv + 0.01 * np.median(np.abs(dv)) * rng.normal(size=dv.shape), 0.05 * np.arange(len(dv))
+
+
+@pytest.mark.parametrize("lag", [0.012, 0.0])
+def test_a_rub_tells_how_far_the_sheet_lags(tomoskin, tmp_path, lag):
+    path, made = tmp_path / "rubbed.npz", tmp_path / "c.npz"
+    dv, time = rubbed_with_a_lag(lag)
+    np.savez(path, dv=dv, time_s=time, drive=PATTERN.drive, measure=PATTERN.measure)
+    code, out, _ = tomoskin("calibrate", "rub", path, "--skin", SKIN, "--out", made)
+    said = re.search(r'slide_lag = "(\d+) mm" in \[touch\] of the skin file', out)
+    assert code == 0
+    assert float(said[1] if said else 0) == pytest.approx(1e3 * lag, abs=3)
 
 
 def test_frames_without_a_label_are_not_learnt_from(tomoskin, tmp_path):

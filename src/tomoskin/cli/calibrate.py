@@ -197,6 +197,7 @@ def rub(labelled: Recorded) -> LearningOutcome:
     The skin file says where the electrodes are. Five frames with a label improve the result.
     """
     from tomoskin.learning import TOUCH, Rubbing
+    from tomoskin.sensing.track import likeliest_lag
 
     dv, noise, skin = labelled.dv, labelled.noise, labelled.drawn
     frames = np.arange(len(dv))
@@ -210,17 +211,20 @@ def rub(labelled: Recorded) -> LearningOutcome:
         locator = rubbing.locator(bar)
     for finding in rubbing.findings:
         remark(finding)
+    lag = 1e3 * likeliest_lag(labelled.data.time[frames], locator.predict(dv[frames])[0])
     facts = {
         "touched_frames": len(frames),
         "used": len(rubbing.presses),
         "labelled": rubbing.labelled,
         "deviation_mm": 1e3 * rubbing.deviation,
         "alike": rubbing.alike,
+        "slide_lag_mm": lag,
     }
+    lines = [f"{len(frames)} frames with a touch, {rubbing.text}"]
+    if lag:
+        lines.append(f'the sheet lags: set slide_lag = "{lag:.0f} mm" in [touch] of the skin file')
     made = TOUCH.of(locator, labelled.pattern, skin)
-    return LearningOutcome(
-        made.write, facts, [f"{len(frames)} frames with a touch, {rubbing.text}"]
-    )
+    return LearningOutcome(made.write, facts, lines)
 
 
 Unit = StrEnum("Unit", {"N": "N", "G": "g", "KG": "kg"})

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from threadpoolctl import threadpool_limits
 
-from tomoskin.core import DataError, FloatArray, IntArray
+from tomoskin.core import DataError, FloatArray
 from tomoskin.learning.kind import Progress, silent
 from tomoskin.learning.touch.locator import Locator
 from tomoskin.learning.touch.posterior import BoolArray
@@ -147,7 +147,8 @@ class Rubbing:
         region = Region.of(skin)
         given = np.flatnonzero(np.isfinite(xy).all(axis=1))
         Presses.of_more(dv[given], xy[given]).within(region)
-        chosen = _evenly(len(dv), given)
+        evenly = np.linspace(0, len(dv) - 1, min(len(dv), _MOST)).astype(int)
+        chosen = np.union1d(given, evenly)
         dv, xy = dv[chosen], xy[chosen]
         labels = region.scaled(xy)
         labelled: BoolArray = np.asarray(np.isfinite(labels).all(axis=1))
@@ -273,11 +274,6 @@ def _harder_and_softer(dv: FloatArray) -> FloatArray:
     """Frames (n, k) as if each had been touched harder or softer: one finger has one force."""
     between = np.modf(_GOLDEN * np.arange(len(dv)))[0]
     return np.asarray(dv * np.exp(_HARDER * (2 * between - 1))[:, None])
-
-
-def _evenly(n: int, given: IntArray) -> IntArray:
-    """Numbers of the touches that are used: labelled ones, and as many others as are needed."""
-    return np.union1d(given, np.linspace(0, n - 1, min(n, _MOST)).astype(int))
 
 
 def quiet_electrodes(dv: FloatArray, pattern: Pattern) -> tuple[int, ...]:

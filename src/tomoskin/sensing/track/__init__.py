@@ -1,11 +1,11 @@
 """Detections of successive frames → touches that keep their identity, and what happens to them."""
 
-from tomoskin.sensing.track.motion import (
-    SlideCorrection as SlideCorrection,
-    TrackSettings as TrackSettings,
-    motion_step as motion_step,
-)
+from tomoskin.sensing.track.motion import TrackSettings as TrackSettings, motion_step as motion_step
 from tomoskin.sensing.track.policy import GATE as GATE, HELD as HELD, RESIDUAL as RESIDUAL
+from tomoskin.sensing.track.sliding import (
+    SlideCorrection as SlideCorrection,
+    likeliest_lag as likeliest_lag,
+)
 from tomoskin.sensing.track.touch_table import (
     ELAPSED as ELAPSED,
     Measurands as Measurands,

@@ -118,7 +118,7 @@ def follow(traces: Sequence[Trace], association: Association, frame: FrameOfTouc
             if trace.missing is None:
                 trace.missing, trace.beside, trace.met = clock.now, now, {}
             trace.state, snr = trace.ahead, trace.detection.snr
-            trace.odds = missed(trace.odds, snr, settings.least_snr, clock.passed)
+            trace.odds = missed(trace.odds, snr, settings.snr, clock.passed)
             continue
         detection, position, *_ = detected[i]
         trace.take(detection, clock.now, clock.passed, still=settings.still)

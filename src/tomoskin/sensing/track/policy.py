@@ -157,25 +157,24 @@ def confirmed(
     return min(odds + _share(seconds) * max(gain, 0.0), MOST)
 
 
-def missed(odds: float, snr: float, least: float, seconds: float) -> float:
-    """Odds after a frame without a detection of a touch of that ratio, ``least`` the ratio
-    below which there is none."""
+def missed(odds: float, snr: float, threshold: float, seconds: float) -> float:
+    """Odds after a frame without a detection of a touch of that ratio: below a part of the
+    ``threshold`` there is none."""
     lasts = math.exp(-seconds / _LIFE)
     there = lasts / (1 + math.exp(-odds))
-    faint = 0.0 if math.isnan(snr) else 0.5 * math.erfc((snr - least) / (1 + 0.2 * snr) / 2**0.5)
+    faint = (
+        0.0
+        if math.isnan(snr)
+        else 0.5 * math.erfc((snr - HELD * threshold) / (1 + 0.2 * snr) / 2**0.5)
+    )
     lost = math.log(max(_MISSES, faint))
     return math.log(there) - math.log1p(-there) + _share(seconds) * lost
 
 
 def may_begin(detection: Detection, threshold: float) -> bool:
-    """Whether a detection that is of no touch may be a new one."""
+    """Whether a detection may be of a new touch; one that is not reported yet is forgotten where
+    its detection no longer may."""
     return not (detection.weak or detection.snr < threshold)
-
-
-def is_forgotten(detection: Detection, threshold: float) -> bool:
-    """Whether a newcomer that is not reported yet is no touch, since it no longer stands out, as
-    it did when it began."""
-    return not may_begin(detection, threshold)
 
 
 def is_reported(odds: float, detection: Detection, seconds: float) -> bool:

@@ -205,12 +205,6 @@ class Trace:
         """Its newest detection, where it is held to be."""
         return self.held.of_detection(self.detection)
 
-    @property
-    def is_full(self) -> bool:
-        """Whether it still changes as much as when it was strong. A touch that a fit has cut in two
-        does: each part stands out little where the other is given."""
-        return content_of(self.detection) > _STRONG * self.full
-
     def alone(self, time: float) -> Alone:
         """The touch as it is now, by itself."""
         return Alone(self.state, self.strength, time)
@@ -365,7 +359,8 @@ def is_residual(trace: Trace, time: float, *, alone: bool) -> bool:
     """
     size, top = size_of(trace.detection), trace.top
     slow = trace.low is None and time - trace.strong > RESIDUAL.recovery
-    if slow or (trace.is_full and not alone) or not RESIDUAL.holds(size, top):
+    full = not alone and content_of(trace.detection) > _STRONG * trace.full
+    if slow or full or not RESIDUAL.holds(size, top):
         trace.low = None
         return False
     if trace.low is None or RESIDUAL.has_grown(size, trace.least, 0.0):

@@ -9,7 +9,8 @@ from tomoskin.core import Detection, Touch
 from tomoskin.sensing.track import merging, policy
 from tomoskin.sensing.track.association import FrameOfTouches, ObservedDetection, associate, follow
 from tomoskin.sensing.track.identity import IdentityLedger
-from tomoskin.sensing.track.motion import SlideCorrection, TrackSettings, begin
+from tomoskin.sensing.track.motion import TrackSettings, begin
+from tomoskin.sensing.track.sliding import SlideCorrection
 from tomoskin.sensing.track.trace import (
     Alone,
     Happening,
@@ -145,7 +146,7 @@ class Tracker:
         if self.settings.still and trace.missing is None:
             self._report_onset(trace)
             return
-        if trace.missing is not None or policy.is_forgotten(trace.detection, self.settings.snr):
+        if trace.missing is not None or not policy.may_begin(trace.detection, self.settings.snr):
             self.traces.remove(trace)
             return
         seconds = self._clock.now - trace.since
