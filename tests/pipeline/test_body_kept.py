@@ -134,5 +134,5 @@ def test_the_command_line_takes_them_beside_a_calibration(run, calibration, monk
     assert (end.value.code or 0, errors) == (0, "")
     assert TOUCH.name in runners[0].prepared.calibrations
     last = json.loads(out.splitlines()[-1])
-    assert set(last["bend"]) == {"angle_rad", "sd_rad", "axis_rad", "state"}
+    assert set(last["bend"]) == {"angle_rad", "sd_rad", "axis_rad", "state", "coordinates"}
     assert last["class"] is None

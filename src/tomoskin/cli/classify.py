@@ -53,17 +53,13 @@ def classify(
     data, dv = given.data, given.dv
     with Bar("classifying"):
         answers = classifier.predict(dv)
-    asked = _spread(min(ask, len(dv)), len(dv))
+    count = min(ask, len(dv))  # evenly: the least sure ones would show one class too often
+    asked = [(2 * k + 1) * len(dv) // (2 * count) for k in range(count)]
     names = classifier.examples.codes.names
     frames = _documents(data, answers)
     if out is not None:
         _write(out, frames, names, overwrite=force)
     tell({"names": names, "frames": frames, "ask": asked}, _lines(answers, asked), json=json)
-
-
-def _spread(count: int, n: int) -> list[int]:
-    """``count`` of n frames, evenly: those that are least sure would show one class too often."""
-    return [(2 * k + 1) * n // (2 * count) for k in range(count)]
 
 
 def _documents(data: Recording, answers: Answers) -> list[dict[str, Any]]:

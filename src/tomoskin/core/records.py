@@ -15,7 +15,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core.errors import DataError, check_positive
+from tomoskin.core.errors import DataError
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -204,19 +204,6 @@ class Image:
     def imag(self) -> Image:
         """The change of ω times permittivity alone."""
         return Image(self.values.imag, self.unit, self.mesh_id)
-
-    def relative_to(self, conductivity: float) -> Image:
-        """Share of the sheet's own ``conductivity`` (S or S/m): Δσ/σ₀.
-
-        Raises
-        ------
-        ModelError
-            When the conductivity is not above 0.
-        """
-        if self.unit == "relative":
-            return self
-        check_positive(conductivity, "a conductivity")
-        return Image(self.values / conductivity, "relative", self.mesh_id)
 
     def on_pixels(self, pixels: PixelMap) -> FloatArray:
         """(h, w) values on a raster of the same mesh, NaN outside.

@@ -294,15 +294,13 @@ class LiveSkin:
         does. A change of ``valid`` counts as news too, so a lost board is told at once.
         """
         with self.runner.audience.watch(self._wake), self._news:
-            self._news.wait_for(self._has_news, timeout)
+            given = getattr(self._mine, "given", None)
+            self._news.wait_for(lambda: self.runner.news != given, timeout)
         return self.latest()
 
     def close(self) -> None:
         """Stop the board and end; returns when it is done. A second call does nothing."""
         self.runner.stop()
-
-    def _has_news(self) -> bool:
-        return self.runner.news != getattr(self._mine, "given", None)
 
     def _wake(self) -> None:
         with self._news:

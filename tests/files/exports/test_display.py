@@ -61,12 +61,6 @@ def test_shown_in_parts_of_the_sheets_own() -> None:
     assert Display().shown(image(values), mesh()).unit == "S"
 
 
-def test_relative_to() -> None:
-    values = np.ones(len(mesh().cells))
-    assert image(values).relative_to(4.0).values == pytest.approx(0.25 * values)
-    assert image(values).relative_to(4.0).relative_to(3.0).values == pytest.approx(0.25 * values)
-
-
 def test_a_stack_of_images_is_filtered_as_each() -> None:
     stack = np.random.default_rng(2).standard_normal((3, len(mesh().cells)))
     display = Display(conductivity=0.5, smoothing=0.01)

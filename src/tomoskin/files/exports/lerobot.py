@@ -79,7 +79,8 @@ def write_lerobot(job: Export, path: StrPath) -> None:
     given = None if job.like is None else rows_like(pq, job.like, sessions)
     rate = _rate(job.every, path) if given is None else given.rate
     tracks = [_Track.of(one) for one in job.each()]
-    rows = given or rows_of(sessions, rate, *_span(tracks))
+    begin, end = (max(track.times[k] for track in tracks) for k in (0, -1))  # all have a reference
+    rows = given or rows_of(sessions, rate, begin, end)
     columns, names = _counted(rows, job.session.epoch), dict[str, list[str]]()
     for track in tracks:
         count = track.frames_of_window(rows)
@@ -192,11 +193,6 @@ class _Track:
         window = [f"{frame}.{label}" for frame in frames for label in labels]
         named = {VOLTAGES: labels, TOUCHES: slots, WINDOW: window, AGES: frames, LINK: [*POSE]}
         return {self.prefix + name: words for name, words in named.items()}
-
-
-def _span(tracks: Sequence[_Track]) -> tuple[float, float]:
-    """From when all skins have a reference until the last frame of any."""
-    return max(t.times[0] for t in tracks), max(t.times[-1] for t in tracks)
 
 
 def _counted(rows: Rows, epoch: float) -> Columns:

@@ -83,7 +83,7 @@ class Operator:
         DataError
             When there are more or fewer values than rows, or one that counts is not finite.
         """
-        return self._image((self.matrix @ self.check(dv).T).T)
+        return Image((self.matrix @ self.check(dv).T).T, self.unit, self.model.mesh.identity)
 
     def deferred(self, dv: NDArray[Any]) -> Image:
         """The image, checked at once and computed when it is asked for, for the frame flow.
@@ -196,9 +196,6 @@ class Operator:
         across = self.precision[np.ix_(missing, kept)]
         filled[missing] = -self._solved(missing, across @ dv[kept])
         return filled
-
-    def _image(self, values: NDArray[Any]) -> Image:
-        return Image(values, self.unit, self.model.mesh.identity)
 
     @cached_property
     def _single(self) -> NDArray[Any]:

@@ -158,7 +158,8 @@ class AmountModel:
         free = np.maximum(free, SHALLOW * usual)
         curve = AmountCurve.of(of, terms[rows], free[rows], presses.amount[rows])
         left_out = _left_out(presses, terms, free)
-        scale = _scale(left_out, presses.amount[rows])
+        needed = nine_in_ten(_half_intervals(left_out, presses.amount[rows]))
+        scale = float(np.clip(needed, *_SCALES))
         remarks = _remarks(presses, left_out, unit)
         return cls(
             presses, conductivity, unit, radius, usual, memory, curve, scale, left_out, remarks,
@@ -259,11 +260,6 @@ def _left_out(presses: LabelledPresses, terms: FloatArray, free: FloatArray) -> 
         curve = AmountCurve.of(of, terms[others], free[others], presses.amount[others])
         out[mine] = np.exp(curve.log_amounts(terms[own], free[own], np.zeros(len(own))))
     return out
-
-
-def _scale(left_out: FloatArray, amount: FloatArray) -> float:
-    """What nine in ten labels need of their intervals."""
-    return float(np.clip(nine_in_ten(_half_intervals(left_out, amount)), *_SCALES))
 
 
 def _half_intervals(left_out: FloatArray, amount: FloatArray) -> FloatArray:

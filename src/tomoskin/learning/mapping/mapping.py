@@ -59,7 +59,8 @@ class ChannelMapping:
         if isinstance(impedance, list):
             impedance = [impedance[place] for place in self.electrodes]
         evenly: dict[str, object] = dict.fromkeys(("count", "first", "order"))
-        electrodes = evenly | {"positions": _written(where), "contact_impedance": impedance}
+        written = [[f"{round(_MICRON * v) / 1e3:g} mm" for v in point] for point in where]
+        electrodes = evenly | {"positions": written, "contact_impedance": impedance}
         was = skin.polarity < 0
         drive = {"polarity": "reversed" if was != self.reversed else None}
         return skin.altered({"electrodes": electrodes, "drive": drive})
@@ -102,10 +103,6 @@ def swaps(mapping: ChannelMapping) -> Iterator[ChannelMapping]:
     """Every mapping in which two wires are exchanged."""
     for a, b in combinations(range(len(mapping.electrodes)), 2):
         yield mapping.swapped(a, b)
-
-
-def _written(where: FloatArray) -> list[list[str]]:
-    return [[f"{round(_MICRON * v) / 1e3:g} mm" for v in point] for point in where]
 
 
 _RADII = (0.04, 0.1)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.special import entr
 from threadpoolctl import threadpool_limits
 
 from tomoskin.core import DataError, FloatArray, IntArray
@@ -260,7 +261,7 @@ class _Session:
         maps = _SessionMaps.of(locator, self.grid)
         weights = maps.surface.posterior(maps.white(dv))
         start = weights @ self.grid
-        covered = float(np.exp(_entropy(weights.mean(axis=0))) / len(self.grid))
+        covered = float(np.exp(entr(weights.mean(axis=0)).sum()) / len(self.grid))
         unlike = np.inf
         if weight is not None or covered > _COVERED:
             even = np.full(len(locator.presses), 1 / len(locator.presses))
@@ -368,10 +369,6 @@ def _likeliest_power(parts: Sequence[tuple[TopographicMap, FloatArray, IntArray]
 
 def _numbers(positions: FloatArray, grid: FloatArray) -> IntArray:
     return np.asarray(squared_distances(positions, grid).argmin(axis=1))
-
-
-def _entropy(part: FloatArray) -> float:
-    return float(-(part * np.log(np.maximum(part, 1e-300))).sum())
 
 
 def _correction(positions: FloatArray, known: BoolArray, labels: FloatArray) -> FloatArray:

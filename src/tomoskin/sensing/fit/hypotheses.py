@@ -53,7 +53,8 @@ def challenged(
     is no evidence: it would say the same in every frame.
     """
     policy = selection.policy
-    if rival is not None and _is_beside(rival, found.fit):
+    goes_on = None not in found.fit.known  # so that the rival does too
+    if rival and goes_on and len(rival.detected.fit.spots) == len(found.fit.spots) + 1:
         fit, gain = _followed(selection, found.fit, rival, going_on)
         odds = rival.odds + gain - policy.against(found.fit, fit)
     else:
@@ -68,11 +69,6 @@ def challenged(
     if decisions.elects_rival(policy, found.fit, selection.ratios(fit).min(), odds):
         return detected, None
     return found, Rival(detected, odds)
-
-
-def _is_beside(rival: Rival, found: Fit) -> bool:
-    """Whether what was found goes on, so that the rival does too."""
-    return None not in found.known and len(rival.detected.fit.spots) == len(found.spots) + 1
 
 
 def _followed(
