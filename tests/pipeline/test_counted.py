@@ -117,4 +117,6 @@ def test_a_frame_needs_little_memory_and_keeps_none(one, prepared, method):
         tracemalloc.stop()
     picture = 8 * len(prepared.mesh.cells)
     assert median(peaks) < MOST_IMAGES[method] * picture
-    assert after - half < picture  # thirty frames that kept one picture each would keep thirty
+    # Thirty frames that kept one picture each would keep thirty. Footprints still fill, up to their
+    # most, and numpy and scipy keep names.
+    assert after - half < 2 * picture
