@@ -7,40 +7,27 @@ import re
 import numpy as np
 import pytest
 
+from server.bent import frames_bent
 from server.looks import look_in_both
 from server.serving import Site
 from tomoskin.board.source import open_source
 from tomoskin.learning import BODY, BodyExamples, BodyModel
-from tomoskin.model.mesh import Hinge
 from tomoskin.pipeline import voltage_covariance
 from tomoskin.run import Runner
 from tomoskin.run.commands import BendRequest, SetPose
 from tomoskin.server.handlers import TwinHandlers
-from tomoskin.twin import Bent, TwinSettings, TwinSkin
 
 pytestmark = [pytest.mark.page, pytest.mark.usefixtures("built_page")]
 
 WIDTH = 0.08
 PRESSURES = np.array([0, 20, 40, 60, 80, 60, 40, 20] * 4 + [0], dtype=np.float64)  # kPa
-
-
-def bend_at(pressure):
-    """Rad."""
-    return float(pressure) / 80
+KPA_A_RAD = 80
 
 
 def learnt(prepared):
     """The skin with what a pressure does to it."""
-    sheet = TwinSkin.of(prepared.skin, TwinSettings.preset("ideal"))
-    seen = {}
-    for pressure in np.unique(PRESSURES):
-        sheet.set_pose((Bent(Hinge(bend_at(pressure), WIDTH)),))
-        seen[pressure] = sheet.model.solve(sheet.conductivity()).voltages
     covariance = voltage_covariance(prepared, None)
-    noise = np.random.default_rng(5).multivariate_normal(
-        np.zeros(len(covariance)), covariance, len(PRESSURES)
-    )
-    dv = np.array([seen[pressure] - seen[0.0] for pressure in PRESSURES]) + noise
+    dv = frames_bent(prepared, PRESSURES / KPA_A_RAD, WIDTH, seed=5)
     time = 0.1 * np.arange(len(dv))
     examples = BodyExamples.checked(dv, time, state=PRESSURES[:, None], names=("pressure",))
     return prepared.calibrated(BODY.of(BodyModel.learn(examples, covariance), prepared.pattern))
@@ -61,7 +48,7 @@ def site(prepared):
 def test_the_pressure_of_a_finger_that_curls_is_beside_the_sheet(opened):
     read, words = opened.test_id("coordinate"), opened.test_id("bend-words")
     words.filter(has_text="at rest").wait_for()
-    opened.site.runner.ask(SetPose(BendRequest(bend_at(50), length=WIDTH)))
+    opened.site.runner.ask(SetPose(BendRequest(50 / KPA_A_RAD, length=WIDTH)))
     words.filter(has_text="moved").wait_for()
     read.filter(has_text=re.compile(r"^pressure [45]\d\.?\d* ± \d")).wait_for()
     assert opened.page.get_by_test_id("bend-angle-read").count() == 0

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from run.test_runner import Watch
+from server.bent import frames_bent
 from server.looks import look_in_both
 from server.serving import Site
 from server.watching import axe_finds, distance
@@ -18,7 +19,7 @@ from tomoskin.pipeline import voltage_covariance
 from tomoskin.run import Runner
 from tomoskin.run.commands import BendRequest, SetPose
 from tomoskin.server.handlers import TwinHandlers
-from tomoskin.twin import Bent, Face, TwinSettings, TwinSkin
+from tomoskin.twin import Bent, Face
 
 pytestmark = [pytest.mark.page, pytest.mark.usefixtures("built_page")]
 
@@ -27,23 +28,9 @@ ANGLES = np.radians([0, 15, 30, 45, 60, 45, 30, 15] * 4 + [0])
 TRUE, ROUGH = math.radians(40), math.radians(8)
 
 
-def bends_of(prepared):
-    """(n, n_meas) V: what bends over a strip do to the twin, with the noise of its board."""
-    sheet = TwinSkin.of(prepared.skin, TwinSettings.preset("ideal"))
-    seen = {}
-    for angle in np.unique(ANGLES):
-        sheet.set_pose((Bent(Hinge(float(angle), WIDTH)),))
-        seen[angle] = sheet.model.solve(sheet.conductivity()).voltages
-    covariance = voltage_covariance(prepared, None)
-    noise = np.random.default_rng(4).multivariate_normal(
-        np.zeros(len(covariance)), covariance, len(ANGLES)
-    )
-    return np.array([seen[angle] - seen[0.0] for angle in ANGLES]) + noise
-
-
 def learnt(prepared):
     """The skin with its bends, and with the states straight and bent."""
-    dv, pattern = bends_of(prepared), prepared.pattern
+    dv, pattern = frames_bent(prepared, ANGLES, WIDTH, seed=4), prepared.pattern
     axes, time = np.full(len(ANGLES), math.pi / 2), 0.1 * np.arange(len(ANGLES))
     examples = BodyExamples.checked(dv, time, angle=ANGLES, axis=axes)
     bends = BodyModel.learn(examples, voltage_covariance(prepared, None))

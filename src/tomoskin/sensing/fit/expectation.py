@@ -85,9 +85,6 @@ _AWAY, _STRONGER, _WEAKER = 2e-3, 1.1, 0.95
 """A footprint is made anew where its touch is by so many m elsewhere or by so much stronger, and no
 weaker: a touch that has just begun is known badly, and so is one that is lifted."""
 
-_FOOTPRINTS = 40
-"""Footprints that are kept, the newest: half a metre of a slide, as many as the tracker's."""
-
 _OTHERWISE = np.array([1.0, 5e-3, 5e-3, 0.3])
 """What is left lies elsewhere than the touch, m, and has another radius, as a logarithm: standard
 deviations. On the textile twin they are 6 mm and 0.27."""
@@ -191,7 +188,7 @@ class ResidualResponse:
             if own is None:
                 made, rows = self._made(shapes(np.array(spot)))
                 own = FootprintChange(spot[:2], spot, made, rows, np.zeros(len(made)))
-                self._feet = [*self._feet, own][-_FOOTPRINTS:]
+                self._feet = [*self._feet, own][-RESIDUAL.most :]
             elif own.takes(spot):
                 own.spot, (own.shapes, own.rows) = spot, self._made(shapes(np.array(spot)))
 

@@ -108,6 +108,8 @@ class ResidualModel:
     gone
         Seconds without any detection after which there is none where it is below the noise: a
         finder loses what is faint for a few frames.
+    most
+        Footprints that are kept, the newest: half a metre of a slide.
     """
 
     part: float = 0.25
@@ -118,6 +120,7 @@ class ResidualModel:
     reach: float = 1.25
     lasts: float = 0.05
     gone: float = 0.5
+    most: int = 40
 
     @property
     def deviation(self) -> float:

@@ -87,7 +87,6 @@ class TouchEvent:
         )
 
 
-_MOST_FOOTPRINTS = 40
 _STRONG = 0.5
 _FRESH = 1.0
 """Seconds for which the strength of a touch that has come out of a merged one tells who it is."""
@@ -240,14 +239,14 @@ class Trace:
     def absorb(self, other: Trace) -> None:
         """Stand for the fingers of ``other`` too."""
         self.members += other.members
-        self.footprints = [*other.footprints, *self.footprints][-_MOST_FOOTPRINTS:]
+        self.footprints = [*other.footprints, *self.footprints][-RESIDUAL.most :]
 
     def _step(self) -> None:
         x, y, size = self.detection.x, self.detection.y, size_of(self.detection)
         feet = self.footprints
         if not feet or (x - feet[-1].x) ** 2 + (y - feet[-1].y) ** 2 >= RESIDUAL.spacing**2:
             feet.append(Footprint(x, y, size))
-            del feet[:-_MOST_FOOTPRINTS]
+            del feet[: -RESIDUAL.most]
         elif size > feet[-1].top:
             feet[-1].top = size
         reach = max(region_radius(self.detection), RESIDUAL.spacing) ** 2
