@@ -36,6 +36,7 @@ class Stream(Runner):
     def __init__(self, prepared: Prepared, rate: float) -> None:
         """``rate`` in results per second; nothing is opened."""
         super().__init__(prepared, lambda: None)  # type: ignore[arg-type, return-value]
+        self.flow.out.begin(prepared, "results made by no source")
         self._ending, self.made = threading.Event(), 0
         self._shown: Snapshot | None = None
         self._period = 1 / rate

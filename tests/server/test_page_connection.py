@@ -1,6 +1,7 @@
 """A page's connection, and one that is gone."""
 
 import asyncio
+from unittest.mock import AsyncMock
 
 from starlette.websockets import WebSocket, WebSocketState
 
@@ -53,3 +54,22 @@ def test_frames_wake_the_loop_only_where_a_page_asks_for_one(runner, monkeypatch
                 assert len(woken) == asked
 
     asyncio.run(serve())
+
+
+def test_an_internal_error_is_an_event_and_no_silent_reconnection(runner, monkeypatch):
+    """A page that only opens again and again would say nothing of the cause."""
+    hub, said = Hub(runner), []
+    monkeypatch.setattr(runner, "say", lambda *event: said.append(event))
+    monkeypatch.setattr(hub, "newest", lambda: {}["voltages"])
+
+    async def serve():
+        async with hub.running():
+            page = WebSocket({"type": "websocket"}, asyncio.Event().wait, AsyncMock())
+            page.client_state = page.application_state = WebSocketState.CONNECTED
+            page.accept = AsyncMock()
+            await asyncio.wait_for(Page(page, hub).run(), PATIENCE)
+
+    asyncio.run(serve())
+    assert said == [
+        ("page-dropped", "a page was disconnected: internal error, KeyError: 'voltages'")
+    ]

@@ -217,5 +217,5 @@ def _reason(done: set[asyncio.Task[None]]) -> str:
         if isinstance(error, TimeoutError):
             return f"a page that received nothing for {PATIENCE:.0f} s was disconnected"
         if error is not None:
-            raise error
+            return f"a page was disconnected: internal error, {type(error).__name__}: {error}"
     return ""
