@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tomoskin import ForwardModel
+from tomoskin.learning import TOUCH
 from tomoskin.model.pattern import Pattern
 from tomoskin.model.skin import Skin
 
@@ -135,9 +136,24 @@ def test_a_rub_tells_how_far_the_sheet_lags(tomoskin, tmp_path, lag):
     dv, time = rubbed_with_a_lag(lag)
     np.savez(path, dv=dv, time_s=time, drive=PATTERN.drive, measure=PATTERN.measure)
     code, out, _ = tomoskin("calibrate", "rub", path, "--skin", SKIN, "--out", made)
-    said = re.search(r'slide_lag = "(\d+) mm" in \[touch\] of the skin file', out)
+    said = re.search(r"the sheet lags (\d+) mm behind a finger that slides", out)
     assert code == 0
     assert float(said[1] if said else 0) == pytest.approx(1e3 * lag, abs=3)
+    kept = TOUCH.read(made).model
+    assert kept.presses.slide_lag == pytest.approx(lag, abs=3e-3)
+    assert kept.updated(dv[:1], [[0.0, 0.0]]).presses.slide_lag == kept.presses.slide_lag
+
+
+@pytest.mark.parametrize("lag", [11.0, -0.01, np.nan])
+def test_a_lag_that_no_sheet_has_is_refused(tomoskin, tmp_path, lag):
+    dv, xy = frames(30, 0)
+    presses, made = tmp_path / "presses.npz", tmp_path / "c.npz"
+    np.savez(presses, dv=dv, xy_m=xy, drive=PATTERN.drive, measure=PATTERN.measure)
+    tomoskin("calibrate", "touch", presses, "--out", made)
+    np.savez(made, **{**np.load(made), "slide_lag_m": lag})
+    code, _, errors = tomoskin("locate", presses, "--calibration", made)
+    assert code == 1
+    assert f"c.npz: expected a slide_lag from 0 to 0.1 m, got {lag:g}" in errors
 
 
 def test_frames_without_a_label_are_not_learnt_from(tomoskin, tmp_path):

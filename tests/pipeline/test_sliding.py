@@ -5,6 +5,8 @@ import pytest
 
 from run.board import pressed, samples_of
 from tomoskin.core import Frame
+from tomoskin.learning import Kind
+from tomoskin.learning.kind import Applied
 from tomoskin.pipeline import Pipeline, prepare
 
 NEEDED, STEP, INTERVAL = 5, 0.004, 0.05
@@ -28,8 +30,40 @@ def shown(prepared):
     return [*[idle] * (NEEDED + 2), *way, *[way[-1]] * 8]
 
 
-def test_touches_are_reported_ahead_while_they_slide_and_nowhere_else(prepared, shown):
-    lagging = prepare(prepared.skin.altered({"touch": {"slide_lag": "10 mm"}}), prepared)
+class Rubbed(Applied):
+    """What a calibration does that knows the sheet's lag, m, and nothing else."""
+
+    def __init__(self, slide_lag, _conditions):
+        self.slide_lag = slide_lag
+
+
+RUBBED = Kind("rubbed", "", "", "", learn=float, exclude=lambda *_: None, apply=Rubbed)
+
+
+def by_skin_file(prepared):
+    return prepare(prepared.skin.altered({"touch": {"slide_lag": "10 mm"}}), prepared)
+
+
+def by_calibration(prepared):
+    return prepared.calibrated(RUBBED.of(0.01, prepared.pattern))
+
+
+def by_both(prepared):
+    """The skin file decides."""
+    return by_skin_file(prepared).calibrated(RUBBED.of(0.03, prepared.pattern))
+
+
+def test_a_skin_file_that_says_none_is_believed(prepared, shown):
+    rolling = prepare(prepared.skin.altered({"touch": {"slide_lag": "0 mm"}}), prepared)
+    plain, rolled = slid(prepared, shown), slid(by_calibration(rolling), shown)
+    assert [r.touches[0].detection.x for r in rolled if r.touches] == [
+        r.touches[0].detection.x for r in plain if r.touches
+    ]
+
+
+@pytest.mark.parametrize("known", [by_skin_file, by_calibration, by_both])
+def test_touches_are_reported_ahead_while_they_slide_and_nowhere_else(prepared, shown, known):
+    lagging = known(prepared)
     plain, ahead = slid(prepared, shown), slid(lagging, shown)
     moved = np.array([
         [b.detection.x - a.detection.x, b.detection.y - a.detection.y]
@@ -50,7 +84,7 @@ def test_touches_are_reported_ahead_while_they_slide_and_nowhere_else(prepared, 
 
 
 def test_the_same_frames_give_the_same_touches_to_the_bit(prepared, shown):
-    lagging = prepare(prepared.skin.altered({"touch": {"slide_lag": "10 mm"}}), prepared)
+    lagging = by_skin_file(prepared)
     first, second = (
         [(t.detection.x, t.detection.y) for r in slid(lagging, shown) for t in r.touches]
         for _ in range(2)

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from cli.test_calibrate import rubbed_with_a_lag
 from learning.test_rubbing import touches
 from tomoskin.core import DataError, Detection, Touch, WireError
 from tomoskin.learning import Locator, Rubbing
@@ -88,6 +89,13 @@ def test_what_was_rubbed_is_learnt_and_says_how_sure_it_is(rubber):
     missed = np.linalg.norm(estimate.answer.predict(dv)[0] - xy, axis=1)
     assert np.median(missed) < 0.015
     assert estimate.figures.deviation_mm < 15
+
+
+def test_a_finger_that_slides_tells_how_far_the_sheet_lags(rubber):
+    dv, time = rubbed_with_a_lag(0.012)
+    for row, rubber.time in zip(dv, time, strict=True):
+        rubber.show(row, spot(1, 0.0, 0.0))
+    assert learn(rubber.flow).answer.presses.slide_lag == pytest.approx(0.012, abs=3e-3)
 
 
 def test_a_finger_that_stands_still_and_two_hands_do_not_count(rubber):

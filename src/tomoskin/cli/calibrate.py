@@ -197,7 +197,6 @@ def rub(labelled: Recorded) -> LearningOutcome:
     The skin file says where the electrodes are. Five frames with a label improve the result.
     """
     from tomoskin.learning import TOUCH, Rubbing
-    from tomoskin.sensing.track import likeliest_lag
 
     dv, noise, skin = labelled.dv, labelled.noise, labelled.drawn
     frames = np.arange(len(dv))
@@ -208,10 +207,10 @@ def rub(labelled: Recorded) -> LearningOutcome:
         rubbing = Rubbing.of(dv[frames], skin, xy)
         if not rubbing.holds:
             raise DataError("; ".join(rubbing.findings), where=str(labelled.path))
-        locator = rubbing.locator(bar)
+        locator = rubbing.locator(bar).sliding(labelled.data.time[frames], dv[frames])
     for finding in rubbing.findings:
         remark(finding)
-    lag = 1e3 * likeliest_lag(labelled.data.time[frames], locator.predict(dv[frames])[0])
+    lag = 1e3 * (locator.presses.slide_lag or 0.0)
     facts = {
         "touched_frames": len(frames),
         "used": len(rubbing.presses),
@@ -222,7 +221,7 @@ def rub(labelled: Recorded) -> LearningOutcome:
     }
     lines = [f"{len(frames)} frames with a touch, {rubbing.text}"]
     if lag:
-        lines.append(f'the sheet lags: set slide_lag = "{lag:.0f} mm" in [touch] of the skin file')
+        lines.append(f"the sheet lags {lag:.0f} mm behind a finger that slides: this is corrected")
     made = TOUCH.of(locator, labelled.pattern, skin)
     return LearningOutcome(made.write, facts, lines)
 

@@ -17,6 +17,7 @@ from tomoskin.core.errors import (
     TomoskinError as TomoskinError,
     WireError as WireError,
     check_positive as check_positive,
+    located as located,
     meant as meant,
     meant_or_known as meant_or_known,
     no_such as no_such,

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from difflib import get_close_matches
 from typing import TypeVar
 
@@ -54,14 +55,28 @@ class TomoskinError(Exception):
 
     def __str__(self) -> str:
         """One line: ``where: message (hint)``."""
-        where = f"{self.where}: " if self.where else ""
-        advice = f" ({self.hint})" if self.hint else ""
-        return f"{where}{self.message}{advice}"
+        return f"{self.where}: {self.advice}" if self.where else self.advice
+
+    @property
+    def advice(self) -> str:
+        """What is wrong and what to do, where it is clear what of."""
+        return f"{self.message} ({self.hint})" if self.hint else self.message
 
     def within(self, place: str, kind: type[E]) -> E:
         """The same as an error of that ``kind``, of something in ``place``."""
-        where = f"{place}, {self.where}" if self.where else place
+        where = ", ".join(filter(None, (place, self.where)))
         return kind(self.message, where=where, hint=self.hint)
+
+
+@contextmanager
+def located(place: str, kind: type[TomoskinError], *of: type[TomoskinError]) -> Iterator[None]:
+    """Within the block errors of the kinds ``of``, by default ``kind`` itself, become errors of
+    ``kind`` of something in ``place``."""
+    kinds = of or (kind,)
+    try:
+        yield
+    except kinds as error:
+        raise error.within(place, kind) from error
 
 
 class SkinError(TomoskinError):

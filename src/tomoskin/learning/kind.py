@@ -11,8 +11,7 @@ the file is read, which gives the same model: a file outlives the method.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from inspect import signature
 from typing import Any, Generic, Protocol, Self, TypeVar
@@ -33,6 +32,7 @@ from tomoskin.core import (
     StrPath,
     electrode_table,
     load_arrays,
+    located,
     pack_arrays,
     save_arrays,
     unpack_arrays,
@@ -168,11 +168,13 @@ class Applied:
     """What a calibration does with each frame; a kind overrides what it needs.
 
     ``moved`` V, or (n_meas,) V: what of the newest frame the baseline must not learn. ``poses``
-    (p, n_meas) V: by how much a body may move it.
+    (p, n_meas) V: by how much a body may move it. ``slide_lag`` m: by which the sheet lags behind
+    a finger that slides.
     """
 
     moved: FloatArray | float = 0.0
     poses: FloatArray = np.zeros((0, 0))
+    slide_lag: float = 0.0
 
     def locate(self, view: FrameView, detections: list[Detection]) -> list[Detection]:
         """Detections with better positions."""
@@ -277,7 +279,7 @@ class Kind(Generic[M]):
     def unpack(self, arrays: Arrays, where: str, progress: Progress = silent) -> Calibration[M]:
         """:meth:`read` from the arrays of the file."""
         pattern = self._pattern(arrays, where)
-        with located(where):
+        with located(where, DataError, DataError, ModelError, PatternError):
             rows = arrays["dv"].shape[1:] if "dv" in arrays else (pattern.n_meas,)
             if rows != (pattern.n_meas,):
                 raise DataError(f"expected {pattern.n_meas} rows of dv, got {rows}")
@@ -300,7 +302,7 @@ class Kind(Generic[M]):
         if whole_number(arrays, "version", where) != _VERSION:
             raise DataError(f"expected version {_VERSION}, got {arrays['version']}", where=where)
         drive, measure = (electrode_table(arrays, key, where) for key in ("drive", "measure"))
-        with located(where):
+        with located(where, DataError, DataError, ModelError, PatternError):
             n_electrodes = whole_number(arrays, "n_electrodes", where, MOST_ELECTRODES)
             return Pattern.from_tables(drive, measure, n_electrodes)
 
@@ -371,12 +373,3 @@ class Calibration(Generic[M]):
             "skin_name": np.array(self.skin_name),
             **self.kind.pack(self.model),
         }
-
-
-@contextmanager
-def located(where: str) -> Iterator[None]:
-    """Name the file in errors of what is made from its arrays, as DataError."""
-    try:
-        yield
-    except (DataError, ModelError, PatternError) as error:
-        raise DataError(error.message, where=f"{where}, {error.where}".rstrip(", ")) from error

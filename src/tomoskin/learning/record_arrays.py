@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from tomoskin.core import Arrays, DataError, IntArray, real_numbers, whole_number
 
 _KEYS = {
-    **{name: f"{name}_m" for name in ("xy", "outline", "unit")},
+    **{name: f"{name}_m" for name in ("xy", "outline", "unit", "slide_lag")},
     **{name: f"{name}_s" for name in ("time", "peak", "conductivity")},
     **{name: f"{name}_rad" for name in ("angle", "axis")},
     **{"area": "area_m2", "spread": "spread_m2", "skin_id": "skin"},

@@ -97,7 +97,7 @@ class Following:
             prepared = tuned_sheet(prepared, reference, excluded)  # they are applied once
         self.rest, self._setting = rest, setting
         self.prepared, self.conditioning = prepared, conditioning
-        self._tracker, tracker.slides = tracker, SlideCorrection(prepared.skin.touch.slide_lag)
+        self._tracker = tracker
         self._imaging = _imaging(conditioning, rest, reference)
         interval = np.nan if rest is None else rest.interval
         if not interval > 0:
@@ -110,6 +110,9 @@ class Following:
         fitted = isinstance(self._finder, finding.FitFinder)
         conditions = finding.FitConditions(prepared, reference, fitted, interval)
         self._applied = {k: c.apply(conditions) for k, c in prepared.calibrations.items()}
+        if (lag := prepared.skin.touch.slide_lag) is None:
+            lag = sum(applied.slide_lag for applied in self._applied.values())
+        tracker.slides = SlideCorrection(lag)
         self._tuning = None if reference is None else tune(prepared, reference, excluded)
         self._sheets: BodySheets | None = None
         poses = [applied.poses for applied in self._applied.values() if len(applied.poses)]

@@ -138,8 +138,7 @@ class TwinHandlers:
                 try:
                     await asyncio.to_thread(self._hub.runner.ask, request)
                 except TomoskinError as error:
-                    hint = f" ({error.hint})" if error.hint else ""
-                    page.post(TwinRefused(message=error.message + hint).json)
+                    page.post(TwinRefused(message=error.advice).json)
             self._hub.tell(*self.greeting())
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from tomoskin.core import DataError, FloatArray, WireError, reach
+from tomoskin.core import FloatArray, WireError, reach
 from tomoskin.files.messages import Every
 from tomoskin.learning import TOUCH, Rubbing, quiet_electrodes
 from tomoskin.pipeline import FrameResult, Prepared
@@ -23,6 +24,9 @@ _FEWEST, _GOOD = 150, 400
 
 _MOST = 3000
 """Touches that are kept; of more, every second is forgotten."""
+
+_COURSE = 600
+"""Newest frames that tell how far the sheet lags behind a finger that slides."""
 
 _NEW, _STANDS_OUT = 0.15, 3.0
 """Part of itself, and of the noise of a frame, by which a touch must differ from the last one to
@@ -49,6 +53,8 @@ class Rubbed:
     ----------
     dv
         (n, n_meas) V by which each differs from the untouched skin.
+    course
+        s and (n_meas,) V of the newest frames with one touch, like each other or not.
     covered
         (k,) how many of them lie near each position of the map.
     several
@@ -60,6 +66,7 @@ class Rubbed:
     """
 
     dv: FloatArray
+    course: tuple[tuple[float, FloatArray], ...]
     covered: FloatArray
     several: int = 0
     frames: int = 0
@@ -119,6 +126,7 @@ class RubbedTouches:
         self.places = region.metres(region.lattice(_PLACES))
         self.near = _FINGER * region.unit
         self._dv: list[FloatArray] = []
+        self._course: deque[tuple[float, FloatArray]] = deque(maxlen=_COURSE)
         self._covered = np.zeros(len(self.places))
         self._several = self._frames = 0
         self._is_due = Every(OFTEN)
@@ -135,6 +143,7 @@ class RubbedTouches:
         if result.health is not None:
             dv = np.where(result.health.lost, np.nan, dv)
         noise = result.baseline.noise if result.baseline else 0.0
+        self._course.append((result.host_time, dv))
         least = max(_NEW * _rms(dv), _STANDS_OUT * noise)
         if self._dv and _rms(dv - self._dv[-1]) < least:
             return
@@ -150,7 +159,8 @@ class RubbedTouches:
         dv = np.array(self._dv).reshape(-1, self._pattern.n_meas)
         some = dv[:: max(1, len(dv) // _GOOD)]
         quiet = quiet_electrodes(some, self._pattern) if len(dv) >= _FEWEST else ()
-        return Rubbed(dv, self._covered, self._several, self._frames, quiet)
+        course = tuple(self._course)
+        return Rubbed(dv, course, self._covered, self._several, self._frames, quiet)
 
 
 class RubFlow(DotFlow):
@@ -216,13 +226,10 @@ class RubFlow(DotFlow):
         """Estimate where the rubbed touches were, and a map from them."""
         rubbed, points = examples
         self.stage = "finding where the touches were"
-        dv = np.concatenate([[point.dv for point in points], rubbed.dv]) if points else rubbed.dv
-        xy = np.full((len(dv), 2), np.nan)
-        for number, point in enumerate(points):
-            xy[number] = point.place
+        dv = np.array([*(point.dv for point in points), *rubbed.dv])
+        unknown = np.full((len(rubbed.dv), 2), np.nan)
+        xy = np.array([*(point.place for point in points), *unknown])
         answer = Rubbing.of(dv, self.prepared.skin, xy)
-        if not answer.holds:
-            raise DataError("; ".join(answer.findings))
 
         def learnt(done: float, total: float) -> None:
             self.stage = f"learning, {100 * done / total:.0f} %"
@@ -234,7 +241,7 @@ class RubFlow(DotFlow):
             figures=Figures(
                 deviation_mm=1e3 * answer.deviation, remarks=[*rubbed.gap, *answer.findings]
             ),
-            answer=answer.locator(learnt),
+            answer=answer.locator(learnt).sliding(*zip(*rubbed.course, strict=True)),
         )
 
     def details(self) -> dict[str, Any]:

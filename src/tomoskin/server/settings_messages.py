@@ -215,8 +215,7 @@ def refusal(error: TomoskinError) -> SettingRefused:
     """That a setting was refused, with its section and key where the error names them."""
     place = _PLACE.search(error.where)
     section, key, part = place.groups() if place else (None, None, None)
-    advice = f" ({error.hint})" if error.hint else ""
-    text = f"{f'{part}: ' if part else ''}{error.message}{advice}" if place else str(error)
+    text = f"{f'{part}: ' if part else ''}{error.advice}" if place else str(error)
     return SettingRefused(section=section, key=key, message=text)
 
 

@@ -9,7 +9,7 @@ from typing import Generic, Self, TypeVar
 
 import numpy as np
 
-from tomoskin.core import FloatArray, GeometryError, ScriptError
+from tomoskin.core import FloatArray, GeometryError, ScriptError, located
 from tomoskin.model.mesh import Arm, Hinge, Outline
 from tomoskin.model.section import Section
 from tomoskin.twin.bend import Bent, Deformation, Pose, Stretched
@@ -116,11 +116,9 @@ class ScriptedBend(Scripted[BendSection | StretchSection]):
         most = given.strain if isinstance(given, StretchSection) else given.angle
         course = there_and_back(given, most, where)
         made = cls(given, where, course)
-        try:
+        with located(where, ScriptError, GeometryError):
             for _, amount in course:
                 made.shape(amount)
-        except GeometryError as error:
-            raise ScriptError(error.message, where=where, hint=error.hint) from None
         return made
 
     @property

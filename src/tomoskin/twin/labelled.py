@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from tomoskin import __version__
-from tomoskin.core import FloatArray, Frame, ScriptError, Touch
+from tomoskin.core import FloatArray, Frame, ScriptError, SkinError, Touch, located
 from tomoskin.model.mesh import Outline
 from tomoskin.model.section import toml_tables
 from tomoskin.model.skin import Skin
@@ -23,7 +23,6 @@ from tomoskin.pipeline import REFERENCE_FRAMES, FrameResult, Pipeline, Prepared
 from tomoskin.sensing.signal import Readout
 from tomoskin.twin.presets import TwinSettings
 from tomoskin.twin.probe import FACES, Probe
-from tomoskin.twin.script import of_script
 from tomoskin.twin.script_schema import FORMAT, SECTIONS, PressesSection
 from tomoskin.twin.source import Scans
 
@@ -49,7 +48,7 @@ class Population(PressesSection):
         ScriptError
             For an unknown or missing key, or a value that cannot be meant.
         """
-        with of_script():
+        with located("", ScriptError, SkinError):
             tables = toml_tables(text, source, FORMAT, SECTIONS)
             others = [name for name in tables if name != cls.section]
             if others or cls.section not in tables:

@@ -3,9 +3,7 @@ said before it begins."""
 
 from __future__ import annotations
 
-import contextlib
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Self
@@ -13,7 +11,7 @@ from typing import Self
 import numpy as np
 
 from tomoskin.board.source import Configuration, ScanSettings
-from tomoskin.core import GeometryError, ScriptError, SkinError
+from tomoskin.core import GeometryError, ScriptError, SkinError, located
 from tomoskin.model.pattern import Scan
 from tomoskin.model.section import toml_tables
 from tomoskin.model.skin import Skin
@@ -85,7 +83,7 @@ class Script:
             For a key that is not known or missing, or a value that cannot be meant. Whether the
             whole can be run on a skin, :func:`check_script` says.
         """
-        with of_script():
+        with located("", ScriptError, SkinError):
             tables = toml_tables(text, source, FORMAT, SECTIONS)
             if PressesSection.section in tables:
                 raise ScriptError(
@@ -109,15 +107,6 @@ class Script:
         )
 
 
-@contextlib.contextmanager
-def of_script() -> Iterator[None]:
-    """Turn errors of the reader of skin files into errors of a script."""
-    try:
-        yield
-    except SkinError as error:
-        raise ScriptError(error.message, where=error.where, hint=error.hint) from None
-
-
 def _press(given: PressSection, where: str) -> ScriptedPress:
     force = there_and_back(given, given.force, where)
     path = after((0.0, *given.at), given.path, f"{where} path")
@@ -133,10 +122,8 @@ def _shape(given: PressSection, where: str) -> Shape:
             return Square(side, crown)
         case PressSection(vertices=None):
             return Finger(given.length, given.width)
-    try:
+    with located(f"{where} vertices", ScriptError, GeometryError):
         return Face(given.vertices or (), crown)
-    except GeometryError as error:
-        raise ScriptError(error.message, where=f"{where} vertices", hint=error.hint) from None
 
 
 def _fault(given: FaultSection, where: str) -> Scripted[FaultSection]:
@@ -194,11 +181,9 @@ def _check_bends(script: Script, skin: Skin) -> None:
     middle = skin.outline.centre
     points = np.concatenate([middle + part * (rim - middle) for part in (0.0, 0.5, 1.0)])
     for bend in script.bends:
-        try:
+        with located(bend.where, ScriptError, GeometryError):
             for _, amount in bend.course:
                 strain_of((bend.shape(amount),), points, skin.surface, height)
-        except GeometryError as error:
-            raise ScriptError(error.message, where=bend.where, hint=error.hint) from None
 
 
 def check_settling(skin: Skin, preset: str) -> None:

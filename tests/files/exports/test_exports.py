@@ -15,7 +15,7 @@ import pytest
 from PIL import Image
 from scipy.io import loadmat
 
-from files.session.runs import SKIN, TOUCH, frame_of, put, write_all
+from files.session.runs import SKIN, TOUCH, frame_of, put, write_all, write_frames
 from tomoskin.core import Amount, DataError
 from tomoskin.files.exports import FILMS
 from tomoskin.files.exports.session_export import fields_of
@@ -220,6 +220,16 @@ def test_touches_beside(export, tmp_path):
     with (tmp_path / "t.csv").open() as file:
         [row] = csv.DictReader(file)
     assert (row["frame"], row["id"], row["sd_y_m"]) == ("20", "4", "")
+
+
+def test_touches_of_a_session_without_a_whole_reference_are_refused(tomoskin, tmp_path):
+    """A table with a header alone would say that nothing was touched."""
+    few = write_frames(tmp_path / "few.mcap", 3)
+    touches = tmp_path / "t.csv"
+    code, _, errors = tomoskin("session", "export", few, tmp_path / "x.csv", "--touches", touches)
+    assert code == 1
+    assert "few.mcap: holds too few frames for a reference, so there are no images and no" in errors
+    assert not touches.exists()
 
 
 @pytest.mark.parametrize("name", ["x.csv", "x.parquet", "x.h5", "x.mat", "x.png", "x.npz"])

@@ -82,7 +82,7 @@ class Export:
                 yield result
         if not shown:
             raise DataError(
-                "holds too few frames for a reference, so there are no images",
+                "holds too few frames for a reference, so there are no images and no touches",
                 where=str(self.session.path),
             )
 

@@ -79,9 +79,12 @@ def _scale(job: Export) -> tuple[Mesh, str, float]:
 def export_touches(job: Export, path: StrPath) -> None:
     """Write a table of the touches; of a session without any, those that a replay finds.
 
-    Where the robot is known that wore the skin, it says which are the robot's own.
+    Where the robot is known that wore the skin, it says which are the robot's own. Raises
+    DataError where the session is too short for a reference, so that none could be told.
     """
     rows, own = list(session_touches(job.session)), None
+    if not rows:
+        next(job.images())
     if job.robot is not None:
         frames = [Contacts(job.stream, -1, time, True, None, None, t).kept() for _, time, t in rows]
         rows = [(*row[:2], frame.tracked) for row, frame in zip(rows, frames, strict=True)]

@@ -100,7 +100,7 @@ class LocatedTouch(Applied):
     """
 
     def __init__(self, locator: Locator, correction: FitCorrection | None) -> None:
-        self._correction = correction
+        self._correction, self.slide_lag = correction, locator.presses.slide_lag or 0.0
         self._watch = Watch(locator, LIVE)
         self._standing = Standing()
         self._stood = 0

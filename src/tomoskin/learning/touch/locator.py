@@ -3,7 +3,8 @@ much each of two estimates of a position counts."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
 
@@ -28,6 +29,7 @@ from tomoskin.learning.touch.session_alignment import SessionAlignment
 from tomoskin.model.pattern import Pattern
 from tomoskin.model.skin import Skin
 from tomoskin.sensing.segment import Region
+from tomoskin.sensing.track import likeliest_lag
 
 _SPREAD = 1e-3
 """Deviation, in radii of the region, below which no place is known."""
@@ -413,6 +415,12 @@ class Locator:
         """
         alignment = SessionAlignment.of(self, dv, xy)
         return self.aligned(alignment) if alignment.holds else self
+
+    def sliding(self, time: Sequence[float] | FloatArray, dv: ArrayLike) -> Self:
+        """The same that knows by how much the sheet lags behind a finger that slides: one that did
+        at each ``time`` (n,) s, in frames (n, n_meas). Raises DataError as :meth:`predict`."""
+        lag = likeliest_lag(time, self.predict(dv)[0])
+        return replace(self, presses=replace(self.presses, slide_lag=lag))
 
     def strangeness(self, dv: ArrayLike) -> FloatArray:
         """(n,) how many times worse than left-out presses frames (n, n_meas) fit the maps.

@@ -22,6 +22,9 @@ _BESIDE = 0.05
 _FARTHEST = 10.0
 """m; a label farther out than any sheet is in another unit."""
 
+_LONGEST = 0.1
+"""m; a lag that is longer is in another unit."""
+
 _MOST = 1e12
 """No instrument has a unit in which a change is a larger number: it counts as missing."""
 
@@ -35,13 +38,15 @@ class Presses:
 
     ``dv`` (n, n_meas) V or instrument units, NaN where a value is missing; ``xy`` (n, 2) m;
     ``strength`` (n,) in any unit, or None. ``spread`` (n, 2, 2) m² covariance of the labels where
-    they were estimated, None where they are all known.
+    they were estimated, None where they are all known. ``slide_lag`` m by which the sheet lags
+    behind a finger that slides, None where none did.
     """
 
     dv: FloatArray
     xy: FloatArray
     strength: FloatArray | None = None
     spread: FloatArray | None = None
+    slide_lag: float | None = None
 
     @classmethod
     def checked(
@@ -50,15 +55,19 @@ class Presses:
         xy: ArrayLike,
         strength: ArrayLike | None = None,
         spread: ArrayLike | None = None,
+        slide_lag: float | None = None,
     ) -> Self:
         """Check the shapes and labels.
 
         Raises
         ------
         DataError
-            For shapes that do not belong together, labels that are not finite, too few presses.
+            For shapes that do not belong together, labels that are not finite, too few presses,
+            a lag that no sheet has.
         """
-        presses = cls.of_more(dv, xy, strength)
+        if slide_lag is not None and not 0 <= slide_lag <= _LONGEST:
+            raise DataError(f"expected a slide_lag from 0 to {_LONGEST} m, got {slide_lag:g}")
+        presses = replace(cls.of_more(dv, xy, strength), slide_lag=slide_lag)
         if spread is not None:
             presses = replace(presses, spread=_checked_spread(spread, len(presses)))
         if len(presses) < _FEWEST:
@@ -92,7 +101,8 @@ class Presses:
         """The first ``count`` of these presses."""
         strength = None if self.strength is None else self.strength[:count]
         spread = None if self.spread is None else self.spread[:count]
-        return type(self)(self.dv[:count], self.xy[:count], strength, spread)
+        dv, xy = self.dv[:count], self.xy[:count]
+        return replace(self, dv=dv, xy=xy, strength=strength, spread=spread)
 
     def within(self, region: Region) -> Self:
         """These presses; DataError, with the rows, where labels lie outside the region."""
@@ -112,8 +122,9 @@ class Presses:
         strength = np.append(self.strength, other.strength) if both else None  # type: ignore[arg-type]
         dv, xy = np.vstack([self.dv, other.dv]), np.vstack([self.xy, other.xy])
         if self.spread is None and other.spread is None:
-            return type(self)(dv, xy, strength)
-        return type(self)(dv, xy, strength, np.concatenate([self.spreads, other.spreads]))
+            return replace(self, dv=dv, xy=xy, strength=strength)
+        spread = np.concatenate([self.spreads, other.spreads])
+        return replace(self, dv=dv, xy=xy, strength=strength, spread=spread)
 
     @property
     def spreads(self) -> FloatArray:

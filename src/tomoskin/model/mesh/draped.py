@@ -17,7 +17,7 @@ from scipy.sparse.csgraph import breadth_first_order
 from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
 
-from tomoskin.core import FloatArray, GeometryError, IntArray
+from tomoskin.core import FloatArray, GeometryError, IntArray, located
 from tomoskin.model.mesh.mesh import MeshFile
 from tomoskin.model.mesh.polygon import Polygon
 from tomoskin.model.mesh.surface import Surface, rows_of
@@ -264,10 +264,8 @@ class Draped(Surface):
         """
         file = MeshFile.read(path, scale=scale)
         used, compact = np.unique(file.cells, return_inverse=True)
-        try:
+        with located(file.source, GeometryError):
             return cls.of(file.places[used], compact.reshape(file.cells.shape))
-        except GeometryError as error:
-            raise error.within(file.source, GeometryError) from error
 
     @cached_property
     def outline(self) -> Polygon:

@@ -13,7 +13,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from tomoskin.core import FloatArray, GeometryError, IntArray, PixelMap, numeric
+from tomoskin.core import FloatArray, GeometryError, IntArray, PixelMap, located, numeric
 from tomoskin.model.mesh.files import (
     Electrodes,
     cells_of,
@@ -281,12 +281,10 @@ class MeshFile:
         """Read ``path``; its coordinates times ``scale`` are m. Raises GeometryError."""
         file = Path(path)
         raw = parsed(file)
-        try:
+        with located(str(file), GeometryError):
             cells = cells_of(raw)
             points, height = points_of(raw, cells, scale)
             groups = groups_of(raw, cells.shape[1] - 1)
-        except GeometryError as error:
-            raise error.within(str(file), GeometryError) from error
         return cls(points, cells, groups, str(file), height)
 
     @property
@@ -297,15 +295,13 @@ class MeshFile:
 
     def mesh(self, electrodes: Electrodes = None) -> Mesh:
         """Return the mesh with those electrodes. Raises GeometryError."""
-        try:
+        with located(self.source, GeometryError):
             facets = choose(self.points, self.cells, self.groups, electrodes)
             used, compact = np.unique(self.cells, return_inverse=True)
             number = np.full(len(self.points), -1)
             number[used] = np.arange(len(used))
             tables = [renumbered(number, f, f"E{i}") for i, f in enumerate(facets, 1)]
             return Mesh(self.points[used], compact.reshape(self.cells.shape), tuple(tables))
-        except GeometryError as error:
-            raise error.within(self.source, GeometryError) from error
 
 
 def _frozen(value: object, dtype: DTypeLike, where: str) -> NDArray[Any]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -11,7 +9,7 @@ from typing import Self, get_type_hints
 
 import numpy as np
 
-from tomoskin.core import DIMENSIONS, FloatArray, GeometryError, PatternError, SkinError
+from tomoskin.core import DIMENSIONS, FloatArray, GeometryError, PatternError, SkinError, located
 from tomoskin.model.mesh import (
     Arm,
     Cap,
@@ -103,27 +101,18 @@ class SkinBody:
     @classmethod
     def of(cls, sections: SkinSections, source: str) -> Self:
         """Raises SkinError that names ``source`` and section where parts do not go together."""
-        with located(f"{source}: [outline]"):
+        with located(f"{source}: [outline]", SkinError, GeometryError):
             outline = _outline(sections.outline)
-        with located(f"{source}: [electrodes]"):
+        with located(f"{source}: [electrodes]", SkinError, GeometryError):
             arcs = _arcs(outline, sections.electrodes)
             check_arcs(outline, arcs)
-        with located(f"{source}: [surface]"):
+        with located(f"{source}: [surface]", SkinError, GeometryError):
             surface = _surface(sections.surface, Path(source).parent)
             surface.check(outline.polyline(outline.length / _RIM_POINTS))
         impedance = _impedances(sections.electrodes, len(arcs), source)
-        with located(f"{source}: [drive]"):
+        with located(f"{source}: [drive]", SkinError, PatternError):
             pattern = _pattern(sections.drive, len(arcs))
         return cls(outline, surface, arcs, impedance, pattern)
-
-
-@contextmanager
-def located(place: str) -> Iterator[None]:
-    """Turn errors of the rooms above into errors of the skin file, at ``place``."""
-    try:
-        yield
-    except (GeometryError, PatternError) as error:
-        raise error.within(place, SkinError) from error
 
 
 def check_readout(readout: ReadoutSettings, source: str) -> None:

@@ -122,11 +122,12 @@ class TouchSettings(Section, section="touch"):
         effective=_IN_IMAGE,
     )
     max_touches: int = key(Whole(1, 50), "Largest number of touches reported at once.", default=8)
-    slide_lag: float = key(
+    slide_lag: float | None = key(
         Quantity("length", "mm", 0, 100),
         "Distance by which the sheet's response lags behind a sliding finger, because friction "
-        "drags the sheet along. Sliding touches are reported ahead by this distance.",
-        default="0 mm",
+        "drags the sheet along. Sliding touches are reported ahead by this distance. Default: "
+        "that of a calibration from rubbing, else none.",
+        default=None,
     )
 
 

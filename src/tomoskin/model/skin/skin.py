@@ -12,7 +12,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from tomoskin.core import FloatArray
+from tomoskin.core import FloatArray, GeometryError, SkinError, located
 from tomoskin.model.mesh import ElectrodeArc, Mesh, Outline, Surface, laid_on
 from tomoskin.model.pattern import Pattern
 from tomoskin.model.section import Document, check_names, toml_tables, toml_text
@@ -25,7 +25,6 @@ from tomoskin.model.skin.build import (
     SkinSections,
     check_readout,
     flat_mesh,
-    located,
 )
 from tomoskin.model.skin.find import built_in_names, skin_text
 from tomoskin.model.skin.processing import (
@@ -194,9 +193,9 @@ class Skin:
     @cached_property
     def _mesh(self) -> Mesh:
         given = self._sections
-        with located(f"{self.source}: [mesh] cells"):
+        with located(f"{self.source}: [mesh] cells", SkinError, GeometryError):
             flat = flat_mesh(given.outline, given.electrodes, given.mesh)
-        with located(f"{self.source}: [surface]"):
+        with located(f"{self.source}: [surface]", SkinError, GeometryError):
             return laid_on(flat, self.surface)
 
     @classmethod

@@ -229,7 +229,7 @@ def sink_report(worker: Worker[SinkConsumer]) -> SinkReport:
 def _why(error: Exception) -> str:
     """In words; the sink's name stands before them already."""
     if isinstance(error, TomoskinError):
-        return f"{error.message} ({error.hint})" if error.hint else error.message
+        return error.advice
     if isinstance(error, OSError) and error.strerror:
         return error.strerror
     return f"{type(error).__name__}: {error}"

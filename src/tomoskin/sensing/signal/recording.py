@@ -9,7 +9,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import DataError, FloatArray, IntArray, PatternError
+from tomoskin.core import DataError, FloatArray, IntArray, PatternError, located
 from tomoskin.model.pattern import Pattern, electrodes_of, match_rows, sum_rows, undirected
 
 _MOST = 1e12
@@ -199,10 +199,8 @@ class Recording:
             )
         once = self.without_repeats(pattern)
         match_own = sum_rows if self.spread else match_rows
-        try:
+        with located(self.source, PatternError):
             match = match_own(pattern, once.drive, once.measure)
-        except PatternError as error:
-            raise error.within(self.source, PatternError) from error
         reference = once.reference
         summed = f"{len(self.drive)} rows with drives of several electrodes were summed to pairs"
         return replace(

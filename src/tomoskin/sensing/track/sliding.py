@@ -106,7 +106,7 @@ class SlidingFinger:
         return type(self)(self.lag, time, moved, places, odds / likely, known, evidence)
 
 
-def likeliest_lag(times: FloatArray, seen: FloatArray) -> float:
+def likeliest_lag(times: Sequence[float] | FloatArray, seen: FloatArray) -> float:
     """m by which the sheet lags behind a finger that slides; 0 where its course does not tell.
 
     ``times`` (n,) s, and where the response was ``seen`` (n, 2) m.
