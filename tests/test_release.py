@@ -110,7 +110,7 @@ def test_the_sdist_holds_the_sources_and_no_recordings(sdist: list[str], built) 
     assert [n for n in sdist if re.search(r"(^|/)(shared|node_modules|target|\.venv)/", n)] == []
     binaries = {name for name in sdist if name.endswith((".mcap", ".npz", ".elf", ".so"))}
     old = {"tests/files/session/of_0_1.mcap"}  # that old files are still read
-    old |= {f"tests/learning/files/{kind}.npz" for kind in ("touch", "force", "bend", "class")}
+    old |= {f"tests/learning/files/{kind}.npz" for kind in ("touch", "force", "body", "class")}
     assert binaries == old
     assert max(file.stat().st_size for file in built) < 1e6 * MOST_MB
 

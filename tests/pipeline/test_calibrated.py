@@ -9,6 +9,7 @@ import pytest
 
 from tomoskin.core import FloatArray, Voltages
 from tomoskin.learning import FORCE, TOUCH, AmountModel, LabelledPresses, Locator
+from tomoskin.learning.touch.located_touch import _together
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Pipeline, Prepared, prepare
 from tomoskin.pipeline.frame_result import FrameResult
@@ -115,3 +116,32 @@ def test_forces_are_told_beside_it_but_not_of_regions_of_an_image(calibrated: Pr
     assert all(t.detection.force is not None for t in shown(both, *PLACES)[-1].touches)
     alone = shown(both, *PLACES[:1], size=40.0)[-1]
     assert [t.detection.force for t in alone.touches] == [None]
+
+
+def rubbed(calibrated: Prepared, xy: FloatArray, spread: FloatArray, **said: bool) -> Prepared:
+    """The same with labels that a rub has found."""
+    model = calibrated.calibrations[TOUCH.name].model
+    presses = replace(model.presses, xy=xy, spread=spread, **said)
+    locator = Locator.learn(presses, model.region, model.pattern, model.skin_id)
+    return FITTED.calibrated(TOUCH.of(locator, FITTED.pattern, FITTED.skin))
+
+
+def test_labels_of_the_same_model_say_no_more_than_the_fit(calibrated: Prepared) -> None:
+    presses = calibrated.calibrations[TOUCH.name].model.presses
+    spread = np.tile(1e-5 * np.eye(2), (len(presses), 1, 1))
+    ours = shown(rubbed(calibrated, presses.xy, spread, modelled=True), *PLACES)[-1]
+    assert positions(ours).tolist() == positions(shown(FITTED, *PLACES)[-1]).tolist()
+    assert ours.calibration is not None
+
+
+def test_where_labels_were_found_both_may_be_wrong() -> None:
+    """The fit and the presses are 20 mm apart, and each is sure of itself."""
+    sure = 1e-6 * np.eye(2)
+    fitted, learnt = (np.array([x, 0.0]) for x in (0.01, 0.03))
+    (known, within), (found, wide) = (
+        _together((fitted, sure), (learnt, sure), doubtful=doubtful) for doubtful in (False, True)
+    )
+    assert known == pytest.approx(learnt, abs=1e-3)
+    assert found == pytest.approx((fitted + learnt) / 2, abs=1e-3)
+    assert within[0, 0] < 2e-6
+    assert 0.007 < np.sqrt(wide[0, 0]) < 0.02  # half of what they are apart

@@ -29,7 +29,7 @@ int main(void) {
         }
         said = '.';
         for (uint8_t cycles = 0u; cycles < CYCLES; cycles++) {
-            TCNT1 = BEFORE;
+            TCNT3 = BEFORE;
             wait(cycles);
             uint32_t first = hal_ticks();
             uint32_t second = hal_ticks();

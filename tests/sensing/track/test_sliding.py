@@ -31,11 +31,12 @@ def followed(places, interval=0.1, lag=LAG):
 
 def there_and_back(lag, strokes=12, interval=0.056):
     """Times (n,) s and responses (n, 2) m, with noise, of a finger that rubs to and fro."""
-    times = interval * np.arange(strokes * 30)
     turns = np.random.default_rng(2).uniform(0, 2 * np.pi, strokes)
-    ways = np.repeat(np.column_stack([np.cos(turns), np.sin(turns)]), 30, axis=0)
-    finger = np.cumsum(SPEED * interval * ways, axis=0)
-    return times, finger - lag * ways + 1e-3 * np.random.default_rng(3).normal(size=ways.shape)
+    ways = np.repeat(np.column_stack([np.cos(turns), np.sin(turns)]), 293, axis=0)
+    finger = np.cumsum(SPEED * interval / 10 * ways, axis=0)
+    seen = (finger - lag * ways)[::10]  # it turns between two frames
+    times = interval * np.arange(len(seen))
+    return times, seen + 1e-3 * np.random.default_rng(3).normal(size=seen.shape)
 
 
 @pytest.mark.parametrize("interval", [0.1, 0.025, 0.005])
@@ -50,8 +51,8 @@ def test_a_touch_that_slides_is_moved_by_the_lag_along_its_way(interval, angle):
 
 def test_what_the_sheet_does_as_a_finger_begins_and_stops():
     """It falls back by the lag as the finger begins to slide, and catches up as it stops."""
-    finger = np.concatenate([np.zeros(12), SPEED * 0.05 * np.arange(1, 31), np.full(12, 0.09)])
-    sliding = np.diff(finger, prepend=0.0) > 0
+    finger = np.clip(SPEED * (0.05 * np.arange(54) - 0.575), 0.0, 0.09)
+    sliding = (finger > 0.0) & (finger < 0.09)
     seen = finger - LAG * sliding
     moved = followed(np.column_stack([seen, np.zeros_like(seen)]), 0.05)[:, 0]
     error = np.abs(seen + moved - finger)

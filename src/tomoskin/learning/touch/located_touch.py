@@ -96,11 +96,14 @@ class LocatedTouch(Applied):
 
     Of several fitted touches, each is located in the frame without what the others change. Regions
     of an image tell nothing of that: then the strongest is located, as if it were the only one.
+    Fitted touches stay where they are if presses were labelled by the same model, from a rub.
     Measurements that have jumped since the presses are left out where frames do not fit with them.
     """
 
     def __init__(self, locator: Locator, correction: FitCorrection | None) -> None:
         self._correction, self.slide_lag = correction, locator.presses.slide_lag or 0.0
+        self._modelled = locator.presses.modelled
+        self._rubbed = locator.presses.spread is not None
         self._watch = Watch(locator, LIVE)
         self._standing = Standing()
         self._stood = 0
@@ -123,8 +126,11 @@ class LocatedTouch(Applied):
             return [_at(detections[0], position, covariance)]
         settled = len(detections) == 1 and self._settled()
         answers = zip(*self._watch(mean - view.others, settled=settled), strict=True)
+        if self._modelled:
+            return detections
+        doubtful = self._rubbed or len(detections) > 1
         return [
-            _at(detection, *_together(correct(detection), answer, several=len(detections) > 1))
+            _at(detection, *_together(correct(detection), answer, doubtful=doubtful))
             for detection, answer in zip(detections, answers, strict=True)
         ]
 
@@ -143,18 +149,19 @@ class LocatedTouch(Applied):
 
 
 def _together(
-    fitted: tuple[FloatArray, FloatArray], learnt: tuple[FloatArray, FloatArray], *, several: bool
+    fitted: tuple[FloatArray, FloatArray], learnt: tuple[FloatArray, FloatArray], *, doubtful: bool
 ) -> tuple[FloatArray, FloatArray]:
     """What a fit and the presses, each a position (2,) m and a covariance (2, 2) m², say together.
 
     What they differ by beyond their covariances widens them (the moment estimator of DerSimonian
-    and Laird 1986). Of one touch it is the fit's error: the presses were tried on labels. Of
-    ``several`` it is both's: the presses see what the fit has left of the others.
+    and Laird 1986). It is the fit's error: the presses were tried on labels. Of ``doubtful`` ones
+    it is both's: of several touches they see what the fit has left of the others, and after a rub
+    their labels were found by the skin's model.
     """
     (here, own), (there, covariance) = fitted, learnt
     away = here - there
     beyond = max(float(away @ away - np.trace(own + covariance)) / 2, 0.0) * np.eye(2)
-    wider = covariance + beyond if several else covariance
+    wider = covariance + beyond if doubtful else covariance
     gain = wider @ np.linalg.inv(wider + own + beyond)
     return there + gain @ away, wider - gain @ wider
 

@@ -39,7 +39,8 @@ class Presses:
     ``dv`` (n, n_meas) V or instrument units, NaN where a value is missing; ``xy`` (n, 2) m;
     ``strength`` (n,) in any unit, or None. ``spread`` (n, 2, 2) m² covariance of the labels where
     they were estimated, None where they are all known. ``slide_lag`` m by which the sheet lags
-    behind a finger that slides, None where none did.
+    behind a finger that slides, None where none did. ``modelled``: whether the labels are those
+    of the skin's model, and say no more than touches that are fitted to it.
     """
 
     dv: FloatArray
@@ -47,6 +48,7 @@ class Presses:
     strength: FloatArray | None = None
     spread: FloatArray | None = None
     slide_lag: float | None = None
+    modelled: bool = False
 
     @classmethod
     def checked(
@@ -55,7 +57,9 @@ class Presses:
         xy: ArrayLike,
         strength: ArrayLike | None = None,
         spread: ArrayLike | None = None,
+        *,
         slide_lag: float | None = None,
+        modelled: bool = False,
     ) -> Self:
         """Check the shapes and labels.
 
@@ -67,7 +71,7 @@ class Presses:
         """
         if slide_lag is not None and not 0 <= slide_lag <= _LONGEST:
             raise DataError(f"expected a slide_lag from 0 to {_LONGEST} m, got {slide_lag:g}")
-        presses = replace(cls.of_more(dv, xy, strength), slide_lag=slide_lag)
+        presses = replace(cls.of_more(dv, xy, strength), slide_lag=slide_lag, modelled=modelled)
         if spread is not None:
             presses = replace(presses, spread=_checked_spread(spread, len(presses)))
         if len(presses) < _FEWEST:

@@ -252,7 +252,8 @@ class Rubbing:
             # What is off in each frame by itself is in the left-out errors.
             shared = (_MODEL * region.unit) ** 2 * np.eye(2)
             spread = np.where(presses.spreads.any(axis=(1, 2), keepdims=True), shared, 0.0)
-            presses = replace(presses, dv=_harder_and_softer(presses.dv), spread=spread)
+            dv = _harder_and_softer(presses.dv)
+            presses = replace(presses, dv=dv, spread=spread, modelled=not self.labelled)
         return Locator.learn(presses, region, self.pattern, self.skin.identity, progress)
 
 

@@ -121,7 +121,8 @@ def likeliest_lag(times: Sequence[float] | FloatArray, seen: FloatArray) -> floa
         likely.append(finger.evidence)
     best = int(np.argmax(likely[:-1]))
     clear = likely[best] > max(likely[0] + _TOLD, likely[-1])
-    return float(_LAGS[best]) if clear else 0.0
+    halfway = _SPEED * float(np.median(np.diff(times))) / 2  # to where it turns between two frames
+    return max(float(_LAGS[best]) - halfway, 0.0) if clear else 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
