@@ -144,6 +144,25 @@ def test_a_rub_tells_how_far_the_sheet_lags(tomoskin, tmp_path, lag):
     assert kept.updated(dv[:1], [[0.0, 0.0]]).presses.slide_lag == kept.presses.slide_lag
 
 
+def test_faint_touches_of_a_rub_are_found_as_the_pipeline_finds_them(tomoskin, tmp_path):
+    """None stands out of the noise of a frame by itself; untouched frames are left out."""
+    rng, skin = np.random.default_rng(8), Skin.load(SKIN)
+    model = ForwardModel(skin.mesh(), PATTERN, contact_impedance=skin.contact_impedance)
+    rest = skin.current * model.solve(skin.conductivity).voltages
+    dv, _ = rubbed_with_a_lag(0.0)
+    dv *= 0.03 * rest.mean() / np.abs(dv).max()
+    noise = np.sqrt(np.mean(dv**2)) / 3
+    frames = np.vstack([np.zeros((60, PATTERN.n_meas)), dv, np.zeros((60, PATTERN.n_meas))])
+    path = tmp_path / "faint.npz"
+    volts = rest + frames + noise * rng.normal(size=frames.shape)
+    tables = {"drive": PATTERN.drive, "measure": PATTERN.measure}
+    np.savez(path, voltages=volts, time_s=0.05 * np.arange(len(volts)), **tables)
+    options = ("--skin", SKIN, "--reference", "first:50", "--out", tmp_path / "c.npz", "--json")
+    code, out, _ = tomoskin("calibrate", "rub", path, *options)
+    assert code == 0
+    assert 0.6 * len(dv) < json.loads(out)["touched_frames"] < 1.02 * len(dv)
+
+
 @pytest.mark.parametrize("lag", [11.0, -0.01, np.nan])
 def test_a_lag_that_no_sheet_has_is_refused(tomoskin, tmp_path, lag):
     dv, xy = frames(30, 0)

@@ -46,9 +46,6 @@ if TYPE_CHECKING:
 
 app = group("calibrate")
 
-_STANDS_OUT = 4.0
-"""Root mean square of a frame's changes, in noise deviations, from which it shows a touch."""
-
 
 @dataclass(frozen=True)
 class LearningOutcome:
@@ -197,11 +194,13 @@ def rub(labelled: Recorded) -> LearningOutcome:
     The skin file says where the electrodes are. Five frames with a label improve the result.
     """
     from tomoskin.learning import TOUCH, Rubbing
+    from tomoskin.pipeline import prepare
 
-    dv, noise, skin = labelled.dv, labelled.noise, labelled.drawn
-    frames = np.arange(len(dv))
-    if noise is not None:
-        frames = np.flatnonzero(np.sqrt(np.nanmean((dv / noise) ** 2, axis=1)) > _STANDS_OUT)
+    dv, skin, frames = labelled.dv, labelled.drawn, np.arange(len(labelled.dv))
+    if labelled.noise is not None:
+        with Bar("finding touches") as bar:
+            result = reconstructed(labelled, prepare(skin), None, bar)
+        frames = result.frames[[len(touches) == 1 for touches in result.touches]]
     xy = None if labelled.data.labels is None else labelled.data.labels[frames]
     with Bar("learning") as bar:
         rubbing = Rubbing.of(dv[frames], skin, xy)

@@ -238,9 +238,9 @@ class Rubbing:
     def text(self) -> str:
         """What was found, in a sentence."""
         return (
-            f"{len(self.presses)} touches used, {self.labelled} of them labelled; positions are "
-            f"uncertain by about {1e3 * self.deviation:.1f} mm in each direction, and a few "
-            "labelled presses make them better"
+            f"{len(self.presses)} touches used, {self.labelled} of them labelled; the other "
+            f"positions are uncertain by about {1e3 * self.deviation:.1f} mm in each direction, "
+            "and a few labelled presses make them better"
         )
 
     def locator(self, progress: Progress = silent) -> Locator:
