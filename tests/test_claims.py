@@ -93,6 +93,10 @@ def test_a_time_holds_within_a_factor_of_three_whatever_its_sign() -> None:
     assert timed.broken({"A > b (1) → off, 1": -10.0, "A > b → ms": 5.0}) == []
     wrong = timed.broken({"A > b (1) → off, 1": 10.0, "A > b → ms": 7.0})
     assert [one.split(":")[0] for one in wrong] == [f"one, {key}" for key in keys]
+    tails = replace(timed, timed=(), tails=("off", "ms"))
+    assert tails.broken({"A > b (1) → off, 1": -90.0, "A > b → ms": 0.3}) == []
+    wrong = tails.broken({"A > b (1) → off, 1": -110.0, "A > b → ms": 0.1})
+    assert [one.split(":")[0] for one in wrong] == [f"one, {key}" for key in keys]
 
 
 def test_a_figure_on_a_page_is_replaced_where_its_words_stand(claim: Claim) -> None:
