@@ -43,6 +43,7 @@ from tomoskin.core import DataError, FloatArray, write_text
 if TYPE_CHECKING:
     from tomoskin.core import IntArray
     from tomoskin.learning import Locator
+    from tomoskin.pipeline import Reconstruction
 
 app = group("calibrate")
 
@@ -187,6 +188,16 @@ def _added(locator: Locator, frames: IntArray, dv: FloatArray, xy: FloatArray) -
     return []
 
 
+def _reconstruction(labelled: Recorded) -> Reconstruction:
+    """The touches that the pipeline finds in each frame."""
+    from tomoskin.pipeline import prepare
+
+    with Bar("preparing"):
+        prepared = prepare(labelled.drawn)
+    with Bar("finding touches") as bar:
+        return reconstructed(labelled, prepared, None, bar)
+
+
 @_kind("rub", _TOUCHED)
 def rub(labelled: Recorded) -> LearningOutcome:
     """Learn where a touch is from one finger that rubs the whole skin, without labels.
@@ -194,12 +205,10 @@ def rub(labelled: Recorded) -> LearningOutcome:
     The skin file says where the electrodes are. Five frames with a label improve the result.
     """
     from tomoskin.learning import TOUCH, Rubbing
-    from tomoskin.pipeline import prepare
 
     dv, skin, frames = labelled.dv, labelled.drawn, np.arange(len(labelled.dv))
     if labelled.noise is not None:
-        with Bar("finding touches") as bar:
-            result = reconstructed(labelled, prepare(skin), None, bar)
+        result = _reconstruction(labelled)
         frames = result.frames[[len(touches) == 1 for touches in result.touches]]
     xy = None if labelled.data.labels is None else labelled.data.labels[frames]
     with Bar("learning") as bar:
@@ -287,14 +296,10 @@ def _amount(
     labelled: Recorded, name: str, given: list[str] | None, unit: str | None, advice: str
 ) -> LearningOutcome:
     from tomoskin.learning import KINDS, MEASURED, AmountModel, report_of
-    from tomoskin.pipeline import prepare
 
     skin, path, of = labelled.drawn, labelled.path, MEASURED[name]
     amount = amounts(path, len(labelled.recording), given, unit, of)
-    with Bar("preparing"):
-        prepared = prepare(skin)
-    with Bar("finding touches") as bar:
-        result = reconstructed(labelled, prepared, None, bar)
+    result = _reconstruction(labelled)
     presses = labelled_presses(path, result, amount, labelled.data.time, of)
     with Bar("learning"):
         model = AmountModel.fit(presses, skin)
