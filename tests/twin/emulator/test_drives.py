@@ -52,11 +52,12 @@ def check_full_turns(link: Link, scan: Scan, expected: list[int]) -> None:
 def test_the_megas_drives(
     programs: Programs, tmp_path: Path, electrodes: int, oversampling: int
 ) -> None:
+    """In real time, a line that nobody reads for a tenth of a second loses bytes; here it waits."""
     scan = Scan.of(Pattern.adjacent(electrodes))
     settings = replace(SINGLY, oversampling=oversampling)
     expected = star_counts(oversampling, scan)
     with (
-        running(programs.emulator, tmp_path / "port", str(programs.elf)) as board,
+        running(programs.emulator, tmp_path / "port", "-f", str(programs.elf)) as board,
         Link(SerialTransport(board.path), scan, settings) as link,
     ):
         check_full_turns(link, scan, expected)

@@ -25,7 +25,7 @@ def test_frames_per_second_and_every_value(
     scan = Scan.of(Pattern.adjacent(electrodes))
     settings = ScanSettings(1, settling, current_limit=0.1, adc_bits=10, prescaler=64)
     with (
-        running(programs.emulator, tmp_path / "port", str(programs.elf)) as board,
+        running(programs.emulator, tmp_path / "port", "-f", str(programs.elf)) as board,
         Link(SerialTransport(board.path), scan, settings, clock=time.monotonic) as link,
     ):
         frames = frames_of(link, 30)
