@@ -94,6 +94,34 @@ def test_labels_are_kept_and_a_turned_skin_contradicts_them() -> None:
         wrong.locator()
 
 
+def test_labels_that_lie_elsewhere_than_the_model_says_are_contradicted() -> None:
+    """Some tens of millimetres each are none, but all together a few."""
+    dv, _ = touches(TOUCHES, 0)
+    places, some = rubbed().presses.xy, np.full((TOUCHES, 2), np.nan)
+    some[:10] = places[:10] + 0.003 * np.array([1, -1])
+    found = Rubbing.of(dv, skin(), some)
+    assert found.holds
+    assert found.locator().presses.modelled
+    inwards = np.where(places > 0, -0.012, 0.012)
+    some[:10] = (places + inwards)[:10]
+    with pytest.raises(DataError, match="frames 0, 1, 2, 3, 4, 5, 6, 7, 8, 9 contradict"):
+        Rubbing.of(dv, skin(), some).locator()
+    some[:25] = (places + inwards)[:25]
+    enough = Rubbing.of(dv, skin(), some)
+    assert enough.by_labels
+    assert not enough.locator().presses.modelled
+
+
+def test_a_faint_rub_is_the_models_too_and_noise_is_not() -> None:
+    dv, _ = touches(TOUCHES, 0)
+    noise = np.random.default_rng(3).normal(size=dv.shape)
+    usual = np.sqrt(np.median(np.sum(dv**2, axis=1)) / dv.shape[1])
+    faint = Rubbing.of(dv + usual * noise, skin())
+    assert faint.modelled
+    assert np.linalg.norm(missed(faint, touches(TOUCHES, 0)[1]), axis=1).mean() < 0.02
+    assert not Rubbing.of(noise, skin()).modelled
+
+
 def test_touches_on_half_of_the_skin_are_said() -> None:
     found = Rubbing.of(touches(TOUCHES, 2, side=0.1)[0], skin())
     assert 6 in found.quiet

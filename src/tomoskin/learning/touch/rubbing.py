@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from threadpoolctl import threadpool_limits
 
-from tomoskin.core import DataError, FloatArray
+from tomoskin.core import DataError, FloatArray, IntArray
 from tomoskin.learning.kind import Progress, silent
 from tomoskin.learning.touch.locator import Locator
 from tomoskin.learning.touch.posterior import BoolArray
@@ -57,6 +57,9 @@ on the twin and a hydrogel; a patterned skin may seem to be touched in part, and
 _NEAR = 0.95
 _CONTRADICTED = 0.5
 """Way in radii by which a label may differ from where the touch is found without labels."""
+
+_AGREED = 1.5
+"""Deviations, of one direction, by which labels together may differ from the model's positions."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,9 +154,9 @@ class Rubbing:
         chosen = np.union1d(given, evenly)
         dv, xy = dv[chosen], xy[chosen]
         labels = region.scaled(xy)
-        labelled: BoolArray = np.asarray(np.isfinite(labels).all(axis=1))
+        labelled = np.flatnonzero(np.isfinite(labels).all(axis=1))
         alone = UnlabelledFit.of(dv, skin, pattern, region, np.full(xy.shape, np.nan))
-        far = np.linalg.norm(alone.positions - labels, axis=1) > _CONTRADICTED
+        far = _contradicting(alone, labels, labelled)
         found = cls(
             skin,
             pattern,
@@ -163,16 +166,16 @@ class Rubbing:
             alone.alike,
             alone.modelled,
             quiet_electrodes(dv, pattern),
-            tuple(chosen[far & labelled].tolist()),
+            tuple(chosen[far].tolist()),
         )
-        if not labelled.any():
+        if not len(labelled):
             return found
         if found.holds:
             fit = UnlabelledFit.of(dv, skin, pattern, region, labels)
             apart = region.unit * fit.disagreement
             presses = _presses(dv, xy, region.metres(fit.positions), _spread(fit, region))
             return replace(found, presses=presses, disagreement=apart)
-        return found._by_labels(xy) if labelled.sum() >= _ENOUGH else found
+        return found._by_labels(xy) if len(labelled) >= _ENOUGH else found
 
     def _by_labels(self, xy: FloatArray) -> Self:
         """The same from labels ``xy`` (n, 2) m alone, unless they contradict each other."""
@@ -184,7 +187,7 @@ class Rubbing:
         positions = from_labels(dv, labels, region, self.pattern)
         spread = np.tile(0.5 * (region.unit * missed) ** 2 * np.eye(2), (len(dv), 1, 1))
         presses = _presses(dv, xy, region.metres(positions), spread)
-        return replace(self, presses=presses, contradicted=(), by_labels=True)
+        return replace(self, presses=presses, modelled=False, contradicted=(), by_labels=True)
 
     @property
     def holds(self) -> bool:
@@ -253,7 +256,7 @@ class Rubbing:
             shared = (_MODEL * region.unit) ** 2 * np.eye(2)
             spread = np.where(presses.spreads.any(axis=(1, 2), keepdims=True), shared, 0.0)
             dv = _harder_and_softer(presses.dv)
-            presses = replace(presses, dv=dv, spread=spread, modelled=not self.labelled)
+            presses = replace(presses, dv=dv, spread=spread, modelled=True)
         return Locator.learn(presses, region, self.pattern, self.skin.identity, progress)
 
 
@@ -262,6 +265,16 @@ def _presses(dv: FloatArray, xy: FloatArray, positions: FloatArray, spread: Floa
     known: BoolArray = np.asarray(np.isfinite(xy).all(axis=1))
     spread = np.where(known[:, None, None], 0.0, spread)
     return Presses.checked(dv, np.where(known[:, None], xy, positions), spread=spread)
+
+
+def _contradicting(fit: UnlabelledFit, labels: FloatArray, labelled: IntArray) -> IntArray:
+    """(k,) those of the frames ``labelled`` whose labels (n, 2) in radii are far from where they
+    were found; all of them where together they speak against the skin's model."""
+    away = fit.positions[labelled] - labels[labelled]
+    spread = np.trace(fit.spread[labelled], axis1=1, axis2=2) / 2 + _MODEL**2
+    if fit.modelled and len(away) and np.mean(away**2) > _AGREED**2 * spread.mean():
+        return labelled
+    return np.asarray(labelled[np.linalg.norm(away, axis=1) > _CONTRADICTED])
 
 
 def _spread(fit: UnlabelledFit, region: Region) -> FloatArray:

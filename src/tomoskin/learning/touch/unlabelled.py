@@ -185,9 +185,10 @@ _MODEL_FREEDOM = 8.0
 """Independent values in a frame: what the model leaves errs together."""
 
 _HOLDS = 0.5
-"""Part of a usual frame that the model must explain: 0.75 to 0.9 on the twin, at most 0.24 on the
+"""Part of a usual frame that the model must explain: 0.76 to 0.95 on the twin, at most 0.24 on the
 public hydrogels."""
 
+_NOISIEST = 0.5
 _TINY = 1e-99
 
 
@@ -212,7 +213,8 @@ class ModelFit:
     weights
         (n, g) probabilities of the grid's positions. Touches may be anywhere, as often as it be.
     explained
-        Part of a usual frame's square that the likeliest response explains (median).
+        Part of a usual frame's square, less what is noise, that the likeliest response explains
+        (median).
     """
 
     weights: FloatArray
@@ -238,13 +240,25 @@ class ModelFit:
         off = squared_distances(shapes, expected)
         noise = float(off.min(axis=1).mean()) / _MODEL_FREEDOM
         weights = np.exp(-0.5 * (off - off.min(axis=1, keepdims=True)) / noise)
-        explained = float(np.median(np.maximum(best, 0.0) ** 2))
+        usual = float(np.median(np.maximum(best, 0.0) ** 2))
+        explained = min(usual / (1 - _noise_part(dv)), 1.0)
         return cls(weights / weights.sum(axis=1, keepdims=True), explained)
 
     @property
     def holds(self) -> bool:
         """Whether the sheet answers as the model says."""
         return self.explained > _HOLDS
+
+
+def _noise_part(dv: FloatArray) -> float:
+    """Part of a usual frame's square that is noise, in frames (n, k) of one touch each.
+
+    Touches change the data in few directions, so that along the median one there is noise alone.
+    More than half is taken for half: noise by itself is not to look like a touch.
+    """
+    along = np.linalg.svd(dv, compute_uv=False) ** 2 / len(dv)
+    part = np.median(along) * len(along) / max(np.median(np.sum(dv**2, axis=1)), _TINY)
+    return min(float(part), _NOISIEST)
 
 
 def _shapes(values: FloatArray) -> FloatArray:
