@@ -253,14 +253,13 @@ class DriveWatch:
         if self._filter is None:
             return None
         moved = {n: f.moving.at(time + self._length / 2) for n, f in self._followed.items()}
-        responses = {n: self._filter.response(touch.state, rows) for n, touch in moved.items()}
-        every = np.sum([change for change, _ in responses.values()], axis=0)
-        doubts = {n: fit.doubt_of(moved[n].covariance, known) for n, known in responses.items()}
-        doubt = np.sum([*doubts.values()], axis=0)
+        answers = {n: self._filter.response(t.state, t.covariance, rows) for n, t in moved.items()}
+        every = np.sum([change for change, *_ in answers.values()], axis=0)
+        doubt = np.sum([doubt for *_, doubt in answers.values()], axis=0)
         is_settled = any(time - each.begun < _BESIDE for each in self._followed.values())
         for n, each in self._followed.items():
-            own, others = data - every + responses[n][0], doubt - doubts[n]
-            told, *odds = self._filter.pushed(moved[n], rows, own, responses[n], others)
+            own, others = data - every + answers[n][0], doubt - answers[n][2]
+            told, *odds = self._filter.pushed(moved[n], rows, own, answers[n], others)
             each.take(moved[n], told, *odds)
             is_settled &= each.lifted is None and odds[0] <= 0 and len(each.past) > _SETTLED
         if not is_settled:  # what goes, or is hardly known, looks like a change
