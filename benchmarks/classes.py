@@ -182,16 +182,9 @@ def _with_labels(known: Classifier, new: Batch, chosen: NDArray[np.int64]) -> fl
 
 
 def _with_few(old: Batch, new: Batch) -> dict[str, float]:
-    known, n = Classifier.fit(*old), len(new[0])
-    parts = {
-        count: [
-            _right(
-                known.in_session(new[0][np.random.default_rng(seed).permutation(n)[:count]]), new
-            )
-            for seed in range(DRAWS)
-        ]
-        for count in FEW
-    }
+    known, (dv, _) = Classifier.fit(*old), new
+    drawn = [np.random.default_rng(seed).permutation(dv) for seed in range(DRAWS)]
+    parts = {n: [_right(known.in_session(each[:n]), new) for each in drawn] for n in FEW}
     return {f"{count} frames": round(float(np.mean(some)), 3) for count, some in parts.items()}
 
 
@@ -205,13 +198,8 @@ def _twin() -> Iterator[dict[str, Any]]:
         scenes = [_scrambled(skin, seed) for seed in range(TRIALS)]
         for rest, count in ((rest, count) for rest in (True, False) for count in COUNTS):
             solved = [_solved(skin, scene, count, rest=rest) for scene in scenes]
-            known = "yes" if rest else "no"
-            yield {
-                "skin": name,
-                "untouched frames known": known,
-                "presses": count,
-                **_tally(solved),
-            }
+            case = {"skin": name, "untouched frames known": "yes" if rest else "no"}
+            yield case | {"presses": count} | _tally(solved)
 
 
 Solved = tuple[bool, bool]

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
+from itertools import product
 from typing import Any
 
 import numpy as np
 
-from bench_rig import INSIDE_90, distance, evenly, gap, nearest
+from bench_rig import INSIDE_90, distance, drawn, evenly, gap, nearest, scan_time
 from report import Floats, Report, mm, percent, progress, table
 from tomoskin import Skin
 from tomoskin.board.source import BOARDS, ScanSettings
@@ -23,13 +25,11 @@ SEEDS = (9501, 9502)
 PRESSES, COURSES, SPEEDS = 15, 4, (0.06, 0.12)
 """Of each seed; m/s."""
 
-RIGS = (
-    ("textile-disc-8", "mega"),
-    ("textile-disc-16", "mega"),
-    ("textile-square-16", "mega"),
-    ("textile-disc-8", "pico"),
-    ("textile-disc-16", "pico"),
-)
+DISCS = "textile-disc-8", "textile-disc-16"
+RIGS = *product((*DISCS, "textile-square-16"), ["mega"]), *product(DISCS, ["pico"])
+PAIR_SEEDS, PAIRS, SOON, APART = (9641, 9642), 10, (0.02, 0.06), 0.05
+"""Of pairs, on which nothing was chosen; s and m between their presses."""
+
 TICKS = 250e3
 IDLE, HELD, AFTER = 14, 5, 6
 """Turns: untouched, pressed, and after that."""
@@ -113,8 +113,14 @@ def run() -> Iterator[Report]:
         "comes on top",
     )
     yield table(
+        "a second press while the first is provisional",
+        [_paired(*rig) for rig in RIGS[:2]],
+        f"two presses as above, {1e3 * SOON[0]:.0f} to {1e3 * SOON[1]:.0f} ms and at least "
+        f"{1e3 * APART:.0f} mm apart, which go together; seeds {PAIR_SEEDS}, {PAIRS} pairs each",
+    )
+    yield table(
         f"an untouched skin, {UNTOUCHED} scans",
-        [row for name in ("textile-disc-8", "textile-disc-16") for row in _untouched(name)],
+        [row for name in DISCS for row in _untouched(name)],
         f"samples as in touch_noise, seed {SEEDS[0]}, at 20 scans/s",
     )
     yield table(
@@ -147,20 +153,20 @@ def _begun(name: str, board: str, seed: int) -> tuple[DriveRig, np.random.Genera
 
 
 def _pressed(name: str, board: str) -> dict[str, Any]:
-    first: dict[str, list[float]] = {"drives": [], "frames": []}
-    gone: dict[str, list[float]] = {"drives": [], "frames": []}
+    times = defaultdict[str, list[float]](list)
     errors, inside, sizes, kept = [], [], [], 0
     for seed in SEEDS:
         progress(f"{name} on {board}, seed {seed}")
         rig, random = _begun(name, board, seed)
         for _ in range(PRESSES):
             press = _drawn(random, _place(random, Skin.load(name)))
-            seen, onset, release = _watched(rig, random, press)
+            seen, (onset,), release = _watched(rig, random, press)
             for way, shown in seen.items():
-                first[way].append(next((t - onset for t, ts in shown if t > onset and ts), np.inf))
-                after = [(t, ts) for t, ts in shown if t > release]
-                last = max([k for k, (_, ts) in enumerate(after) if ts], default=-1) + 1
-                gone[way].append(after[last][0] - release if last < len(after) else np.inf)
+                first = (t - onset for t, ts in shown if t > onset and ts)
+                times[f"first, {way}"].append(next(first, np.inf))
+                last = max([release, *(t for t, ts in shown if ts)])
+                gone = (t - release for t, _ in shown if t > last)
+                times[f"release, {way}"].append(next(gone, np.inf))
             told = next((ts for t, ts in seen["drives"] if t > onset and ts), ())
             if (touch := nearest(told, press)) is not None:
                 errors.append(gap(touch, press))
@@ -168,11 +174,7 @@ def _pressed(name: str, board: str) -> dict[str, Any]:
                 sizes.append(np.hypot(touch.detection.sd_x, touch.detection.sd_y))
             kept += len({t.id for _, ts in (*seen["drives"], *seen["frames"]) for t in ts}) == 1
     row: dict[str, Any] = {"skin": name, "board": board, "scan ms": round(1e3 * rig.period, 1)}
-    for title, ways in (("first", first), ("release", gone)):
-        for way, times in ways.items():
-            ends = np.percentile(times, (50, 99), method="higher")
-            told = (f"{1e3 * t:.1f}" if np.isfinite(t) else "later" for t in ends)
-            row[f"{title}, {way}: p50 / p99 ms"] = " / ".join(told)
+    row |= {f"{what}: p50 / p99 ms": _ends(times[what], 99) for what in sorted(times)}
     return row | {
         "first position off, mm": mm(np.median(errors), digits=0)[0],
         "its deviation, mm": mm(np.median(sizes), digits=0)[0],
@@ -181,16 +183,44 @@ def _pressed(name: str, board: str) -> dict[str, Any]:
     }
 
 
-def _watched(rig: DriveRig, random: np.random.Generator, press: Press) -> tuple[Seen, float, float]:
-    """What is told of a press from nothing on, and when it comes and goes."""
+def _ends(times: Sequence[float], high: float) -> str:
+    """The median of ``times`` s, and that percentile, in ms."""
+    ends = np.percentile(times, (50, high), method="higher")
+    return " / ".join(f"{1e3 * t:.1f}" if np.isfinite(t) else "later" for t in ends)
+
+
+def _watched(
+    rig: DriveRig, random: np.random.Generator, *presses: Press
+) -> tuple[Seen, list[float], float]:
+    """What is told of presses from nothing on; when each comes, soon after another, and all go."""
     for _ in range(IDLE):
         rig.turn(lambda _: (), ())
-    onset = rig.time + random.uniform() * rig.period
-    release = onset + (HELD + random.uniform()) * rig.period
+    begun = [rig.time + random.uniform() * rig.period]
+    begun += [begun[0] + random.uniform(*SOON) for _ in presses[1:]]
+    release = begun[-1] + (HELD + random.uniform()) * rig.period
+
+    def course(time: float) -> tuple[Press, ...]:
+        return tuple(p for p, t in zip(presses, begun, strict=True) if t <= time < release)
+
     seen: Seen = {"drives": [], "frames": []}
-    for _ in range(1 + HELD + AFTER):
-        rig.turn(lambda t: (press,) if onset <= t < release else (), (onset, release), seen)
-    return seen, onset, release
+    for _ in range(len(presses) + HELD + AFTER):
+        rig.turn(course, (*begun, release), seen)
+    return seen, begun, release
+
+
+def _paired(name: str, board: str) -> dict[str, Any]:
+    """When the second of two presses is told."""
+    times = defaultdict[str, list[float]](list)
+    for seed in PAIR_SEEDS:
+        progress(f"{name} on {board}, pairs of seed {seed}")
+        rig, random = _begun(name, board, seed)
+        for _ in range(PAIRS):
+            pair = drawn(random, 2, apart=APART, forces=(2.0, 6.0))
+            seen, (_, second), release = _watched(rig, random, *pair)
+            for way, shown in seen.items():
+                both = (t - second for t, ts in shown if second < t < release and len(ts) > 1)
+                times[f"by {way}: p50 / slowest ms"].append(next(both, np.inf))
+    return {"skin": name, "board": board} | {way: _ends(each, 100) for way, each in times.items()}
 
 
 def _untouched(name: str) -> Iterator[dict[str, Any]]:
@@ -208,13 +238,9 @@ def _untouched(name: str) -> Iterator[dict[str, Any]]:
                 now = result is not None and bool(result.touches)
                 told, before = told + (now and not before), now
             pipeline.push(frame)
-        hours = UNTOUCHED * BOARD_PERIOD[name] / 3600
+        minutes = UNTOUCHED * scan_time(prepared) / 60
         yield {"skin": name, "noise": case, "drives": UNTOUCHED * len(prepared.scan.drives),
-               "false touches": told, "minutes of a Mega": round(60 * hours, 1)}  # fmt: skip
-
-
-BOARD_PERIOD = {"textile-disc-8": 0.056, "textile-disc-16": 0.0965}
-"""Seconds of a Mega's scan."""
+               "false touches": told, "minutes of a Mega": round(minutes, 1)}  # fmt: skip
 
 
 def _moving(name: str, board: str) -> Iterator[dict[str, Any]]:

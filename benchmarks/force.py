@@ -329,10 +329,8 @@ def _hydrogel(folder: Path) -> Iterator[dict[str, Any]]:
         with np.load(folder / f"{name}.npz") as kept:
             rest, pressed, depth = (kept[k].astype(float) for k in ("v_up", "v_down", "depth_mm"))
         order = np.arange(len(depth)) / len(depth)
-        for rows, test in {
-            "the last tenth": order >= 0.9,
-            "every tenth": np.arange(len(depth)) % 10 == 5,
-        }.items():
+        tests = {"the last tenth": order >= 0.9, "every tenth": np.arange(len(depth)) % 10 == 5}
+        for rows, test in tests.items():
             model = AmountProcess.fit(rest[~test], pressed[~test], depth[~test])
             ours = model.predict(rest[test], pressed[test])
             change = pressed - rest
@@ -341,12 +339,11 @@ def _hydrogel(folder: Path) -> Iterator[dict[str, Any]]:
             for method, (found, low, high) in {"": ours, "plain: ": plain}.items():
                 levels = np.unique(depth)
                 nearest = levels[np.abs(found[:, None] - levels).argmin(axis=1)]
+                held = (low <= depth[test]) & (depth[test] <= high)
                 row |= {
                     f"{method}class right": _percent((nearest == depth[test]).mean()),
                     f"{method}error mm": round(float(np.abs(found - depth[test]).mean()), 2),
-                    f"{method}in 90 % interval": _percent(
-                        ((low <= depth[test]) & (depth[test] <= high)).mean()
-                    ),
+                    f"{method}in 90 % interval": _percent(held.mean()),
                 }
             yield row
 

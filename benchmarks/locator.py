@@ -209,6 +209,7 @@ def _strangers(files: Mapping[str, Path]) -> Iterator[dict[str, Any]]:
             scores[other] = strange, part_held(locator, theirs[some], there[some])
         own = scores.pop(name)
         nearest = min(scores, key=lambda other: scores[other][0])
+        known = [held for _, held in scores.values() if np.isfinite(held)]
         yield {
             "learnt on": Path(name).name,
             "presses": count,
@@ -216,14 +217,8 @@ def _strangers(files: Mapping[str, Path]) -> Iterator[dict[str, Any]]:
             "in 90 % ellipse": percent(own[1]),
             "others, least": round(scores[nearest][0], 2),
             "which": Path(nearest).name,
-            "others in 90 % ellipse": _least([held for _, held in scores.values()]),
+            "others in 90 % ellipse": percent(min(known)) if known else "–",
         }
-
-
-def _least(parts: list[float]) -> str:
-    """The least of the parts that are known."""
-    known = [part for part in parts if np.isfinite(part)]
-    return percent(min(known)) if known else "–"
 
 
 def disc(**electrodes: str) -> Skin:

@@ -183,6 +183,18 @@ def test_a_second_touch_that_frames_do_not_confirm_beside_the_first_is_withdrawn
     assert turns.pipeline.numbered == number + 2
 
 
+def test_a_drive_that_shows_a_further_touch_does_not_move_the_first_there(turns, touched):
+    turns.turn(touched)
+    (followed,) = watch_of(turns)._followed.values()
+    known = followed.moving
+    elsewhere = replace(known, state=known.state + np.array([0.08, *np.zeros(7)]))
+    followed.take(known, elsewhere, -1.0, -1.0)
+    assert followed.moving is known
+    late = replace(known, time=known.time + 0.3)  # when no further one is looked for
+    followed.take(late, elsewhere, -1.0, -1.0)
+    assert followed.moving is elsewhere
+
+
 def test_what_drives_follow_goes_to_the_touch_of_the_frame_that_is_there(turns, touched):
     """A fit of half a scan has put it elsewhere, and the next one shows it as a further touch."""
     for _ in range(6):

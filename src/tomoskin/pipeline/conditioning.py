@@ -160,20 +160,21 @@ class BaselineDifferences:
 
     def condition(self, measured: Voltages) -> Conditioned:
         """Make difference data of one frame of voltages."""
-        values, baseline = measured.values, self._baseline
+        values, baseline, unknown = measured.values, self._baseline, measured.excluded
         mean = baseline.mean
-        unknown = measured.excluded & ~np.isfinite(values)
-        values = np.where(unknown, mean, values)
+        if np.count_nonzero(unknown):
+            unknown = unknown & ~np.isfinite(values)
+            values = np.where(unknown, mean, values)
         from_rest = values - baseline.start
         health = self._monitor.push(
             values, measured.excluded, measured.time, measured.samples, measured.own
         )
-        if unknown.any():  # what is not there tells nothing of a sum either
+        if np.count_nonzero(unknown):  # what is not there tells nothing of a sum either
             health = replace(health, lost=health.lost | unknown)
         self._values, self._health = values, health
         subspace = self._nuisance(health)
         self._excluded = health.lost
-        if health.floating.any():
+        if np.count_nonzero(health.floating):
             self._excluded = health.lost | health.floating[self.prepared.pattern.measure].any(
                 axis=1
             )
@@ -185,10 +186,11 @@ class BaselineDifferences:
         if self._levels.mean is not mean or self._levels.excluded is not self._excluded:
             self._levels = _Levels.of(mean, self._excluded)
         times = self._levels.gain(values)
+        problem = None if times is None else _gain_text(times)
         self._has_gain = times is not None
-        if times is not None and self.prepared.skin.signal.common_modes != "projected":
-            return Conditioned(None, n_excluded, health, f"{_gain_text(times)}; no image is shown")
         if times is not None:
+            if self.prepared.skin.signal.common_modes != "projected":
+                return Conditioned(None, n_excluded, health, f"{problem}; no image is shown")
             values = values / times  # touches and noise are then as large as they were learnt
         whole = signal.difference(values, mean, self.prepared.operator.difference)
         differences = Differences(
@@ -203,7 +205,6 @@ class BaselineDifferences:
             from_rest=from_rest,
             excluded=health.lost,
         )
-        problem = None if times is None else _gain_text(times)
         return Conditioned(differences, n_excluded, health, problem)
 
     def newest(self, values: FloatArray) -> FloatArray | None:
@@ -336,8 +337,8 @@ class _Levels:
 
     @classmethod
     def of(cls, mean: FloatArray, excluded: NDArray[np.bool_]) -> Self:
-        least = _COUNTS * np.sqrt(np.mean(mean**2))
-        counts = np.flatnonzero(~excluded & (np.abs(mean) > least))
+        least = _COUNTS * np.sqrt((mean * mean).sum() / len(mean))  # each idle frame asks
+        (counts,) = (~excluded & (np.abs(mean) > least)).nonzero()
         return cls(mean, excluded, counts, mean[counts])
 
     def gain(self, values: FloatArray) -> float | None:

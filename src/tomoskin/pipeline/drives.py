@@ -32,6 +32,10 @@ _SETTLED, _PAST = 3, 16
 """Drives after which a touch is known so well that another one shows beside it, and those of which
 its states are kept."""
 
+_FURTHER = 25.0
+"""Squared deviations by which a drive would move a touch from where it is known to be, beyond which
+another one moves it: of one that comes, stands or slides they are 2 at most."""
+
 _CALM = 8
 """Frames since touches came or went in which more noise may be what these look like: a scan that
 sees a touch come down disagrees with itself, and it takes so many frames to forget that."""
@@ -90,10 +94,14 @@ class _Followed:
 
         What shows a part of a touch would draw it elsewhere, and later drives would speak of what
         is there. So such a drive is left out, and the odds begin with it. The next one counts.
+        While a further touch is looked for, what shows one is left out too.
         """
         self.past = (moved, *self.past)[:_PAST]
         self.doubtful = going > _MOST and not self.doubtful
-        self.moving = moving = moved if self.doubtful else told
+        off = told.state[:2] - moved.state[:2]
+        is_further = going < 0 and moved.time - self.begun < _BESIDE
+        is_further &= bool(off @ np.linalg.solve(moved.covariance[:2, :2], off) > _FURTHER)
+        self.moving = moving = moved if self.doubtful or is_further else told
         if self.lifted is None:
             self.odds = max(self.odds + min(gone, _MOST), min(going, _MOST), 0.0)
             is_left = RESIDUAL.holds(abs(moving.content), abs(self.full))
@@ -250,17 +258,15 @@ class DriveWatch:
         """Let each touch take its part of the data: what the others do not change. A further touch,
         once one has begun soon after another: beside one that stays, frames tell of it, since one
         that turns on its way looks like a further one too."""
-        if self._filter is None:
-            return None
+        assert self._filter is not None  # it is made before the initiation
         moved = {n: f.moving.at(time + self._length / 2) for n, f in self._followed.items()}
-        responses = {n: self._filter.response(touch.state, rows) for n, touch in moved.items()}
-        every = np.sum([change for change, _ in responses.values()], axis=0)
-        doubts = {n: fit.doubt_of(moved[n].covariance, known) for n, known in responses.items()}
-        doubt = np.sum([*doubts.values()], axis=0)
+        answers = {n: self._filter.response(t.state, t.covariance, rows) for n, t in moved.items()}
+        every = np.sum([change for change, *_ in answers.values()], axis=0)
+        doubt = np.sum([doubt for *_, doubt in answers.values()], axis=0)
         is_settled = any(time - each.begun < _BESIDE for each in self._followed.values())
         for n, each in self._followed.items():
-            own, others = data - every + responses[n][0], doubt - doubts[n]
-            told, *odds = self._filter.pushed(moved[n], rows, own, responses[n], others)
+            own, others = data - every + answers[n][0], doubt - answers[n][2]
+            told, *odds = self._filter.pushed(moved[n], rows, own, answers[n], others)
             each.take(moved[n], told, *odds)
             is_settled &= each.lifted is None and odds[0] <= 0 and len(each.past) > _SETTLED
         if not is_settled:  # what goes, or is hardly known, looks like a change
@@ -285,8 +291,7 @@ class DriveWatch:
     ) -> _Followed:
         """A touch of a frame whose scan began at ``time`` s and was half done at ``middle`` s: as
         the drives have what is nearest to it, its ``heir``, else as the frame has it."""
-        before = self._followed
-        known = before.get(touch.id, heir)
+        known = self._followed.get(touch.id, heir)
         moving = fit.MovingTouch.begin(
             middle, self.view.spot(touch.detection), _spread(touch.detection), self.view.model.prior
         )

@@ -242,9 +242,7 @@ class Following:
 
     def _learn(self, time: float, *, touched: bool, noise: bool) -> None:
         conditioning = self.conditioning
-        moved: FloatArray | float = 0.0
-        for applied in self._applied.values():
-            moved = moved + applied.moved
+        moved = sum((applied.moved for applied in self._applied.values()), 0.0)
         if self._sheets is not None and self._tuning is None and isinstance(moved, np.ndarray):
             self._tuning = self._sheets.steps(self.prepared, moved)
         learnt = conditioning.learn(time, moved, touched=touched, noise=noise)

@@ -43,8 +43,8 @@ class PreRoll:
         self._newest: Frame | None = None
 
     def frame(self, frame: Frame, mark: Mark, number: int) -> None:
-        """A frame and what becomes of it, before the pipeline has it; ``number``: where a reference
-        begins, the last identity that it has given to a touch."""
+        """A frame and what becomes of it, before the pipeline has it; ``number``: the last identity
+        that it has given to a touch."""
         self._newest = None
         if mark & Mark.REFERENCE:
             self._since, self._complete, self._number = [], True, number
@@ -193,8 +193,7 @@ class Recordings:
             case session.RawRead() if self._awaiting is not None:
                 self._head()
             case MarkedFrame():
-                number = self._numbered() if message.mark & Mark.REFERENCE else 0
-                self._pre_roll.frame(message.frame, message.mark, number)
+                self._pre_roll.frame(message.frame, message.mark, self._numbered())
             case FrameResult():
                 self._pre_roll.result(message)
             case session.BoardInfo():

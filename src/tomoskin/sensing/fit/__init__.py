@@ -13,7 +13,6 @@ from tomoskin.sensing.fit.drive_evidence import (
     Initiation as Initiation,
     MovingTouch as MovingTouch,
     Onset as Onset,
-    doubt_of as doubt_of,
 )
 from tomoskin.sensing.fit.finder import SpotFinder as SpotFinder
 from tomoskin.sensing.fit.noise import (

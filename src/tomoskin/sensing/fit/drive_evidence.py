@@ -318,8 +318,9 @@ class MovingTouch:
         return self.state[:2], self.covariance[:2, :2] + memory
 
 
-Response = tuple[FloatArray, FloatArray]
-"""(m,) V of a touch in the measurements of a drive, and (m, 8) its slopes."""
+Response = tuple[FloatArray, FloatArray, FloatArray]
+"""(m,) V of a touch in the measurements of a drive, (m, 8) its slopes, and (m, m) V² by which it
+may answer otherwise."""
 
 
 def _root(covariance: FloatArray) -> FloatArray:
@@ -335,13 +336,6 @@ def _cost(data: FloatArray, root: FloatArray) -> float:
     their covariance, up to what all have."""
     white = dtrtrs(root, data, lower=1)[0]
     return float(white @ white) / 2 + float(np.log(root.diagonal()).sum())
-
-
-def doubt_of(spread: FloatArray, response: Response) -> FloatArray:
-    """(m, m) V² by which a touch with the covariance ``spread`` (8, 8) may answer otherwise than
-    its ``response``."""
-    change, slopes = response
-    return np.asarray(slopes @ spread @ slopes.T + np.diag((_OTHERWISE * change) ** 2))
 
 
 @lru_cache(maxsize=16)
@@ -394,8 +388,10 @@ class DriveFilter:
         own, state = self.noise[rows, rows] + others, before
         gone = going = 0.0
         for step in range(_STEPS):
-            change, slopes = self.response(state, rows) if step or known is None else known
-            across, both = slopes @ spread, own + doubt_of(spread, (change, slopes))
+            if step or known is None:
+                known = self.response(state, spread, rows)
+            change, slopes, doubt = known
+            across, both = slopes @ spread, own + doubt
             off, root = data - change - slopes @ (before - state), _root(both)
             if not step:
                 stands, half = _cost(off, root), change / 2  # a measurement shows it, or none of it
@@ -406,8 +402,8 @@ class DriveFilter:
         left = spread - gain @ both @ gain.T
         return MovingTouch(touch.time, state, (left + left.T) / 2), gone, going
 
-    def response(self, state: FloatArray, rows: slice) -> Response:
-        """The response of a touch in a ``state`` (8,)."""
+    def response(self, state: FloatArray, spread: FloatArray, rows: slice) -> Response:
+        """The response of a touch in a ``state`` (8,) with the covariance ``spread`` (8, 8)."""
         basis = self.solver.table.basis[:, rows]
         parts = self.solver.expanded(state[None, _SPOT])[0] @ basis
         change, own, unknown = parts[0], parts[1 : 1 + N_PARAMETERS], parts[1 + N_PARAMETERS :]
@@ -415,7 +411,8 @@ class DriveFilter:
         slopes = np.zeros((len(change), _SIZE))
         slopes[:, _SPOT] = own[[X, Y, LOG_RADIUS, CONTENT]].T
         slopes[:, 6:] = unknown.T
-        return change + state[6:] @ unknown, slopes
+        change = change + state[6:] @ unknown
+        return change, slopes, slopes @ spread @ slopes.T + np.diag((_OTHERWISE * change) ** 2)
 
     def _held(self, state: FloatArray) -> FloatArray:
         held = state.copy()

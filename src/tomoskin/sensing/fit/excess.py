@@ -177,7 +177,7 @@ class Gauge:
         along = np.array([self.shows @ column for column in seen], np.float64)
         differs, gains, changes = self.means(along * along)
         allowed = _MOVES**2 * changes + _GAINS**2 * gains
-        return np.asarray(differs - (allowed + allowed.mean()) / 2)
+        return np.asarray(differs - (allowed + allowed.sum() / len(allowed)) / 2)
 
     @cached_property
     def loudest(self) -> float:
@@ -249,6 +249,8 @@ class Excess:
                 f"the voltages change by {np.sqrt(level):.0f} times the noise of the idle "
                 "skin, and no touch explains it: check cables and supply, or take a new reference"
             )
+        if not self.any:
+            return None
         times = np.sqrt(1 + self.variance / np.maximum(usual, np.finfo(float).tiny))
         worst = int(times.argmax())
         if times[worst] < _SAID:
@@ -264,7 +266,7 @@ class Excess:
         if common <= gauge.loudest:
             common = 1.0
         louder = squares > gauge.limit * common
-        if common == 1.0 and not louder.any():
+        if common == 1.0 and not np.count_nonzero(louder):  # any takes five times as long
             return self._passed(squares, gauge)
         more = np.where(louder, _MARGIN * (squares - common) * gauge.variance / self.level, 0.0)
         level = self.level if common == 1.0 else _MARGIN * common * self.level

@@ -179,6 +179,7 @@ class ResidualResponse:
         self._feet: list[FootprintChange] = []
         self._matrix = self._left = np.zeros((0, 0))
         self._doubts: tuple[float, ...] | None = None
+        self._known: list[FloatArray] | None = None
 
     def after(self, spots: FloatArray, shapes: Shapes) -> None:
         """Take a frame in which touches ``spots`` (k, 4) were."""
@@ -199,14 +200,15 @@ class ResidualResponse:
         along = rows[1:] @ rows[0] / max(float(rows[0] @ rows[0]), 1e-300)
         for own in (made, rows):
             own[1:] -= np.outer(along, own[0])
-        self._doubts = None
+        self._doubts = self._known = None
         return made, rows
 
     def without(self, data: FloatArray) -> FloatArray:
         """``data`` (n_meas,) V less what is known to be left."""
-        for foot in self._feet:
-            if foot.parts.any():
-                data = data - foot.parts @ foot.shapes
+        if self._known is None:
+            self._known = [foot.parts @ foot.shapes for foot in self._feet if foot.parts.any()]
+        for known in self._known:
+            data = data - known
         return data
 
     def beneath(self, x: float, y: float, radius: float) -> float:
@@ -245,7 +247,7 @@ class ResidualResponse:
 
     def idle(self, data: FloatArray) -> None:
         """Take ``data`` (n_meas,) V of a frame in which nothing touched, less what was known."""
-        self._since = self._seconds
+        self._since, self._known = self._seconds, None
         if not self._feet:
             return
         rows = np.concatenate([foot.rows for foot in self._feet])

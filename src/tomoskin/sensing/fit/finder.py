@@ -77,7 +77,6 @@ class SpotFinder:
         self._residual = ResidualResponse(pace.interval)
         self._before = self._shown = np.zeros((0, N_PARAMETERS))
         self._deficit = Deficit.none(len(model.solver.table.basis))
-        self._change = self._deficit.change
         self._expected = Expectation.none()
         self._rival: Rival | None = None
         self._jump = CommonModeJump()
@@ -240,7 +239,9 @@ class SpotFinder:
 
     def _detections(self, detected: SpotDetections) -> list[Detection]:
         """The touches as detections, strongest first."""
-        spots = detected.fit.spots
+        self._shown = spots = detected.fit.spots
+        if not len(spots):
+            return []
         shown = np.flatnonzero(~self._policy.is_wrong(spots[:, CONTENT]))
         found = [self._detection(detected, k, spots[k].tolist()) for k in shown.tolist()]
         order = sorted(range(len(found)), key=lambda k: -abs(found[k].peak))

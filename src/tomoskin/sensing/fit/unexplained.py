@@ -112,8 +112,8 @@ class FrameWatch:
         self._before, self._times = fit.spots, times
         self._in_vain, self._astray = self._in_vain + 1 if self._astray else 0, False
         self._age = self._age + 1 if len(fit.spots) else 0
-        wrong, self._lifted = self._policy.is_wrong(fit.spots[:, CONTENT]), None
-        if wrong.any():
+        self._lifted = None
+        if len(fit.spots) and (wrong := self._policy.is_wrong(fit.spots[:, CONTENT])).any():
             spots = fit.spots[wrong]
             self._lifted = spots[np.abs(spots[:, CONTENT]).argmax(), :2]
         self._raised = 0 if self._lifted is None else self._raised + 1

@@ -315,7 +315,7 @@ class Baseline:
         gain = self._variance / (self._variance + noise)
         gain[lost] = 0.0
         most = _CUT * np.sqrt(self._variance + noise)
-        self.mean = self.mean + moved + gain * np.clip(apart, -most, most)
+        self.mean = self.mean + moved + gain * np.minimum(np.maximum(apart, -most), most)
         self._variance = (1.0 - gain) * self._variance
 
     @property

@@ -138,7 +138,7 @@ class SampleWatch:
             return {}
         share = np.asarray(self._members @ (samples == last).astype(float))
         alone = share[:-1] > 1.0 - 1e-9
-        if share[-1] > 0.5 or not alone.any():
+        if share[-1] > 0.5 or not np.count_nonzero(alone):
             self._still[:] = 0.0
             return {}
         self._still = np.where(alone, self._still + 1, 0.0)
@@ -251,7 +251,8 @@ class Monitor:
             causes |= self._samples.push(samples)
         if samples is not None and self._equal and self._reciprocity.looks % _ALIKE == 1:
             self._unreached = self._equal(samples, values, self._pairs)
-        if not (self._states.sick or self._unreached or causes or bad.any() or dead.any()):
+        blamed = self._states.sick or self._unreached or causes
+        if not (blamed or np.count_nonzero(bad) or np.count_nonzero(dead)):
             self._states.rest()
             self._silent = self._unusable
             return self._well

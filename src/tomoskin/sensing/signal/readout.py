@@ -149,16 +149,11 @@ class Readout:
         """
         counts = samples.astype(np.float64)
         plus, minus = self.scan.plus, self.scan.minus
-        at_rail = (
-            self._at_rail(counts, 1)
-            if sums is None
-            else np.any([self._at_rail(part, 2) for part in directions(samples, sums)], axis=0)
-        )
+        ends = counts if sums is None else np.multiply(2, directions(samples, sums))
+        at_rail = (ends <= self.low) | (ends >= self.high)
+        at_rail = at_rail if sums is None else at_rail.any(axis=0)
         volts = (counts.take(plus, -1) - counts.take(minus, -1)) * self.volts_per_count
         return np.asarray(volts), np.asarray(at_rail.take(plus, -1) | at_rail.take(minus, -1))
-
-    def _at_rail(self, counts: FloatArray, parts: int) -> NDArray[np.bool_]:
-        return np.asarray((parts * counts <= self.low) | (parts * counts >= self.high))
 
 
 def directions(
