@@ -8,18 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from tomoskin import learning
 from tomoskin.core import DataError, Detection, FloatArray, Touch, WireError
-from tomoskin.learning import (
-    DEPTH,
-    FEWEST_LABELS,
-    FORCE,
-    MEASURED,
-    AmountLabel,
-    AmountModel,
-    LabelledPresses,
-    least_known,
-    report_of,
-)
 from tomoskin.pipeline import FrameResult, Prepared
 from tomoskin.server.guided_flow import Estimate, GuidedFlow, counted
 from tomoskin.server.page_messages import Figures, LabelNow, Phase, Point
@@ -136,7 +126,7 @@ class PlacementTaker:
         return first + int(middle)
 
 
-LabelledPlacement = tuple[Placement, AmountLabel]
+LabelledPlacement = tuple[Placement, learning.AmountLabel]
 """A placement, and what is said of it."""
 
 
@@ -159,9 +149,9 @@ class AmountFlow(GuidedFlow):
 
     def __init__(self, prepared: Prepared) -> None:
         super().__init__(prepared)
-        self.of = MEASURED[self.kind]
-        self.label: AmountLabel | None = None
-        self.asked: AmountLabel | None = None
+        self.of = learning.MEASURED[self.kind]
+        self.label: learning.AmountLabel | None = None
+        self.asked: learning.AmountLabel | None = None
         self.skin_says: Callable[[], float | None] = lambda: None
         self.answers[SetLabel] = self._set
         self._taker = PlacementTaker()
@@ -177,7 +167,7 @@ class AmountFlow(GuidedFlow):
         self._waiting = placement
         if (known := self.skin_says()) is not None:
             value = round(known / self.of.units[self.of.shown], 3)
-            self.label = AmountLabel(value, self.of.shown, self.of)
+            self.label = learning.AmountLabel(value, self.of.shown, self.of)
         return self._record()
 
     def restart(self) -> None:
@@ -193,7 +183,7 @@ class AmountFlow(GuidedFlow):
         return True
 
     def _set(self, request: SetLabel) -> bool:
-        label = AmountLabel(request.value, request.unit, self.of)
+        label = learning.AmountLabel(request.value, request.unit, self.of)
         self.asked = None if request.sure or label.meant is None else label
         try:
             self.label = None if self.asked else label.checked(self.prepared.skin.layer)
@@ -208,12 +198,14 @@ class AmountFlow(GuidedFlow):
 
     def estimate_from(self, examples: tuple[LabelledPlacement, ...]) -> Estimate:
         """Learn the amounts of touches from these presses."""
-        if len(examples) < FEWEST_LABELS:
-            return Estimate(f"{counted(FEWEST_LABELS - len(examples))} more for a first answer")
-        model = AmountModel.fit(labelled_presses(examples), self.prepared.skin)
+        if len(examples) < learning.FEWEST_LABELS:
+            return Estimate(
+                f"{counted(learning.FEWEST_LABELS - len(examples))} more for a first answer"
+            )
+        model = learning.AmountModel.fit(labelled_presses(examples), self.prepared.skin)
         return Estimate(
-            f"{report_of(model)['text']}. {_advice(model)}",
-            least_known(model, self._dots.places),
+            f"{learning.report_of(model)['text']}. {_advice(model)}",
+            learning.least_known(model, self._dots.places),
             ready=True,
             figures=Figures(
                 errors=model.errors.tolist(),
@@ -239,16 +231,16 @@ class AmountFlow(GuidedFlow):
 class ForceFlow(AmountFlow):
     """The flow in which known weights are laid on the skin."""
 
-    kind, teaches = "force", FORCE
+    kind, teaches = "force", learning.FORCE
 
 
 class DepthFlow(AmountFlow):
     """A tip is lowered to known depths."""
 
-    kind, teaches = "depth", DEPTH
+    kind, teaches = "depth", learning.DEPTH
 
 
-def labelled_presses(examples: tuple[LabelledPlacement, ...]) -> LabelledPresses:
+def labelled_presses(examples: tuple[LabelledPlacement, ...]) -> learning.LabelledPresses:
     """What is learnt from: of each placement the way there, labelled where it lies still.
 
     Raises DataError as :meth:`LabelledPresses.of` does.
@@ -261,10 +253,10 @@ def labelled_presses(examples: tuple[LabelledPlacement, ...]) -> LabelledPresses
     amount[still] = [label.si for label in labels]
     press = np.repeat(np.arange(len(examples)), length)
     time = np.concatenate([one.time for one in placements])
-    return LabelledPresses.of(detections, amount, press, time, labels[0].of.name)
+    return learning.LabelledPresses.of(detections, amount, press, time, labels[0].of.name)
 
 
-def _advice(model: AmountModel) -> str:
+def _advice(model: learning.AmountModel) -> str:
     n = len(np.unique(model.presses.press[model.presses.labelled]))
     if n < _ENOUGH:
         return f"Ten presses are a start: {counted(_ENOUGH - n)} more."

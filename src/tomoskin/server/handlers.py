@@ -15,6 +15,7 @@ from tomoskin.core import TomoskinError, WireError
 from tomoskin.learning import DEPTH, FORCE, TOUCH, Kind, load_calibration
 from tomoskin.pipeline import FrameResult, Prepared
 from tomoskin.run import Runner, SetPose, SetTwin, commands, way_to_bend
+from tomoskin.server import requests
 from tomoskin.server.amount_flow import DepthFlow, ForceFlow
 from tomoskin.server.folder import Folder
 from tomoskin.server.guided_flow import GuidedFlow, StoppedError
@@ -22,19 +23,6 @@ from tomoskin.server.hub import Hub
 from tomoskin.server.page_connection import Page
 from tomoskin.server.page_messages import Calibrations, FlowNow
 from tomoskin.server.press_flow import MappingFlow, TouchFlow
-from tomoskin.server.requests import (
-    AskPoint,
-    BeginFlow,
-    DeletePress,
-    EndFlow,
-    FlowKind,
-    KeepFlow,
-    LearnFlow,
-    SetLabel,
-    ShowFlow,
-    StopLearning,
-    UseCalibration,
-)
 from tomoskin.server.rub_flow import RubFlow
 from tomoskin.server.settings_handlers import SettingsHandlers
 from tomoskin.server.settings_messages import TwinBend, TwinRefused, TwinState, TwinStretch
@@ -59,7 +47,7 @@ class CalibrationHandlers:
         self._folder = Folder(hub.folder)
         self._files: dict[str, str] = {}  # by kind; "": the name is not known
         self._used_on = ""
-        hub.serve({UseCalibration: self._use}, self.greeting)
+        hub.serve({requests.UseCalibration: self._use}, self.greeting)
 
     def greeting(self) -> Sequence[Calibrations]:
         """The calibrations in use, as a new page learns of them."""
@@ -80,7 +68,7 @@ class CalibrationHandlers:
             self._files[kind.name] = name
         self._hub.tell(*self.greeting())
 
-    def _use(self, page: Page, request: UseCalibration) -> None:
+    def _use(self, page: Page, request: requests.UseCalibration) -> None:
         def work() -> Kind[Any]:
             runner = self._hub.runner
             if request.name is None:
@@ -142,10 +130,16 @@ class TwinHandlers:
             self._hub.tell(*self.greeting())
 
 
-_OF_FLOWS = (DeletePress, SetLabel, AskPoint, LearnFlow, StopLearning)
+_OF_FLOWS = (
+    requests.DeletePress,
+    requests.SetLabel,
+    requests.AskPoint,
+    requests.LearnFlow,
+    requests.StopLearning,
+)
 """Requests that the flow of the moment answers."""
 
-_FLOWS: dict[FlowKind, Callable[[Prepared], GuidedFlow]] = {
+_FLOWS: dict[requests.FlowKind, Callable[[Prepared], GuidedFlow]] = {
     flow.kind: flow for flow in (TouchFlow, MappingFlow, ForceFlow, DepthFlow, RubFlow)
 }
 _LOOKS = 0.3
@@ -174,10 +168,10 @@ class GuideHandlers:
         self._watching = contextlib.ExitStack()
         hub.serve(
             {
-                BeginFlow: lambda page, request: self._begin(page, request.kind),
-                ShowFlow: lambda page, request: self._show(page, on=request.on),
-                EndFlow: lambda _, __: self._end(),
-                KeepFlow: self._keep,
+                requests.BeginFlow: lambda page, request: self._begin(page, request.kind),
+                requests.ShowFlow: lambda page, request: self._show(page, on=request.on),
+                requests.EndFlow: lambda _, __: self._end(),
+                requests.KeepFlow: self._keep,
                 **dict.fromkeys(_OF_FLOWS, lambda _, request: self._answer(request)),
             },
             self.greeting,
@@ -200,7 +194,7 @@ class GuideHandlers:
         flow.show(on=on)
         return True
 
-    def _begin(self, page: Page, kind: FlowKind) -> None:
+    def _begin(self, page: Page, kind: requests.FlowKind) -> None:
         if self._hub.runner.flow.marker.replay is not None:
             raise WireError("presses need a live source: go back to live first")
         flow = _FLOWS[kind](self._hub.runner.prepared)
@@ -281,7 +275,7 @@ class GuideHandlers:
         if flow is self._flow:
             self._tell()
 
-    def _keep(self, page: Page, request: KeepFlow) -> None:
+    def _keep(self, page: Page, request: requests.KeepFlow) -> None:
         flow = self._flow
         if flow is None:
             raise WireError("there are no presses to save: press the skin first")

@@ -21,18 +21,9 @@ from tomoskin.learning import DEPTH, DentMap, dent_map
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import FrameResult, Prepared, Unresolved, colour_limit
 from tomoskin.run import FILE_NAME, Runner, SetPresses, Snapshot, StrictRequest, commands
-from tomoskin.server import views
+from tomoskin.server import page_messages as to_page, views
 from tomoskin.server.frames import encode_result
 from tomoskin.server.page_connection import Handler, Handlers, Host, Page, Tasks, during
-from tomoskin.server.page_messages import (
-    DentNow,
-    EventNote,
-    Message,
-    PlayedTimeline,
-    Scale,
-    Scene,
-    UnresolvedMap,
-)
 from tomoskin.server.requests import AskUnresolved, Painted, SetRecording, ShowDent
 from tomoskin.twin import Probe
 
@@ -70,7 +61,7 @@ def run_handlers(runner: Runner, folder: Path, tasks: Tasks) -> Handlers:
     }
 
 
-def _unresolved(runner: Runner) -> UnresolvedMap:
+def _unresolved(runner: Runner) -> to_page.UnresolvedMap:
     """What the data of this moment cannot tell."""
     newest, prepared = runner.newest, runner.prepared
     health = newest.result.health if newest else None
@@ -78,8 +69,10 @@ def _unresolved(runner: Runner) -> UnresolvedMap:
     try:
         part = Unresolved.of(prepared, runner.flow.pipeline.choice.alpha, np.flatnonzero(lost))
     except TomoskinError as error:
-        return UnresolvedMap(values=None, radius_m=0.0, problem=error.message)
-    return UnresolvedMap(values=part.values.round(3).tolist(), radius_m=part.radius, problem="")
+        return to_page.UnresolvedMap(values=None, radius_m=0.0, problem=error.message)
+    return to_page.UnresolvedMap(
+        values=part.values.round(3).tolist(), radius_m=part.radius, problem=""
+    )
 
 
 async def _record(runner: Runner, folder: Path, *, on: bool) -> None:
@@ -132,13 +125,13 @@ class Hub(Host):
         self.opener: Callable[[Skin], Transport] | None = None
         self.tasks = Tasks()
         self._handlers: dict[type, Handler] = {}
-        self._greetings: list[Callable[[], Sequence[Message]]] = []
+        self._greetings: list[Callable[[], Sequence[to_page.Message]]] = []
         self._farewells: list[Callable[[Page], None]] = []
         self._next_event = 0
-        self._timeline: PlayedTimeline | None = None
-        self._past: deque[EventNote] = deque(maxlen=_FIRST_EVENTS)
+        self._timeline: to_page.PlayedTimeline | None = None
+        self._past: deque[to_page.EventNote] = deque(maxlen=_FIRST_EVENTS)
         self._limit = colour_limit(runner.prepared)
-        self._scene: Scene | None = None
+        self._scene: to_page.Scene | None = None
         self._made: tuple[Snapshot, bool, bytes] | None = None
         self._dents = Dents(runner)
         self.serve(run_handlers(runner, self.folder, self.tasks))
@@ -147,7 +140,7 @@ class Hub(Host):
     def serve(
         self,
         handlers: Handlers,
-        greeting: Callable[[], Sequence[Message]] = tuple,
+        greeting: Callable[[], Sequence[to_page.Message]] = tuple,
         farewell: Callable[[Page], None] = lambda _: None,
     ) -> None:
         """Answer these requests too, before the first page comes.
@@ -174,7 +167,7 @@ class Hub(Host):
             with self.runner.audience.watch(announce):
                 yield
 
-    def first(self) -> list[Message]:
+    def first(self) -> list[to_page.Message]:
         """Scene and state, what happened, and what the handlers greet with."""
         timeline = [self._timeline] if self._timeline else []
         return [*self._now(), *timeline, *self._greeting(), *self._past]
@@ -224,12 +217,12 @@ class Hub(Host):
     def rescale(self, prepared: Prepared, limit: float) -> None:
         """Tell every page that pictures have another scale and unit from now on."""
         self._limit, self._scene = limit, None
-        self.tell(Scale(limit=limit, unit=prepared.operator.unit))
+        self.tell(to_page.Scale(limit=limit, unit=prepared.operator.unit))
 
-    def _greeting(self) -> list[Message]:
+    def _greeting(self) -> list[to_page.Message]:
         return [message for greeting in self._greetings for message in greeting()]
 
-    def _now(self) -> tuple[Message, Message]:
+    def _now(self) -> tuple[to_page.Message, to_page.Message]:
         """The scene, made when it is first asked for, and the state."""
         runner, status, replay = self.runner, self.runner.status(), self.runner.flow.marker.replay
         if self._scene is None:
@@ -281,7 +274,7 @@ class Dents:
             problem = "depths are uncalibrated: teach them in Set up, or choose a calibration there"
         elif prepared.skin.layer is None:
             problem = 'the skin file does not give the layer: add layer = "3 mm" to [surface]'
-        page.post(DentNow(problem=problem).json)
+        page.post(to_page.DentNow(problem=problem).json)
         (self.pages.add if request.on else self.pages.discard)(page)
 
     def of(self, result: FrameResult) -> DentMap | None:

@@ -18,17 +18,8 @@ from tomoskin.core import Amount, FloatArray, SkinError, WireError, encode_json
 from tomoskin.files.messages import Contacts, Stream
 from tomoskin.model.robot import PlacedSkin, Pose, Robot
 from tomoskin.run import FILE_NAME, RobotRun, StrictRequest, commands
+from tomoskin.server import page_messages as to_page
 from tomoskin.server.page_connection import Host, Page, Tasks, during
-from tomoskin.server.page_messages import (
-    DrawnLink,
-    PlacedShape,
-    RobotScene,
-    RobotState,
-    RobotTouches,
-    SkinState,
-    SpaceTouch,
-    TouchesOfSkin,
-)
 from tomoskin.server.requests import SetRecording
 
 PERIOD = 1 / 20
@@ -66,7 +57,7 @@ class Overview(Host):
         async with during(self._tick()):
             yield
 
-    def first(self) -> tuple[RobotScene, RobotState]:
+    def first(self) -> tuple[to_page.RobotScene, to_page.RobotState]:
         """The robot, and how its skins are doing."""
         self._renew()  # while nobody looked it was not
         return self._scene, states(self.run)
@@ -119,7 +110,7 @@ class Overview(Host):
         newest = {n: r.contacts for n, r in self.run.runners.items() if r.newest}
         poses = self._stance.poses(max((c.utc or 0.0 for c in newest.values()), default=0.0))
         skins = {name: _on(contacts, poses) for name, contacts in newest.items()}
-        made = encode_json(RobotTouches(skins=skins, poses=_flat(poses)))
+        made = encode_json(to_page.RobotTouches(skins=skins, poses=_flat(poses)))
         if made != self._touches:
             self._touches = made
 
@@ -147,13 +138,13 @@ class Stance:
         return self._last.get(joint, 0.0)
 
 
-def _on(contacts: Contacts, poses: Mapping[str, Pose]) -> TouchesOfSkin:
+def _on(contacts: Contacts, poses: Mapping[str, Pose]) -> to_page.TouchesOfSkin:
     pose = poses.get(contacts.frame_id, Pose())
-    return TouchesOfSkin(
+    return to_page.TouchesOfSkin(
         valid=contacts.valid,
         pose_problem=contacts.link.problem if contacts.link else None,
         touches=[
-            SpaceTouch(
+            to_page.SpaceTouch(
                 id=contact.touch.id,
                 position=_rounded(pose(np.array([contact.position]))[0]),
                 normal=_rounded(pose.rotation @ contact.normal),
@@ -167,7 +158,7 @@ def _on(contacts: Contacts, poses: Mapping[str, Pose]) -> TouchesOfSkin:
     )
 
 
-def scene(robot: Robot, streams: Mapping[str, Stream]) -> RobotScene:
+def scene(robot: Robot, streams: Mapping[str, Stream]) -> to_page.RobotScene:
     """Links and skins, each in its own frame, m; coordinates lie flat as x0, y0, z0, …
 
     Where a link is shown by its shape no bone is, and what cannot be shown is said.
@@ -177,10 +168,12 @@ def scene(robot: Robot, streams: Mapping[str, Stream]) -> RobotScene:
     shown = {solid.link: solid.triangles for solid in solids if len(solid.triangles)}
     number = {link: k for k, link in enumerate(urdf.links)} if urdf else {}
     bones = urdf.bones(without=shown) if urdf else ()
-    return RobotScene(
+    return to_page.RobotScene(
         name=robot.name,
         bones=[number[link] for ends in bones for link in ends],
-        links=[DrawnLink(number[n], _rounded(corners.ravel())) for n, corners in shown.items()],
+        links=[
+            to_page.DrawnLink(number[n], _rounded(corners.ravel())) for n, corners in shown.items()
+        ],
         undrawn=[f"{solid.link}: {why}" for solid in solids for why in solid.problems],
         skins=[_skin(s, streams[s.name], number.get(s.place.link)) for s in robot.skins],
         poses=_flat(urdf.poses()) if urdf else [],
@@ -188,10 +181,10 @@ def scene(robot: Robot, streams: Mapping[str, Stream]) -> RobotScene:
     )
 
 
-def _skin(skin: PlacedSkin, stream: Stream, link: int | None) -> PlacedShape:
+def _skin(skin: PlacedSkin, stream: Stream, link: int | None) -> to_page.PlacedShape:
     corners = np.zeros(0) if stream.corners is None else stream.corners.ravel()
     frame = stream.naming.frame_id
-    return PlacedShape.of(skin, frame=frame, link=link, corners=_rounded(corners))
+    return to_page.PlacedShape.of(skin, frame=frame, link=link, corners=_rounded(corners))
 
 
 def _flat(poses: Mapping[str, Pose]) -> Any:
@@ -200,10 +193,10 @@ def _flat(poses: Mapping[str, Pose]) -> Any:
     return _rounded(np.concatenate([np.zeros(0), *rows]))
 
 
-def states(run: RobotRun) -> RobotState:
+def states(run: RobotRun) -> to_page.RobotState:
     """The state of each skin, in words."""
     skins = {
-        name: SkinState.of(
+        name: to_page.SkinState.of(
             status,
             ready=status.reference.ready,
             lost=status.dropped + status.gaps,
@@ -212,7 +205,7 @@ def states(run: RobotRun) -> RobotState:
         for name, status in run.statuses().items()
     }
     recording = None if run.recording is None else run.recording.name
-    return RobotState(skins=skins, recording=recording)
+    return to_page.RobotState(skins=skins, recording=recording)
 
 
 def _more_than(force: Amount | None) -> float | None:

@@ -8,17 +8,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from tomoskin import learning
 from tomoskin.core import FloatArray, write_text
-from tomoskin.learning import (
-    TOUCH,
-    LeftOut,
-    Locator,
-    MappingAnswer,
-    growth_of_errors,
-    ring_of,
-    solve_channel_mapping,
-    worse,
-)
 from tomoskin.pipeline import FrameResult, Prepared, prepare
 from tomoskin.run import Runner, commands
 from tomoskin.server.folder import Folder
@@ -43,12 +34,12 @@ def estimate_touch(prepared: Prepared, presses: Sequence[GuidedPress]) -> Estima
     if len(presses) < _FEWEST_TOUCH:
         return Estimate(f"{counted(_FEWEST_TOUCH - len(presses))} more for a first estimate")
     dv, xy = _arrays(presses)
-    locator = Locator.fit(dv, xy, pattern=prepared.pattern, skin=prepared.skin)
+    locator = learning.Locator.fit(dv, xy, pattern=prepared.pattern, skin=prepared.skin)
     errors = 1e3 * locator.errors
     doubted = sorted({remark.row for remark in locator.remarks})
     text = f"Median error {_by_effort(presses, errors)} (each press left out in turn)"
     text += _as_it_is(presses, errors)
-    left_out = LeftOut.of(locator)
+    left_out = learning.LeftOut.of(locator)
     if left_out.one_force:
         text += (
             ", but all presses were about equally hard: expect larger errors for softer and "
@@ -58,7 +49,7 @@ def estimate_touch(prepared: Prepared, presses: Sequence[GuidedPress]) -> Estima
         text += "; the mean of all positions is as good an estimate: press harder"
     elif len(presses) < _FIRST:
         text += ". Ten presses are a start, fifty are good"
-    if what := worse(growth_of_errors(locator)):
+    if what := learning.worse(learning.growth_of_errors(locator)):
         text += (
             f". But {what}. Take back those that were not on their dot; where the skin has "
             "changed, begin again"
@@ -101,8 +92,8 @@ def estimate_mapping(
         return Estimate(f"{counted(_FEWEST_MAPPING - len(presses))} more for a first answer")
     dv, xy = _arrays(presses)
     rest, noise = untouched or (None, None)
-    solution = solve_channel_mapping(dv, xy, prepared.skin, reference=rest, noise=noise)
-    ring = ring_of(prepared.skin)
+    solution = learning.solve_channel_mapping(dv, xy, prepared.skin, reference=rest, noise=noise)
+    ring = learning.ring_of(prepared.skin)
     figures = Figures(
         mapping=solution.mapping.text(ring),
         probability=solution.probability,
@@ -113,7 +104,7 @@ def estimate_mapping(
     return Estimate(text, solution.next_place, solution.sure, figures, solution)
 
 
-def _in_words(solution: MappingAnswer, figures: Figures) -> str:
+def _in_words(solution: learning.MappingAnswer, figures: Figures) -> str:
     if solution.sure:
         return f"Sure: {figures.mapping}"
     if solution.doubtful:
@@ -188,7 +179,7 @@ class DotFlow(GuidedFlow):
 class TouchFlow(DotFlow):
     """Touch is learnt from presses on dots, soft and hard in turn."""
 
-    kind, teaches, efforts = "touch", TOUCH, EFFORTS
+    kind, teaches, efforts = "touch", learning.TOUCH, EFFORTS
 
     def estimate_from(self, examples: tuple[GuidedPress, ...]) -> Estimate:
         """Estimate the map of touches from these presses."""
@@ -205,7 +196,9 @@ class MappingFlow(DotFlow):
         untouched = None if self._taker is None else self._taker.untouched
         return estimate_mapping(self.prepared, examples, untouched)
 
-    def keep(self, answer: MappingAnswer, folder: Folder, name: str, runner: Runner) -> str:
+    def keep(
+        self, answer: learning.MappingAnswer, folder: Folder, name: str, runner: Runner
+    ) -> str:
         """Write a skin file with the mapping, and change over to it."""
         path = folder.free(name, ".toml")
         mapped = answer.mapping.applied(self.prepared.skin)

@@ -25,29 +25,13 @@ from tomoskin.imaging import LightTouch, LinearProblem, Spectrum
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, colour_limit, prepare, tuned_image
 from tomoskin.run import Runner, commands
+from tomoskin.server import requests, settings_messages as messages
 from tomoskin.server.folder import Folder
 from tomoskin.server.hub import Hub
 from tomoskin.server.page_connection import Page
 from tomoskin.server.page_messages import Message
-from tomoskin.server.requests import (
-    AskPattern,
-    LoadSkin,
-    RedoSettings,
-    SaveSkin,
-    SetSettings,
-    UndoSettings,
-)
-from tomoskin.server.settings_messages import (
-    Progress,
-    Settings,
-    StageName,
-    altered,
-    refusal,
-    schema,
-    table_of,
-)
 
-STAGES = get_args(StageName)
+STAGES = get_args(messages.StageName)
 """What a change of settings comes to, one after the other; many begin later, or end earlier."""
 
 MOST_KEPT = 100
@@ -146,24 +130,24 @@ class SettingsHandlers:
         self._automatic = AutomaticAlpha()
         hub.serve(
             {
-                SetSettings: self._set,
-                UndoSettings: lambda page, _: self._step(page, self._history.undo),
-                RedoSettings: lambda page, _: self._step(page, self._history.redo),
-                SaveSkin: self._save,
-                LoadSkin: self._load,
-                AskPattern: self._pattern,
+                requests.SetSettings: self._set,
+                requests.UndoSettings: lambda page, _: self._step(page, self._history.undo),
+                requests.RedoSettings: lambda page, _: self._step(page, self._history.redo),
+                requests.SaveSkin: self._save,
+                requests.LoadSkin: self._load,
+                requests.AskPattern: self._pattern,
             },
             self.greeting,
         )
 
     def greeting(self) -> tuple[Message, ...]:
         """The schema, the settings as they are, and how far a change is."""
-        return (schema(), self._message(), _progress(self._stage))
+        return (messages.schema(), self._message(), _progress(self._stage))
 
-    def _set(self, page: Page, request: SetSettings) -> None:
+    def _set(self, page: Page, request: requests.SetSettings) -> None:
         keys = sorted((s, k) for s, keys in request.changes.items() for k in keys)
         with _refusals_to(page):
-            skin = altered(self._present(), request.changes)
+            skin = messages.altered(self._present(), request.changes)
             self._check(skin)
             self._history.add(self._present(), keys, time.monotonic())
             self._go(page, skin)
@@ -173,7 +157,7 @@ class SettingsHandlers:
         if (skin := step(self._present())) is not None:
             self._go(page, skin)
 
-    def _load(self, page: Page, request: LoadSkin) -> None:
+    def _load(self, page: Page, request: requests.LoadSkin) -> None:
         path = self._hub.folder / f"{request.name}.toml"
         with _refusals_to(page):
             skin = Skin.load(path if path.is_file() else request.name)
@@ -181,16 +165,16 @@ class SettingsHandlers:
             self._history.add(self._present())
             self._go(page, skin)
 
-    def _save(self, page: Page, request: SaveSkin) -> None:
+    def _save(self, page: Page, request: requests.SaveSkin) -> None:
         name = f"{request.name}.toml"
         with _refusals_to(page, where=name):  # the page is told names, never paths
             _save(self._hub.folder / name, self._present(), replace=request.replace)
             self._hub.runner.say("saved", f"settings saved as {name}")
             self._hub.tell(self._message())
 
-    def _pattern(self, page: Page, request: AskPattern) -> None:
+    def _pattern(self, page: Page, request: requests.AskPattern) -> None:
         with _refusals_to(page):
-            page.post(table_of(request.name, self._present().n_electrodes).json)
+            page.post(messages.table_of(request.name, self._present().n_electrodes).json)
 
     def _present(self) -> Skin:
         """The settings as they are, or will be when what is being prepared is ready."""
@@ -225,11 +209,11 @@ class SettingsHandlers:
             except _SupersededError:
                 continue
             except TomoskinError as error:
-                page.post(refusal(error).json)
+                page.post(messages.refusal(error).json)
             except Exception as error:  # the next change is none the worse for it
                 _log.exception("settings could not be prepared")
                 internal = SkinError(f"internal error, {type(error).__name__}: {error}")
-                page.post(refusal(internal).json)
+                page.post(messages.refusal(internal).json)
         self._working, self._stage = False, None
         self._hub.tell(self._message())
 
@@ -277,9 +261,9 @@ class SettingsHandlers:
         self._took = time.monotonic() - start
         return None
 
-    def _message(self) -> Settings:
+    def _message(self) -> messages.Settings:
         skin = self._present()
-        return Settings(
+        return messages.Settings(
             document=skin.document,
             n_electrodes=skin.n_electrodes,
             automatic_alpha=self._automatic.of(self._hub.runner),
@@ -300,13 +284,13 @@ def _refusals_to(page: Page, where: str = "") -> Iterator[None]:
         yield
     except TomoskinError as error:
         named = type(error)(error.message, where=where, hint=error.hint) if where else error
-        page.post(refusal(named).json)
+        page.post(messages.refusal(named).json)
 
 
-def _progress(stage: Any) -> Progress:
+def _progress(stage: Any) -> messages.Progress:
     """How far a change is; None: nothing is being changed."""
     done = 0 if stage is None else STAGES.index(stage)
-    return Progress(stage=stage, done=done, stages=len(STAGES))
+    return messages.Progress(stage=stage, done=done, stages=len(STAGES))
 
 
 def _change(runner: Runner, prepared: Prepared, open_source: commands.Opener) -> None:

@@ -16,21 +16,11 @@ from tomoskin.files.exports import WRITERS, Export, export_touches
 from tomoskin.files.session import ReplayTransport, SessionReader, as_recorded, parse_replay
 from tomoskin.pipeline import Prepared
 from tomoskin.run import Runner, commands
+from tomoskin.server import requests
 from tomoskin.server.folder import SESSION, Folder
 from tomoskin.server.hub import Hub
 from tomoskin.server.page_connection import Page
 from tomoskin.server.page_messages import BoardNow, Exported, FileEntry, Files, Offer, Sources
-from tomoskin.server.requests import (
-    Annotate,
-    Connect,
-    DeleteSession,
-    ExportSession,
-    GoLive,
-    ListFiles,
-    ListSources,
-    OpenSession,
-    RenameSession,
-)
 
 EMULATED = {
     "emulator"
@@ -168,15 +158,19 @@ class SourceHandlers:
         self._use = SessionUse(hub.runner)
         hub.serve(
             {
-                ListSources: self._list_sources,
-                Connect: lambda page, ask: self._go(page, partial(switch.connect, ask.source)),
-                OpenSession: lambda page, ask: self._go(page, partial(self._play, ask.name)),
-                GoLive: lambda page, _: self._go(page, switch.back),
-                ListFiles: lambda page, _: self._list(page),
-                ExportSession: self._export,
-                RenameSession: self._rename,
-                DeleteSession: self._delete,
-                Annotate: self._annotate,
+                requests.ListSources: self._list_sources,
+                requests.Connect: lambda page, ask: self._go(
+                    page, partial(switch.connect, ask.source)
+                ),
+                requests.OpenSession: lambda page, ask: self._go(
+                    page, partial(self._play, ask.name)
+                ),
+                requests.GoLive: lambda page, _: self._go(page, switch.back),
+                requests.ListFiles: lambda page, _: self._list(page),
+                requests.ExportSession: self._export,
+                requests.RenameSession: self._rename,
+                requests.DeleteSession: self._delete,
+                requests.Annotate: self._annotate,
             }
         )
 
@@ -187,21 +181,21 @@ class SourceHandlers:
 
         self._hub.tasks.run(page, self._folder.list_files, answer)
 
-    def _rename(self, page: Page, request: RenameSession) -> None:
+    def _rename(self, page: Page, request: requests.RenameSession) -> None:
         def work() -> str:
             self._use.check_idle(request.name)
             return self._folder.rename(request.name, request.to)
 
         self._change(page, work, lambda new: f"{request.name} is now {new}")
 
-    def _delete(self, page: Page, request: DeleteSession) -> None:
+    def _delete(self, page: Page, request: requests.DeleteSession) -> None:
         def work() -> None:
             self._use.check_idle(request.name)
             self._folder.delete(request.name)
 
         self._change(page, work, lambda _: f"{request.name} is deleted")
 
-    def _annotate(self, page: Page, request: Annotate) -> None:
+    def _annotate(self, page: Page, request: requests.Annotate) -> None:
         work = partial(self._folder.annotate, request.name, request.text)
         self._change(page, work, lambda _: f"Notes on {request.name} are saved")
 
@@ -214,7 +208,7 @@ class SourceHandlers:
 
         self._hub.tasks.run(page, work, done)
 
-    def _list_sources(self, page: Page, _: ListSources) -> None:
+    def _list_sources(self, page: Page, _: requests.ListSources) -> None:
         def answer(offers: list[Offer]) -> None:
             page.post(self._sources(offers).json)
 
@@ -237,7 +231,7 @@ class SourceHandlers:
     def _play(self, name: str) -> None:
         self._switch.play(self._complete(name))
 
-    def _export(self, page: Page, request: ExportSession) -> None:
+    def _export(self, page: Page, request: requests.ExportSession) -> None:
         if self._use.exporting is not None:
             raise WireError(f"{self._use.exporting} is being exported: wait until it has ended")
         self._use.exporting, self._use.share = request.name, 0.0
