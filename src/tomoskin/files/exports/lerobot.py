@@ -32,18 +32,8 @@ from tomoskin.core import (
     needed,
     write_text,
 )
+from tomoskin.files import messages
 from tomoskin.files.exports.export import Export
-from tomoskin.files.messages import (
-    FIELDS,
-    POSE,
-    SLOTS,
-    Contacts,
-    Slots,
-    last_before,
-    pose_row,
-    row_labels,
-    still_holds,
-)
 from tomoskin.files.session import SessionReader
 from tomoskin.model.pattern import Pattern
 
@@ -124,16 +114,16 @@ class _Track:
 
     @classmethod
     def of(cls, job: Export) -> Self:
-        times, valid, change, touches, poses, slots = [], [], [], [], [], Slots()
+        times, valid, change, touches, poses, slots = [], [], [], [], [], messages.Slots()
         for result in job.results():
-            contacts = Contacts.of(job.stream, result)
+            contacts = messages.Contacts.of(job.stream, result)
             if contacts.change is not None:
                 slots = slots.after(contacts)
                 times.append(contacts.when)
                 valid.append(contacts.valid)
                 change.append(contacts.change.astype(np.float32))
                 touches.append(slots.table.ravel().astype(np.float32))
-                poses.append(pose_row(contacts) if contacts.link else [])
+                poses.append(messages.pose_row(contacts) if contacts.link else [])
         if not times:
             raise DataError("holds too few frames for a reference", where=str(job.session.path))
         if (link := contacts.link) is not None and not np.any(poses):
@@ -157,9 +147,9 @@ class _Track:
         The window is flat: LeRobot's tools fail on tables in its rows.
         """
         moments = rows.moments
-        chosen = last_before(self.times, moments, count)
+        chosen = messages.last_before(self.times, moments, count)
         newest, ages = chosen[:, -1], moments[:, None] - self.times[chosen]
-        holds = still_holds(self.times, ages[:, -1])
+        holds = messages.still_holds(self.times, ages[:, -1])
         valid = self.valid[newest] & holds
         window = np.where((ages >= 0)[:, :, None], self.change[chosen], 0).astype(np.float32)
         columns = {
@@ -187,11 +177,17 @@ class _Track:
 
     def names(self, count: int) -> dict[str, list[str]]:
         """What the columns of each feature are, by its name."""
-        labels = row_labels(self.pattern)
-        slots = [f"touch_{n}.{name}" for n in range(SLOTS) for name in FIELDS]
+        labels = messages.row_labels(self.pattern)
+        slots = [f"touch_{n}.{name}" for n in range(messages.SLOTS) for name in messages.FIELDS]
         frames = [f"frame_{n - count + 1}" for n in range(count)]
         window = [f"{frame}.{label}" for frame in frames for label in labels]
-        named = {VOLTAGES: labels, TOUCHES: slots, WINDOW: window, AGES: frames, LINK: [*POSE]}
+        named = {
+            VOLTAGES: labels,
+            TOUCHES: slots,
+            WINDOW: window,
+            AGES: frames,
+            LINK: [*messages.POSE],
+        }
         return {self.prefix + name: words for name, words in named.items()}
 
 

@@ -11,22 +11,8 @@ import numpy as np
 
 from tomoskin import __version__
 from tomoskin.core import CHANGE, MEASURANDS, Event, Image, SinkError, StrPath, needed, written
+from tomoskin.files import messages
 from tomoskin.files.exports.export import Export
-from tomoskin.files.messages import (
-    TOPICS,
-    Contacts,
-    Item,
-    Naming,
-    RosMessage,
-    Stream,
-    definition,
-    encode_cdr,
-    ros_messages,
-    time_of,
-    touch_colour,
-    touch_width,
-    type_hash,
-)
 
 if TYPE_CHECKING:
     from mcap.writer import Writer
@@ -49,23 +35,23 @@ def write_bag(job: Export, path: StrPath) -> None:
     with written(path, overwrite=job.overwrite) as part, part.open("wb") as file:
         bag = Writer(file, compression=CompressionType.NONE)
         bag.start(profile="ros2", library=f"tomoskin {__version__}")
-        channels = {topic: _register(bag, job.stream.naming, topic) for topic in TOPICS}
+        channels = {topic: _register(bag, job.stream.naming, topic) for topic in messages.TOPICS}
         for item in job.items():
-            for message in ros_messages(job.stream, item):
+            for message in messages.ros_messages(job.stream, item):
                 _put(bag, channels[message.topic], message)
         bag.finish()  # type: ignore[no-untyped-call]
 
 
-def _register(bag: Writer, naming: Naming, topic: str) -> int:
-    kind = TOPICS[topic]
-    text = _BETWEEN.join(definition(kind))
+def _register(bag: Writer, naming: messages.Naming, topic: str) -> int:
+    kind = messages.TOPICS[topic]
+    text = _BETWEEN.join(messages.definition(kind))
     schema = bag.register_schema(kind, "ros2msg", text.encode())
-    about = {"offered_qos_profiles": "", "topic_type_hash": type_hash(kind)}
+    about = {"offered_qos_profiles": "", "topic_type_hash": messages.type_hash(kind)}
     return bag.register_channel(f"/{naming.topic(topic)}", "cdr", schema, about)
 
 
-def _put(bag: Writer, channel: int, message: RosMessage) -> None:
-    data = encode_cdr(TOPICS[message.topic], message.value)
+def _put(bag: Writer, channel: int, message: messages.RosMessage) -> None:
+    data = messages.encode_cdr(messages.TOPICS[message.topic], message.value)
     bag.add_message(channel, message.stamp, data, message.stamp)
 
 
@@ -80,7 +66,7 @@ _ROBOT = uuid4()
 class RerunView:
     """Logs results and events to a recording stream of Rerun, on the timeline ``time``."""
 
-    def __init__(self, rerun: Any, recording: Any, stream: Stream) -> None:
+    def __init__(self, rerun: Any, recording: Any, stream: messages.Stream) -> None:
         self._rerun, self._recording, self._stream = rerun, recording, stream
         self._ids: set[int] = set()
         if stream.corners is not None:
@@ -90,10 +76,10 @@ class RerunView:
             )
             recording.log(self._path("sheet"), sheet, static=True)
 
-    def log(self, item: Item) -> None:
+    def log(self, item: messages.Item) -> None:
         """What ``item`` says, at the time of its measurement."""
-        utc = self._stream.utc(time_of(item))
-        when = {"duration": time_of(item)} if utc is None else {"timestamp": utc}
+        utc = self._stream.utc(messages.time_of(item))
+        when = {"duration": messages.time_of(item)} if utc is None else {"timestamp": utc}
         self._recording.set_time("time", **when)
         for event in (item,) if isinstance(item, Event) else item.events:
             text = self._rerun.TextLog(f"{event.kind}: {event.text}")
@@ -105,14 +91,14 @@ class RerunView:
         if item.image is not None and self._stream.corners is not None:
             self._sheet(item.image)
 
-    def _touches(self, contacts: Contacts) -> None:
+    def _touches(self, contacts: messages.Contacts) -> None:
         touches = contacts.tracked
         places = np.array([contact.position for contact in contacts.touches]).reshape(-1, 3)
         normals = np.array([contact.normal for contact in contacts.touches]).reshape(-1, 3)
-        colours = [[*touch_colour(touch).values()] for touch in touches]
+        colours = [[*messages.touch_colour(touch).values()] for touch in touches]
         dots = self._rerun.Points3D(
             places,
-            radii=[touch_width(touch) / 2 for touch in touches],
+            radii=[messages.touch_width(touch) / 2 for touch in touches],
             labels=[str(touch.id) for touch in touches],
             colors=np.array(colours).reshape(-1, 4),
         )
@@ -170,7 +156,7 @@ def write_rerun(job: Export, path: StrPath) -> None:
         recording.disconnect()
 
 
-def rerun_recording(rerun: Any, stream: Stream) -> Any:
+def rerun_recording(rerun: Any, stream: messages.Stream) -> Any:
     """A recording whose only times are those of the measurements.
 
     Those of a robot's skins have one identity in a process: a viewer shows them as one.

@@ -13,14 +13,7 @@ from tomoskin.core import (
     numbers,
     real_numbers,
 )
-from tomoskin.files.imports.tables import (
-    clockwise,
-    drives_of,
-    neighbours,
-    pairs_of,
-    scan_of,
-    voltages_of,
-)
+from tomoskin.files.imports import tables
 from tomoskin.sensing.signal import Recording
 
 _MM = 1e-3
@@ -64,7 +57,7 @@ def read_eskin(arrays: Arrays, source: str) -> Recording:
     else:
         values = _frames(arrays, kind, n_rows, source)
     inj, meas = (electrode_table(arrays, key, source) for key in ("inj", "meas"))
-    return voltages_of(
+    return tables.voltages_of(
         source,
         values,
         (inj[:, ::-1], meas),
@@ -135,8 +128,8 @@ def read_ktc(arrays: Arrays, source: str) -> Recording:
         When the shapes do not belong together or a pattern is no pair.
     """
     inj, mpat, voltages, reference = next(n for n in _NAMES if set(arrays) >= set(n[:3]))
-    injections = drives_of(real_numbers(arrays, inj, source).T, "injection", source)
-    pairs = pairs_of(real_numbers(arrays, mpat, source).T, "measuring pair", source)
+    injections = tables.drives_of(real_numbers(arrays, inj, source).T, "injection", source)
+    pairs = tables.pairs_of(real_numbers(arrays, mpat, source).T, "measuring pair", source)
     n_electrodes = arrays[inj].shape[0]
     n_rows = len(injections) * len(pairs)
     values = _flat(real_numbers(arrays, voltages, source), len(injections), len(pairs))
@@ -152,11 +145,11 @@ def read_ktc(arrays: Arrays, source: str) -> Recording:
             raise DataError(f"expected {reference} ({n_rows},), got {len(water)}", where=source)
     rows = np.repeat(injections, len(pairs), axis=0), np.tile(pairs, (len(injections), 1))
     if inj != "CurrentPattern":
-        turned = clockwise(rows[0], n_electrodes)
+        turned = tables.clockwise(rows[0], n_electrodes)
         if rows[0].shape[1] > 2:
-            turned = rows[0][:, clockwise(np.arange(n_electrodes), n_electrodes)]
-        rows = turned, clockwise(rows[1], n_electrodes)
-    return voltages_of(source, frames, rows, reference=water).without_repeats()
+            turned = rows[0][:, tables.clockwise(np.arange(n_electrodes), n_electrodes)]
+        rows = turned, tables.clockwise(rows[1], n_electrodes)
+    return tables.voltages_of(source, frames, rows, reference=water).without_repeats()
 
 
 def _flat(values: FloatArray, n_injections: int, n_pairs: int) -> FloatArray:
@@ -194,14 +187,14 @@ def read_pyeit(arrays: Arrays, source: str) -> Recording:
             f"expected v (n_frames, {count}), got {voltages.shape}: its protocol has {count} rows",
             where=source,
         )
-    return voltages_of(source, voltages, rows, reference=reference)
+    return tables.voltages_of(source, voltages, rows, reference=reference)
 
 
 def _rows(arrays: Arrays, source: str) -> tuple[IntArray, IntArray]:
     excitations = electrode_table(arrays, "ex_mat", source)
     if "meas_mat" not in arrays:
-        pairs = neighbours(1 + int(excitations.max()))
-        return scan_of(excitations, pairs[:, ::-1])[0]
+        pairs = tables.neighbours(1 + int(excitations.max()))
+        return tables.scan_of(excitations, pairs[:, ::-1])[0]
     table = real_numbers(arrays, "meas_mat", source)
     if table.ndim != 3 or table.shape[0] != len(excitations) or table.shape[2] != 2:
         raise DataError(

@@ -12,13 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import DataError, IntArray, check_fits, open_input, read_refusals
-from tomoskin.files.imports.tables import (
-    adjacent_scan,
-    for_magnitudes,
-    neighbours,
-    scan_of,
-    voltages_of,
-)
+from tomoskin.files.imports import tables
 from tomoskin.sensing.signal import Recording
 
 LONGEST_LINE = 1 << 16
@@ -127,10 +121,10 @@ def read_eit_kit(lines: Iterable[str], source: str) -> Recording:
     if not frames:
         held = f"{len(blocks[0].values)} in the first" if blocks else "no frame"
         raise DataError(f"expected frames of 64, 256 or 1024 values, got {held}", where=source)
-    rows, used = adjacent_scan(_SIZES[n_values])
+    rows, used = tables.adjacent_scan(_SIZES[n_values])
     origin = next((np.array(block.values)[used] for block in kept if block.is_origin), None)
     voltages = np.array(frames)[:, used]
-    return voltages_of(source, voltages, rows, reference=origin, notes=skipped.notes())
+    return tables.voltages_of(source, voltages, rows, reference=origin, notes=skipped.notes())
 
 
 def _blocks(lines: Iterable[str], skipped: Skipped) -> list[_Block]:
@@ -198,7 +192,7 @@ def read_open_eit(lines: Iterable[str], source: str) -> Recording:
             hint="numbers must have a decimal point, not a comma",
         )
     rows = rows_of(len(frames[0]))
-    recording = voltages_of(source, np.array(frames), rows, notes=skipped.notes())
+    recording = tables.voltages_of(source, np.array(frames), rows, notes=skipped.notes())
     return recording.without_repeats()
 
 
@@ -216,8 +210,8 @@ def rows_of(count: int) -> tuple[IntArray, IntArray]:
     n, spread = _SCANS[count]
     e = np.arange(n)
     drives = np.column_stack([e, (e + spread) % n])
-    (drive, measure), _ = scan_of(drives, neighbours(n)[:, ::-1])
-    return drive, for_magnitudes(drive, measure, n)
+    (drive, measure), _ = tables.scan_of(drives, tables.neighbours(n)[:, ::-1])
+    return drive, tables.for_magnitudes(drive, measure, n)
 
 
 _N = 16
@@ -288,9 +282,9 @@ def read_serial_log(lines: Iterable[str], source: str) -> Recording:
 
 
 def _recording(frames: list[list[_Row]], skipped: Skipped, source: str) -> Recording:
-    rows, used = adjacent_scan(_N)
+    rows, used = tables.adjacent_scan(_N)
     values = np.array([[value for row in frame for value in row.values] for frame in frames])
-    return voltages_of(
+    return tables.voltages_of(
         source,
         _MILLI * values[:, used],
         rows,
@@ -391,6 +385,6 @@ def _potentials(
 
 
 def _of_injections(drives: IntArray, potentials: NDArray[np.complex128], source: str) -> Recording:
-    rows, kept = scan_of(drives, neighbours(potentials.shape[1]))
+    rows, kept = tables.scan_of(drives, tables.neighbours(potentials.shape[1]))
     values = potentials - np.roll(potentials, -1, axis=1)
-    return voltages_of(source, values.reshape(1, -1)[:, kept], rows)
+    return tables.voltages_of(source, values.reshape(1, -1)[:, kept], rows)

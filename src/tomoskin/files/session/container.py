@@ -13,23 +13,8 @@ import zlib
 from collections.abc import Mapping, Sequence
 from typing import BinaryIO
 
+from mcap import records as mcap
 from mcap.opcode import Opcode
-from mcap.records import (
-    Attachment,
-    AttachmentIndex,
-    Channel,
-    Chunk,
-    ChunkIndex,
-    DataEnd,
-    Footer,
-    Header,
-    MessageIndex,
-    Metadata,
-    MetadataIndex,
-    Schema,
-    Statistics,
-    SummaryOffset,
-)
 
 from tomoskin.core import MAGIC
 from tomoskin.files.session.mcap_records import encode, encode_message
@@ -60,12 +45,16 @@ class ContainerWriter:
     """
 
     def __init__(
-        self, file: BinaryIO, library: str, schemas: Sequence[Schema], channels: Sequence[Channel]
+        self,
+        file: BinaryIO,
+        library: str,
+        schemas: Sequence[mcap.Schema],
+        channels: Sequence[mcap.Channel],
     ) -> None:
         self.size = 0
         self._file, self._crc, self._broken = file, 0, False
         counts = {channel.id: 0 for channel in channels}
-        self._totals = Statistics(0, len(channels), counts, 0, 0, 0, 0, 0, len(schemas))
+        self._totals = mcap.Statistics(0, len(channels), counts, 0, 0, 0, 0, 0, len(schemas))
         self._summary = {
             Opcode.SCHEMA: bytearray(encode(*schemas)),
             Opcode.CHANNEL: bytearray(encode(*channels)),
@@ -75,9 +64,9 @@ class ContainerWriter:
             Opcode.CHUNK_INDEX: bytearray(),
         }
         self._records = self._summary[Opcode.SCHEMA] + self._summary[Opcode.CHANNEL]
-        self._indexes: dict[int, MessageIndex] = {}
+        self._indexes: dict[int, mcap.MessageIndex] = {}
         self._span: tuple[int, int] | None = None
-        self._write(MAGIC + encode(Header("", library)))
+        self._write(MAGIC + encode(mcap.Header("", library)))
 
     @property
     def is_linked(self) -> bool:
@@ -90,8 +79,8 @@ class ContainerWriter:
     def attach(self, name: str, media_type: str, data: bytes, log_time: int = 0) -> None:
         """Add a whole file under a name."""
         self.flush()
-        record = encode(Attachment(0, log_time, name, media_type, data))
-        index = AttachmentIndex(
+        record = encode(mcap.Attachment(0, log_time, name, media_type, data))
+        index = mcap.AttachmentIndex(
             self._write(record), len(record), log_time, 0, len(data), name, media_type
         )
         self._summary[Opcode.ATTACHMENT_INDEX] += encode(index)
@@ -100,8 +89,8 @@ class ContainerWriter:
     def describe(self, name: str, values: Mapping[str, str]) -> None:
         """Add named strings under a title."""
         self.flush()
-        record = encode(Metadata(name, dict(values)))
-        index = MetadataIndex(self._write(record), len(record), name)
+        record = encode(mcap.Metadata(name, dict(values)))
+        index = mcap.MetadataIndex(self._write(record), len(record), name)
         self._summary[Opcode.METADATA_INDEX] += encode(index)
         self._totals.metadata_count += 1
 
@@ -112,7 +101,7 @@ class ContainerWriter:
         records = self._records
         index = self._indexes.get(channel)
         if index is None:
-            index = self._indexes[channel] = MessageIndex(channel, [])
+            index = self._indexes[channel] = mcap.MessageIndex(channel, [])
         index.records.append((log_time, len(records)))
         number = self._totals.channel_message_counts[channel]
         records += encode_message(channel, number % 2**32, log_time, data)
@@ -127,14 +116,14 @@ class ContainerWriter:
         if self._span is None or self._broken:
             return
         records, (first, last), totals = bytes(self._records), self._span, self._totals
-        chunk = encode(Chunk("", records, last, first, zlib.crc32(records), len(records)))
+        chunk = encode(mcap.Chunk("", records, last, first, zlib.crc32(records), len(records)))
         begin, place = self.size, self.size + len(chunk)
         indexes, places = bytearray(), {}
         for channel, index in self._indexes.items():
             places[channel] = place + len(indexes)
             indexes += encode(index)
         self._write(chunk + indexes)
-        entry = ChunkIndex(
+        entry = mcap.ChunkIndex(
             len(chunk), begin, "", len(records), last, len(indexes), places, first, len(records)
         )
         self._summary[Opcode.CHUNK_INDEX] += encode(entry)
@@ -164,7 +153,7 @@ class ContainerWriter:
     def _finish(self) -> None:
         last_chunk = self.size
         try:
-            self._write(encode(DataEnd(self._crc)))
+            self._write(encode(mcap.DataEnd(self._crc)))
             self._write(self._ending(self.size))
             os.fsync(self._file.fileno())
         except OSError:
@@ -180,11 +169,11 @@ class ContainerWriter:
         summary, offsets = bytearray(), []
         for opcode, group in self._summary.items():
             if group:
-                offsets.append(SummaryOffset(opcode, start + len(summary), len(group)))
+                offsets.append(mcap.SummaryOffset(opcode, start + len(summary), len(group)))
                 summary += group
         offsets_start = start + len(summary)
         summary += encode(*offsets)
-        head = encode(Footer(start, offsets_start, 0))[:-4]
+        head = encode(mcap.Footer(start, offsets_start, 0))[:-4]
         return bytes(summary) + head + struct.pack("<I", zlib.crc32(summary + head)) + MAGIC
 
     def _write(self, data: bytes | bytearray) -> int:

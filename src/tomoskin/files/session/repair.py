@@ -30,17 +30,10 @@ from tomoskin.core import (
     open_input,
     written,
 )
+from tomoskin.files.session import mcap_records
 from tomoskin.files.session.channels import CHANNELS, SCHEMAS, SPAN, TOPICS
 from tomoskin.files.session.container import ContainerWriter
 from tomoskin.files.session.layout import host_time_of
-from tomoskin.files.session.mcap_records import (
-    LARGEST,
-    PREFIX,
-    LoggedMessage,
-    decode,
-    decode_chunk,
-    messages_in,
-)
 from tomoskin.files.session.scanned import Advance, no_report
 from tomoskin.files.session.session_reader import epoch_of
 from tomoskin.files.session.session_writer import (
@@ -204,10 +197,10 @@ def _about(source: Path) -> Iterator[Any]:
             yield stretch.record
 
 
-def _messages(record: McapRecord | None) -> Iterator[LoggedMessage]:
+def _messages(record: McapRecord | None) -> Iterator[mcap_records.LoggedMessage]:
     """Those of a chunk; of anything else there are none."""
     if isinstance(record, Chunk):
-        yield from messages_in(record, 0)
+        yield from mcap_records.messages_in(record, 0)
 
 
 def stretches(file: BinaryIO, size: int, advance: Advance) -> Iterator[Stretch]:
@@ -287,7 +280,7 @@ def _earliest_epoch(chunk: Chunk) -> float:
 
     Frames from before the recording are logged when it begins, later than they were.
     """
-    ages = ((m.log_time, host_time_of(m.data)) for m in messages_in(chunk, 0))
+    ages = ((m.log_time, host_time_of(m.data)) for m in mcap_records.messages_in(chunk, 0))
     differences = ((log - round(1e9 * host)) / 1e9 for log, host in ages if math.isfinite(host))
     return min(differences, default=math.inf)
 
@@ -319,12 +312,12 @@ def _copy(source: Path, container: ContainerWriter, result: Repaired, advance: A
 
 def _head(file: BinaryIO, place: int, size: int) -> tuple[int, int]:
     """Kind and end of the record at ``place``; its end is ``place`` where there can be none."""
-    head = _read(file, place, PREFIX.size)
-    if len(head) < PREFIX.size:
+    head = _read(file, place, mcap_records.PREFIX.size)
+    if len(head) < mcap_records.PREFIX.size:
         return 0, place
-    opcode, length = PREFIX.unpack(head)
-    stop = place + PREFIX.size + int(length)
-    fits = opcode in _KINDS and length <= LARGEST and stop <= size
+    opcode, length = mcap_records.PREFIX.unpack(head)
+    stop = place + mcap_records.PREFIX.size + int(length)
+    fits = opcode in _KINDS and length <= mcap_records.LARGEST and stop <= size
     return opcode, stop if fits else place
 
 
@@ -332,10 +325,12 @@ def _record(opcode: int, data: bytes) -> McapRecord | None:
     """What ``data`` is, when it is whole."""
     try:
         if opcode == Opcode.CHUNK:
-            chunk = decode_chunk(data)
-            deque(messages_in(chunk, 0), maxlen=0)  # ValueError where they do not add up
+            chunk = mcap_records.decode_chunk(data)
+            deque(
+                mcap_records.messages_in(chunk, 0), maxlen=0
+            )  # ValueError where they do not add up
             return None if chunk.compression else chunk
-        return decode(_KINDS[opcode], data) if data else None
+        return mcap_records.decode(_KINDS[opcode], data) if data else None
     except ValueError:
         return None
 
@@ -343,7 +338,7 @@ def _record(opcode: int, data: bytes) -> McapRecord | None:
 def _next_record(file: BinaryIO, place: int, beyond: int, size: int, advance: Advance) -> int:
     """Where from ``place`` on a whole record of data begins that ends ``beyond`` it, or the end."""
     while place < size:
-        window = _read(file, place, _WINDOW + PREFIX.size)
+        window = _read(file, place, _WINDOW + mcap_records.PREFIX.size)
         for match in _BEGINNING.finditer(window):
             start = place + match.start()
             opcode, stop = _head(file, start, size)
