@@ -16,24 +16,8 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 import numpy as np
 import typer
 
+from tomoskin.cli import calibrate_labels as labels, calibrate_reports as reports
 from tomoskin.cli.app import group
-from tomoskin.cli.calibrate_labels import (
-    ALONG_Y,
-    amounts,
-    body_examples,
-    class_examples,
-    labelled_presses,
-)
-from tomoskin.cli.calibrate_reports import (
-    body_facts,
-    body_lines,
-    class_facts,
-    class_lines,
-    mapping_facts,
-    mapping_lines,
-    touch_facts,
-    touch_lines,
-)
 from tomoskin.cli.named_files import SKIN, ForceFlag, Reads, Writes, with_options
 from tomoskin.cli.named_parts import Recorded, labelled_frames, reconstructed
 from tomoskin.cli.options import CalibrationOut, KnownSkinOption, ReferenceOption, SkinOption
@@ -154,7 +138,7 @@ def touch(
             calibration = old.with_model(old.model.updated(dv, xy, progress=bar))
     added = _added(calibration.model, frames, dv, xy)
     older = old.model if old is not None and not unlabelled else None
-    facts = touch_facts(calibration.model, added, older)
+    facts = reports.touch_facts(calibration.model, added, older)
     if given.skin is not None and (doubts := label_doubts(calibration.model, given.skin)):
         remark(f"{given.path}: {doubts}")
     if facts["is_guess"]:
@@ -163,7 +147,7 @@ def touch(
             f"error of {facts['mean_mm']:.0f} mm, and of {facts['guessed_mm']:.0f} mm if the "
             "answer is always their middle. Check --reference and the labels, or press harder"
         )
-    return LearningOutcome(calibration.write, facts, touch_lines(facts))
+    return LearningOutcome(calibration.write, facts, reports.touch_lines(facts))
 
 
 def _aligned(locator: Locator, dv: FloatArray, xy: FloatArray) -> Locator:
@@ -298,9 +282,9 @@ def _amount(
     from tomoskin.learning import KINDS, MEASURED, AmountModel, report_of
 
     skin, path, of = labelled.drawn, labelled.path, MEASURED[name]
-    amount = amounts(path, len(labelled.recording), given, unit, of)
+    amount = labels.amounts(path, len(labelled.recording), given, unit, of)
     result = _reconstruction(labelled)
-    presses = labelled_presses(path, result, amount, labelled.data.time, of)
+    presses = labels.labelled_presses(path, result, amount, labelled.data.time, of)
     with Bar("learning"):
         model = AmountModel.fit(presses, skin)
     facts = report_of(model)
@@ -341,16 +325,16 @@ def classes(
         old = CLASSES.read(onto) if onto else None
     given = labelled.onto(old)
     codes = old.model.examples.codes if old else None
-    examples = class_examples(given.path, given.dv, label, codes)
+    examples = labels.class_examples(given.path, given.dv, label, codes)
     with Bar("learning"):
         if old is None:
             skin_id = given.skin.identity if given.skin else ""
             made = CLASSES.of(Classifier.learn(examples, skin_id), given.pattern, given.skin)
         else:
             made = old.with_model(old.model.in_session(examples.dv, examples.flags))
-    facts = class_facts(made.model, len(given.dv))
+    facts = reports.class_facts(made.model, len(given.dv))
     return LearningOutcome(
-        made.write, facts, class_lines(made.model, facts, is_aligned=old is not None)
+        made.write, facts, reports.class_lines(made.model, facts, is_aligned=old is not None)
     )
 
 
@@ -362,7 +346,7 @@ def body(
         typer.Option(
             metavar="DEG[@AXIS]=A:B",
             help="Label: frames A to B-1 are bent by this angle about an axis in this direction "
-            f"from x (default {ALONG_Y:.0f}). Can be repeated. Default: the session's own "
+            f"from x (default {labels.ALONG_Y:.0f}). Can be repeated. Default: the session's own "
             "truth.",
         ),
     ] = None,
@@ -391,14 +375,14 @@ def body(
         )
     with Bar("preparing"):
         prepared = prepare(skin)
-    examples = body_examples(labelled.path, labelled.data, rest.mean, bend, states)
+    examples = labels.body_examples(labelled.path, labelled.data, rest.mean, bend, states)
     with Bar("learning"):
         model = BodyModel.learn(examples, voltage_covariance(prepared, rest))
     for problem in model.doubts:
         remark(f"{labelled.path}: {problem}")
-    facts = body_facts(model)
+    facts = reports.body_facts(model)
     made = BODY.of(model, labelled.pattern, skin)
-    return LearningOutcome(made.write, facts, body_lines(model, facts))
+    return LearningOutcome(made.write, facts, reports.body_lines(model, facts))
 
 
 _MappedOut = Annotated[
@@ -426,8 +410,8 @@ def mapping(labelled: Recorded) -> LearningOutcome:
             dv[frames], xy[frames], skin, reference=None if rest is None else rest.mean,
             noise=labelled.noise, progress=bar,
         )  # fmt: skip
-    facts = mapping_facts(answer, skin, frames.tolist())
-    lines = mapping_lines(facts)
+    facts = reports.mapping_facts(answer, skin, frames.tolist())
+    lines = reports.mapping_lines(facts)
     if answer.sure:
         document = answer.mapping.applied(skin).to_toml()
 

@@ -6,16 +6,7 @@ from collections.abc import Sequence
 from dataclasses import astuple, dataclass, fields, replace
 from typing import Self
 
-from tomoskin.board import wire
-from tomoskin.board.source import (
-    BOARDS,
-    DEFAULT_BOARD,
-    PRESCALERS,
-    BoardRecord,
-    Converter,
-    ScanSettings,
-    chop_limit,
-)
+from tomoskin.board import source, wire
 from tomoskin.twin.scanning import LIMITS
 
 Verdict = tuple[wire.Result, int]
@@ -51,10 +42,10 @@ class Board:
     firmware: tuple[int, int, int] = (1, 3, 0)
     unique_id: bytes = b"twin\0\0\0\0"
     limits: wire.BoardLimits = LIMITS
-    converter: Converter = BOARDS[DEFAULT_BOARD].converter
+    converter: source.Converter = source.BOARDS[source.DEFAULT_BOARD].converter
 
     @classmethod
-    def of(cls, record: BoardRecord, needed: int, current: float, unique_id: bytes) -> Self:
+    def of(cls, record: source.BoardRecord, needed: int, current: float, unique_id: bytes) -> Self:
         """A board of the table, of the smallest size that has the channels ``needed``."""
         channels = next((n for n in record.channels if n >= needed), record.channels[-1])
         own = {name: getattr(record, name) for name in _OF_RECORD}
@@ -96,7 +87,7 @@ class Board:
             "n_drives": command.n_drives > 0,
             "settling": command.settling <= _MAX_SETTLING,
             "oversampling": 1 <= command.oversampling <= self.max_oversampling,
-            "prescaler": command.prescaler in PRESCALERS,
+            "prescaler": command.prescaler in source.PRESCALERS,
         }
         names = [field.name for field in fields(wire.SetScan)]
         wrong = next((name for name, fine in good.items() if not fine), None)
@@ -155,11 +146,13 @@ class Board:
             return wire.Result.TOO_MANY_SAMPLES, most
         if mode is None:
             return OK
-        settings = ScanSettings(
+        settings = source.ScanSettings(
             scan.oversampling, scan.settling / 1e6, self.current, self.adc_bits,
             scan.dead_time / 1e6, scan.prescaler,
         )  # fmt: skip
-        limit = chop_limit(self.limits, settings, mode.periods, max(channels), self.tick_rate)
+        limit = source.chop_limit(
+            self.limits, settings, mode.periods, max(channels), self.tick_rate
+        )
         return OK if mode.frequency <= limit else (wire.Result.CHOP_TOO_FAST, limit)
 
 

@@ -15,6 +15,7 @@ from tomoskin.core import GeometryError, ScriptError, SkinError, located
 from tomoskin.model.pattern import Scan
 from tomoskin.model.section import toml_tables
 from tomoskin.model.skin import Skin
+from tomoskin.twin import script_schema as schema
 from tomoskin.twin.bend import strain_of
 from tomoskin.twin.course import (
     NO_FRAME,
@@ -27,17 +28,6 @@ from tomoskin.twin.course import (
 )
 from tomoskin.twin.presets import TwinSettings
 from tomoskin.twin.probe import Circle, Face, Finger, Shape, Square
-from tomoskin.twin.script_schema import (
-    FORMAT,
-    SECTIONS,
-    BendSection,
-    FaultSection,
-    MarkSection,
-    PressesSection,
-    PressSection,
-    ScriptSection,
-    StretchSection,
-)
 
 _DEFAULT_SOURCE = "script"
 
@@ -68,8 +58,8 @@ class Script:
     lead_in: float
     seed: int
     presses: tuple[ScriptedPress, ...]
-    faults: tuple[Scripted[FaultSection], ...]
-    marks: tuple[Scripted[MarkSection], ...]
+    faults: tuple[Scripted[schema.FaultSection], ...]
+    marks: tuple[Scripted[schema.MarkSection], ...]
     preset: str | None = None
     bends: tuple[ScriptedBend, ...] = ()
 
@@ -84,19 +74,19 @@ class Script:
             whole can be run on a skin, :func:`check_script` says.
         """
         with located("", ScriptError, SkinError):
-            tables = toml_tables(text, source, FORMAT, SECTIONS)
-            if PressesSection.section in tables:
+            tables = toml_tables(text, source, schema.FORMAT, schema.SECTIONS)
+            if schema.PressesSection.section in tables:
                 raise ScriptError(
                     "describes labelled frames, not a timeline",
-                    where=f"{source}: {PressesSection.heading}",
+                    where=f"{source}: {schema.PressesSection.heading}",
                     hint="give the number of frames: --presses N",
                 )
-            head = ScriptSection.read(tables.get("script", {}), f"{source}: [script]")
-            presses = tuple(_press(s, w) for s, w in PressSection.each(tables, source))
-            faults = tuple(_fault(s, w) for s, w in FaultSection.each(tables, source))
-            marks = tuple(Scripted(s, w) for s, w in MarkSection.each(tables, source))
-            bends = [ScriptedBend.of(s, w) for s, w in BendSection.each(tables, source)]
-            bends += [ScriptedBend.of(s, w) for s, w in StretchSection.each(tables, source)]
+            head = schema.ScriptSection.read(tables.get("script", {}), f"{source}: [script]")
+            presses = tuple(_press(s, w) for s, w in schema.PressSection.each(tables, source))
+            faults = tuple(_fault(s, w) for s, w in schema.FaultSection.each(tables, source))
+            marks = tuple(Scripted(s, w) for s, w in schema.MarkSection.each(tables, source))
+            bends = [ScriptedBend.of(s, w) for s, w in schema.BendSection.each(tables, source)]
+            bends += [ScriptedBend.of(s, w) for s, w in schema.StretchSection.each(tables, source)]
         return cls(
             source,
             presses=presses,
@@ -107,26 +97,26 @@ class Script:
         )
 
 
-def _press(given: PressSection, where: str) -> ScriptedPress:
+def _press(given: schema.PressSection, where: str) -> ScriptedPress:
     force = there_and_back(given, given.force, where)
     path = after((0.0, *given.at), given.path, f"{where} path")
     return ScriptedPress(given, where, _shape(given, where), force, path)
 
 
-def _shape(given: PressSection, where: str) -> Shape:
+def _shape(given: schema.PressSection, where: str) -> Shape:
     crown = given.crown or math.inf
     match given:
-        case PressSection(radius=float(radius)):
+        case schema.PressSection(radius=float(radius)):
             return Circle(radius, crown)
-        case PressSection(side=float(side)):
+        case schema.PressSection(side=float(side)):
             return Square(side, crown)
-        case PressSection(vertices=None):
+        case schema.PressSection(vertices=None):
             return Finger(given.length, given.width)
     with located(f"{where} vertices", ScriptError, GeometryError):
         return Face(given.vertices or (), crown)
 
 
-def _fault(given: FaultSection, where: str) -> Scripted[FaultSection]:
+def _fault(given: schema.FaultSection, where: str) -> Scripted[schema.FaultSection]:
     if given.end is not None and not given.end > given.start:
         raise ScriptError(
             f"expected a time after start, {given.start:g} s, got {given.end:g} s",

@@ -86,7 +86,7 @@ def test_a_skin_that_polarises_does_so_before_an_emulated_board_too(
 ) -> None:
     monkeypatch.setattr("tomoskin.twin.emulator.source.programs_of", lambda _: pico)
     settings = TwinSettings.preset("ideal").with_noise(0.0)
-    monkeypatch.setattr("tomoskin.twin.emulator.source.read_settings", lambda *_: settings)
+    monkeypatch.setattr("tomoskin.twin.read_settings", lambda *_: settings)
     plain = Skin.load("textile-disc-8")
     ionic = plain.altered({"twin": {"electrodes": "polarising"}})
     frames = []

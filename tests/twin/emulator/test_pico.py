@@ -311,7 +311,7 @@ def test_one_skin_file_runs_on_either_board(
 ) -> None:
     monkeypatch.setattr("tomoskin.twin.emulator.source.programs_of", lambda _: pico)
     quiet = TwinSettings.preset("ideal").with_noise(0.0)
-    monkeypatch.setattr("tomoskin.twin.emulator.source.read_settings", lambda *_: quiet)
+    monkeypatch.setattr("tomoskin.twin.read_settings", lambda *_: quiet)
     skin = Skin.load("textile-disc-8")
     transport = open_emulator("pico", skin)
     with Link(transport, SCAN, ScanSettings.of(skin)) as link:

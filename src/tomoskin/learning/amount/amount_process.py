@@ -11,12 +11,7 @@ from numpy.typing import ArrayLike
 from scipy.special import ndtri
 
 from tomoskin.core import DataError, FloatArray
-from tomoskin.learning.touch.gaussian_process import (
-    Process,
-    leading,
-    nine_in_ten,
-    squared_distances,
-)
+from tomoskin.learning.touch import gaussian_process as gp
 from tomoskin.learning.touch.presses import Features, frames
 
 _TERMS = (("change", "rest"), ("pressed",), ("rest",))
@@ -58,9 +53,9 @@ class FeatureBlock:
         features = Features.of(data - middle)
         values = features(data - middle)
         mean = values.mean(axis=0)
-        axes = leading(values - mean, components)
+        axes = gp.leading(values - mean, components)
         inputs = (values - mean) @ axes
-        square = squared_distances(inputs, inputs)
+        square = gp.squared_distances(inputs, inputs)
         unit = float(np.median(square[square > 0]))
         return cls(features, middle, mean, axes, inputs, unit)
 
@@ -70,7 +65,7 @@ class FeatureBlock:
 
     def squares(self, inputs: FloatArray) -> FloatArray:
         """(m, n) squared distances of ``inputs`` (m, c) from the presses."""
-        return squared_distances(inputs, self.inputs) / self.unit
+        return gp.squared_distances(inputs, self.inputs) / self.unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +88,7 @@ class AmountProcess:
     """
 
     blocks: Mapping[str, FeatureBlock]
-    process: Process
+    process: gp.Process
     scale: float
 
     @classmethod
@@ -131,7 +126,7 @@ class AmountProcess:
             for name, data in _named(rest, pressed).items()
         }
         squares = {name: block.squares(block.inputs) for name, block in blocks.items()}
-        process = Process.of(_TERMS, squares, labels[:, None])
+        process = gp.Process.of(_TERMS, squares, labels[:, None])
         return cls(blocks, process, _scale(np.abs(process.missed[:, 0])))
 
     @property
@@ -164,4 +159,4 @@ def _named(rest: FloatArray, pressed: FloatArray) -> dict[str, FloatArray]:
 def _scale(away: FloatArray) -> float:
     """Of deviations, by how many of which (n,) each left-out press is missed."""
     last = away[-max(len(away) // _RECENT, _LEAST) :]
-    return max(nine_in_ten(away), nine_in_ten(last) / _CHANCE) / HALF
+    return max(gp.nine_in_ten(away), gp.nine_in_ten(last) / _CHANCE) / HALF

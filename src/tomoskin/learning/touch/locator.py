@@ -16,12 +16,7 @@ from threadpoolctl import threadpool_limits
 
 from tomoskin.core import Detection, FloatArray
 from tomoskin.learning.kind import Progress, silent
-from tomoskin.learning.touch.gaussian_process import (
-    Process,
-    nine_in_ten,
-    squared_distances,
-    squared_norms,
-)
+from tomoskin.learning.touch import gaussian_process as gp
 from tomoskin.learning.touch.per_channel import Envelope, likeliest_envelope, rings
 from tomoskin.learning.touch.posterior import Estimates
 from tomoskin.learning.touch.presses import Features, Presses, Strength, frames, mean_about
@@ -84,7 +79,7 @@ class CalibratedCovariance:
         optimum = np.exp(minimize(cost, start, method="Nelder-Mead", options={"maxiter": 150}).x)
         far = squared_lengths(errors, cls(*optimum)(posterior))
         last = far[-max(len(far) // _RECENT, _FEWEST) :]
-        factor = max(nine_in_ten(far), nine_in_ten(last) / _CHANCE) / NINE_IN_TEN
+        factor = max(gp.nine_in_ten(far), gp.nine_in_ten(last) / _CHANCE) / NINE_IN_TEN
         spent = _FOLDED * (len(errors) + _SPENT) / max(len(errors) - _SPENT, 1)
         return cls(*(float(x) for x in factor * spent * optimum))
 
@@ -122,7 +117,7 @@ class Stacking:
     features: FloatArray
     estimates: FloatArray
     unit: float
-    process: Process
+    process: gp.Process
     part: float
     left_out: FloatArray
 
@@ -139,22 +134,22 @@ class Stacking:
         unit = _usual(between)
         squares = {
             "features": between / unit,
-            "estimate": squared_distances(estimates, estimates) / _NEAR**2,
+            "estimate": gp.squared_distances(estimates, estimates) / _NEAR**2,
         }
-        process = Process.of(_TERMS, squares, xy)
+        process = gp.Process.of(_TERMS, squares, xy)
         part = _part(estimates, process.left_out, xy)
         left_out = estimates + part * (process.left_out - estimates)
         return cls(features, estimates, unit, process, part, left_out)
 
     @cached_property
     def _norms(self) -> FloatArray:
-        return squared_norms(self.features)
+        return gp.squared_norms(self.features)
 
     def __call__(self, features: FloatArray, estimates: FloatArray) -> FloatArray:
         """(m, 2) places of frames with ``features`` (m, k) of which the maps say ``estimates``."""
         squares = {
-            "features": squared_distances(features, self.features, self._norms) / self.unit,
-            "estimate": squared_distances(estimates, self.estimates) / _NEAR**2,
+            "features": gp.squared_distances(features, self.features, self._norms) / self.unit,
+            "estimate": gp.squared_distances(estimates, self.estimates) / _NEAR**2,
         }
         return estimates + self.part * (self.process(squares) - estimates)
 
@@ -195,7 +190,7 @@ def twins(between: FloatArray, positions: FloatArray, unit: float) -> list[Remar
     """Presses with the same data as an earlier one, at another place, by the squared distances
     ``between`` their features (n, n)."""
     usual = _usual(between)
-    apart = squared_distances(positions, positions)
+    apart = gp.squared_distances(positions, positions)
     pairs = np.argwhere(np.triu((between < _SAME * usual) & (apart > _APART**2), 1))
     remarks: dict[int, Remark] = {}
     for first, second in pairs.tolist():
@@ -355,7 +350,7 @@ class Locator:
         grid = region.lattice(_PLACES)
         estimates = Estimates.of(data, positions, grid, envelope)
         progress(1, _STEPS)
-        between = squared_distances(data, data)
+        between = gp.squared_distances(data, data)
         stacking = Stacking.of(data, between, estimates.left_out, positions)
         progress(2, _STEPS)
         errors = stacking.left_out - positions

@@ -10,14 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, IntArray
-from tomoskin.learning.touch.gaussian_process import (
-    LENGTHS,
-    Basis,
-    Likeness,
-    climbed,
-    squared_distances,
-    telling,
-)
+from tomoskin.learning.touch import gaussian_process as gp
 from tomoskin.model.pattern import Pattern
 
 _TURNS = 32
@@ -60,7 +53,7 @@ class Envelope:
             return np.ones((len(positions), 1))
         k = len(self.electrodes)
         points = self.electrodes.reshape(-1, 2)
-        away = squared_distances(positions, points) / (points**2).sum(axis=1)
+        away = gp.squared_distances(positions, points) / (points**2).sum(axis=1)
         return np.asarray(
             np.exp(-0.5 * _FALL * np.log(away).reshape(len(positions), k, 4).sum(axis=2))
         )
@@ -91,7 +84,7 @@ def likeliest_envelope(
 
     Some rows tell which are likely, all of them which one is likeliest.
     """
-    some = telling(features.shape[1], _TELL)
+    some = gp.telling(features.shape[1], _TELL)
     by_some = {
         one: evidence_of(one.of_rows(some), positions, features[:, some]) for one in envelopes
     }
@@ -105,8 +98,8 @@ def likeliest_envelope(
 def evidence_of(envelope: Envelope, positions: FloatArray, features: FloatArray) -> float:
     """Log marginal likelihood of some presses at ``positions`` (n, 2), up to a constant of their
     ``features`` (n, k)."""
-    some = telling(len(positions), _TRIED_ON)
-    near = Likeness(LENGTHS[len(LENGTHS) // 2])(positions[some], positions[some])
+    some = gp.telling(len(positions), _TRIED_ON)
+    near = gp.Likeness(gp.LENGTHS[len(gp.LENGTHS) // 2])(positions[some], positions[some])
     about = (features[some] - features[some].mean(axis=0)).T
     size = envelope(positions[some]).T
     prior = size[:, :, None] * near * size[:, None, :] + _NOISE * np.eye(len(some))
@@ -152,7 +145,7 @@ class ChannelMaps:
     """
 
     envelope: Envelope
-    basis: Basis
+    basis: gp.Basis
     mean: FloatArray
     size: FloatArray
     ratio: FloatArray
@@ -168,24 +161,24 @@ class ChannelMaps:
         The length scale, of some rows for all, and the noise of each are those of the largest
         evidence.
         """
-        some = telling(features.shape[1], _TELL)
+        some = gp.telling(features.shape[1], _TELL)
 
         def evidence(length: float) -> float:
-            likeness, their = Likeness(length), envelope.of_rows(some)
+            likeness, their = gp.Likeness(length), envelope.of_rows(some)
             return cls._of(likeness, positions, features[:, some], their).evidence
 
-        return cls._of(climbed(evidence), positions, features, envelope)
+        return cls._of(gp.climbed(evidence), positions, features, envelope)
 
     @classmethod
     def _of(
         cls,
-        likeness: Likeness,
+        likeness: gp.Likeness,
         positions: FloatArray,
         features: FloatArray,
         envelope: Envelope,
         ratio: FloatArray | None = None,
     ) -> Self:
-        basis = Basis.of(likeness, positions, _FUNCTIONS)
+        basis = gp.Basis.of(likeness, positions, _FUNCTIONS)
         n, mean = len(features), features.mean(axis=0)
         about = (features - mean).T
         design = envelope(positions).T[:, :, None] * basis(positions)

@@ -11,13 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray
-from tomoskin.learning.touch.gaussian_process import (
-    Likeness,
-    climbed,
-    moments,
-    squared_distances,
-    telling,
-)
+from tomoskin.learning.touch import gaussian_process as gp
 from tomoskin.learning.touch.maps import ResponseMaps, principal
 from tomoskin.learning.touch.per_channel import ChannelLikelihood, ChannelMaps, Envelope
 
@@ -105,7 +99,7 @@ def powers_of(
     ``log_likelihoods`` two (n, g), of presses that the maps have not seen. A pool's sum over the
     grid is a product of what each power makes of both.
     """
-    nearest = squared_distances(xy, grid).argmin(axis=1)[:, None, None]
+    nearest = gp.squared_distances(xy, grid).argmin(axis=1)[:, None, None]
     tried = np.append(0.0, POWERS)
     logs = [
         tried[:, None] * (part - part.max(axis=1, keepdims=True))[:, None]
@@ -174,7 +168,7 @@ class Estimates:
         envelope: Envelope,
     ) -> Self:
         """Learn the maps; length scales by evidence, powers by left-out presses."""
-        n, few = len(positions), telling(len(positions), _MOST)
+        n, few = len(positions), gp.telling(len(positions), _MOST)
         likeness = _likeliest(positions, features)
         maps = ResponseMaps.of(likeness, positions, features, principal(features))
         channels = ChannelMaps.of(positions[few], features[few], envelope)
@@ -184,13 +178,13 @@ class Estimates:
             some, theirs = positions[~out], features[~out]
             learnt = ResponseMaps.of(likeness, some, theirs, principal(theirs))
             folds.append(GridLikelihood.of(learnt, grid))
-            spread = telling(len(some), _MOST)
+            spread = gp.telling(len(some), _MOST)
             single = ChannelLikelihood.of(channels.again(some[spread], theirs[spread]), grid)
             misfit[out], alone[out] = folds[-1].misfit(features[out]), single(features[out])
             unlike[out] = folds[-1].unlike(features[out], misfit[out])
         parts = [folds[0].of_misfit(misfit), alone]
         powers = powers_of([part[few] for part in parts], grid, positions[few])
-        left_out = moments(pooled(parts, powers), grid)
+        left_out = gp.moments(pooled(parts, powers), grid)
         per_channel = ChannelLikelihood.of(channels, grid) if powers[1] else None
         usual = np.maximum(np.median(unlike, axis=0), (_LEAST, _SHAPE))
         fewer = (n - _LESS) / (n + _LESS)
@@ -208,7 +202,7 @@ class Estimates:
         parts = [self.likelihood.of_misfit(misfit)]
         if self.per_channel is not None:
             parts.append(self.per_channel(features))
-        mean, covariance = moments(pooled(parts, self.powers), self.grid)
+        mean, covariance = gp.moments(pooled(parts, self.powers), self.grid)
         unlike = self.likelihood.unlike(features, misfit)
         return mean, covariance, (unlike / self.usual).max(axis=1)
 
@@ -229,13 +223,13 @@ class Estimates:
         return np.asarray(self.grid[int(self.likelihood.volume.argmax())])
 
 
-def _likeliest(positions: FloatArray, features: FloatArray) -> Likeness:
+def _likeliest(positions: FloatArray, features: FloatArray) -> gp.Likeness:
     """The likeness of the maps' largest evidence, as some of the rows tell."""
-    some = telling(features.shape[1], _TELL)
+    some = gp.telling(features.shape[1], _TELL)
     alone = np.eye(len(some))
-    return climbed(
+    return gp.climbed(
         lambda length: (
-            ResponseMaps.of(Likeness(length), positions, features[:, some], alone).evidence
+            ResponseMaps.of(gp.Likeness(length), positions, features[:, some], alone).evidence
         )
     )
 

@@ -13,14 +13,7 @@ from scipy.special import entr
 from threadpoolctl import threadpool_limits
 
 from tomoskin.core import DataError, FloatArray, IntArray
-from tomoskin.learning.touch.gaussian_process import (
-    Basis,
-    Likeness,
-    moments,
-    nearness,
-    squared_distances,
-    telling,
-)
+from tomoskin.learning.touch import gaussian_process as gp
 from tomoskin.learning.touch.posterior import BoolArray
 from tomoskin.learning.touch.presses import Presses, labelled_touches
 from tomoskin.learning.touch.topographic import TopographicMap, coefficients_of, whitening
@@ -321,7 +314,7 @@ class _SessionMaps:
     def of(cls, locator: Locator, grid: FloatArray) -> Self:
         """Of some of the presses; folds of them say how sharp the maps are."""
         presses = locator.presses
-        chosen = telling(len(presses), _LEARNT_ON)
+        chosen = gp.telling(len(presses), _LEARNT_ON)
         dv, positions = presses.dv[chosen], locator.region.scaled(presses.xy[chosen])
         fold = np.arange(len(dv)) % _FOLDS
         parts = []
@@ -336,7 +329,7 @@ class _SessionMaps:
 
     @classmethod
     def _plain(cls, dv: FloatArray, positions: FloatArray, grid: FloatArray) -> Self:
-        basis = Basis.of(Likeness(_LENGTH), grid)
+        basis = gp.Basis.of(gp.Likeness(_LENGTH), grid)
         features = SessionFeatures.of(dv)(dv)
         there = basis(positions)
         coefficients = coefficients_of(there, features, _RIDGE)
@@ -368,7 +361,7 @@ def _likeliest_power(parts: Sequence[tuple[TopographicMap, FloatArray, IntArray]
 
 
 def _numbers(positions: FloatArray, grid: FloatArray) -> IntArray:
-    return np.asarray(squared_distances(positions, grid).argmin(axis=1))
+    return np.asarray(gp.squared_distances(positions, grid).argmin(axis=1))
 
 
 def _correction(positions: FloatArray, known: BoolArray, labels: FloatArray) -> FloatArray:
@@ -377,15 +370,15 @@ def _correction(positions: FloatArray, known: BoolArray, labels: FloatArray) -> 
     A smooth mapping of the sheet onto itself fits the frames about as well.
     """
     at = positions[known]
-    among = nearness(at, at, _SMOOTH) + _UNSURE * np.eye(len(at))
-    near = nearness(positions, at, _SMOOTH)
+    among = gp.nearness(at, at, _SMOOTH) + _UNSURE * np.eye(len(at))
+    near = gp.nearness(positions, at, _SMOOTH)
     return np.asarray(near @ np.linalg.solve(among, labels - at))
 
 
 def _spread(weights: FloatArray, mean: FloatArray, grid: FloatArray) -> FloatArray:
     """(n, 2, 2) mean square of the grid's positions about ``mean`` (n, 2)."""
     off = weights @ grid - mean
-    about = moments(weights, grid)[1] + off[:, :, None] * off[:, None]
+    about = gp.moments(weights, grid)[1] + off[:, :, None] * off[:, None]
     return np.asarray(about + _FLOOR**2 * np.eye(2))
 
 
@@ -407,7 +400,7 @@ def prevalence(presses: FloatArray, touches: FloatArray) -> FloatArray:
 
     ``touches`` (m, 2), both in radii of the region. The sum is one.
     """
-    often, before = (nearness(presses, some, _NEAR).mean(axis=1) for some in (touches, presses))
+    often, before = (gp.nearness(presses, some, _NEAR).mean(axis=1) for some in (touches, presses))
     weight = often / before
     return np.asarray(weight / weight.sum())
 

@@ -11,18 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
+from tomoskin import twin
 from tomoskin.board.source import BOARDS, DEFAULT_BOARD, SerialTransport, Transport, read_options
 from tomoskin.core import FloatArray, SourceError
 from tomoskin.model.skin import Skin
-from tomoskin.twin import (
-    SheetTransport,
-    ThermalVoltages,
-    TwinSettings,
-    TwinSkin,
-    on_converter,
-    read_board,
-    read_settings,
-)
 from tomoskin.twin.emulator.board_process import (
     BoardProcess,
     BoardPrograms,
@@ -36,17 +28,17 @@ _STEP = 0.01
 """Between two looks at the sheet, s."""
 
 
-class EmulatorTransport(SheetTransport):
+class EmulatorTransport(twin.SheetTransport):
     """Bytes of a board that is simulated down to its processor."""
 
     def __init__(
         self,
         programs: BoardPrograms,
-        sheet: TwinSkin,
+        sheet: twin.TwinSkin,
         front: Front,
         own: OwnVoltages | None = None,
         *,
-        thermal: ThermalVoltages | None = None,
+        thermal: twin.ThermalVoltages | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         """Power the board on; SourceError when it does not start.
@@ -127,12 +119,12 @@ def open_emulator(argument: str, skin: Skin) -> EmulatorTransport:
         For an unknown option, or when firmware and emulator cannot be built here.
     """
     options = read_options(argument, ("seed", "preset", "board", *BOARDS), "emulator")
-    board = read_board(options, "emulator") or DEFAULT_BOARD
-    settings = read_settings(options, skin, "emulator").with_electrodes(skin.twin.electrodes)
+    board = twin.read_board(options, "emulator") or DEFAULT_BOARD
+    settings = twin.read_settings(options, skin, "emulator").with_electrodes(skin.twin.electrodes)
     own, thermal = own_of(skin, settings)
     return EmulatorTransport(
         programs_of(board),
-        TwinSkin.of(skin, settings),
+        twin.TwinSkin.of(skin, settings),
         front_of(skin, settings, board),
         own,
         thermal=thermal,
@@ -160,8 +152,8 @@ def powered(
 @contextmanager
 def emulate_board(skin: Skin, board: str = DEFAULT_BOARD) -> Iterator[BoardProcess]:
     """A board on the skin at rest, for a host that opens its port itself; SourceError."""
-    settings = TwinSettings.preset(skin.twin.preset).with_electrodes(skin.twin.electrodes)
-    resistance, (own, _) = TwinSkin.of(skin, settings).resistance(), own_of(skin, settings)
+    settings = twin.TwinSettings.preset(skin.twin.preset).with_electrodes(skin.twin.electrodes)
+    resistance, (own, _) = twin.TwinSkin.of(skin, settings).resistance(), own_of(skin, settings)
     front = front_of(skin, settings, board)
     with powered(programs_of(board), front, resistance, own=own) as (process, _):
         yield process
@@ -190,11 +182,11 @@ def emulate_load(
         yield transport
 
 
-def own_of(skin: Skin, settings: TwinSettings) -> tuple[OwnVoltages, ThermalVoltages]:
+def own_of(skin: Skin, settings: twin.TwinSettings) -> tuple[OwnVoltages, twin.ThermalVoltages]:
     """What is read of electrodes and amplifiers themselves, and how their warmth wanders."""
     electronics, n = settings.electronics, skin.n_electrodes
     offsets, warmth = np.random.SeedSequence(settings.seed).spawn(2)
-    thermal = ThermalVoltages(n, electronics, warmth)
+    thermal = twin.ThermalVoltages(n, electronics, warmth)
     polarises = math.isfinite(electronics.double_layer)
     own = OwnVoltages(
         potentials=thermal.volts,
@@ -205,7 +197,7 @@ def own_of(skin: Skin, settings: TwinSettings) -> tuple[OwnVoltages, ThermalVolt
     return own, thermal
 
 
-def front_of(skin: Skin, settings: TwinSettings, board: str = DEFAULT_BOARD) -> Front:
+def front_of(skin: Skin, settings: twin.TwinSettings, board: str = DEFAULT_BOARD) -> Front:
     """The board before a skin, as far as the emulator knows it.
 
     The skin file's read-out is that of the board it was made for. Another one's amplifier uses as
@@ -213,7 +205,7 @@ def front_of(skin: Skin, settings: TwinSettings, board: str = DEFAULT_BOARD) -> 
     """
     compliance = settings.electronics.compliance
     bits = BOARDS[board].adc_bits
-    readout, noise = on_converter(skin.readout, settings.electronics.noise, bits)
+    readout, noise = twin.on_converter(skin.readout, settings.electronics.noise, bits)
     return Front(
         current=skin.current,
         compliance=1e300 if math.isinf(compliance) else compliance,
