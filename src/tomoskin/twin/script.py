@@ -15,17 +15,8 @@ from tomoskin.core import GeometryError, ScriptError, SkinError, located
 from tomoskin.model.pattern import Scan
 from tomoskin.model.section import toml_tables
 from tomoskin.model.skin import Skin
-from tomoskin.twin import script_schema as schema
+from tomoskin.twin import course, script_schema as schema
 from tomoskin.twin.bend import strain_of
-from tomoskin.twin.course import (
-    NO_FRAME,
-    Scripted,
-    ScriptedBend,
-    ScriptedPress,
-    after,
-    check_stages,
-    there_and_back,
-)
 from tomoskin.twin.presets import TwinSettings
 from tomoskin.twin.probe import Circle, Face, Finger, Shape, Square
 
@@ -57,11 +48,11 @@ class Script:
     duration: float
     lead_in: float
     seed: int
-    presses: tuple[ScriptedPress, ...]
-    faults: tuple[Scripted[schema.FaultSection], ...]
-    marks: tuple[Scripted[schema.MarkSection], ...]
+    presses: tuple[course.ScriptedPress, ...]
+    faults: tuple[course.Scripted[schema.FaultSection], ...]
+    marks: tuple[course.Scripted[schema.MarkSection], ...]
     preset: str | None = None
-    bends: tuple[ScriptedBend, ...] = ()
+    bends: tuple[course.ScriptedBend, ...] = ()
 
     @classmethod
     def from_toml(cls, text: str, *, source: str = _DEFAULT_SOURCE) -> Self:
@@ -84,9 +75,13 @@ class Script:
             head = schema.ScriptSection.read(tables.get("script", {}), f"{source}: [script]")
             presses = tuple(_press(s, w) for s, w in schema.PressSection.each(tables, source))
             faults = tuple(_fault(s, w) for s, w in schema.FaultSection.each(tables, source))
-            marks = tuple(Scripted(s, w) for s, w in schema.MarkSection.each(tables, source))
-            bends = [ScriptedBend.of(s, w) for s, w in schema.BendSection.each(tables, source)]
-            bends += [ScriptedBend.of(s, w) for s, w in schema.StretchSection.each(tables, source)]
+            marks = tuple(course.Scripted(s, w) for s, w in schema.MarkSection.each(tables, source))
+            bends = [
+                course.ScriptedBend.of(s, w) for s, w in schema.BendSection.each(tables, source)
+            ]
+            bends += [
+                course.ScriptedBend.of(s, w) for s, w in schema.StretchSection.each(tables, source)
+            ]
         return cls(
             source,
             presses=presses,
@@ -97,10 +92,10 @@ class Script:
         )
 
 
-def _press(given: schema.PressSection, where: str) -> ScriptedPress:
-    force = there_and_back(given, given.force, where)
-    path = after((0.0, *given.at), given.path, f"{where} path")
-    return ScriptedPress(given, where, _shape(given, where), force, path)
+def _press(given: schema.PressSection, where: str) -> course.ScriptedPress:
+    force = course.there_and_back(given, given.force, where)
+    path = course.after((0.0, *given.at), given.path, f"{where} path")
+    return course.ScriptedPress(given, where, _shape(given, where), force, path)
 
 
 def _shape(given: schema.PressSection, where: str) -> Shape:
@@ -116,7 +111,7 @@ def _shape(given: schema.PressSection, where: str) -> Shape:
         return Face(given.vertices or (), crown)
 
 
-def _fault(given: schema.FaultSection, where: str) -> Scripted[schema.FaultSection]:
+def _fault(given: schema.FaultSection, where: str) -> course.Scripted[schema.FaultSection]:
     if given.end is not None and not given.end > given.start:
         raise ScriptError(
             f"expected a time after start, {given.start:g} s, got {given.end:g} s",
@@ -129,7 +124,7 @@ def _fault(given: schema.FaultSection, where: str) -> Scripted[schema.FaultSecti
             where=f"{where} other",
             hint="an electrode is always connected to itself",
         )
-    return Scripted(given, where)
+    return course.Scripted(given, where)
 
 
 _LEFT = 0.01
@@ -157,7 +152,7 @@ def check_script(script: Script, skin: Skin) -> None:
             where=f"{script.source}: [script] duration",
             hint="make it longer, or shorten [readout] settling of the skin",
         )
-    check_stages(script.presses, scan.scan_time)
+    course.check_stages(script.presses, scan.scan_time)
     _check_faults(script, skin, scan.scan_time)
     for press in script.presses:
         press.check_on(skin.outline)
@@ -204,7 +199,7 @@ def _check_faults(script: Script, skin: Skin, frame_time: float) -> None:
                 f"it lasts {1e3 * lasts:g} ms, shorter than a frame of this "
                 f"skin, {1e3 * frame_time:.3g} ms",
                 where=f"{fault.where} end",
-                hint=NO_FRAME,
+                hint=course.NO_FRAME,
             )
         for key in ("electrode", "other"):
             electrode = getattr(fault.given, key)
@@ -216,7 +211,7 @@ def _check_faults(script: Script, skin: Skin, frame_time: float) -> None:
                 )
 
 
-def _check_ids(presses: tuple[ScriptedPress, ...]) -> None:
+def _check_ids(presses: tuple[course.ScriptedPress, ...]) -> None:
     for first, second in combinations(presses, 2):
         start = first.given.start
         together = min(first.end, second.end) > max(start, second.given.start) + _ROUNDING
@@ -229,7 +224,7 @@ def _check_ids(presses: tuple[ScriptedPress, ...]) -> None:
 
 
 def _check_ends(script: Script) -> None:
-    lasting: list[ScriptedPress | ScriptedBend] = [*script.presses, *script.bends]
+    lasting: list[course.ScriptedPress | course.ScriptedBend] = [*script.presses, *script.bends]
     last = [(one.end, one.where, "it to end by") for one in lasting]
     last += [
         (one.given.stop, f"{one.where} {'end' if one.given.end else 'start'}", "at most")

@@ -15,25 +15,14 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Footer, Metadata
 
 from tomoskin.core import EMPTY, MAGIC, DataError, open_input, read_refusals
-from tomoskin.files.session.mcap_records import (
-    LARGEST,
-    LARGEST_SUMMARY,
-    PREFIX,
-    LoggedMessage,
-    Summary,
-    decode,
-    decode_chunk,
-    decode_summary,
-    encode,
-    messages_in,
-)
+from tomoskin.files.session import mcap_records
 
 MEND = "tomoskin session repair recovers all whole chunks"
 """What to do about a damaged file."""
 
 _END = "tomoskin session repair completes it"
 
-_FOOTER_BYTES = len(encode(Footer(0, 0, 0)))
+_FOOTER_BYTES = len(mcap_records.encode(Footer(0, 0, 0)))
 
 
 class ContainerReader:
@@ -60,7 +49,7 @@ class ContainerReader:
     def __init__(self, path: Path) -> None:
         self.where, self.torn = str(path), ""
         self._prefix, self.first = "", 0
-        self.summary: Summary | None = None
+        self.summary: mcap_records.Summary | None = None
         self._file = open_input(path, buffering=1 << 18)
         self.size = self._end = self._file.seek(0, io.SEEK_END)
         try:
@@ -86,7 +75,7 @@ class ContainerReader:
                 break
             if opcode == Opcode.METADATA:
                 with self._damage_at(offset):
-                    record = decode(Metadata, self._record(offset))
+                    record = mcap_records.decode(Metadata, self._record(offset))
                 if record.name == self._prefix + name:
                     return record.metadata
         return None
@@ -100,11 +89,13 @@ class ContainerReader:
             offsets = self.summary.attachments
         for offset in offsets:
             with self._damage_at(offset):
-                record = decode(Attachment, self._record(offset))
+                record = mcap_records.decode(Attachment, self._record(offset))
             if record.name.startswith(self._prefix):
                 yield replace(record, name=record.name.removeprefix(self._prefix))
 
-    def messages(self, channels: frozenset[int], since: int = 0) -> Iterator[LoggedMessage]:
+    def messages(
+        self, channels: frozenset[int], since: int = 0
+    ) -> Iterator[mcap_records.LoggedMessage]:
         """Messages of the channels ``wanted`` logged at ``since`` ns or later, in file order.
 
         Of a file with its end only the chunks that hold such messages are read.
@@ -114,7 +105,7 @@ class ContainerReader:
                 if message.channel in channels and message.log_time >= since:
                     yield message
 
-    def last(self, channel: int) -> LoggedMessage | None:
+    def last(self, channel: int) -> mcap_records.LoggedMessage | None:
         """The last message of a channel in the file."""
         channels = frozenset({channel})
         if self.summary is None:
@@ -133,9 +124,9 @@ class ContainerReader:
             own = frozenset(self.first + channel for channel in channels)
             yield from self.summary.chunks(own, since)
 
-    def _messages_at(self, offset: int) -> Iterator[LoggedMessage]:
+    def _messages_at(self, offset: int) -> Iterator[mcap_records.LoggedMessage]:
         with self._damage_at(offset):
-            chunk = decode_chunk(self._record(offset))
+            chunk = mcap_records.decode_chunk(self._record(offset))
         if chunk.compression:
             raise DataError(
                 f"its chunks are compressed ({chunk.compression}), but tomoskin reads only "
@@ -144,7 +135,7 @@ class ContainerReader:
                 hint="decompress it first: mcap decompress",
             )
         with self._damage_at(offset):
-            yield from messages_in(chunk, offset, self.first)
+            yield from mcap_records.messages_in(chunk, offset, self.first)
 
     def _open(self) -> None:
         """Read the summary, where the file has its end."""
@@ -160,7 +151,7 @@ class ContainerReader:
         end = self.size - _FOOTER_BYTES - len(MAGIC)
         tail = self._read(end, _FOOTER_BYTES + len(MAGIC))
         try:
-            footer = decode(Footer, tail.removesuffix(MAGIC))
+            footer = mcap_records.decode(Footer, tail.removesuffix(MAGIC))
         except ValueError:
             stop = "the program or the computer stopped during the recording"
             self.torn = f"is incomplete: {stop} ({_END})"
@@ -171,18 +162,18 @@ class ContainerReader:
         with self._damage_at(start):
             if not len(MAGIC) <= start <= footer.summary_offset_start <= end:
                 raise ValueError("the index is not in the file")
-            if end - start > LARGEST_SUMMARY:
+            if end - start > mcap_records.LARGEST_SUMMARY:
                 raise ValueError(f"an index of {end - start} bytes")
-            self.summary = decode_summary(footer, self._read(start, end - start))
+            self.summary = mcap_records.decode_summary(footer, self._read(start, end - start))
 
     def _records(self) -> Iterator[tuple[int, int]]:
         """(opcode, offset) from the first record on; ends where the file is torn."""
         place = len(MAGIC)
-        while place + PREFIX.size <= self._end:
-            opcode, length = PREFIX.unpack(self._read(place, PREFIX.size))
-            if length > LARGEST or not opcode:
+        while place + mcap_records.PREFIX.size <= self._end:
+            opcode, length = mcap_records.PREFIX.unpack(self._read(place, mcap_records.PREFIX.size))
+            if length > mcap_records.LARGEST or not opcode:
                 raise self._damage(place, f"a record of kind {opcode} and {length} bytes")
-            after = place + PREFIX.size + length
+            after = place + mcap_records.PREFIX.size + length
             if after > self._end:
                 break
             yield opcode, place
@@ -197,11 +188,15 @@ class ContainerReader:
 
     def _record(self, offset: int) -> bytes:
         """A whole record; ValueError where it would go beyond the end."""
-        head = self._read(offset, PREFIX.size)
-        length = PREFIX.unpack(head)[1] if len(head) == PREFIX.size else self.size
-        if length > min(LARGEST, self.size - offset - PREFIX.size):
+        head = self._read(offset, mcap_records.PREFIX.size)
+        length = (
+            mcap_records.PREFIX.unpack(head)[1]
+            if len(head) == mcap_records.PREFIX.size
+            else self.size
+        )
+        if length > min(mcap_records.LARGEST, self.size - offset - mcap_records.PREFIX.size):
             raise ValueError(f"a record of {length} bytes extends beyond the end of the file")
-        return self._read(offset, PREFIX.size + length)
+        return self._read(offset, mcap_records.PREFIX.size + length)
 
     def _read(self, place: int, length: int) -> bytes:
         with read_refusals(self.where):

@@ -13,17 +13,8 @@ import msgspec
 
 from tomoskin.board.source import TICK_RATES
 from tomoskin.core import DataError, Event, Mark, MarkedFrame, SkinError, StrPath
-from tomoskin.files.session import channels
+from tomoskin.files.session import channels, layout
 from tomoskin.files.session.container_reader import MEND, ContainerReader
-from tomoskin.files.session.layout import (
-    RecordedTouches,
-    Truth,
-    decode_frame,
-    decode_raw,
-    event_of,
-    touches_of,
-    truth_of,
-)
 from tomoskin.files.session.mcap_records import LoggedMessage
 from tomoskin.files.session.session_writer import ABOUT, FORMAT, SKIN_FILE, SKINS
 from tomoskin.model.skin import Skin
@@ -89,34 +80,34 @@ class SessionReader(AbstractContextManager["SessionReader"]):
     def frames(self, since: float | None = None) -> Iterator[MarkedFrame]:
         """Frames, from host time ``since`` on."""
         for message in self.container.messages(_FRAMES, _log_time(self, since)):
-            yield decode_frame(message.data, _place(self, message))
+            yield layout.decode_frame(message.data, _place(self, message))
 
     def raw(self, since: float | None = None) -> Iterator[tuple[float, bytes]]:
         """(host time, bytes as they were read from the source)."""
         for message in self.container.messages(_RAW, _log_time(self, since)):
-            yield decode_raw(message.data, _place(self, message))
+            yield layout.decode_raw(message.data, _place(self, message))
 
     def reads(self, since: float | None = None) -> Iterator[tuple[float, bytes] | MarkedFrame]:
         """Raw bytes, each followed by the frames that they completed, as they were recorded."""
         for message in self.container.messages(_RAW | _FRAMES, _log_time(self, since)):
-            decode = decode_raw if message.channel == channels.RAW else decode_frame
+            decode = layout.decode_raw if message.channel == channels.RAW else layout.decode_frame
             yield decode(message.data, _place(self, message))
 
-    def touches(self) -> Iterator[RecordedTouches]:
+    def touches(self) -> Iterator[layout.RecordedTouches]:
         """Touches of every frame that had some, or none after some."""
-        return _documents(self, channels.TOUCHES, touches_of)
+        return _documents(self, channels.TOUCHES, layout.touches_of)
 
-    def truth(self) -> Iterator[Truth]:
+    def truth(self) -> Iterator[layout.Truth]:
         """The twin's presses and bends, each time that they changed."""
-        return _documents(self, channels.TRUTH, truth_of)
+        return _documents(self, channels.TRUTH, layout.truth_of)
 
     def events(self) -> Iterator[Event]:
         """The events of the run, in their order."""
-        return _documents(self, channels.EVENTS, event_of)
+        return _documents(self, channels.EVENTS, layout.event_of)
 
     def notes(self) -> Iterator[Event]:
         """The notes that a person made."""
-        return _documents(self, channels.NOTES, event_of)
+        return _documents(self, channels.NOTES, layout.event_of)
 
     def device(self) -> dict[str, Any]:
         """What the board last said of itself; empty when it did not."""

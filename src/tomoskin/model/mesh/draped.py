@@ -18,17 +18,10 @@ from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
 
 from tomoskin.core import FloatArray, GeometryError, IntArray, located
+from tomoskin.model.mesh import triangles
 from tomoskin.model.mesh.mesh import MeshFile
 from tomoskin.model.mesh.polygon import Polygon
 from tomoskin.model.mesh.surface import Surface, rows_of
-from tomoskin.model.mesh.triangles import (
-    SIDES,
-    barycentric,
-    check_cells,
-    check_crossings,
-    closest,
-    paired_facets,
-)
 
 _ROUNDS = 100
 _SETTLED = 1e-6
@@ -70,7 +63,7 @@ def rim_of(cells: IntArray) -> IntArray:
     GeometryError
         When there is no rim, more than one, or a hole that makes it no disc.
     """
-    sides = np.concatenate([cells[:, turn] for turn in SIDES])
+    sides = np.concatenate([cells[:, turn] for turn in triangles.SIDES])
     n = int(cells.max()) + 1
     forth = sides[:, 0] * n + sides[:, 1]
     back = sides[:, 1] * n + sides[:, 0]
@@ -97,7 +90,7 @@ def rim_of(cells: IntArray) -> IntArray:
 
 def same_turn(cells: IntArray) -> IntArray:
     """The cells, all turning as the first does. Raises GeometryError for a one-sided surface."""
-    pairs = paired_facets(cells)[0]
+    pairs = triangles.paired_facets(cells)[0]
     turns = np.where(_turn_alike(cells, pairs), 1.0, -1.0)
     n = len(cells)
     half = coo_array((turns, (pairs[:, 0], pairs[:, 1])), shape=(n, n))
@@ -121,8 +114,8 @@ def _turn_alike(cells: IntArray, pairs: IntArray) -> FloatArray:
     """(n_pairs,) whether two neighbours run along their common edge in opposite senses."""
     one, other = cells[pairs[:, 0]], cells[pairs[:, 1]]
     opposed = np.zeros(len(pairs), dtype=bool)
-    for a, b in SIDES:
-        for c, d in SIDES:
+    for a, b in triangles.SIDES:
+        for c, d in triangles.SIDES:
             opposed |= (one[:, a] == other[:, d]) & (one[:, b] == other[:, c])
     return opposed
 
@@ -145,7 +138,7 @@ def _on_disc(points: FloatArray, cells: IntArray, rim: IntArray) -> FloatArray:
 
 def _laplacian(cells: IntArray, weight: FloatArray, n: int) -> csr_array:
     """(n, n) Σ over the sides of all cells of weight · (uᵢ − uⱼ)²; weight (n_cells, 3) by side."""
-    start, end = (np.concatenate([cells[:, turn[k]] for turn in SIDES]) for k in (0, 1))
+    start, end = (np.concatenate([cells[:, turn[k]] for turn in triangles.SIDES]) for k in (0, 1))
     w = weight.T.reshape(-1)
     rows = np.concatenate([start, end, start, end])
     columns = np.concatenate([start, end, end, start])
@@ -155,7 +148,7 @@ def _laplacian(cells: IntArray, weight: FloatArray, n: int) -> csr_array:
 def _cotangents(shape: FloatArray) -> FloatArray:
     """(n_cells, 3): of the angle opposite to each side."""
     out = np.empty(shape.shape[:2])
-    for side, (a, b) in enumerate(SIDES):
+    for side, (a, b) in enumerate(triangles.SIDES):
         tip = shape[:, 3 - a - b]
         one, other = shape[:, a] - tip, shape[:, b] - tip
         cross = one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]
@@ -168,17 +161,17 @@ def _rigid(shape: FloatArray, cells: IntArray, n: int) -> Callable[[FloatArray],
     weight = _cotangents(shape)
     matrix = csc_array(_laplacian(cells, weight, n)[1:][:, 1:])  # the first point stands still
     factor = splu(matrix)
-    own = np.stack([shape[:, b] - shape[:, a] for a, b in SIDES], axis=1)
+    own = np.stack([shape[:, b] - shape[:, a] for a, b in triangles.SIDES], axis=1)
 
     def turned(flat: FloatArray) -> FloatArray:
-        lies = np.stack([flat[cells[:, b]] - flat[cells[:, a]] for a, b in SIDES], axis=1)
+        lies = np.stack([flat[cells[:, b]] - flat[cells[:, a]] for a, b in triangles.SIDES], axis=1)
         both = np.einsum("ns,nsi,nsj->nij", weight, own, lies)
         c, s = both[:, 0, 0] + both[:, 1, 1], both[:, 0, 1] - both[:, 1, 0]
         size = np.maximum(np.hypot(c, s), np.finfo(float).tiny)
         turn = np.stack([np.stack([c, s], -1), np.stack([-s, c], -1)], axis=1)
         pull = weight[:, :, None] * (own @ (turn / size[:, None, None]))
         load = np.zeros((n, 2))
-        for side, (a, b) in enumerate(SIDES):
+        for side, (a, b) in enumerate(triangles.SIDES):
             np.add.at(load, cells[:, b], pull[:, side])
             np.subtract.at(load, cells[:, a], pull[:, side])
         moved = np.vstack([np.zeros((1, 2)), factor.solve(load[1:])])
@@ -244,13 +237,13 @@ class Draped(Surface):
             degenerate, one-sided, running through itself, closed, or with more than one rim.
         """
         x, table = np.asarray(points, dtype=np.float64), np.asarray(cells, dtype=np.int64)
-        check_cells(x, table)
+        triangles.check_cells(x, table)
         if x.shape[1] != 3 or table.shape[1] != 3:
             raise GeometryError(
                 f"expected triangles in space, got cells {table.shape} of points {x.shape}"
             )
         table = same_turn(table)
-        check_crossings(x, table)
+        triangles.check_crossings(x, table)
         return cls(x, table, _upright(x, table, flattened(x, table)))
 
     @classmethod
@@ -308,7 +301,7 @@ class Draped(Surface):
         k = min(_NEAREST, len(self.cells))
         near = cKDTree(self.points[self.cells].mean(axis=1)).query(xyz, k=k)[1].reshape(-1, k)
         corner = self.points[self.cells[near]]
-        share = closest(corner, xyz[:, None])
+        share = triangles.closest(corner, xyz[:, None])
         gap = np.linalg.norm(np.einsum("nqk,nqkd->nqd", share, corner) - xyz[:, None], axis=2)
         best = gap.argmin(axis=1)
         rows = np.arange(len(xyz))
@@ -319,7 +312,7 @@ class Draped(Surface):
         """(n,) triangle that holds each point, or is nearest to holding it; (n, 3) shares."""
         k = min(_NEAREST, len(self.cells))
         near = self._tree.query(uv, k=k)[1].reshape(-1, k)
-        share = barycentric(self.flat[self.cells[near]], uv[:, None])
+        share = triangles.barycentric(self.flat[self.cells[near]], uv[:, None])
         best = share.min(axis=2).argmax(axis=1)
         rows = np.arange(len(uv))
         return near[rows, best], share[rows, best]

@@ -14,15 +14,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from tomoskin.core import FloatArray, GeometryError, IntArray, PixelMap, located, numeric
-from tomoskin.model.mesh.files import (
-    Electrodes,
-    cells_of,
-    choose,
-    groups_of,
-    parsed,
-    points_of,
-    renumbered,
-)
+from tomoskin.model.mesh import files
 from tomoskin.model.mesh.triangles import (
     boundary_facets,
     check_mesh,
@@ -144,7 +136,9 @@ class Mesh:
         return made
 
     @classmethod
-    def read(cls, path: str | Path, electrodes: Electrodes = None, *, scale: float = 1.0) -> Mesh:
+    def read(
+        cls, path: str | Path, electrodes: files.Electrodes = None, *, scale: float = 1.0
+    ) -> Mesh:
         """Read a .msh, .vtu, .stl or .obj file.
 
         See :class:`MeshFile` for what is read and :data:`Electrodes` for the choice.
@@ -280,11 +274,11 @@ class MeshFile:
     def read(cls, path: str | Path, *, scale: float = 1.0) -> Self:
         """Read ``path``; its coordinates times ``scale`` are m. Raises GeometryError."""
         file = Path(path)
-        raw = parsed(file)
+        raw = files.parsed(file)
         with located(str(file), GeometryError):
-            cells = cells_of(raw)
-            points, height = points_of(raw, cells, scale)
-            groups = groups_of(raw, cells.shape[1] - 1)
+            cells = files.cells_of(raw)
+            points, height = files.points_of(raw, cells, scale)
+            groups = files.groups_of(raw, cells.shape[1] - 1)
         return cls(points, cells, groups, str(file), height)
 
     @property
@@ -293,14 +287,14 @@ class MeshFile:
         spare = np.full((len(self.points), 3 - self.points.shape[1]), self.height)
         return np.hstack((self.points, spare))
 
-    def mesh(self, electrodes: Electrodes = None) -> Mesh:
+    def mesh(self, electrodes: files.Electrodes = None) -> Mesh:
         """Return the mesh with those electrodes. Raises GeometryError."""
         with located(self.source, GeometryError):
-            facets = choose(self.points, self.cells, self.groups, electrodes)
+            facets = files.choose(self.points, self.cells, self.groups, electrodes)
             used, compact = np.unique(self.cells, return_inverse=True)
             number = np.full(len(self.points), -1)
             number[used] = np.arange(len(used))
-            tables = [renumbered(number, f, f"E{i}") for i, f in enumerate(facets, 1)]
+            tables = [files.renumbered(number, f, f"E{i}") for i, f in enumerate(facets, 1)]
             return Mesh(self.points[used], compact.reshape(self.cells.shape), tuple(tables))
 
 

@@ -10,35 +10,10 @@ from typing import Self, get_type_hints
 import numpy as np
 
 from tomoskin.core import DIMENSIONS, FloatArray, GeometryError, PatternError, SkinError, located
-from tomoskin.model.mesh import (
-    Arm,
-    Cap,
-    Cylinder,
-    Disc,
-    Draped,
-    ElectrodeArc,
-    Ellipse,
-    Mesh,
-    Outline,
-    Plane,
-    Polygon,
-    Rectangle,
-    Saddle,
-    Surface,
-    check_arcs,
-    triangulate,
-)
+from tomoskin.model import mesh as meshes
 from tomoskin.model.pattern import Pattern, named
 from tomoskin.model.section import Section
-from tomoskin.model.skin.body import (
-    DriveSection,
-    ElectrodesSection,
-    MaterialSection,
-    NameSection,
-    OutlineSection,
-    ReadoutSettings,
-    SurfaceSection,
-)
+from tomoskin.model.skin import body
 from tomoskin.model.skin.kept_mesh import kept_mesh
 from tomoskin.model.skin.processing import (
     InverseSettings,
@@ -64,13 +39,13 @@ _SAMPLE_BITS = 16
 class SkinSections:
     """The sections of a skin file, in the order in which they are written."""
 
-    skin: NameSection
-    outline: OutlineSection
-    surface: SurfaceSection
-    electrodes: ElectrodesSection
-    material: MaterialSection
-    drive: DriveSection
-    readout: ReadoutSettings
+    skin: body.NameSection
+    outline: body.OutlineSection
+    surface: body.SurfaceSection
+    electrodes: body.ElectrodesSection
+    material: body.MaterialSection
+    drive: body.DriveSection
+    readout: body.ReadoutSettings
     mesh: MeshSettings
     inverse: InverseSettings
     signal: SignalSettings
@@ -92,9 +67,9 @@ class SkinBody:
     ``contact_impedance`` is (n,) per electrode, Ω·m.
     """
 
-    outline: Outline
-    surface: Surface
-    arcs: tuple[ElectrodeArc, ...]
+    outline: meshes.Outline
+    surface: meshes.Surface
+    arcs: tuple[meshes.ElectrodeArc, ...]
     contact_impedance: FloatArray
     pattern: Pattern
 
@@ -105,7 +80,7 @@ class SkinBody:
             outline = _outline(sections.outline)
         with located(f"{source}: [electrodes]", SkinError, GeometryError):
             arcs = _arcs(outline, sections.electrodes)
-            check_arcs(outline, arcs)
+            meshes.check_arcs(outline, arcs)
         with located(f"{source}: [surface]", SkinError, GeometryError):
             surface = _surface(sections.surface, Path(source).parent)
             surface.check(outline.polyline(outline.length / _RIM_POINTS))
@@ -115,7 +90,7 @@ class SkinBody:
         return cls(outline, surface, arcs, impedance, pattern)
 
 
-def check_readout(readout: ReadoutSettings, source: str) -> None:
+def check_readout(readout: body.ReadoutSettings, source: str) -> None:
     """Raise SkinError for sums that do not fit into a frame's samples."""
     most = (2**_SAMPLE_BITS - 1) // (2**readout.adc_bits - 1)
     if readout.oversampling > most:
@@ -127,7 +102,9 @@ def check_readout(readout: ReadoutSettings, source: str) -> None:
 
 
 @lru_cache(maxsize=16)
-def flat_mesh(outline: OutlineSection, electrodes: ElectrodesSection, mesh: MeshSettings) -> Mesh:
+def flat_mesh(
+    outline: body.OutlineSection, electrodes: body.ElectrodesSection, mesh: MeshSettings
+) -> meshes.Mesh:
     """The sheet of these sections, laid flat; equal skins of a process share it, and it is kept on
     disk.
 
@@ -136,43 +113,45 @@ def flat_mesh(outline: OutlineSection, electrodes: ElectrodesSection, mesh: Mesh
     rim = _outline(outline)
     arcs = _arcs(rim, electrodes)
     wanted = f"{outline!r} {electrodes!r} {mesh.cells}"
-    return kept_mesh(wanted, lambda: triangulate(rim, arcs, mesh.cells))
+    return kept_mesh(wanted, lambda: meshes.triangulate(rim, arcs, mesh.cells))
 
 
-def _outline(given: OutlineSection) -> Outline:
+def _outline(given: body.OutlineSection) -> meshes.Outline:
     match given:
-        case OutlineSection(diameter=float(diameter)):
-            return Disc(diameter / 2)
-        case OutlineSection(shape="ellipse", width=float(width), height=float(height)):
-            return Ellipse(width / 2, height / 2)
-        case OutlineSection(width=float(width), height=float(height)):
-            return Rectangle(width, height)
+        case body.OutlineSection(diameter=float(diameter)):
+            return meshes.Disc(diameter / 2)
+        case body.OutlineSection(shape="ellipse", width=float(width), height=float(height)):
+            return meshes.Ellipse(width / 2, height / 2)
+        case body.OutlineSection(width=float(width), height=float(height)):
+            return meshes.Rectangle(width, height)
         case _:
-            return Polygon(np.array(given.vertices))
+            return meshes.Polygon(np.array(given.vertices))
 
 
-def _surface(given: SurfaceSection, folder: Path) -> Surface:
+def _surface(given: body.SurfaceSection, folder: Path) -> meshes.Surface:
     if given.radius is not None and (given.layer or 0.0) >= given.radius:
         raise GeometryError(
             f"expected a layer thinner than the radius, {1e3 * given.radius:.4g} mm, since it lies "
             f"within the body; got {1e3 * (given.layer or 0.0):.4g} mm"
         )
     match given:
-        case SurfaceSection(shape="cylinder", radius=float(radius)):
-            return Cylinder(radius, given.axis)
-        case SurfaceSection(shape="cap", radius=float(radius)):
-            return Cap(radius)
-        case SurfaceSection(radius_x=float(x), radius_y=float(y)):
-            return Saddle(x, y)
-        case SurfaceSection(radius=float(radius), joint=float(joint)):
-            return Arm(radius, given.bend, joint)
-        case SurfaceSection(file=str(file)):
-            return Draped.read(folder / file, scale=DIMENSIONS["length"][given.unit])
+        case body.SurfaceSection(shape="cylinder", radius=float(radius)):
+            return meshes.Cylinder(radius, given.axis)
+        case body.SurfaceSection(shape="cap", radius=float(radius)):
+            return meshes.Cap(radius)
+        case body.SurfaceSection(radius_x=float(x), radius_y=float(y)):
+            return meshes.Saddle(x, y)
+        case body.SurfaceSection(radius=float(radius), joint=float(joint)):
+            return meshes.Arm(radius, given.bend, joint)
+        case body.SurfaceSection(file=str(file)):
+            return meshes.Draped.read(folder / file, scale=DIMENSIONS["length"][given.unit])
         case _:
-            return Plane()
+            return meshes.Plane()
 
 
-def _arcs(outline: Outline, given: ElectrodesSection) -> tuple[ElectrodeArc, ...]:
+def _arcs(
+    outline: meshes.Outline, given: body.ElectrodesSection
+) -> tuple[meshes.ElectrodeArc, ...]:
     """Electrodes, E1 first. Raises GeometryError that names the one that is off the rim."""
     if given.count is None:
         centres = _on_rim(outline, np.array(given.positions), given.width)
@@ -180,10 +159,12 @@ def _arcs(outline: Outline, given: ElectrodesSection) -> tuple[ElectrodeArc, ...
         step = outline.length / given.count
         turn = -1 if given.order == "clockwise" else 1
         centres = np.float64(outline.toward(given.first)) + turn * step * np.arange(given.count)
-    return tuple(ElectrodeArc.around(float(s) % outline.length, given.width) for s in centres)
+    return tuple(
+        meshes.ElectrodeArc.around(float(s) % outline.length, given.width) for s in centres
+    )
 
 
-def _on_rim(outline: Outline, positions: FloatArray, width: float) -> FloatArray:
+def _on_rim(outline: meshes.Outline, positions: FloatArray, width: float) -> FloatArray:
     s = outline.nearest(positions)
     gap = np.linalg.norm(outline.point(s) - positions, axis=1)
     allowed = min(width / 2, OFF_RIM * outline.length)
@@ -198,7 +179,7 @@ def _on_rim(outline: Outline, positions: FloatArray, width: float) -> FloatArray
     return s
 
 
-def _impedances(given: ElectrodesSection, n_electrodes: int, source: str) -> FloatArray:
+def _impedances(given: body.ElectrodesSection, n_electrodes: int, source: str) -> FloatArray:
     values = given.contact_impedance
     if len(values) not in (1, n_electrodes):
         raise SkinError(
@@ -210,7 +191,7 @@ def _impedances(given: ElectrodesSection, n_electrodes: int, source: str) -> Flo
     return result
 
 
-def _pattern(given: DriveSection, n_electrodes: int) -> Pattern:
+def _pattern(given: body.DriveSection, n_electrodes: int) -> Pattern:
     """The file's own tables, or the named pattern."""
     if given.drive is not None and given.measure is not None:
         return Pattern.from_tables(given.drive, given.measure, n_electrodes)

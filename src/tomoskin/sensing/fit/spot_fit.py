@@ -12,15 +12,8 @@ import numpy as np
 
 from tomoskin.core import FloatArray
 from tomoskin.model.mesh import Mesh
+from tomoskin.sensing.fit import spot
 from tomoskin.sensing.fit.expectation import Expectation, Known
-from tomoskin.sensing.fit.spot import (
-    CONTENT,
-    FILLING,
-    LOG_RADIUS,
-    N_PARAMETERS,
-    USUAL,
-    bounds_of,
-)
 
 _RADIUS = 0.11
 """Median radius where touches are as large as the sheet lets them be, in parts of its breadth: that
@@ -84,15 +77,15 @@ class SpotPrior:
         """
         area = float(mesh.volumes.sum())
         if layer is not None:
-            return cls(area, USUAL, _ON_LAYER, _DEPTH * FILLING * USUAL**2, *_SURER)
+            return cls(area, spot.USUAL, _ON_LAYER, _DEPTH * spot.FILLING * spot.USUAL**2, *_SURER)
         scaled = _RADIUS * math.sqrt(area)
         radius = math.sqrt(scaled * _FINGER)
         spread = math.hypot(_SPREAD, math.log(scaled / _FINGER) / 2)
-        return cls(area, radius, spread, _DEPTH * FILLING * radius**2)
+        return cls(area, radius, spread, _DEPTH * spot.FILLING * radius**2)
 
     def widest(self, spots: FloatArray) -> float:
         """Deviations of the prior by which the widest of spots (k, 4) is wide."""
-        return float(((spots[:, LOG_RADIUS] - math.log(self.radius)) / self.spread).max())
+        return float(((spots[:, spot.LOG_RADIUS] - math.log(self.radius)) / self.spread).max())
 
     @property
     def middle(self) -> FloatArray:
@@ -125,10 +118,10 @@ class SpotPrior:
     def held(self, spots: FloatArray, sign: str) -> FloatArray:
         """``spots`` (k, 4) with radius and content where they may be."""
         kept = spots.copy()
-        kept[:, LOG_RADIUS] = np.clip(kept[:, LOG_RADIUS], *self.log_radii)
+        kept[:, spot.LOG_RADIUS] = np.clip(kept[:, spot.LOG_RADIUS], *self.log_radii)
         low, high = self.depths(sign)
-        filling = FILLING * np.exp(2 * kept[:, LOG_RADIUS])
-        kept[:, CONTENT] = np.clip(kept[:, CONTENT], low * filling, high * filling)
+        filling = spot.FILLING * np.exp(2 * kept[:, spot.LOG_RADIUS])
+        kept[:, spot.CONTENT] = np.clip(kept[:, spot.CONTENT], low * filling, high * filling)
         return kept
 
     @property
@@ -141,7 +134,7 @@ class SpotPrior:
     @staticmethod
     def depths(sign: str) -> tuple[float, float]:
         """Least and largest log(σ/σ₀) at the centre: ``sign`` as in a skin's ``[touch]``."""
-        return bounds_of(sign, _MOST_DEPTH)
+        return spot.bounds_of(sign, _MOST_DEPTH)
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,7 +155,7 @@ class Deficit:
     @classmethod
     def none(cls, rank: int) -> Deficit:
         """Before the exact model is solved."""
-        return cls(np.zeros((0, N_PARAMETERS)), np.zeros(rank))
+        return cls(np.zeros((0, spot.N_PARAMETERS)), np.zeros(rank))
 
     def holds_for(self, spots: FloatArray, part: float) -> bool:
         """Whether as many ``spots`` (k, 4) are where they were, as wide and as strong, but for a
