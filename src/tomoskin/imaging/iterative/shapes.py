@@ -19,7 +19,7 @@ from scipy.linalg import solve_triangular
 from scipy.spatial.distance import cdist
 from scipy.special import expit, ndtr
 
-from tomoskin.core import FloatArray, IntArray, ModelError, check_positive
+from tomoskin.core import FloatArray, ModelError, check_positive
 from tomoskin.imaging.iterative.absolute import Absolute, medium
 from tomoskin.imaging.iterative.newton import Goal, descend
 from tomoskin.imaging.iterative.unknowns import (
@@ -32,13 +32,10 @@ from tomoskin.imaging.iterative.unknowns import (
 )
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Mesh
-from tomoskin.model.prior import Diagonal, matern_correlation
+from tomoskin.model.prior import Diagonal, matern_correlation, pivoted_cholesky
 
 LEFT_OUT = 0.02
 """Part of the field's variance that the modes may lack, at the worst point."""
-
-_ROOM = 128
-"""Modes for which there is room at first."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +84,8 @@ class RandomField:
             gap = cdist(mesh.centroids, mesh.centroids[cell][None])[:, 0]
             return correlation(scale * gap)
 
-        basis, pivots = _pivoted(column, len(mesh.cells), left_out)
+        n = len(mesh.cells)
+        basis, pivots = pivoted_cholesky(column, np.ones(n), left_out, n)
         places, none = mesh.centroids[pivots], np.zeros(len(pivots))
         return cls(basis, places, basis[pivots], correlation, scale, none)
 
@@ -109,26 +107,6 @@ class RandomField:
         """(n, k) basis at ``points`` (n, d) m: the same image between the cells' centres."""
         covariance = self.correlation(self.scale * cdist(points, self.places))
         return np.asarray(solve_triangular(self.factor, covariance.T, lower=True).T - self.mean)
-
-
-def _pivoted(
-    column: Callable[[int], FloatArray], n: int, left_out: float
-) -> tuple[FloatArray, IntArray]:
-    """Pivoted Cholesky factor (n, k) of a matrix with unit diagonal, given by its columns."""
-    rest = np.ones(n)
-    basis = np.zeros((n, _ROOM))
-    pivots: list[int] = []
-    while len(pivots) < n and rest.max() > left_out:
-        pivot, k = int(rest.argmax()), len(pivots)
-        if k == basis.shape[1]:
-            basis = np.hstack([basis, np.zeros_like(basis)])
-        explained = basis[:, :k] @ basis[pivot, :k]
-        basis[:, k] = (column(pivot) - explained) / np.sqrt(rest[pivot])
-        basis[pivots, k] = 0.0
-        pivots.append(pivot)
-        rest -= basis[:, k] ** 2
-        rest[pivots] = 0.0
-    return np.ascontiguousarray(basis[:, : len(pivots)]), np.array(pivots)
 
 
 BACKGROUND, LESS, MORE = 0, 1, 2

@@ -13,6 +13,7 @@ from scipy.linalg.lapack import dpotri
 from scipy.optimize import minimize
 
 from tomoskin.core import FloatArray, IntArray
+from tomoskin.model.prior import pivoted_cholesky
 
 LENGTHS = (0.16, 0.22, 0.32, 0.45, 0.65)
 """Length scales of a response that are tried, in radii of the region."""
@@ -109,7 +110,14 @@ class Basis:
     @classmethod
     def of(cls, likeness: Likeness, positions: FloatArray, most: int = _MOST) -> Self:
         """Basis of at ``most`` so many functions for responses at ``positions`` (n, 2)."""
-        centres = positions[_pivots(likeness, positions, most)]
+        variance = np.full(len(positions), likeness.variance)
+        pivots = pivoted_cholesky(
+            lambda i: likeness(positions, positions[i : i + 1])[:, 0],
+            variance,
+            _TOLERANCE * likeness.variance,
+            most,
+        )[1]
+        centres = positions[pivots]
         values, vectors = eigh(likeness(centres, centres))
         keep = values > _ROUNDING * values[-1]
         return cls(likeness, centres, vectors[:, keep] / np.sqrt(values[keep]))
@@ -117,25 +125,6 @@ class Basis:
     def __call__(self, positions: FloatArray) -> FloatArray:
         """(n, m) values of the functions at ``positions`` (n, 2)."""
         return np.asarray(self.likeness(positions, self.centres) @ self.root)
-
-
-def _pivots(likeness: Likeness, positions: FloatArray, most: int) -> list[int]:
-    """Rows whose likeness to all others explains the rest."""
-    unexplained = np.full(len(positions), likeness.variance)
-    factor = np.zeros((len(positions), min(most, len(positions))))
-    chosen: list[int] = []
-    while len(chosen) < factor.shape[1]:
-        pivot = int(unexplained.argmax())
-        if unexplained[pivot] < _TOLERANCE * likeness.variance:
-            break
-        k = len(chosen)
-        column = likeness(positions, positions[pivot : pivot + 1])[:, 0]
-        column -= factor[:, :k] @ factor[pivot, :k]
-        factor[:, k] = column / np.sqrt(unexplained[pivot])
-        unexplained = np.maximum(unexplained - factor[:, k] ** 2, 0.0)
-        unexplained[pivot] = 0.0
-        chosen.append(pivot)
-    return chosen
 
 
 def moments(probability: FloatArray, grid: FloatArray) -> tuple[FloatArray, FloatArray]:

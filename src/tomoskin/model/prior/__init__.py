@@ -19,4 +19,5 @@ from tomoskin.model.prior.smooth import (
     Matern as Matern,
     Structural as Structural,
     matern_correlation as matern_correlation,
+    pivoted_cholesky as pivoted_cholesky,
 )

@@ -12,7 +12,7 @@ from scipy.linalg import inv
 from scipy.sparse import coo_array, csr_array
 from scipy.spatial.distance import cdist
 
-from tomoskin.core import FloatArray, ModelError, check_positive
+from tomoskin.core import FloatArray, IntArray, ModelError, check_positive
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.prior.penalty import (
     Carried,
@@ -32,6 +32,9 @@ DEFAULT_LENGTH = 0.1
 
 _BLOCK = 256
 """Rows of the covariance that are in memory at a time."""
+
+_ROOM = 128
+"""Columns of a Cholesky factor for which there is room at first."""
 
 CORRELATIONS: dict[float, Callable[[FloatArray], FloatArray]] = {
     0.5: lambda s: np.exp(-s),
@@ -207,6 +210,30 @@ def matern_correlation(
         names = ", ".join(map(str, CORRELATIONS))
         raise ModelError(f"expected a smoothness among {names}, got {smoothness}")
     return CORRELATIONS[smoothness], float(np.sqrt(2.0 * smoothness) / length)
+
+
+def pivoted_cholesky(
+    column: Callable[[int], FloatArray], variance: FloatArray, left_out: float, most: int
+) -> tuple[FloatArray, IntArray]:
+    """Factor (n, k ≤ ``most``) of the covariance that is given by its columns and ``variance``.
+
+    As Harbrecht, Peters & Schneider (2012): the places (k,), each where most is unexplained, until
+    no more than the variance ``left_out`` is anywhere.
+    """
+    rest, n = variance.copy(), len(variance)
+    factor = np.zeros((n, _ROOM))
+    pivots: list[int] = []
+    while len(pivots) < min(most, n) and rest.max() > left_out:
+        pivot, k = int(rest.argmax()), len(pivots)
+        if k == factor.shape[1]:
+            factor = np.hstack([factor, np.zeros_like(factor)])
+        explained = factor[:, :k] @ factor[pivot, :k]
+        factor[:, k] = (column(pivot) - explained) / np.sqrt(rest[pivot])
+        factor[pivots, k] = 0.0
+        pivots.append(pivot)
+        rest -= factor[:, k] ** 2
+        rest[pivots] = 0.0
+    return np.ascontiguousarray(factor[:, : len(pivots)]), np.array(pivots)
 
 
 @dataclass(frozen=True, eq=False)
