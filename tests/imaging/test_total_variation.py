@@ -127,7 +127,6 @@ def test_every_step_lowers_the_objective(prior: SharpPrior) -> None:
     dv = model.jacobian(1.0) @ (0.2 * spot(mesh))
     found = SharpDifference(model, prior, alpha=3.0)(Observation.of(dv, 1e-3 * np.abs(dv).max()))
     objective = [step.objective for step in found.descent.steps]
-    assert found.descent.converged
     assert (np.diff(objective) < 0).all()
     assert "stopped: the last step lowered" in str(found)
 

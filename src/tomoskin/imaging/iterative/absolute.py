@@ -244,7 +244,7 @@ def medium(
         x[-unknowns.n_contacts :] = np.log(ratio[: unknowns.n_contacts])
     weight = np.zeros(unknowns.size)
     weight[image.size :] = others(unknowns.n_contacts).matrix
-    return unknowns, Descent(x, weight * x, (), "not begun", False)
+    return unknowns, Descent(x, weight * x, (), "not begun")
 
 
 def _of_right_size(model: ForwardModel, target: FloatArray, rows: NDArray[Any]) -> float:

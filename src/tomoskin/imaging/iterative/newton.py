@@ -55,20 +55,17 @@ class Descent:
         The start, which has length zero, and every step.
     reason
         Why it stopped.
-    converged
-        Whether that is because there was nothing left to gain.
     """
 
     unknowns: FloatArray
     force: FloatArray
     steps: tuple[Iteration, ...]
     reason: str
-    converged: bool
 
     @classmethod
     def begin(cls, n: int) -> Descent:
         """The state before the first step, at zero."""
-        return cls(np.zeros(n), np.zeros(n), (), "not begun", False)
+        return cls(np.zeros(n), np.zeros(n), (), "not begun")
 
     def __str__(self) -> str:
         """The steps as a table, and why they ended."""
@@ -113,20 +110,19 @@ def descend(
     """
     here = _Here(begin.unknowns, begin.force, goal.forward(begin.unknowns))
     steps = [here.step(goal, 0.0)]
-    reason, converged = f"reached the limit of {most} steps", False
+    reason = f"reached the limit of {most} steps"
     for _ in range(most):
         moved = _moved(here, goal, reach)
         if moved is None:
-            reason, converged = "no step lowers the objective any further", True
+            reason = "no step lowers the objective any further"
             break
         here, step = moved
         gain = 1.0 - step.objective / steps[-1].objective
         steps.append(step)
         if gain < tolerance:
             reason = f"the last step lowered the objective by {gain:.1e} of its value"
-            converged = True
             break
-    return Descent(here.unknowns, here.force, (*begin.steps, *steps), reason, converged)
+    return Descent(here.unknowns, here.force, (*begin.steps, *steps), reason)
 
 
 @dataclass(frozen=True, eq=False)
