@@ -197,7 +197,7 @@ class Decoder:
         for payload in self._deframer.feed(data):
             message = decode_payload(payload, host_time)
             if message is None or is_command(message):
-                self._deframer.drop("foreign", len(payload) + 2)
+                self._deframer.drop("foreign")
             else:
                 messages.append(message)
         self.counters.messages += len(messages)

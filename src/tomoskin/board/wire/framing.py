@@ -75,8 +75,6 @@ class Counters:
         Blocks whose CRC is wrong.
     foreign
         Blocks with a right CRC that are no message of this schema in this direction.
-    bytes_dropped
-        Bytes in the blocks that were not passed on.
     """
 
     messages: int = 0
@@ -84,7 +82,6 @@ class Counters:
     torn: int = 0
     checksum: int = 0
     foreign: int = 0
-    bytes_dropped: int = 0
 
     @property
     def corrupt(self) -> int:
@@ -120,35 +117,33 @@ class Deframer:
         """What comes next does not follow what came before: a message under way is given up."""
         self._partial, self._skipping = b"", False
 
-    def drop(self, reason: str, size: int) -> None:
-        """Count a block of ``size`` bytes that is not passed on; ``reason`` is its counter."""
+    def drop(self, reason: str) -> None:
+        """Count a block that is not passed on; ``reason`` is its counter."""
         setattr(self.counters, reason, getattr(self.counters, reason) + 1)
-        self.counters.bytes_dropped += size
 
     def _open(self, block: bytes) -> bytes | None:
         if self._skipping:
             self._skipping = False
-            self.counters.bytes_dropped += len(block)
             return None
         if not block:
             return None
         if len(block) > self._limit:
-            self.drop("overlong", len(block))
+            self.drop("overlong")
             return None
         data = cobs_decode(block)
         if data is None:
-            self.drop("torn", len(block))
+            self.drop("torn")
             return None
         if crc16(data):
-            self.drop("checksum", len(block))
+            self.drop("checksum")
             return None
         return data[:-2]
 
     def _keep(self, rest: bytes) -> None:
         if self._skipping:
-            self.counters.bytes_dropped += len(rest)
-        elif len(self._partial) + len(rest) > self._limit:
-            self.drop("overlong", len(self._partial) + len(rest))
+            return
+        if len(self._partial) + len(rest) > self._limit:
+            self.drop("overlong")
             self._partial, self._skipping = b"", True
         else:
             self._partial += rest
