@@ -17,7 +17,6 @@ from tomoskin.pipeline import FrameResult, Prepared
 from tomoskin.run import Runner, SetPose, SetTwin, commands, way_to_bend
 from tomoskin.server import requests
 from tomoskin.server.amount_flow import DepthFlow, ForceFlow
-from tomoskin.server.folder import Folder
 from tomoskin.server.guided_flow import GuidedFlow, StoppedError
 from tomoskin.server.hub import Hub
 from tomoskin.server.page_connection import Page
@@ -44,7 +43,6 @@ class CalibrationHandlers:
 
     def __init__(self, hub: Hub) -> None:
         self._hub = hub
-        self._folder = Folder(hub.folder)
         self._files: dict[str, str] = {}  # by kind; "": the name is not known
         self._used_on = ""
         hub.serve({requests.UseCalibration: self._use}, self.greeting)
@@ -75,7 +73,7 @@ class CalibrationHandlers:
                 kind = _OFFERED[request.of]
                 runner.ask(commands.Adopt(runner.prepared.uncalibrated(kind)))
                 return kind
-            calibration = load_calibration(self._folder.existing(request.name, ".npz"))
+            calibration = load_calibration(self._hub.folder.existing(request.name, ".npz"))
             runner.ask(commands.Adopt(runner.prepared.calibrated(calibration)))
             return calibration.kind
 
@@ -162,7 +160,6 @@ class GuideHandlers:
 
     def __init__(self, hub: Hub, note: Callable[[Kind[Any], str], None]) -> None:
         self._hub, self._note = hub, note
-        self._folder = Folder(hub.folder)
         self._flow: GuidedFlow | None = None
         self._shown_by: set[Page] = set()
         self._watching = contextlib.ExitStack()
@@ -283,7 +280,7 @@ class GuideHandlers:
         if flow.estimating or estimate is None or not estimate.ready or estimate.answer is None:
             raise WireError("more presses are needed before this can be saved")
         runner = self._hub.runner
-        work = partial(flow.keep, estimate.answer, self._folder, request.name, runner)
+        work = partial(flow.keep, estimate.answer, self._hub.folder, request.name, runner)
         self._hub.tasks.run(page, work, partial(self._kept, flow.teaches, runner))
 
     def _kept(self, kind: Kind[Any] | None, runner: Runner, name: str) -> None:

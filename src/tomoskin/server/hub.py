@@ -22,6 +22,7 @@ from tomoskin.model.skin import Skin
 from tomoskin.pipeline import FrameResult, Prepared, Unresolved, colour_limit
 from tomoskin.run import FILE_NAME, Runner, SetPresses, Snapshot, StrictRequest, commands
 from tomoskin.server import page_messages as to_page, views
+from tomoskin.server.folder import Folder
 from tomoskin.server.frames import encode_result
 from tomoskin.server.page_connection import Handler, Handlers, Host, Page, Tasks, during
 from tomoskin.server.requests import AskUnresolved, Painted, SetRecording, ShowDent
@@ -121,7 +122,7 @@ class Hub(Host):
     def __init__(self, runner: Runner, folder: Path | None = None) -> None:
         super().__init__()
         self.runner = runner
-        self.folder = folder or Path()
+        self.folder = Folder(folder or Path())
         self.opener: Callable[[Skin], Transport] | None = None
         self.tasks = Tasks()
         self._handlers: dict[type, Handler] = {}
@@ -134,7 +135,7 @@ class Hub(Host):
         self._scene: to_page.Scene | None = None
         self._made: tuple[Snapshot, bool, bytes] | None = None
         self._dents = Dents(runner)
-        self.serve(run_handlers(runner, self.folder, self.tasks))
+        self.serve(run_handlers(runner, self.folder.path, self.tasks))
         self.serve(self._dents.handlers, farewell=self._dents.pages.discard)
 
     def serve(

@@ -26,7 +26,6 @@ from tomoskin.core import DataError, StrPath, TomoskinError
 from tomoskin.server import views
 from tomoskin.server.access import AccessControl, AccessPolicy
 from tomoskin.server.door import Door
-from tomoskin.server.folder import Folder
 from tomoskin.server.hub import Hub
 from tomoskin.server.overview import Overview, states
 from tomoskin.server.page_connection import PATIENCE, Host, Page
@@ -110,7 +109,7 @@ def _routes(hub: Hub) -> list[BaseRoute]:
     async def download(request: Request) -> Response:
         name = request.path_params["name"]
         try:
-            path = Folder(hub.folder).existing(name)
+            path = hub.folder.existing(name)
         except DataError as error:
             return PlainTextResponse(f"{error}\n", 404)
         return FileResponse(path, media_type="application/octet-stream", filename=name)

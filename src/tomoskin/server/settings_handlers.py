@@ -26,7 +26,6 @@ from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, colour_limit, prepare, tuned_image
 from tomoskin.run import Runner, commands
 from tomoskin.server import requests, settings_messages as messages
-from tomoskin.server.folder import Folder
 from tomoskin.server.hub import Hub
 from tomoskin.server.page_connection import Page
 from tomoskin.server.page_messages import Message
@@ -158,7 +157,7 @@ class SettingsHandlers:
             self._go(page, skin)
 
     def _load(self, page: Page, request: requests.LoadSkin) -> None:
-        path = self._hub.folder / f"{request.name}.toml"
+        path = self._hub.folder.path / f"{request.name}.toml"
         with _refusals_to(page):
             skin = Skin.load(path if path.is_file() else request.name)
             self._check(skin)
@@ -168,7 +167,7 @@ class SettingsHandlers:
     def _save(self, page: Page, request: requests.SaveSkin) -> None:
         name = f"{request.name}.toml"
         with _refusals_to(page, where=name):  # the page is told names, never paths
-            _save(self._hub.folder / name, self._present(), replace=request.replace)
+            _save(self._hub.folder.path / name, self._present(), replace=request.replace)
             self._hub.runner.say("saved", f"settings saved as {name}")
             self._hub.tell(self._message())
 
@@ -272,7 +271,7 @@ class SettingsHandlers:
             redo=len(self._history.future),
             busy=self._working,
             took_ms=None if self._took is None else 1e3 * self._took,
-            files=Folder(self._hub.folder).skins(),
+            files=self._hub.folder.skins(),
             builtin=Skin.names(),
         )
 

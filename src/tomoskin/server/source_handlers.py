@@ -17,7 +17,7 @@ from tomoskin.files.session import ReplayTransport, SessionReader, as_recorded, 
 from tomoskin.pipeline import Prepared
 from tomoskin.run import Runner, commands
 from tomoskin.server import requests
-from tomoskin.server.folder import SESSION, Folder
+from tomoskin.server.folder import SESSION
 from tomoskin.server.hub import Hub
 from tomoskin.server.page_connection import Page
 from tomoskin.server.page_messages import BoardNow, Exported, FileEntry, Files, Offer, Sources
@@ -154,7 +154,6 @@ class SourceHandlers:
 
     def __init__(self, hub: Hub, switch: SourceSwitch) -> None:
         self._hub, self._switch = hub, switch
-        self._folder = Folder(hub.folder)
         self._use = SessionUse(hub.runner)
         hub.serve(
             {
@@ -179,24 +178,24 @@ class SourceHandlers:
             files, others = listed
             page.post(Files.of(self._use, files=files, others=others).json)
 
-        self._hub.tasks.run(page, self._folder.list_files, answer)
+        self._hub.tasks.run(page, self._hub.folder.list_files, answer)
 
     def _rename(self, page: Page, request: requests.RenameSession) -> None:
         def work() -> str:
             self._use.check_idle(request.name)
-            return self._folder.rename(request.name, request.to)
+            return self._hub.folder.rename(request.name, request.to)
 
         self._change(page, work, lambda new: f"{request.name} is now {new}")
 
     def _delete(self, page: Page, request: requests.DeleteSession) -> None:
         def work() -> None:
             self._use.check_idle(request.name)
-            self._folder.delete(request.name)
+            self._hub.folder.delete(request.name)
 
         self._change(page, work, lambda _: f"{request.name} is deleted")
 
     def _annotate(self, page: Page, request: requests.Annotate) -> None:
-        work = partial(self._folder.annotate, request.name, request.text)
+        work = partial(self._hub.folder.annotate, request.name, request.text)
         self._change(page, work, lambda _: f"Notes on {request.name} are saved")
 
     def _change(self, page: Page, work: Callable[[], _T], said: Callable[[_T], str]) -> None:
@@ -252,7 +251,7 @@ class SourceHandlers:
         ending = ".csv" if form == "touches" else f".{form}"
         stem = f"{path.stem}-touches" if form == "touches" else path.stem
         write = export_touches if form == "touches" else WRITERS[ending]
-        out = self._folder.free(stem, ending)
+        out = self._hub.folder.free(stem, ending)
         with SessionReader(path) as session:
             write(Export(session, _EVERY, self._advance), out)
         return out
@@ -262,4 +261,4 @@ class SourceHandlers:
 
     def _complete(self, name: str) -> Path:
         self._use.check_ended(name)
-        return self._folder.existing(name, SESSION)
+        return self._hub.folder.existing(name, SESSION)
