@@ -6,7 +6,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import wait
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -58,7 +58,7 @@ class Member:
         )
 
 
-class RobotRun:
+class RobotRun(AbstractContextManager["RobotRun"]):
     """Runs the skins of a robot.
 
     Each has a thread that reads its board; they compute in turns, so that none disturbs another.
@@ -92,10 +92,6 @@ class RobotRun:
         self._logs: Mapping[str, MessageLog] = {}
         self._ended = threading.Event()
         self._watch = threading.Thread(target=self._look_on, name="tomoskin-robot", daemon=True)
-
-    def __enter__(self) -> Self:
-        """The robot itself, which runs already."""
-        return self
 
     def __exit__(self, *_: object) -> None:
         """Stop the boards and end the runs."""
@@ -246,7 +242,7 @@ MAX_AGE = 0.5
 """Seconds after which a frame says nothing of the skin any more."""
 
 
-class LiveSkin:
+class LiveSkin(AbstractContextManager["LiveSkin"]):
     """The newest contacts of a skin that runs; may be used from any thread.
 
     A thread of the run reads the board and computes. Nothing of it waits for who reads here, and
@@ -264,10 +260,6 @@ class LiveSkin:
         self.runner, self.max_age = runner, max_age
         self._news = threading.Condition()
         self._mine = threading.local()
-
-    def __enter__(self) -> Self:
-        """The skin itself, which runs already."""
-        return self
 
     def __exit__(self, *_: object) -> None:
         """Stop the board and end the run."""
