@@ -45,9 +45,7 @@ class NoisyBoard:
         self.prepared, self.noise = prepared, noise
         self.random = np.random.default_rng(seed)
         scan, readout = prepared.scan, prepared.readout
-        self.makes = np.zeros((len(scan.plus), scan.n_samples))
-        rows = np.arange(len(scan.plus))
-        self.makes[rows, scan.plus], self.makes[rows, scan.minus] = 1.0, -1.0
+        self.makes = scan.makes
         self.inverse = np.linalg.pinv(self.makes)
         self.unit = readout.noise / readout.volts_per_count
         self.rest = self._rest()

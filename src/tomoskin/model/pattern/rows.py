@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tomoskin.core import FloatArray, IntArray, PatternError
-from tomoskin.model.pattern.pattern import Pattern, check_drives, drive_table
+from tomoskin.model.pattern.pattern import Pattern, check_drives, drive_table, signed
 
 _MOST = 32
 """Electrodes that a mask has bits for."""
@@ -72,6 +72,11 @@ class Scan:
     def n_samples(self) -> int:
         """Number of samples in a frame."""
         return len(self.sample_drive)
+
+    @property
+    def makes(self) -> FloatArray:
+        """(n_meas, n_samples): +1 where a sample is a row's plus, -1 where it is its minus."""
+        return signed(np.column_stack([self.plus, self.minus]), self.n_samples)
 
 
 _LISTED = 5

@@ -71,16 +71,14 @@ class Channels:
     @classmethod
     def of(cls, pattern: Pattern) -> Self:
         """The channels that the rows of a pattern are read by."""
-        scan, rows = Scan.of(pattern), np.arange(pattern.n_meas)
-        samples = np.zeros((scan.n_samples, pattern.n_meas))
-        samples[scan.plus, rows], samples[scan.minus, rows] = 1.0, -1.0
+        scan = Scan.of(pattern)
         pairs, pair = np.unique(np.sort(pattern.measure, axis=1), axis=0, return_inverse=True)
         n = pattern.n_electrodes
         names = [f"E{e + 1}" for e in range(n)]
         names += [f"E{a + 1} to E{b + 1}" for a, b in pairs.tolist()]
         channel = np.concatenate([scan.sample_electrode, n + pair.reshape(-1)])
-        parts = np.concatenate([samples, np.eye(pattern.n_meas)])
         reciprocal, single = Reciprocity.of(pattern), np.eye(pattern.n_meas)
+        parts = np.concatenate([scan.makes.T, single])
         apart = single[reciprocal.first] - reciprocal.sign[:, None] * single[reciprocal.second]
         return cls(parts, channel, tuple(names), reciprocal, apart)
 

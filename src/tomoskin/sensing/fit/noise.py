@@ -82,12 +82,7 @@ def row_covariance(scan: Scan, sample_sd: FloatArray | float) -> FloatArray:
 
     ``sample_sd`` is the standard deviation of a sample, V, or one per sample (n_samples,).
     """
-    n_meas = len(scan.plus)
-    makes = np.zeros((n_meas, scan.n_samples))
-    rows = np.arange(n_meas)
-    makes[rows, scan.plus] = 1.0
-    makes[rows, scan.minus] = -1.0
-    makes *= sample_sd
+    makes = scan.makes * sample_sd
     return np.asarray(makes @ makes.T)
 
 
