@@ -11,17 +11,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from tomoskin.cli import options
 from tomoskin.cli.choices import quantity, skin_for_file, with_recorded_calibrations
 from tomoskin.cli.named_files import TABLE, ForceFlag, Writes
 from tomoskin.cli.named_parts import Recorded, first_time, reconstructed, say_notes, span_lines
-from tomoskin.cli.options import (
-    CalibrationsOption,
-    FramesOption,
-    RecordingArgument,
-    ReferenceOption,
-    SkinOption,
-    TouchesOut,
-)
 from tomoskin.cli.output import Bar, JsonFlag, remark, tell
 from tomoskin.core import MEASURANDS, DataError, no_such
 
@@ -69,7 +62,7 @@ class Tuned:
             '"0 s" each image uses its own frame alone.',
         ),
     ] = None
-    calibration: CalibrationsOption = None
+    calibration: options.CalibrationsOption = None
     sharp: Annotated[
         bool,
         typer.Option(
@@ -145,7 +138,7 @@ class Results:
         typer.Option(metavar="X.png|.npz|.vtu", help="File for the images."),
         Writes(IMAGES),
     ] = None
-    touches: TouchesOut = None
+    touches: options.TouchesOut = None
     force: ForceFlag = False
     thorough: Annotated[
         Path | None,
@@ -158,10 +151,10 @@ class Results:
 
 
 def image(
-    recording: RecordingArgument,
-    skin: SkinOption = None,
-    reference: ReferenceOption = None,
-    frames: FramesOption = None,
+    recording: options.RecordingArgument,
+    skin: options.SkinOption = None,
+    reference: options.ReferenceOption = None,
+    frames: options.FramesOption = None,
     *,
     tuned: Tuned,
     shown: Shown,

@@ -9,16 +9,8 @@ from functools import lru_cache
 import numpy as np
 
 from tomoskin.core import FloatArray
+from tomoskin.model import skin
 from tomoskin.model.forward import choose_engine
-from tomoskin.model.skin import (
-    MaterialMemory,
-    MemoryState,
-    Metric,
-    advanced,
-    broken_down,
-    check_step,
-    followed,
-)
 from tomoskin.twin.parameters import check_numbers, parameter, wandered
 
 _MOST_COMPRESSION = 0.99
@@ -95,7 +87,7 @@ class MaterialSettings:
         _ = self.memory  # checks its own
 
     @property
-    def memory(self) -> MaterialMemory:
+    def memory(self) -> skin.MaterialMemory:
         """What the sheet remembers, of strain and of compression alike."""
         return _memory(
             self.play,
@@ -117,18 +109,18 @@ class MaterialSettings:
         return self.memory.still and self.temperature_sd == 0
 
 
-_memory = lru_cache(maxsize=64)(MaterialMemory)
+_memory = lru_cache(maxsize=64)(skin.MaterialMemory)
 """The same for the same series: it is asked for several times a frame, and checks its numbers."""
 
 
 @lru_cache(maxsize=64)
-def metric_of(thickness: float) -> Metric:
+def metric_of(thickness: float) -> skin.Metric:
     """Strain, whatever its direction, and compression: two loads, each with its own plays.
 
     A strain's size is √((xx² + yy²)/2 + xy²), the mean strain where both directions are strained
     alike. That of a depth is the compression of a layer of this ``thickness``, m.
     """
-    return Metric(((0.5, 0.5, 1.0), (thickness**-2,)))
+    return skin.Metric(((0.5, 0.5, 1.0), (thickness**-2,)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +137,7 @@ class MaterialState:
         K above the temperature of the unloaded sheet's conductivity.
     """
 
-    memory: MemoryState
+    memory: skin.MemoryState
     worn: FloatArray
     warmer: float = 0.0
 
@@ -153,7 +145,7 @@ class MaterialState:
     def fresh(cls, settings: MaterialSettings, n: int) -> MaterialState:
         """A sheet of ``n`` cells that nothing has touched."""
         metric = metric_of(settings.thickness)
-        return cls(memory=MemoryState.fresh(settings.memory, n, metric), worn=np.zeros(n))
+        return cls(memory=skin.MemoryState.fresh(settings.memory, n, metric), worn=np.zeros(n))
 
 
 def stepped(
@@ -172,7 +164,7 @@ def stepped(
     if (core := choose_engine().core) is None:
         after = advance(state, settings, load, dt, chance)
         return after, conductivity(after, settings, unloaded)
-    check_step(dt)
+    skin.check_step(dt)
     past, memory = state.memory, settings.memory
     worn = state.worn if settings.wear else state.worn[:0]
     warmer = _warmed(state.warmer, settings, dt, chance)
@@ -194,7 +186,7 @@ def stepped(
         ),
     )
     sigma = rows[0] if settings.scalar else rows.reshape(2, 2, -1).transpose(2, 0, 1)
-    return MaterialState(MemoryState(load, *parts), state.worn, warmer), sigma
+    return MaterialState(skin.MemoryState(load, *parts), state.worn, warmer), sigma
 
 
 def advance(
@@ -216,7 +208,7 @@ def advance(
     """
     metric = metric_of(settings.thickness)
     return MaterialState(
-        memory=advanced(state.memory, settings.memory, load, dt, metric),
+        memory=skin.advanced(state.memory, settings.memory, load, dt, metric),
         worn=_worn(state, load, settings),
         warmer=_warmed(state.warmer, settings, dt, chance),
     )
@@ -237,11 +229,11 @@ def conductivity(
         (n_cells,) S.
     """
     memory = settings.memory
-    xx, yy, xy, depth = followed(state.memory, memory)
+    xx, yy, xy, depth = skin.followed(state.memory, memory)
     squeezed = np.clip(depth / settings.thickness, -_MOST_COMPRESSION, _MOST_COMPRESSION)
     rise = xx + yy
     if memory.breakdown:
-        rise += 2 * broken_down(state.memory, memory)[0]
+        rise += 2 * skin.broken_down(state.memory, memory)[0]
     rise *= -settings.gauge / 2
     if settings.wear:
         rise -= settings.wear * state.worn
@@ -254,7 +246,7 @@ def conductivity(
     return _directed(level, rise, half, cross)
 
 
-def _series(memory: MaterialMemory, dt: float) -> tuple[list[tuple[float, float]], ...]:
+def _series(memory: skin.MaterialMemory, dt: float) -> tuple[list[tuple[float, float]], ...]:
     """Parts of plays with their half widths; of creep and breakdown with what ``dt`` s leave."""
     return (
         list(zip(memory.play, memory.play_widths, strict=True)),

@@ -14,14 +14,7 @@ from numpy.typing import NDArray
 from threadpoolctl import ThreadpoolController
 
 from tomoskin.core import DataError, Mark, StrPath
-from tomoskin.files.session.scanned import (
-    Advance,
-    ScannedFrame,
-    no_report,
-    read_session,
-    scanned_touches,
-    timed,
-)
+from tomoskin.files.session import scanned
 from tomoskin.files.session.session_reader import (
     SessionReader,
     indexed_frames,
@@ -92,12 +85,12 @@ def replaying(
 
 def gathered(
     pipeline: Pipeline, session: SessionReader, scan: Scan, *, marked: bool = True
-) -> Iterator[tuple[ScannedFrame, FrameResult | None]]:
+) -> Iterator[tuple[scanned.ScannedFrame, FrameResult | None]]:
     """Every frame of ``scan`` but those from before the recording, and what ``pipeline`` makes of
     it: None where it was held, skipped or refused. Not ``marked``: as if the run had followed all
     of them, from one reference on."""
     threads = ThreadpoolController()
-    for frame in timed(session.frames(), tick_rate(session), scan):
+    for frame in scanned.timed(session.frames(), tick_rate(session), scan):
         mark = frame.item.mark if marked else Mark.NONE
         try:
             with threads.limit(limits=1):  # as live, so that sums keep their order
@@ -123,7 +116,7 @@ def session_touches(session: SessionReader) -> Iterator[TouchedFrame]:
     """(frame, time, touches) as they were recorded; as a replay tells them where none were."""
     counts = message_counts(session)
     if counts["/touches"] or counts["/image"]:
-        yield from scanned_touches(session)
+        yield from scanned.scanned_touches(session)
         return
     prepared = as_recorded(session)
     for frame, result in gathered(replaying(prepared, session), session, prepared.scan):
@@ -139,7 +132,7 @@ def reconstruct_session(
     stop: int | None = None,
     setting: Setting | None = None,
     idle: int | None = None,
-    advance: Advance = no_report,
+    advance: scanned.Advance = scanned.no_report,
 ) -> Reconstruction:
     """A whole session as its replay tells it, to the bit; ``unseen`` are the frames that the run
     held or skipped.
@@ -238,7 +231,7 @@ class Session:
 
     def voltages(self) -> Recording:
         """All frames at once, as voltages in the order of the skin's pattern."""
-        return read_session(self.path)
+        return scanned.read_session(self.path)
 
     def touches(self) -> dict[str, NDArray[np.generic]]:
         """All touches as columns, one row a touch, as ``pandas.DataFrame`` takes them.

@@ -13,15 +13,8 @@ from tomoskin.core import DIMENSIONS, FloatArray, GeometryError, PatternError, S
 from tomoskin.model import mesh as meshes
 from tomoskin.model.pattern import Pattern, named
 from tomoskin.model.section import Section
-from tomoskin.model.skin import body
+from tomoskin.model.skin import body, processing
 from tomoskin.model.skin.kept_mesh import kept_mesh
-from tomoskin.model.skin.processing import (
-    InverseSettings,
-    MeshSettings,
-    SignalSettings,
-    TouchSettings,
-    TwinChoice,
-)
 
 FORMAT = 1
 """Version of the file that this code reads, the top-level key ``format``."""
@@ -46,11 +39,11 @@ class SkinSections:
     material: body.MaterialSection
     drive: body.DriveSection
     readout: body.ReadoutSettings
-    mesh: MeshSettings
-    inverse: InverseSettings
-    signal: SignalSettings
-    touch: TouchSettings
-    twin: TwinChoice
+    mesh: processing.MeshSettings
+    inverse: processing.InverseSettings
+    signal: processing.SignalSettings
+    touch: processing.TouchSettings
+    twin: processing.TwinChoice
 
 
 SECTIONS: dict[str, type[Section]] = get_type_hints(SkinSections)
@@ -103,7 +96,7 @@ def check_readout(readout: body.ReadoutSettings, source: str) -> None:
 
 @lru_cache(maxsize=16)
 def flat_mesh(
-    outline: body.OutlineSection, electrodes: body.ElectrodesSection, mesh: MeshSettings
+    outline: body.OutlineSection, electrodes: body.ElectrodesSection, mesh: processing.MeshSettings
 ) -> meshes.Mesh:
     """The sheet of these sections, laid flat; equal skins of a process share it, and it is kept on
     disk.

@@ -16,6 +16,7 @@ from tomoskin.core import FloatArray, GeometryError, SkinError, located
 from tomoskin.model.mesh import ElectrodeArc, Mesh, Outline, Surface, laid_on
 from tomoskin.model.pattern import Pattern
 from tomoskin.model.section import Document, check_names, toml_tables, toml_text
+from tomoskin.model.skin import processing
 from tomoskin.model.skin.body import ReadoutSettings
 from tomoskin.model.skin.build import (
     BODY,
@@ -27,12 +28,6 @@ from tomoskin.model.skin.build import (
     flat_mesh,
 )
 from tomoskin.model.skin.find import built_in_names, skin_text
-from tomoskin.model.skin.processing import (
-    InverseSettings,
-    SignalSettings,
-    TouchSettings,
-    TwinChoice,
-)
 
 _BODY = ("outline", "surface", "electrodes", "material", "drive", "readout", "mesh", "twin")
 """Sections that sheet, mesh and scan rest on; the others only make images of it."""
@@ -81,10 +76,10 @@ class Skin:
     current: float
     mesh_cells: int
     readout: ReadoutSettings
-    inverse: InverseSettings
-    signal: SignalSettings
-    touch: TouchSettings
-    twin: TwinChoice
+    inverse: processing.InverseSettings
+    signal: processing.SignalSettings
+    touch: processing.TouchSettings
+    twin: processing.TwinChoice
     _body: SkinBody = field(repr=False)
     _sections: SkinSections = field(repr=False)
 
