@@ -131,32 +131,28 @@ def configure(
     """Write a board's current and id into its EEPROM and read them back; without either, show
     them and the board's name. Of a Pico the current alone is written, to its flash."""
     from tomoskin.model.skin import Skin
-    from tomoskin.twin.emulator import (
-        check_current,
-        read_identity,
-        say_board,
-        say_identity,
-        write_identity,
-    )
+    from tomoskin.twin import emulator
 
     asked = None if current is None else quantity(current, "current", "--current")
     of_skin = Skin.load(skin).current if skin else None
     if asked is not None:
-        check_current(asked, BOARDS[board], of_skin)
+        emulator.check_current(asked, BOARDS[board], of_skin)
     if BOARDS[board].flash == "uf2":
         _configure_pico(Path(port), asked, name)
         return
-    held = read_identity(port)
+    held = emulator.read_identity(port)
     if asked is None and name is None:
-        typer.echo(f"{port}: {say_board(held)}")
+        typer.echo(f"{port}: {emulator.say_board(held)}")
         return
     if asked is None and held.damaged:
-        raise typer.BadParameter(f"expected --current too: the board holds {say_identity(held)}")
+        raise typer.BadParameter(
+            f"expected --current too: the board holds {emulator.say_identity(held)}"
+        )
     identity = held.change(asked, name)
-    check_current(identity.current, BOARDS[board], of_skin)
+    emulator.check_current(identity.current, BOARDS[board], of_skin)
     with Bar("writing"):
-        write_identity(BOARDS[board], port, identity)
-    typer.echo(f"{port}: {say_identity(identity)}, read back from the firmware")
+        emulator.write_identity(BOARDS[board], port, identity)
+    typer.echo(f"{port}: {emulator.say_identity(identity)}, read back from the firmware")
     _say_resistor(identity.current)
 
 

@@ -29,24 +29,20 @@ class Bar:
     """
 
     def __init__(self, title: str) -> None:
+        from rich import progress
         from rich.console import Console
-        from rich.progress import (
-            BarColumn,
-            Progress,
-            TaskProgressColumn,
-            TextColumn,
-            TimeRemainingColumn,
-        )
 
         console = Console(stderr=True)
         columns = (
-            TextColumn("{task.description}"),
-            BarColumn(),
-            TaskProgressColumn("{task.percentage:>3.0f} %", text_format_no_percentage=""),
-            TimeRemainingColumn(),
+            progress.TextColumn("{task.description}"),
+            progress.BarColumn(),
+            progress.TaskProgressColumn("{task.percentage:>3.0f} %", text_format_no_percentage=""),
+            progress.TimeRemainingColumn(),
         )
         shown = console.is_terminal
-        self._progress = Progress(*columns, console=console, transient=True, disable=not shown)
+        self._progress = progress.Progress(
+            *columns, console=console, transient=True, disable=not shown
+        )
         self._task = self._progress.add_task(title, total=None)
         self._begun = time.monotonic()
         self._lock = threading.Lock()

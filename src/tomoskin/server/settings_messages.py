@@ -11,17 +11,8 @@ from typing import Any, Literal
 from msgspec.structs import replace
 
 from tomoskin.core import PatternError, SkinError, TomoskinError
+from tomoskin.model import section as sections
 from tomoskin.model.pattern import named
-from tomoskin.model.section import (
-    Choice,
-    Number,
-    NumberOrWord,
-    OneOrMore,
-    Quantity,
-    Table,
-    ValueKind,
-    Whole,
-)
 from tomoskin.model.skin import SECTIONS, Skin
 from tomoskin.server.page_messages import Message, MessagePart
 from tomoskin.server.requests import Value
@@ -269,20 +260,20 @@ def _tidy(skin: Skin, name: str, changes: Mapping[str, Any]) -> dict[str, Any]:
     return {**barred, **changes}
 
 
-def _form(kind: ValueKind[Any]) -> KindForm:
+def _form(kind: sections.ValueKind[Any]) -> KindForm:
     form = KindForm(form="text")
     match kind:
-        case Choice():
+        case sections.Choice():
             form = KindForm(form="choice", words=kind.words)
-        case Whole() | Number():
+        case sections.Whole() | sections.Number():
             form = KindForm(form="number", low=kind.low, high=kind.high)
-        case Quantity():
+        case sections.Quantity():
             form = KindForm(form="quantity", unit=kind.unit, low=kind.low, high=kind.high)
-        case NumberOrWord():
+        case sections.NumberOrWord():
             form = replace(_form(kind.number), words=kind.words.words)
-        case OneOrMore():
+        case sections.OneOrMore():
             form = _form(kind.inner)
-        case Table():
-            names, kinds = zip(*kind.row.entries.items(), strict=True)
-            form = KindForm(form="rows", names=names, inner=_form(kinds[0]))
+        case sections.Table():
+            names, entries = zip(*kind.row.entries.items(), strict=True)
+            form = KindForm(form="rows", names=names, inner=_form(entries[0]))
     return form

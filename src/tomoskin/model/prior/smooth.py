@@ -14,14 +14,7 @@ from scipy.spatial.distance import cdist
 
 from tomoskin.core import FloatArray, IntArray, ModelError, check_positive
 from tomoskin.model.mesh import Mesh
-from tomoskin.model.prior.penalty import (
-    Carried,
-    Factored,
-    Penalty,
-    dense_penalty,
-    dense_solver,
-    sparse_penalty,
-)
+from tomoskin.model.prior import penalty as penalties
 from tomoskin.model.section import Quantity, key
 
 LEAST_COUPLING = 1e-6
@@ -48,10 +41,10 @@ CORRELATIONS: dict[float, Callable[[FloatArray], FloatArray]] = {
 class Laplace:
     """Q = twice the graph Laplacian of cells that share a facet, as in EIDORS."""
 
-    def penalty(self, mesh: Mesh, jacobian: NDArray[Any]) -> Penalty:
+    def penalty(self, mesh: Mesh, jacobian: NDArray[Any]) -> penalties.Penalty:
         """The matrix Q for the cells of ``mesh``."""
         del jacobian
-        return sparse_penalty(graph_laplacian(mesh, np.full(len(mesh.neighbours), 2.0)))
+        return penalties.sparse_penalty(graph_laplacian(mesh, np.full(len(mesh.neighbours), 2.0)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +66,7 @@ class Structural:
     labels: ArrayLike
     coupling: float = 0.01
 
-    def penalty(self, mesh: Mesh, jacobian: NDArray[Any]) -> Penalty:
+    def penalty(self, mesh: Mesh, jacobian: NDArray[Any]) -> penalties.Penalty:
         """Return Q on ``mesh``. Raises ModelError for labels or a coupling that do not fit."""
         del jacobian
         labels = np.asarray(self.labels)
@@ -89,7 +82,7 @@ class Structural:
                 where="coupling of the structural prior",
             )
         first, second = labels[mesh.neighbours].T
-        return sparse_penalty(
+        return penalties.sparse_penalty(
             graph_laplacian(mesh, np.where(first == second, 2.0, 2.0 * self.coupling))
         )
 
@@ -121,7 +114,7 @@ class GaussianHighPass:
 
     width: float = 0.1
 
-    def penalty(self, mesh: Mesh, jacobian: NDArray[Any]) -> Penalty:
+    def penalty(self, mesh: Mesh, jacobian: NDArray[Any]) -> penalties.Penalty:
         """Return Q on ``mesh``.
 
         With D the sums of the rows of the symmetric weights area · exp(…) · area and L = D minus
@@ -138,9 +131,9 @@ class GaussianHighPass:
             return np.asarray(high_pass.T @ high_pass)
 
         free = np.full((len(degree), 1), 1.0 / np.sqrt(len(degree)))
-        solve = dense_solver(laplacian, free)
+        solve = penalties.dense_solver(laplacian, free)
         if solve is None:
-            return dense_penalty(dense())
+            return penalties.dense_penalty(dense())
 
         def solve_twice(columns: FloatArray) -> FloatArray:
             """Between the two, the constant is chosen so that the second has a solution."""
@@ -149,7 +142,7 @@ class GaussianHighPass:
             inner -= (square * inner).sum(axis=0) / square.sum()
             return solve(square * inner)
 
-        return Factored(dense, free, solve_twice)
+        return penalties.Factored(dense, free, solve_twice)
 
     def _weights(self, mesh: Mesh) -> FloatArray:
         extent = float(np.ptp(mesh.points, axis=0).max())
@@ -185,7 +178,7 @@ class Matern:
     )
     smoothness: float = 1.5
 
-    def penalty(self, mesh: Mesh, jacobian: NDArray[Any]) -> Penalty:
+    def penalty(self, mesh: Mesh, jacobian: NDArray[Any]) -> penalties.Penalty:
         """Return Q on ``mesh``. Raises ModelError for an impossible length or smoothness."""
         del jacobian
         length = self.correlation_length
@@ -253,7 +246,7 @@ class _Covariance:
         """The matrix Q = C⁻¹ of the penalty, dense."""
         return np.asarray(inv(self.correlation(cdist(self.positions, self.positions))))
 
-    def carry(self, jacobian: NDArray[Any]) -> Carried:
+    def carry(self, jacobian: NDArray[Any]) -> penalties.Carried:
         """CJᴴ and JCJᴴ, a block of rows at a time: C itself would be the largest array of all."""
         columns = jacobian.conj().T
         spread = np.empty(columns.shape, columns.dtype, order="F")
