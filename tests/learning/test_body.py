@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -175,6 +177,18 @@ def test_an_encoder_that_stops_is_said():
     state[150:170] = state[150]
     examples = BodyExamples.checked(dv, time, state=state, names=("angle", "stretch"))
     assert "stopped or jumped" in BodyModel.learn(examples, COVARIANCE).doubts[0]
+
+
+def test_states_of_other_frames_are_refused_and_a_jump_is_said():
+    dv, time, state = two_coordinates(0)
+    examples = BodyExamples.checked(dv, time, state=state, names=("angle", "stretch"))
+    order = np.random.default_rng(4).permutation(len(state))
+    shuffled = BodyModel.learn(replace(examples, state=state[order]), COVARIANCE)
+    with pytest.raises(DataError, match="do not follow the states: those of"):
+        shuffled.doubts.append("")
+    jumped = state + np.where(np.arange(len(state)) < 150, 0.0, 3.0)[:, None] * [1.0, 0.0]
+    said = BodyModel.learn(replace(examples, state=jumped), COVARIANCE).doubts
+    assert any("times their own scatter" in text for text in said)
 
 
 def test_noise_is_no_bend():

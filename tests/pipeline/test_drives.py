@@ -233,3 +233,15 @@ def test_drives_tell_nothing_before_a_reference_stands_nor_of_another_scan(prepa
     assert turns.drives == [None] * len(turns.drives)
     part = DriveSamples(0, 0, 0.0, 1, 0, 0, 0, 0, 0, np.zeros(3, np.uint16))
     assert turns.pipeline.push_drive(part) is None
+
+
+def test_where_a_press_was_there_at_the_reference_drives_begin_no_touches(prepared, idle, touched):
+    """Frames say what the lifted one left; drives would see touches all round it."""
+    turns = Turns(prepared)
+    for _ in range(NEEDED + 3):
+        turns.turn(touched)
+    for _ in range(60):
+        turns.turn(touched, idle) if turns.number == NEEDED + 3 else turns.turn(idle)
+        assert not turns.frames[-1].touches
+    assert "risen" in turns.frames[-1].problem
+    assert sum(bool(result and result.touches) for result in turns.drives[-8 * 50 :]) == 0

@@ -126,9 +126,12 @@ def test_pause_and_reference(runner, until):
     until(lambda: runner.newest.result.ready and runner.status().reference.since != first)
     runner.ask(commands.SetPause(True))
     assert runner.status().paused
+    assert not runner.contacts.valid
+    assert "paused" in runner.contacts.problem
+    assert [event.kind for event in runner.events.since(0)[1]].count("paused") == 1
     frames = runner.status().frames
     runner.ask(commands.SetPause(False))
-    until(lambda: runner.status().frames > frames)
+    until(lambda: runner.status().frames > frames and runner.contacts.valid)
 
 
 def test_presses_of_all_owners_reach_the_source(runner, board, until):

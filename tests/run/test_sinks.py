@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from contextlib import closing
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from run.board import Board
 from run.test_runner import PATIENCE, Watch
 from server.serving import Site
 from tomoskin.core import Event, SinkError
-from tomoskin.files.messages import event_content
+from tomoskin.files.messages import event_content, without_frame
 from tomoskin.files.messages.reporter import WAITING
 from tomoskin.files.session.replay import open_replay
 from tomoskin.model.skin import Skin
@@ -126,7 +127,8 @@ def test_a_replay_is_published_with_the_times_of_its_day():
     (stream,) = sink.streams
     assert (stream.epoch, stream.replayed) == (1e9, True)
     event = Event(0.5, "connected", "board 01")
-    assert event_content(stream, event, of_frame=True)["utc_s"] == 1e9 + 0.5
+    frame = replace(without_frame(stream, "", 0.75), scanned=0.5)
+    assert event_content(stream, event, frame)["utc_s"] == frame.utc == 1e9 + 0.5
     assert event_content(stream, event)["utc_s"] is None  # it is of today
 
 

@@ -204,10 +204,11 @@ def chosen_robot(
             "does not say to which skin it belongs: name the calibrations in a robot file",
             param_hint="--calibration",
         )
-    twins = [f"twin:seed={number}" for number in range(1, len(skins) + 1)]
     given = [
         {"name": name, "skin": skin, "source": source}
-        for (name, skin), source in zip(map(_named, skins), sources or twins, strict=True)
+        for (name, skin), source in zip(
+            map(_named, skins), sources or ["twin"] * len(skins), strict=True
+        )
     ]
     return Robot.of({"skin": given}, "command line", Path())
 

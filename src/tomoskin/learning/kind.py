@@ -155,6 +155,11 @@ class Conditions(Protocol):
         """Whether detections are touches that were fitted to the data."""
         ...
 
+    @property
+    def unrelated(self) -> bool:
+        """Whether frames are no course in time, so that none tells of another."""
+        ...
+
     def fitted_presses(self, dv: FloatArray) -> list[Detection | None] | None:
         """What the fit finds in each frame (n, n_meas) V of one press; None where none is."""
         ...

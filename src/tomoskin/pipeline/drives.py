@@ -7,6 +7,7 @@ touch that has begun, or withdraw it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 
@@ -59,12 +60,16 @@ class DriveResult:
         Where they are now.
     withdrawn
         Those that drives have told of, and no frame has confirmed in time.
+    scanned, scan_time
+        Its middle by the host's clock, and how long it took, s.
     """
 
     drive: int
     host_time: float
     touches: tuple[Touch, ...]
     withdrawn: tuple[Touch, ...] = ()
+    scanned: float = math.nan
+    scan_time: float = math.nan
 
 
 @dataclass(slots=True, eq=False)
@@ -147,6 +152,11 @@ class DriveWatch:
         self._followed: dict[int, _Followed] = {}
         self._calm = 0
         self._withdrawn: tuple[Touch, ...] = ()
+
+    @property
+    def follows_some(self) -> bool:
+        """Whether there are touches."""
+        return bool(self._followed)
 
     def push(
         self,

@@ -200,12 +200,15 @@ class FitConditions:
         Whether detections are touches that were fitted to the data.
     interval
         Between frames, s, or NaN.
+    unrelated
+        Whether frames are no course in time.
     """
 
     prepared: Prepared
     reference: Reference | None
     fitted: bool
     interval: float = np.nan
+    unrelated: bool = False
 
     def fitted_presses(self, dv: FloatArray) -> list[Detection | None] | None:
         """See :class:`tomoskin.learning.Conditions`."""

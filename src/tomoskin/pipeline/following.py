@@ -13,6 +13,7 @@ from tomoskin.learning import BODY, Differences, FrameView
 from tomoskin.model.pattern import Scan
 from tomoskin.pipeline import finding
 from tomoskin.pipeline.conditioning import (
+    MOST_NUISANCE,
     BaselineDifferences,
     Conditioned,
     Conditioning,
@@ -108,7 +109,7 @@ class Following:
         self._renewal: finding.FinderSteps | None = None
         self._is_outdated = False
         fitted = isinstance(self._finder, finding.FitFinder)
-        conditions = finding.FitConditions(prepared, reference, fitted, interval)
+        conditions = finding.FitConditions(prepared, reference, fitted, interval, setting.alone)
         self._applied = {k: c.apply(conditions) for k, c in prepared.calibrations.items()}
         if (lag := prepared.skin.touch.slide_lag) is None:
             lag = sum(applied.slide_lag for applied in self._applied.values())
@@ -204,6 +205,8 @@ class Following:
             follows = not any(c.kind.locates for c in self.prepared.calibrations.values())
             pattern = self.prepared.pattern
             self._drives = DriveWatch(view, pattern, self._interval, follows=follows)
+        if self._finder.problem and not self._drives.follows_some:
+            return None  # what is neither touch nor noise would look like a touch
         result = self._drives.push(drive, dv, clock, self._tracker.ledger.numbered, late=late)
         if result is None:
             return None
@@ -237,8 +240,10 @@ class Following:
 
     def first(self, measured: Voltages) -> FrameResult:
         """The frame that completed the rest: nothing shows in it."""
-        state = self.conditioning.state
-        return FrameResult.at_rest(measured, self.prepared.no_image, self.conditioning.mean, state)
+        mean, state = self.conditioning.mean, self.conditioning.state
+        result = FrameResult.at_rest(measured, self.prepared.no_image, mean, state)
+        shows = result.left_out <= MOST_NUISANCE * len(measured.values)
+        return replace(result, has_image=shows, calibrated=frozenset(self._applied))
 
     def _learn(self, time: float, *, touched: bool, noise: bool) -> None:
         conditioning = self.conditioning
@@ -319,6 +324,7 @@ class Following:
             health=conditioned.health,
             baseline=self.conditioning.state,
             readings=readings,
+            calibrated=frozenset(self._applied),
             unexplained=bent or conditioned.problem or (shows and self._finder.problem) or None,
             scanned=measured.scanned,
             scan_time=measured.scan_time,

@@ -100,6 +100,8 @@ class FrameResult:
         What the skin's calibrations read in it, by the name of their kind.
     unexplained
         What it shows that is neither touch nor noise, in a sentence, or None.
+    calibrated
+        Names of the kinds of calibrations in use.
     """
 
     sequence: int
@@ -116,6 +118,7 @@ class FrameResult:
     baseline: BaselineState | None = None
     readings: Mapping[str, Any] = field(default_factory=dict)
     unexplained: str | None = None
+    calibrated: frozenset[str] = frozenset()
     scanned: float = math.nan
     scan_time: float = math.nan
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from tomoskin.board.source import ScanTimer
@@ -159,8 +161,13 @@ class Pipeline:
         values, railed = given.readout.rows(self._samples, sums)
         if railed[given.pattern.drive_index == part.drive].any():
             return None
-        time = part.ticks / (self.tick_rate or given.readout.tick_rate)
-        return state.push_drive(part.drive, values, (time, part.host_time), late=late)
+        rate = self.tick_rate or given.readout.tick_rate
+        clock = part.ticks / rate, part.host_time
+        known = state.push_drive(part.drive, values, clock, late=late)
+        if known is None:
+            return None
+        middle, length = self._clock.drive(part, given.pattern.n_drive, rate)
+        return replace(known, scanned=middle, scan_time=length)
 
     def early(self, result: FrameResult) -> FrameResult:
         """The newest ``result`` for those who were told of drives before: it neither shows touches

@@ -285,7 +285,7 @@ def _tell_drive(flow: Flow, link: Link, drive: DriveSamples, *, late: bool) -> N
     if known is None or not (known.touches or newest.result.touches):
         return
     result = replace(
-        newest.result, host_time=known.host_time, scanned=known.host_time, scan_time=0.0,
+        newest.result, host_time=known.host_time, scanned=known.scanned, scan_time=known.scan_time,
         touches=known.touches, events=(),
     )  # fmt: skip
     ready = flow.now()

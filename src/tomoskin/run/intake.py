@@ -105,6 +105,8 @@ PERIOD = 1.0
 COUNTED = frozenset({"fault", "refused"})
 """Kinds of events that a sick board causes in masses; all others are said each time."""
 
+PAUSED = "it is paused: touches follow when it is resumed"
+
 _STANDSTILL = frozenset({"silent", "fault", "reset"})
 """Events after which no frame comes until the board is well again."""
 

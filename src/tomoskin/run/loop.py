@@ -18,6 +18,7 @@ from tomoskin.pipeline import Prepared
 from tomoskin.run import commands
 from tomoskin.run.commands import Opener, RunCommands
 from tomoskin.run.flow import Flow
+from tomoskin.run.intake import PAUSED
 from tomoskin.run.publisher import Audience
 
 _POLL = 0.05
@@ -189,6 +190,8 @@ class Loop:
             case commands.TakeReference():
                 flow.marker.reference = True
             case commands.SetPause():
+                if command.on and not flow.marker.held:
+                    flow.out.say("paused", PAUSED)
                 flow.marker.hold(command.on)
             case commands.HoldPresses():
                 flow.twin.hold(command.owner, command.presses)

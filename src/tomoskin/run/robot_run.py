@@ -3,6 +3,7 @@ all skins of a robot in one program: a run each, one clock, one recording, one w
 
 from __future__ import annotations
 
+import os
 import threading
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import wait
@@ -253,11 +254,11 @@ class LiveSkin(AbstractContextManager["LiveSkin"]):
     runner
         What runs it: recording, a new reference, the state, and all else that can be asked of it.
     max_age
-        Seconds after which a frame is not valid any more.
+        Seconds after which a frame is not valid any more; SkinError unless it is more than 0.
     """
 
     def __init__(self, runner: Runner, max_age: float = MAX_AGE) -> None:
-        self.runner, self.max_age = runner, max_age
+        self.runner, self.max_age, self._closed = runner, _checked_age(max_age), False
         self._news = threading.Condition()
         self._mine = threading.local()
 
@@ -273,6 +274,8 @@ class LiveSkin(AbstractContextManager["LiveSkin"]):
         """
         self._mine.given = news = self.runner.news
         contacts = self.runner.contacts_of(news)
+        if self._closed:
+            return contacts.outdated("the skin has been closed")
         if contacts.valid and contacts.age_s > self.max_age:
             played = self.runner.flow.played
             ended = "the replay has ended" if played and played.ended else ""
@@ -292,6 +295,7 @@ class LiveSkin(AbstractContextManager["LiveSkin"]):
 
     def close(self) -> None:
         """Stop the board and end; returns when it is done. A second call does nothing."""
+        self._closed = True
         self.runner.stop()
 
     def _wake(self) -> None:
@@ -299,12 +303,23 @@ class LiveSkin(AbstractContextManager["LiveSkin"]):
             self._news.notify_all()
 
 
+def _checked_age(max_age: float) -> float:
+    if isinstance(max_age, float | int) and max_age > 0:
+        return max_age
+    raise SkinError(f"expected a max_age of more than 0 s, got {max_age!r}")
+
+
+def _each(given: StrPath | Iterable[StrPath]) -> list[StrPath]:
+    """The things given, of which one alone is no list."""
+    return [given] if isinstance(given, str | os.PathLike) else [*given]
+
+
 def open_skin(
     skin: Skin | StrPath | None,
     source: str = "twin",
-    calibrations: Iterable[StrPath] = (),
+    calibrations: StrPath | Iterable[StrPath] = (),
     *,
-    sinks: Sequence[str] = (),
+    sinks: str | Sequence[str] = (),
     max_age: float = MAX_AGE,
     early: bool = False,
 ) -> LiveSkin:
@@ -318,9 +333,9 @@ def open_skin(
     source
         Where frames come from, as for ``--source``: ``serial:PORT``, ``replay:FILE``, ``twin``.
     calibrations
-        Files from ``tomoskin calibrate``, one of each kind. With forces touches are in newtons.
+        A file from ``tomoskin calibrate``, or one of each kind. With forces touches are in newtons.
     sinks
-        Where results go too, as for ``--sink``.
+        Where results go too, as for ``--sink``: one, or several.
     max_age
         Seconds after which a frame is not valid any more.
     early
@@ -331,11 +346,12 @@ def open_skin(
     TomoskinError
         When the skin or a calibration cannot be used, or the source cannot be opened.
     """
+    _checked_age(max_age)
     prepared = prepared_for(skin, source, calibrations)
     runner = Runner(
         prepared,
         partial(open_source, source, prepared.skin),
-        sinks=[*map(make_sink, sinks)],
+        sinks=[make_sink(str(sink)) for sink in _each(sinks)],
         memory=BoardMemory.in_cache(),
         early=early,
     )
@@ -344,7 +360,7 @@ def open_skin(
 
 
 def prepared_for(
-    skin: Skin | StrPath | None, source: str, calibrations: Iterable[StrPath] = ()
+    skin: Skin | StrPath | None, source: str, calibrations: StrPath | Iterable[StrPath] = ()
 ) -> Prepared:
     """What a run begins with, as :func:`open_skin` has it. Raises TomoskinError."""
     if skin is not None:
@@ -358,4 +374,4 @@ def prepared_for(
             )
         with SessionReader(parse_replay(argument)[0]) as session:
             prepared = as_recorded(session)
-    return with_calibrations(prepared, calibrations)
+    return with_calibrations(prepared, _each(calibrations))

@@ -15,7 +15,7 @@ from tomoskin.pipeline import Prepared
 from tomoskin.run import commands
 from tomoskin.run.board_memory import BoardMemory
 from tomoskin.run.flow import Flow, News, Snapshot
-from tomoskin.run.intake import play
+from tomoskin.run.intake import PAUSED, play
 from tomoskin.run.loop import Loop
 from tomoskin.run.publisher import Audience, Turns
 from tomoskin.run.recordings import FILE_NAME
@@ -228,7 +228,8 @@ class Runner:
     def news(self) -> News:
         """What :meth:`contacts_of` makes contacts of, at no cost: another pair is other news."""
         flow = self._loop.flow
-        return flow.newest, self._loop.trouble or flow.intake.standstill
+        trouble = self._loop.trouble or flow.intake.standstill
+        return flow.newest, trouble or (PAUSED if flow.marker.held else None)
 
     def contacts_of(self, news: News) -> Contacts:
         """The contacts of a result that :attr:`news` gave."""

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tomoskin.board.source.clock import ClockFitter, ClockWatch, ScanTimer
-from tomoskin.core import Frame
+from tomoskin.core import DriveSamples, Frame
 
 RATE, FAST, OFFSET = 250e3, 37e-6, 1234.5
 PERIOD = 5e-3
@@ -114,6 +114,17 @@ def test_a_scan_is_stamped_with_its_middle_however_late_the_frame_came(wander):
             assert duration == pytest.approx(interval, rel=1e-3)
     assert np.abs(missed).max() < 3e-3
     assert np.percentile(np.abs(missed), 50) < 1e-3
+
+
+def test_a_drive_is_stamped_with_its_own_middle():
+    """The third of eight, 30 ms late; frames come at once."""
+    clock = ScanTimer()
+    for k in range(30):
+        clock.middle(framed(k, 12_500 * k, 100 + 0.05 * (k + 1)), 0.05, 250e3)
+    part = DriveSamples(30, 12_500 * 30 + 3125, 101.5 + 0.01875 + 0.03, 1, 0, 0, 0, 2, 2, None)
+    middle, length = clock.drive(part, 8, 250e3)
+    assert length == pytest.approx(0.00625)
+    assert middle == pytest.approx(101.5 + 2.5 * 0.00625, abs=1e-4)
 
 
 def test_without_a_clock_a_scan_is_stamped_by_its_arrival():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -303,3 +304,9 @@ def test_a_skin_is_added_to_a_file_or_a_new_one(files):
         add_skin(path, given, "leg.urdf")
     with pytest.raises(SkinError, match="unknown key"):
         add_skin(path, given | {"lnk": "fore"})
+
+
+def test_twins_of_which_no_more_is_said_are_two() -> None:
+    skins = [{"name": name, "skin": "textile-disc-8"} for name in ("palm", "back")]
+    robot = Robot.of({"skin": skins}, "robot.toml", Path())
+    assert [skin.source for skin in robot.skins] == ["twin:seed=1", "twin:seed=2"]

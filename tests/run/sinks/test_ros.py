@@ -222,8 +222,11 @@ def test_a_wrench_is_that_of_all_touches_about_the_origin(stream):
     assert [*value["torque"].values()] == pytest.approx([-4 * y, 4 * x, 0])
     for contact in values["contacts"]["contacts"]:
         assert [*contact["wrench"]["torque"].values()] == pytest.approx([-2 * y, 2 * x, 0])
-    none = messages_of(stream, 0.0)["wrench"]["wrench"]
+    weighed = Reporter(stream).of(result_at(0.0, calibrated=frozenset({"force"})))
+    none = messages_of(stream, weighed)["wrench"]["wrench"]
     assert [*none["force"].values()] == [0, 0, 0]
+    unknown = messages_of(stream, 0.0)["wrench"]["wrench"]
+    assert np.isnan([*unknown["force"].values()]).all()
 
 
 @pytest.mark.parametrize("blind", [{"ready": False}, {"has_image": False, "left_out": 40}])

@@ -6,7 +6,7 @@ import math
 from bisect import bisect_left
 from dataclasses import dataclass, field
 
-from tomoskin.core import Event, Frame
+from tomoskin.core import DriveSamples, Event, Frame
 
 TICK_RATES = (100.0, 100e6)
 """Hz, between which the clock of a board can run. Any other rate is a mistake of its firmware."""
@@ -152,6 +152,15 @@ class ScanTimer:
         if came < frame.host_time - _LATEST:
             self._now, self._next, came = ClockFitter(), ClockFitter(), frame.host_time
         return came - duration / 2, duration
+
+    def drive(self, part: DriveSamples, n_drives: int, tick_rate: float) -> tuple[float, float]:
+        """Host time of the middle of one of the ``n_drives`` of a scan, and its duration, s."""
+        fit, scan = self._now.fit, self._shortest[0]
+        if fit is None or not math.isfinite(scan):
+            return part.host_time, 0.0
+        half = scan / n_drives / 2
+        begun = fit.offset + part.ticks / tick_rate - scan  # the line is of whole scans' last bytes
+        return min(begun, part.host_time - 2 * half) + half, 2 * half
 
 
 class ClockWatch:

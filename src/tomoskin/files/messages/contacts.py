@@ -17,6 +17,7 @@ import numpy as np
 from tomoskin.core import MEASURANDS, Detection, Event, FloatArray, Image, Touch
 from tomoskin.files.messages.link_pose import LinkPose
 from tomoskin.files.messages.stream import Stream
+from tomoskin.learning import FORCE
 from tomoskin.model.mesh import Surface
 from tomoskin.model.robot import quaternion
 from tomoskin.pipeline import FrameResult
@@ -215,6 +216,8 @@ class Contacts:
         Whether the touches are worth a message.
     reports
         Whether it is time to say how the skin is.
+    weighs
+        Whether forces are calibrated.
     """
 
     stream: Stream = field(repr=False)
@@ -233,6 +236,7 @@ class Contacts:
     measured: float = math.nan
     is_due: bool = True
     reports: bool = True
+    weighs: bool = False
     change: FloatArray | None = field(default=None, repr=False)
     noise: FloatArray | None = field(default=None, repr=False)
 
@@ -255,6 +259,7 @@ class Contacts:
             image=result.image if valid else None,
             scanned=result.scanned,
             scan_time=result.scan_time,
+            weighs=FORCE.name in result.calibrated,
             change=_change(result) if result.ready else None,
             noise=result.baseline.deviation if result.ready and result.baseline else None,
             measured=(math.nan if stream.replayed else when) if measured is None else measured,
@@ -286,8 +291,14 @@ class Contacts:
 
     @property
     def force(self) -> float:
-        """N, of all touches against their normals; NaN where one is not known, or none is valid."""
-        return sum((c.force for c in self.touches), start=0.0 if self.valid else math.nan)
+        """N, of all touches against their normals; NaN where one is not known, nothing tells of
+        forces, or none is valid."""
+        return sum((c.force for c in self.touches), start=self.nothing)
+
+    @property
+    def nothing(self) -> float:
+        """N that a sum of forces begins with: 0, or NaN where even no touch has no known force."""
+        return 0.0 if self.valid and (self.weighs or self.tracked) else math.nan
 
     @property
     def skin(self) -> str:
@@ -411,14 +422,15 @@ def event_of(happened: TouchEvent) -> Event:
     return Event(happened.host_time, f"touch-{happened.kind}", happened.text)
 
 
-def event_content(stream: Stream, event: Event, *, of_frame: bool = False) -> dict[str, Any]:
-    """An event as plain values; of a replay only those of its frames are known in UTC."""
-    unknown = stream.replayed and not of_frame
+def event_content(stream: Stream, event: Event, frame: Contacts | None = None) -> dict[str, Any]:
+    """An event as plain values; what happened in a ``frame`` has its time in UTC, and of a replay
+    other events have none."""
+    own = None if stream.replayed else stream.utc(event.host_time)
     return {
         "time_s": event.host_time,
         "kind": event.kind,
         "text": event.text,
-        "utc_s": None if unknown else stream.utc(event.host_time),
+        "utc_s": own if frame is None else frame.utc,
         "skin": stream.skin,
         "frame_id": stream.naming.frame_id,
     }

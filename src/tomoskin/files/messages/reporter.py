@@ -20,8 +20,8 @@ IMAGE_PERIOD = 0.1
 WAITING = "waiting for the first frame"
 """What is wrong before it has come."""
 
-LOST = frozenset({"source-lost", "no-answer", "silent", "fault", "reset"})
-"""Kinds of events after which no frame comes until the board is well again."""
+LOST = frozenset({"source-lost", "no-answer", "silent", "fault", "reset", "paused"})
+"""Kinds of events after which no frame is told until the board is well again, or goes on."""
 
 Item = Contacts | Event
 """What every sink and every file of other programs takes, one after the other."""

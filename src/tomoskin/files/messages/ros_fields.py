@@ -67,7 +67,7 @@ def wrench(head: Value, frame: Contacts) -> Value:
 
     It is NaN where touches are not valid, or the force of one is not measured.
     """
-    nothing = np.full(3, 0.0 if frame.valid else np.nan)
+    nothing = np.full(3, frame.nothing)
     force = sum((contact.push for contact in frame.touches), start=nothing)
     torque = sum((contact.torque for contact in frame.touches), start=nothing)
     return {"header": head, "wrench": _wrench(force, torque)}

@@ -58,10 +58,10 @@ class RosMessage:
 
 def ros_messages(stream: Stream, item: Item) -> Iterator[RosMessage]:
     """Messages of one frame, or of an event."""
-    of_frame = not isinstance(item, Event)
+    frame = None if isinstance(item, Event) else item
     stamp = stream.log_time(time_of(item))
     for event in (item,) if isinstance(item, Event) else item.events:
-        content = partial(event_content, stream, event, of_frame=of_frame)
+        content = partial(event_content, stream, event, frame)
         yield RosMessage("events", partial(_json, content), stamp)
     if isinstance(item, Event):
         return

@@ -245,6 +245,12 @@ _SLOPE = 1e-3
 _ODD = 5.0
 """Frames are odd that are missed by so many times the median."""
 
+_DOUBTED, _SAYS_NOTHING = 0.3, 1.0
+"""Error of left-out states, in parts of their scatter, from which they are doubted, or refused."""
+
+_FEW = 0.03
+"""Part of the frames that may be odd: a sheet that remembers has some at the turns."""
+
 _FOLDS = 5
 _RIDGES = np.geomspace(1e-6, 1.0, 13)
 
@@ -375,16 +381,32 @@ class BodyModel:
 
     @property
     def doubts(self) -> list[str]:
-        """What is wrong with the states of the examples, in sentences."""
+        """What is wrong with the states of the examples, in sentences.
+
+        Raises DataError where left-out frames tell no more of a state than its mean does.
+        """
+        if not self.examples.names:
+            return []
+        missed = self.error / self.body.state.std(axis=0)
+        worst = int(missed.argmax())
+        text = (
+            f"the voltages do not follow the states: those of {self.body.names[worst]} that were "
+            f"left out are missed by {missed[worst]:.1f} times their own scatter"
+        )
+        advice = "check that the states are of these frames, in time and order, and of this body"
+        if not missed[worst] < _SAYS_NOTHING:
+            raise DataError(f"{text}, expected less than {_SAYS_NOTHING:g}", hint=advice)
+        said = [f"{text}; {advice}"] if missed[worst] > _DOUBTED else []
         away = np.linalg.norm(self.errors, axis=1)
         odd = np.flatnonzero(away > _ODD * max(float(np.median(away)), np.sqrt(self.n_modes)))
-        if not len(odd) or not self.examples.names:
-            return []
-        return [
-            f"in {len(odd)} of {len(away)} frames, first in frame {odd[0]}, the voltages do not "
-            "follow the states: an encoder has stopped or jumped, or something touched. Touches "
-            "are separated all the same; states are less certain, which their deviations say"
-        ]
+        if len(odd) > _FEW * len(away):
+            said.append(
+                f"in {len(odd)} of {len(away)} frames, first in frame {odd[0]}, the voltages do "
+                "not follow the states: an encoder has stopped or jumped, or something touched. "
+                "Touches are separated all the same; states are less certain, which their "
+                "deviations say"
+            )
+        return said
 
     def changes(self, state: FloatArray, time: FloatArray) -> FloatArray:
         """(n, n_meas) V that the body adds to the reference in a course of states (n, d) at

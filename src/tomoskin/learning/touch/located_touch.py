@@ -98,15 +98,18 @@ class LocatedTouch(Applied):
     of an image tell nothing of that: then the strongest is located, as if it were the only one.
     Fitted touches stay where they are if presses were labelled by the same model, from a rub.
     Measurements that have jumped since the presses are left out where frames do not fit with them.
+    A mean of frames in which a touch stands is located, unless frames are ``unrelated``.
     """
 
-    def __init__(self, locator: Locator, correction: FitCorrection | None) -> None:
+    def __init__(
+        self, locator: Locator, correction: FitCorrection | None, *, unrelated: bool
+    ) -> None:
         self._correction, self.slide_lag = correction, locator.presses.slide_lag or 0.0
         self._modelled = locator.presses.modelled
         self._rubbed = locator.presses.spread is not None
         self._watch = Watch(locator, LIVE)
-        self._standing = Standing()
-        self._stood = 0
+        self._standing, self._stood = Standing(), 0
+        self._unrelated = unrelated
 
     def locate(self, view: FrameView, detections: list[Detection]) -> list[Detection]:
         """The detections, each at the position that the presses tell."""
@@ -119,7 +122,7 @@ class LocatedTouch(Applied):
         dv = np.where(_excluded(differences.nuisance), np.nan, differences.change)
         if not np.isfinite(dv).any():
             return []
-        mean = self._standing.push(dv)
+        mean = dv if self._unrelated else self._standing.push(dv)
         correct = self._correction
         if view.others is None or correct is None:
             (position,), (covariance,) = self._watch(mean, settled=self._settled())
@@ -194,7 +197,8 @@ def _exclude(_locator: Locator, _measurements: IntArray) -> None:
 
 
 def _apply(locator: Locator, conditions: Conditions) -> Applied:
-    return LocatedTouch(locator, _correction(locator, conditions))
+    correction = _correction(locator, conditions)
+    return LocatedTouch(locator, correction, unrelated=conditions.unrelated)
 
 
 def _correction(locator: Locator, conditions: Conditions) -> FitCorrection | None:

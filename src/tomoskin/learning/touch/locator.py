@@ -313,7 +313,8 @@ class Locator:
         presses = Presses.checked(dv, xy, strength)
         if table is not None:
             frames(presses.dv, table.n_meas)
-        region = Region.of(skin) if skin else Region.around(presses.xy)
+        hull = Region.around(presses.xy)  # refuses presses on one line
+        region = Region.of(skin) if skin else hull
         skin_id = skin.identity if skin else ""
         return cls.learn(presses.within(region), region, table, skin_id, progress)
 

@@ -247,8 +247,11 @@ class Robot:
         """From the tables of a file: ``source`` for errors, ``folder`` of its paths; SkinError."""
         robot = RobotSection.read(tables.get("robot", {}), f"{source}: [robot]")
         urdf = None if robot.urdf is None else Urdf.read(Path(folder) / robot.urdf)
-        each = SkinSection.each(tables, source)
-        skins = tuple(_placed(given, where, Path(folder), urdf, robot) for given, where in each)
+        each = enumerate(SkinSection.each(tables, source), 1)
+        skins = tuple(
+            _placed(_a_twin(given, n), where, Path(folder), urdf, robot)
+            for n, (given, where) in each
+        )
         if not 0 < len(skins) <= MOST_SKINS:
             raise SkinError(
                 f"expected 1 to {MOST_SKINS} sections [[skin]], got {len(skins)}", where=source
@@ -300,6 +303,11 @@ def add_skin(path: StrPath, given: Mapping[str, Any], urdf: str | None = None) -
     text = "\n".join([text, "", "[[skin]]", *entry]) + "\n"
     Robot.of(toml_tables(text, str(path), FORMAT, SECTIONS), str(path), path.parent)
     return text
+
+
+def _a_twin(given: SkinSection, number: int) -> SkinSection:
+    """The same; a twin of which no more is said is another one than those of other numbers."""
+    return replace(given, source=f"twin:seed={number}") if given.source == "twin" else given
 
 
 def _placed(
