@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from learning.labelled import RADIUS, Floats, places
-from tomoskin import Locator, Pattern, Skin
+from tomoskin import ForwardModel, Locator, Pattern, Skin
 from tomoskin.learning import label_doubts
 from tomoskin.learning.touch.per_channel import (
     ChannelMaps,
@@ -14,6 +14,7 @@ from tomoskin.learning.touch.per_channel import (
     likeliest_envelope,
     rings,
 )
+from tomoskin.learning.touch.unlabelled import model_responses
 from tomoskin.sensing.segment import Region
 
 PATTERN = Pattern.adjacent(8)
@@ -110,6 +111,24 @@ def test_labels_in_another_unit_are_said() -> None:
     dv, xy = _on(skin, [0, 1], (1, 1))
     inches = Locator.fit(dv, xy / 25.4, skin=skin)
     assert "inches" in label_doubts(inches, skin)
+
+
+@pytest.mark.parametrize("electrodes", [8, 16])
+def test_a_sheet_that_answers_as_its_model_says_tells_axes_and_unit(electrodes: int) -> None:
+    skin = Skin.load(f"textile-disc-{electrodes}")
+    model = ForwardModel(skin.mesh(), skin.pattern(), contact_impedance=skin.contact_impedance)
+    region, rng = Region.of(skin), np.random.default_rng(5)
+    xy = region.metres(region.grid[rng.choice(len(region.grid), 20, replace=False)])
+    dv = model_responses(model, skin.conductivity, xy, region.unit)
+    dv += 0.1 * np.abs(dv).mean() * rng.normal(size=dv.shape)
+
+    def said(labels: Floats) -> str:
+        return label_doubts(Locator.fit(dv, labels, pattern=skin.pattern(), skin=skin), skin)
+
+    assert said(xy) == ""
+    assert "with x and y exchanged:" in said(xy[:, ::-1])
+    assert "with x of the other sign:" in said(xy * [-1, 1])
+    assert "0.39 times as far from the middle" in said(xy / 2.54)
 
 
 def test_presses_that_do_not_tell_where_the_electrodes_are_doubt_no_label() -> None:

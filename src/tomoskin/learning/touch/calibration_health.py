@@ -13,6 +13,7 @@ from tomoskin.core import Detection, FloatArray
 from tomoskin.learning.touch.locator import SHARED, Locator
 from tomoskin.learning.touch.per_channel import SURE, Envelope, evidence_of
 from tomoskin.learning.touch.presses import equally_hard
+from tomoskin.learning.touch.unlabelled import modelled_positions
 from tomoskin.model.skin import Skin
 from tomoskin.sensing.segment import Region
 
@@ -193,12 +194,20 @@ _TINY = 0.12
 twenty-five."""
 
 _AXES = ("x and y exchanged", "x of the other sign", "y of the other sign")
+_TURNS = tuple(product((False, True), repeat=3))
+
+_CLEARLY = 4.0
+"""How many times smaller squares must be with other axes, or another unit, than as given."""
+
+_OF_ANOTHER_UNIT = 1.6
+"""Times the way from the middle that labels of another unit differ by: an inch is 2.54 cm."""
 
 
 def label_doubts(locator: Locator, skin: Skin) -> str:
     """What speaks for another unit or other axes of the labels than the ``skin`` has, in words.
 
-    Rows answer most strongly near their electrodes, so that presses tell where these are.
+    A sheet that answers as its model says tells where the presses were. Of others, rows answer most
+    strongly near their electrodes, so that presses tell where these are.
     """
     xy, outline = locator.presses.xy, Region.of(skin).outline
     covered, extent = (float(np.ptp(points, axis=0).max()) for points in (xy, outline))
@@ -208,21 +217,63 @@ def label_doubts(locator: Locator, skin: Skin) -> str:
             f"{1e3 * extent:.0f} mm: are they in inches or centimetres? "
             "Give them in metres"
         )
-    features, region = locator.features, locator.region
-    if locator.pattern is None or len(features.rows) > SHARED:
+    if locator.pattern is None:
         return ""
+    there = modelled_positions(locator.presses.dv, skin, locator.pattern, locator.region)
+    if there is None:
+        return _axes_doubt(_axes_by_rim(locator, skin))
+    return _doubt_by_model(locator.region.scaled(xy), there)
+
+
+def _doubt_by_model(labels: FloatArray, there: FloatArray) -> str:
+    """What speaks against labels (n, 2) in radii of presses that the model has ``there`` (n, 2)."""
+    every = {turned: _missed(_turned(labels, turned), there) for turned in _TURNS}
+    usual, axes = every[_TURNS[0]], min(_TURNS, key=every.__getitem__)
+    if every[axes] < usual / _CLEARLY:
+        return _axes_doubt(axes)
+    scale = float((labels * there).sum() / (there * there).sum())
+    is_near = 1 / _OF_ANOTHER_UNIT < scale < _OF_ANOTHER_UNIT
+    if is_near or _missed(labels, scale * there) > usual / _CLEARLY:
+        return ""
+    return (
+        f"the labels lie {scale:.2f} times as far from the middle as the skin's model has the "
+        "presses: are they in another unit? Give them in metres"
+    )
+
+
+def _turned(xy: FloatArray, turned: tuple[bool, ...]) -> FloatArray:
+    """Labels (n, 2) with x and y exchanged, and then of the other sign."""
+    return np.asarray((xy[:, ::-1] if turned[0] else xy) * np.where(turned[1:], -1, 1))
+
+
+def _missed(labels: FloatArray, there: FloatArray) -> float:
+    """Median square of the way from labels (n, 2) to where they should be."""
+    return float(np.median(((labels - there) ** 2).sum(axis=1)))
+
+
+def _axes_by_rim(locator: Locator, skin: Skin) -> tuple[bool, ...]:
+    """By which change of the axes the strongest answers are nearest to their electrodes; none where
+    that is not sure."""
+    features, region, xy = locator.features, locator.region, locator.presses.xy
+    own, *others = _TURNS
+    if locator.pattern is None or len(features.rows) > SHARED:
+        return own
     rim = Envelope.of(locator.pattern, region.scaled(skin.electrode_centres))
     near, data = rim.of_rows(features.rows), features(locator.presses.dv)
 
     def evidence(turned: tuple[bool, ...], envelope: Envelope = near) -> float:
-        labels = (xy[:, ::-1] if turned[0] else xy) * np.where(turned[1:], -1, 1)
-        return evidence_of(envelope, region.scaled(labels), data)
+        return evidence_of(envelope, region.scaled(_turned(xy, turned)), data)
 
-    own, *others = product((False, True), repeat=3)
     best = max(others, key=evidence)
-    if evidence(best) < SURE + max(evidence(own), evidence(own, Envelope())):
+    sure = evidence(best) >= SURE + max(evidence(own), evidence(own, Envelope()))
+    return best if sure else own
+
+
+def _axes_doubt(axes: tuple[bool, ...]) -> str:
+    """What speaks for other axes, in words; nothing where none is changed."""
+    if not any(axes):
         return ""
-    changes = " and ".join(compress(_AXES, best))
+    changes = " and ".join(compress(_AXES, axes))
     return (
         f"the labels fit the electrodes of this skin better with {changes}: check the axes of the "
         "labels, and [electrodes] first and order in the skin file"

@@ -188,7 +188,7 @@ _HOLDS = 0.5
 """Part of a usual frame that the model must explain: 0.76 to 0.95 on the twin, at most 0.24 on the
 public hydrogels."""
 
-_NOISIEST = 0.5
+_NOISIEST, _TELLING = 0.5, 150
 _TINY = 1e-99
 
 
@@ -250,12 +250,27 @@ class ModelFit:
         return self.explained > _HOLDS
 
 
+def modelled_positions(
+    dv: FloatArray, skin: Skin, pattern: Pattern, region: Region
+) -> FloatArray | None:
+    """(n, 2) in radii, where the skin's model has the touches of frames ``dv`` (n, n_meas); None
+    where the sheet does not answer as its model says."""
+    model = ForwardModel(skin.mesh(), pattern, contact_impedance=skin.contact_impedance)
+    places = region.metres(region.grid)
+    responses = model_responses(model, skin.conductivity, places, region.unit)
+    answer = ModelFit.of(dv, responses)
+    return np.asarray(answer.weights @ region.grid) if answer.holds else None
+
+
 def _noise_part(dv: FloatArray) -> float:
     """Part of a usual frame's square that is noise, in frames (n, k) of one touch each.
 
     Touches change the data in few directions, so that along the median one there is noise alone.
-    More than half is taken for half: noise by itself is not to look like a touch.
+    More than half is taken for half: noise by itself is not to look like a touch. Few frames do not
+    tell it.
     """
+    if len(dv) < _TELLING:
+        return 0.0
     along = np.linalg.svd(dv, compute_uv=False) ** 2 / len(dv)
     part = np.median(along) * len(along) / max(np.median(np.sum(dv**2, axis=1)), _TINY)
     return min(float(part), _NOISIEST)
