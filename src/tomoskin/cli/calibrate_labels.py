@@ -205,13 +205,21 @@ def _tabled(table: Path, n: int) -> tuple[list[int], dict[str, Any]]:
 
     columns = read_columns(table)
     names = [name for name in columns if name != "frame"]
-    frames = columns.get("frame", np.array([-1.0]))
-    if not (names and np.isin(frames, np.arange(n)).all()):
+    frames = columns.get("frame")
+    if frames is None or not names:
         given = ", ".join(filter(None, columns)) or "none"
         raise DataError(
-            f"expected columns frame (within 0:{n}) and coordinates, got {given}",
+            f"expected columns frame and coordinates, got {given}",
             where=str(table),
             hint="for example: frame,angle_deg,stretch",
+        )
+    rising = np.diff(frames, prepend=-1.0) > 0
+    wrong = np.flatnonzero(~(np.isin(frames, np.arange(n)) & rising))
+    if len(wrong):
+        raise DataError(
+            f"expected frames from 0 to {n - 1} in their order, each once, got frame "
+            f"{frames[wrong[0]]:g} in row {wrong[0] + 1}",
+            where=str(table),
         )
     state = np.column_stack([columns[k] * (math.pi / 180 if _in_degrees(k) else 1) for k in names])
     if not np.isfinite(state).all():
