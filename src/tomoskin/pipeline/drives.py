@@ -155,7 +155,7 @@ class DriveWatch:
 
     @property
     def follows_some(self) -> bool:
-        """Whether there are touches."""
+        """Whether there are touches that drives move on."""
         return bool(self._followed)
 
     def push(
