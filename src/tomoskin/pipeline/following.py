@@ -111,6 +111,7 @@ class Following:
         fitted = isinstance(self._finder, finding.FitFinder)
         conditions = finding.FitConditions(prepared, reference, fitted, interval, setting.alone)
         self._applied = {k: c.apply(conditions) for k, c in prepared.calibrations.items()}
+        self._calibrated = frozenset(self._applied)
         if (lag := prepared.skin.touch.slide_lag) is None:
             lag = sum(applied.slide_lag for applied in self._applied.values())
         tracker.slides = SlideCorrection(lag)
@@ -243,7 +244,7 @@ class Following:
         mean, state = self.conditioning.mean, self.conditioning.state
         result = FrameResult.at_rest(measured, self.prepared.no_image, mean, state)
         shows = result.left_out <= MOST_NUISANCE * len(measured.values)
-        return replace(result, has_image=shows, calibrated=frozenset(self._applied))
+        return replace(result, has_image=shows, calibrated=self._calibrated)
 
     def _learn(self, time: float, *, touched: bool, noise: bool) -> None:
         conditioning = self.conditioning
@@ -324,7 +325,7 @@ class Following:
             health=conditioned.health,
             baseline=self.conditioning.state,
             readings=readings,
-            calibrated=frozenset(self._applied),
+            calibrated=self._calibrated,
             unexplained=bent or conditioned.problem or (shows and self._finder.problem) or None,
             scanned=measured.scanned,
             scan_time=measured.scan_time,

@@ -166,7 +166,7 @@ class Pipeline:
         known = state.push_drive(part.drive, values, clock, late=late)
         if known is None:
             return None
-        middle, length = self._clock.drive(part, given.pattern.n_drive, rate)
+        middle, length = self._clock.drive(part, given.pattern.n_drive)
         return replace(known, scanned=middle, scan_time=length)
 
     def early(self, result: FrameResult) -> FrameResult:

@@ -122,9 +122,19 @@ def test_a_drive_is_stamped_with_its_own_middle():
     for k in range(30):
         clock.middle(framed(k, 12_500 * k, 100 + 0.05 * (k + 1)), 0.05, 250e3)
     part = DriveSamples(30, 12_500 * 30 + 3125, 101.5 + 0.01875 + 0.03, 1, 0, 0, 0, 2, 2, None)
-    middle, length = clock.drive(part, 8, 250e3)
+    middle, length = clock.drive(part, 8)
     assert length == pytest.approx(0.00625)
     assert middle == pytest.approx(101.5 + 2.5 * 0.00625, abs=1e-4)
+
+
+def test_a_drive_of_a_clock_that_is_fast_is_stamped_by_its_own_rate():
+    """300 ppm are 0.2 s after ten minutes."""
+    clock, rate = ScanTimer(), 250e3 * 1.0003
+    for k in range(12_000):
+        clock.middle(framed(k, round(rate * 0.05 * k), 100 + 0.05 * (k + 1)), 0.05, 250e3)
+    start = 700.0 + 0.0125
+    part = DriveSamples(12_000, round(rate * 600.0125), start + 0.03, 1, 0, 0, 0, 2, 2, None)
+    assert clock.drive(part, 8)[0] == pytest.approx(start + 0.003125, abs=1e-3)
 
 
 def test_without_a_clock_a_scan_is_stamped_by_its_arrival():

@@ -153,13 +153,14 @@ class ScanTimer:
             self._now, self._next, came = ClockFitter(), ClockFitter(), frame.host_time
         return came - duration / 2, duration
 
-    def drive(self, part: DriveSamples, n_drives: int, tick_rate: float) -> tuple[float, float]:
+    def drive(self, part: DriveSamples, n_drives: int) -> tuple[float, float]:
         """Host time of the middle of one of the ``n_drives`` of a scan, and its duration, s."""
         fit, scan = self._now.fit, self._shortest[0]
         if fit is None or not math.isfinite(scan):
             return part.host_time, 0.0
         half = scan / n_drives / 2
-        begun = fit.offset + part.ticks / tick_rate - scan  # the line is of whole scans' last bytes
+        last = fit.offset + part.ticks / fit.tick_rate  # when a scan that began with it would come
+        begun = last - scan
         return min(begun, part.host_time - 2 * half) + half, 2 * half
 
 

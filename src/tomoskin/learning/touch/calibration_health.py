@@ -13,7 +13,7 @@ from tomoskin.core import Detection, FloatArray
 from tomoskin.learning.touch.locator import SHARED, Locator
 from tomoskin.learning.touch.per_channel import SURE, Envelope, evidence_of
 from tomoskin.learning.touch.presses import equally_hard
-from tomoskin.learning.touch.unlabelled import modelled_positions
+from tomoskin.learning.touch.unlabelled import compared
 from tomoskin.model.skin import Skin
 from tomoskin.sensing.segment import Region
 
@@ -217,12 +217,14 @@ def label_doubts(locator: Locator, skin: Skin) -> str:
             f"{1e3 * extent:.0f} mm: are they in inches or centimetres? "
             "Give them in metres"
         )
-    if locator.pattern is None:
+    region, pattern = locator.region, locator.pattern
+    if pattern is None:
         return ""
-    there = modelled_positions(locator.presses.dv, skin, locator.pattern, locator.region)
-    if there is None:
-        return _axes_doubt(_axes_by_rim(locator, skin))
-    return _doubt_by_model(locator.region.scaled(xy), there)
+    answer = compared(locator.presses.dv, skin, pattern, region)[1]
+    if answer.holds:
+        return _doubt_by_model(region.scaled(xy), answer.weights @ region.grid)
+    rim = Envelope.of(pattern, region.scaled(skin.electrode_centres))
+    return _axes_doubt(_axes_by_rim(locator, rim))
 
 
 def _doubt_by_model(labels: FloatArray, there: FloatArray) -> str:
@@ -251,14 +253,13 @@ def _missed(labels: FloatArray, there: FloatArray) -> float:
     return float(np.median(((labels - there) ** 2).sum(axis=1)))
 
 
-def _axes_by_rim(locator: Locator, skin: Skin) -> tuple[bool, ...]:
-    """By which change of the axes the strongest answers are nearest to their electrodes; none where
-    that is not sure."""
+def _axes_by_rim(locator: Locator, rim: Envelope) -> tuple[bool, ...]:
+    """By which change of the axes the strongest answers are nearest to their electrodes on the
+    ``rim``; none where that is not sure."""
     features, region, xy = locator.features, locator.region, locator.presses.xy
     own, *others = _TURNS
-    if locator.pattern is None or len(features.rows) > SHARED:
+    if len(features.rows) > SHARED:
         return own
-    rim = Envelope.of(locator.pattern, region.scaled(skin.electrode_centres))
     near, data = rim.of_rows(features.rows), features(locator.presses.dv)
 
     def evidence(turned: tuple[bool, ...], envelope: Envelope = near) -> float:

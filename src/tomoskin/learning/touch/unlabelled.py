@@ -230,18 +230,21 @@ class ModelFit:
         dv = np.nan_to_num(dv)
         usual = _usual(dv) / _usual(responses)
         scales = (np.ones(len(usual)), np.maximum(usual, _TINY))
-        fits = [cls._of(sign * dv / scale, responses) for scale in scales for sign in (1, -1)]
+        fits = []
+        for data in (dv / scale for scale in scales):
+            noise = _noise_part(data)
+            fits += [cls._of(sign * data, responses, noise) for sign in (1, -1)]
         return max(fits, key=lambda fit: fit.explained)
 
     @classmethod
-    def _of(cls, dv: FloatArray, responses: FloatArray) -> Self:
+    def _of(cls, dv: FloatArray, responses: FloatArray, noise_part: float) -> Self:
         shapes, expected = _shapes(dv), _shapes(responses)
         best = (shapes @ expected.T).max(axis=1)
         off = squared_distances(shapes, expected)
         noise = float(off.min(axis=1).mean()) / _MODEL_FREEDOM
         weights = np.exp(-0.5 * (off - off.min(axis=1, keepdims=True)) / noise)
         usual = float(np.median(np.maximum(best, 0.0) ** 2))
-        explained = min(usual / (1 - _noise_part(dv)), 1.0)
+        explained = min(usual / (1 - noise_part), 1.0)
         return cls(weights / weights.sum(axis=1, keepdims=True), explained)
 
     @property
@@ -250,16 +253,13 @@ class ModelFit:
         return self.explained > _HOLDS
 
 
-def modelled_positions(
+def compared(
     dv: FloatArray, skin: Skin, pattern: Pattern, region: Region
-) -> FloatArray | None:
-    """(n, 2) in radii, where the skin's model has the touches of frames ``dv`` (n, n_meas); None
-    where the sheet does not answer as its model says."""
+) -> tuple[ForwardModel, ModelFit]:
+    """The skin's model, and frames ``dv`` (n, n_meas) against it on the grid of the region."""
     model = ForwardModel(skin.mesh(), pattern, contact_impedance=skin.contact_impedance)
     places = region.metres(region.grid)
-    responses = model_responses(model, skin.conductivity, places, region.unit)
-    answer = ModelFit.of(dv, responses)
-    return np.asarray(answer.weights @ region.grid) if answer.holds else None
+    return model, ModelFit.of(dv, model_responses(model, skin.conductivity, places, region.unit))
 
 
 def _noise_part(dv: FloatArray) -> float:
@@ -339,14 +339,12 @@ class UnlabelledFit:
         cls, dv: FloatArray, skin: Skin, pattern: Pattern, region: Region, labels: FloatArray
     ) -> Self:
         """Fit frames (n, n_meas); ``labels`` (n, 2) in radii, NaN where there is none."""
-        model = ForwardModel(skin.mesh(), pattern, contact_impedance=skin.contact_impedance)
-        places, sheet = region.metres(region.grid), skin.conductivity
-        answer = ModelFit.of(dv, model_responses(model, sheet, places, region.unit))
+        model, answer = compared(dv, skin, pattern, region)
         if answer.holds:
             alike = float(np.sqrt(answer.explained))
             return cls._mean([answer.weights], region.grid, (0.0, alike, True))
         grid = region.lattice(_POSITIONS)
-        ranked = Ranked.of(dv, expected_sizes(model, sheet, region.metres(grid)), grid)
+        ranked = Ranked.of(dv, expected_sizes(model, skin.conductivity, region.metres(grid)), grid)
         features, fits = signed_features(dv), []
         for neighbours in _NEIGHBOURS:
             layout = unfolded(ranked.scores, neighbours)
