@@ -16,6 +16,7 @@ from tomoskin.core import DataError, OutputError, SourceError
 from tomoskin.files.session import SessionReader, repair, split, split_targets
 from tomoskin.model.robot import Place, Pose
 from tomoskin.run import Member, RobotRun
+from tomoskin.run.intake import MOST_AT_ONCE
 from tomoskin.run.publisher import Turns
 from tomoskin.run.robot_run import board_problems
 from tomoskin.run.sinks import Contacts, Sink
@@ -223,6 +224,42 @@ def test_turns_are_taken_in_order_and_who_waits_does_something_else():
     for thread in threads:
         thread.join(PATIENCE)
     assert taken == ["a", "b", "c"]
+
+
+def test_who_waited_for_a_turn_computes_what_has_come_since(prepared, boards):
+    members = [member(prepared, name, boards[name]) for name in ("left", "hand")]
+    with running(members) as run, ExitStack() as calls:
+        watch, hand, results = Watch(run), run.runners["hand"], []
+        watch.until(grown(run, ["left", "hand"]))
+        for _ in range(MOST_AT_ONCE):  # a host that stays behind computes the newest frame alone
+            hand.flow.intake.backlog.late(2 * MOST_AT_ONCE, waited=1.0)
+        turns = hand.audience.turns
+        with turns.turn(lambda: None):
+            while len(turns._waiting) < 2:
+                pass
+            before = hand.newest.result.sequence
+            for _ in range(5):
+                boards["hand"].send(boards["hand"].free)
+            skipped = hand.status().dropped
+            calls.enter_context(hand.audience.subscribe("results", results.append))
+        watch.until(lambda: results)
+        assert results[0].sequence >= before + 6
+        watch.until(lambda: hand.status().dropped >= skipped + 5)
+
+
+def test_a_source_that_is_lost_while_it_waits_loses_nothing_that_was_read(prepared, boards):
+    members = [member(prepared, name, boards[name]) for name in ("left", "hand")]
+    with running(members) as run:
+        watch, left = Watch(run), run.runners["left"]
+        watch.until(grown(run, ["left", "hand"]))
+        turns = left.audience.turns
+        with turns.turn(lambda: None):
+            while len(turns._waiting) < 2:
+                pass
+            before = left.newest.result.sequence
+            boards["left"].lose()
+        watch.until(lambda: left.status().problem)
+        assert left.newest.result.sequence == before + 1
 
 
 def test_a_board_hears_its_host_while_another_skin_computes_for_long(prepared, boards):

@@ -132,7 +132,22 @@ class Flow:
                     self.out.say("press-refused", f"a press is left out: {why}")
 
     def take(self, link: Link, items: Sequence[Received]) -> None:
-        """What one read of the link brought: frames, drives of the next one, and events."""
+        """What one read of the link brought: frames, drives of the next one, and events.
+
+        Where others of the robot's skins compute first, what comes meanwhile is read before
+        anything is computed: a frame would be as old as the turns of all others.
+        """
+        if not any(isinstance(item, Frame | DriveSamples) for item in items):
+            self._take(link, items)
+            return
+        with self.turns.turn(link.keep_alive) as waited:
+            more: Sequence[Received] = ()
+            try:
+                more = link.poll(0.0) if waited else ()
+            finally:  # what has been read counts, even where the source is lost now
+                self._take(link, [*items, *more])
+
+    def _take(self, link: Link, items: Sequence[Received]) -> None:
         intake, out = self.intake, self.out
         frames = intake.take(link, items, self._clock())
         info, board = link.session.info, link.session.board
@@ -145,9 +160,9 @@ class Flow:
         drives = [item for item in items if isinstance(item, DriveSamples)]
         for item in items:
             if isinstance(item, DriveSamples):
-                _tell_drive(self, link, item, late=item is not drives[-1])
+                _tell_drive(self, item, late=item is not drives[-1])
             elif isinstance(item, Frame):
-                self._mark(link, item, late=late > 0)
+                self._mark(item, late=late > 0)
                 late -= 1
         replay = self.marker.replay
         if replay is not None and replay.ended != self._ended:
@@ -232,17 +247,16 @@ class Flow:
         if self.marker.replay is None:
             self._recall.meet(info, self)
 
-    def _mark(self, link: Link, frame: Frame, *, late: bool) -> None:
+    def _mark(self, frame: Frame, *, late: bool) -> None:
         mark = self.marker.mark(frame, late=late)
         if mark is not None:
             for before in self.out.recordings.again():
                 self.pipeline.push(*before)
             self.out.put(MarkedFrame(frame, mark))
-            if mark & Mark.SKIPPED:  # without a turn, or it would take as long as one that counts
+            if mark & Mark.SKIPPED:
                 self.intake.skipped += 1
                 return
-            with self.turns.turn(link.keep_alive):
-                self._take_frame(frame, mark)
+            self._take_frame(frame, mark)
 
     def _take_frame(self, frame: Frame, mark: Mark) -> None:
         intake = self.intake
@@ -267,15 +281,14 @@ class Flow:
         self.out.tell(result)
 
 
-def _tell_drive(flow: Flow, link: Link, drive: DriveSamples, *, late: bool) -> None:
+def _tell_drive(flow: Flow, drive: DriveSamples, *, late: bool) -> None:
     """Tell where touches are by now, unless that is ``late``: of drives that wait the newest alone
     is told. Frames alone are recorded."""
     newest = flow.newest
     if newest is None or flow.marker.held:
         return
     try:
-        with flow.turns.turn(link.keep_alive):
-            known = flow.pipeline.push_drive(drive, late=late)
+        known = flow.pipeline.push_drive(drive, late=late)
     except (TomoskinError, np.linalg.LinAlgError) as error:  # frames go on
         _leave_out(flow, "drive", drive.host_time, error)
         return

@@ -59,9 +59,12 @@ class _Interpreter:
                 gc.unfreeze()
 
     def settle(self) -> None:
-        """Keep what is there, and collect what has become garbage since this was done last."""
+        """Collect what has become garbage since this was done last, and keep the rest.
+
+        All that there is would take a tenth of a second with several skins, and boards that scan
+        already lose frames meanwhile.
+        """
         with self._lock:
-            gc.unfreeze()
             gc.collect()
             gc.freeze()
 
@@ -234,6 +237,7 @@ class Loop:
         self.flow.out.stop()
         self.flow, self.open = Flow(change.prepared, self._audience), opener
         self.flow.begin(transport)
+        gc.unfreeze()  # the old skin may go
         _INTERPRETER.settle()
         self.trouble = _WAITING
         future.set_result(None)

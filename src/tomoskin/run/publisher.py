@@ -75,7 +75,7 @@ class Turns:
 
     Many runs that computed at once would take the interpreter from each other, and every frame
     of all of them would be late. One after the other, a run that is flooded with frames holds
-    up the others for a frame at most.
+    up the others for one read at most.
     """
 
     def __init__(self) -> None:
@@ -85,8 +85,8 @@ class Turns:
         self._taken = False
 
     @contextlib.contextmanager
-    def turn(self, meanwhile: Callable[[], None]) -> Iterator[None]:
-        """Wait for the turn, and have it while the block lasts.
+    def turn(self, meanwhile: Callable[[], None]) -> Iterator[bool]:
+        """Wait for the turn, and have it while the block lasts; whether others were first.
 
         It calls ``meanwhile`` before, and now and then while it waits: a first frame may take
         seconds, and boards stop that hear nothing for so long. It must not raise.
@@ -96,12 +96,13 @@ class Turns:
         ticket.acquire()
         with self._lock:
             self._waiting.append(ticket)
-            if not self._taken:
+            waits = self._taken
+            if not waits:
                 self._pass_on()
         while not ticket.acquire(timeout=_OFTEN):
             meanwhile()
         try:
-            yield
+            yield waits
         finally:
             with self._lock:
                 self._pass_on()
