@@ -12,7 +12,15 @@ from files.session.runs import SKIN, TOUCH
 from run.sinks.conftest import EPOCH, result_at
 from tomoskin.core import SkinError
 from tomoskin.files.exports import Export, export_touches
-from tomoskin.files.messages import FIELDS, Contacts, Naming, Slots, Stream, own_touches
+from tomoskin.files.messages import (
+    FIELDS,
+    Contacts,
+    Naming,
+    Slots,
+    Stream,
+    happenings,
+    own_touches,
+)
 from tomoskin.files.session import SessionReader, SessionWriter
 from tomoskin.model.robot import Robot
 from tomoskin.pipeline import prepare
@@ -91,13 +99,13 @@ def test_own_touches_can_be_left_out_with_what_happens_to_them(contacts):
         frame = contacts(own, other, choice=choice, happened=happened)
         assert [contact.touch.id for contact in frame.touches] == kept
         assert [touch.id for touch in frame.tracked] == kept
-        assert [happening["id"] for happening in frame.happenings()] == kept
+        assert [happening["id"] for happening in happenings(frame)] == kept
         assert len(frame.events) == len(kept)
     assert happening_marks(contacts(own, happened=happened[:1])) == [True]
 
 
 def happening_marks(contacts):
-    return [happening["self"] for happening in contacts.happenings()]
+    return [happening["self"] for happening in happenings(contacts)]
 
 
 def test_samples_of_lsl_and_slots_of_policies_have_the_mark(contacts):

@@ -6,6 +6,7 @@ from tomoskin.files.messages.contacts import (
     Contacts as Contacts,
     event_content as event_content,
     event_of as event_of,
+    happenings as happenings,
     own_touches as own_touches,
     time_of as time_of,
     touch_row as touch_row,

@@ -335,10 +335,6 @@ class Contacts:
         """What happened to touches, in words."""
         return tuple(map(event_of, self.happened))
 
-    def strongest(self, most: int) -> list[Contact]:
-        """The strongest ``most`` touches, for forms that have room for no more."""
-        return sorted(self.touches, key=lambda c: -abs(c.touch.detection.peak))[:most]
-
     def header(self) -> dict[str, Any]:
         """Everything but the touches, as plain values by name."""
         return {
@@ -358,12 +354,13 @@ class Contacts:
         """Everything as plain values by name, the touches too."""
         return self.header() | {"touches": [touch.content() for touch in self.touches]}
 
-    def happenings(self) -> list[dict[str, Any]]:
-        """Each thing that happened to a touch, with that touch, as plain values by name."""
-        return [
-            {"time_s": event.host_time, "event": event.kind} | self.header() | contact.content()
-            for event, contact in _happened(self)
-        ]
+
+def happenings(contacts: Contacts) -> list[dict[str, Any]]:
+    """Each thing that happened to a touch, with that touch, as plain values by name."""
+    return [
+        {"time_s": event.host_time, "event": event.kind} | contacts.header() | contact.content()
+        for event, contact in _happened(contacts)
+    ]
 
 
 def own_touches(stream: Stream, result: FrameResult) -> set[int]:

@@ -90,7 +90,8 @@ def touch_sample(contacts: Contacts) -> FloatArray:
     """Each touch, forces, depths, own touches, then 1 where touches are valid, else 0."""
     row = np.full((MOST_TOUCHES, len(_FIELDS)), np.nan)
     more = np.full((len(MEASURANDS) + 1, MOST_TOUCHES), np.nan)
-    for number, contact in enumerate(contacts.strongest(MOST_TOUCHES)):
+    strongest = sorted(contacts.touches, key=lambda c: -abs(c.touch.detection.peak))
+    for number, contact in enumerate(strongest[:MOST_TOUCHES]):
         touch, detection = contact.touch, contact.touch.detection
         row[number] = touch.id, detection.x, detection.y, detection.peak
         amounts = (touch.amounts.get(name) for name in MEASURANDS)

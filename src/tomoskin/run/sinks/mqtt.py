@@ -12,7 +12,7 @@ from typing import Any
 from urllib.parse import SplitResult, unquote, urlsplit
 
 from tomoskin.core import Event, SinkError, encode_json, needed
-from tomoskin.files.messages import Item, Naming, Stream, event_content
+from tomoskin.files.messages import Item, Naming, Stream, event_content, happenings
 from tomoskin.run.sinks.sink import Sink, options_of
 
 DEFAULT_PORT, TLS_PORT = 1883, 8883
@@ -94,7 +94,7 @@ class MqttSink(Sink):
             self._put("events", encode_json(event_content(self._stream, item)))
             return
         self._say("offline" if item.voltages is None else "online")
-        for content in item.happenings():
+        for content in happenings(item):
             self._put("touch", encode_json(content), qos=int(content["event"] != "move"))
         if item.is_due:
             self._put("touches", encode_json(item.content()), keep=_EXPIRY)
