@@ -144,7 +144,7 @@ def test_the_errors_of_two_coordinates_are_those_of_the_noise():
     examples = BodyExamples.checked(dv, time, state=state, names=("angle", "stretch"))
     model = BodyModel.learn(examples, COVARIANCE)
     assert (model.error < [0.005, 0.0005]).all()
-    assert not model.doubts
+    assert not model.doubts()
     other = two_coordinates(1)
     left = other[0] - model.changes(other[2], other[1])
     assert np.sqrt(np.mean(left**2)) < 1.2 * NOISE
@@ -176,7 +176,7 @@ def test_an_encoder_that_stops_is_said():
     dv, time, state = two_coordinates(0)
     state[150:170] = state[150]
     examples = BodyExamples.checked(dv, time, state=state, names=("angle", "stretch"))
-    assert "stopped or jumped" in BodyModel.learn(examples, COVARIANCE).doubts[0]
+    assert "stopped or jumped" in BodyModel.learn(examples, COVARIANCE).doubts()[0]
 
 
 def test_states_of_other_frames_are_refused_and_a_jump_is_said():
@@ -185,9 +185,9 @@ def test_states_of_other_frames_are_refused_and_a_jump_is_said():
     order = np.random.default_rng(4).permutation(len(state))
     shuffled = BodyModel.learn(replace(examples, state=state[order]), COVARIANCE)
     with pytest.raises(DataError, match="do not follow the states: those of"):
-        shuffled.doubts.append("")
+        shuffled.doubts()
     jumped = state + np.where(np.arange(len(state)) < 150, 0.0, 3.0)[:, None] * [1.0, 0.0]
-    said = BodyModel.learn(replace(examples, state=jumped), COVARIANCE).doubts
+    said = BodyModel.learn(replace(examples, state=jumped), COVARIANCE).doubts()
     assert any("times their own scatter" in text for text in said)
 
 

@@ -378,7 +378,7 @@ def body(
     examples = labels.body_examples(labelled.path, labelled.data, rest.mean, bend, states)
     with Bar("learning"):
         model = BodyModel.learn(examples, voltage_covariance(prepared, rest))
-    for problem in model.doubts:
+    for problem in model.doubts():
         remark(f"{labelled.path}: {problem}")
     facts = reports.body_facts(model)
     made = BODY.of(model, labelled.pattern, skin)

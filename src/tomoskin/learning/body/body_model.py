@@ -379,7 +379,6 @@ class BodyModel:
             total += (np.linalg.pinv(slopes.T @ weights @ slopes) @ slopes.T @ weights @ error) ** 2
         return np.asarray(self.body.size * np.sqrt(total / len(self.errors)))
 
-    @property
     def doubts(self) -> list[str]:
         """What is wrong with the states of the examples, in sentences.
 
