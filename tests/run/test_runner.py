@@ -12,7 +12,7 @@ import pytest
 
 from run.board import Board
 from tomoskin.board.source import Timing
-from tomoskin.board.wire import Start, Stop
+from tomoskin.board.wire import Ping, Start, Stop
 from tomoskin.core import DataError, SourceError
 from tomoskin.files.session import RawRead, session_info
 from tomoskin.model.skin import Skin
@@ -232,6 +232,29 @@ def test_a_backlog_is_skipped_and_counted(prepared, idle):
     until(lambda: runner.newest and runner.newest.result.sequence == MOST_AT_ONCE + 9)
     assert runner.status().dropped == 10
     runner.stop()
+
+
+def test_a_board_hears_its_host_between_frames_that_take_long(prepared, idle, monkeypatch):
+    ahead, push = [0.0], Pipeline.push
+
+    def slow(*given):
+        ahead[0] += 0.3
+        return push(*given)
+
+    monkeypatch.setattr(Pipeline, "push", slow)
+    board = Board()
+    runner = Runner(prepared, lambda: board, clock=lambda: time.monotonic() + ahead[0])
+    until = Watch(runner).until
+    runner.start()
+    assert board.scanning.wait(PATIENCE)
+    with board._news:
+        heard = len(board.commands)
+        for _ in range(MOST_AT_ONCE):
+            board.send(idle)
+    until(lambda: runner.newest and runner.newest.result.sequence == MOST_AT_ONCE - 1)
+    pings = [command for command in board.commands[heard:] if isinstance(command, Ping)]
+    runner.stop()
+    assert len(pings) >= MOST_AT_ONCE // 3
 
 
 def test_a_fault_of_our_own_is_said(runner, until, monkeypatch, caplog):

@@ -162,6 +162,7 @@ class Flow:
             if isinstance(item, DriveSamples):
                 _tell_drive(self, item, late=item is not drives[-1])
             elif isinstance(item, Frame):
+                link.keep_alive()  # as long as the frames before may take
                 self._mark(item, late=late > 0)
                 late -= 1
         replay = self.marker.replay
