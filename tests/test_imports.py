@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -30,6 +31,9 @@ UNITS = {
 """The rooms in their order, and in some of them further packages with an order of their own. Others
 import from the package itself, so what it imports as itself (``X as X``) is what it offers; "."
 are the room's modules."""
+
+EXTRAS = "extras"
+"""The folder of features that can be taken out: each may import what rooms offer."""
 
 ROOMS = list(UNITS)
 ORDER = [
@@ -104,7 +108,7 @@ def unit_of(module: str) -> str | None:
     if parts[0] != "tomoskin" or parts[1:] in ([], ["__main__"]):
         return None
     inner = ".".join(parts[1:3])
-    return inner if inner in ORDER else parts[1]
+    return inner if inner in ORDER or (parts[1] == EXTRAS and parts[2:]) else parts[1]
 
 
 def violations(sources: Sources) -> list[str]:
@@ -125,12 +129,35 @@ def _wrong(module: str, found: Import, sources: Sources) -> str | None:
     if full in {f"tomoskin.{unit}" for unit in (*ROOMS, *ORDER)}:
         found = Import(found.line, full, "", found.runs_at_import)
     there = unit_of(found.module)
+    if EXTRAS in (here.partition(".")[0], (there or "").partition(".")[0]):
+        return _wrong_with_extras(here, there, found, sources)
     if there is None:
         own = found.name == "__version__"
         return None if own else "a room imports rooms, not the package above them"
     if there == here:
         return _wrong_inside(module, found, sources)
     return _wrong_across(here, there, found, sources)
+
+
+def _wrong_with_extras(here: str, there: str | None, found: Import, sources: Sources) -> str | None:
+    if not here.startswith(f"{EXTRAS}."):
+        return "the core never names an extra"
+    if there is None or there == here:
+        return None if there else "an extra imports rooms, not the package above them"
+    if there.startswith(f"{EXTRAS}."):
+        used = there.partition(".")[2] in uses(here.partition(".")[2])
+        return None if used else f'{here} must say so: uses = ["{there[7:]}"] in its extra.toml'
+    if there not in ORDER:
+        return f"no such room: {there}"
+    if _is_inner(there, found, sources):
+        return f"import from tomoskin.{there}, not from its inner modules"
+    return None
+
+
+def uses(extra: str) -> list[str]:
+    """The extras that an ``extra`` says it cannot do without."""
+    table = ROOT / "src" / "tomoskin" / EXTRAS / extra / "extra.toml"
+    return list(tomllib.loads(table.read_text(encoding="utf-8")).get("uses", ()))
 
 
 def _wrong_across(here: str, there: str, found: Import, sources: Sources) -> str | None:
@@ -206,8 +233,8 @@ def test_no_import_cycle() -> None:
 
 
 def test_every_module_stands_in_a_room() -> None:
-    found = {unit_of(module) for module in library()} - {None}
-    assert found == {*ROOMS, *ORDER}
+    units = {unit_of(module) or "" for module in library()} - {"", EXTRAS}
+    assert {unit for unit in units if not unit.startswith(f"{EXTRAS}.")} == {*ROOMS, *ORDER}
 
 
 def test_the_documented_order_is_the_order() -> None:
@@ -239,6 +266,8 @@ ROOM = {
         "from tomoskin.nowhere import thing",
         "from tomoskin import Skin",
         "from tomoskin.model.skin import Skin",
+        "from tomoskin.extras.dust import Dust",
+        "from tomoskin import extras",
     ],
 )
 def test_a_planted_import_is_found(source: str) -> None:
@@ -262,6 +291,29 @@ def test_a_planted_import_is_found(source: str) -> None:
 def test_what_is_allowed_passes(source: str) -> None:
     planted = {**ROOM, "tomoskin.model.skin": "", "tomoskin.model.skin.load": source}
     assert violations({**planted, "tomoskin.model.skin.outline": ""}) == []
+
+
+@pytest.mark.parametrize(
+    ("source", "count"),
+    [
+        ("from tomoskin.core import DataError", 0),
+        ("from tomoskin.extras.dust.cloud import Cloud", 0),
+        ("from tomoskin.core.errors import DataError", 1),
+        ("from tomoskin.extras.rain import Rain", 1),
+        ("from tomoskin.nowhere import thing", 1),
+        ("from tomoskin import Skin", 1),
+    ],
+)
+def test_what_an_extra_may_import(source: str, count: int, monkeypatch) -> None:
+    monkeypatch.setitem(globals(), "uses", lambda _: [])
+    dust = {"tomoskin.extras.dust": source, "tomoskin.extras.dust.cloud": ""}
+    assert len(violations({**ROOM, **dust, "tomoskin.extras.rain": ""})) == count
+
+
+def test_an_extra_that_says_so_may_import_another(monkeypatch) -> None:
+    monkeypatch.setitem(globals(), "uses", lambda extra: ["rain"] if extra == "dust" else [])
+    dust = {"tomoskin.extras.dust": "from tomoskin.extras.rain import Rain"}
+    assert violations({**ROOM, **dust, "tomoskin.extras.rain": ""}) == []
 
 
 def test_a_planted_cycle_is_found() -> None:

@@ -2,7 +2,9 @@
 of an error: one sentence and an exit code.
 
 To add a command: a module of its name with a function of its name (or sub-commands, ``app``, made
-by :func:`group`) that imports heavy rooms inside, and its sentence in the list below.
+by :func:`group`) that imports heavy rooms inside, and its sentence in the list below. Extras and
+other packages register theirs at the seam "commands", whose sentence is the first of their
+docstring: as ``NAME``, or as ``"GROUP NAME"`` where it is a sub-command.
 """
 
 from __future__ import annotations
@@ -20,7 +22,7 @@ from typer.core import TyperGroup
 
 from tomoskin import __version__
 from tomoskin.cli.named_files import guarded, spread
-from tomoskin.core import OutputError, TomoskinError
+from tomoskin.core import OutputError, TomoskinError, registered, registered_one
 
 DEBUG = "TOMOSKIN_DEBUG"
 """Environment variable: set it to see the traceback of an error."""
@@ -52,7 +54,8 @@ class Commands(typer.Typer):
         register = super().command(name, **options)
 
         def add(function: Any) -> Any:
-            register(guarded(spread(function)))
+            of = " ".join(filter(None, (self.info.name, name or function.__name__)))
+            register(guarded(spread(function, of)))
             return function
 
         return add
@@ -60,6 +63,12 @@ class Commands(typer.Typer):
 
 class Contents(TyperGroup):
     """Commands with whole sentences: too long ones go on in the next line."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+        names = [_inside(self.name or "", name) for name in registered("commands")]
+        later: dict[str, Any] = dict.fromkeys(filter(None, names))
+        self.commands = {**self.commands, **later}
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write the commands with a sentence each."""
@@ -72,22 +81,44 @@ class Contents(TyperGroup):
         first = ((command and command.help) or "").partition("\n\n")[0]
         return " ".join(first.split())
 
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """The command, one that was registered loaded now; None where there is none."""
+        if self.commands.get(cmd_name) is None and cmd_name in self.commands:
+            self.commands[cmd_name] = _added(f"{self.name} {cmd_name}")
+        return super().get_command(ctx, cmd_name)
+
+
+def _inside(group: str, name: str) -> str:
+    """What a registered command is called in a ``group``; "" where it is of another one."""
+    first, _, second = name.rpartition(" ")
+    return second if first == group else ""
+
 
 class Later(Contents):
-    """The commands of :data:`COMMANDS`, each loaded when it runs."""
+    """The commands of :data:`COMMANDS` and those that are registered, each loaded when it runs."""
 
     def __init__(self, **options: Any) -> None:
-        super().__init__(**options)
+        TyperGroup.__init__(self, **options)
         names: dict[str, Any] = dict.fromkeys(COMMANDS)
         self.commands = names
 
-    def sentence(self, ctx: Any, name: str) -> str:  # noqa: ARG002
-        """What the command does, without loading it."""
-        return COMMANDS[name]
+    def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002
+        """All names, for a list or a mistyped one."""
+        return [*COMMANDS, *(name for name in registered("commands") if " " not in name)]
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write the commands with a sentence each."""
+        names: dict[str, Any] = dict.fromkeys(self.list_commands(ctx))
+        self.commands = names
+        super().format_commands(ctx, formatter)
+
+    def sentence(self, ctx: Any, name: str) -> str:
+        """What the command does, without loading it where the core has it."""
+        return COMMANDS.get(name) or super().sentence(ctx, name)
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:  # noqa: ARG002
         """The command, or None where there is none of that name."""
-        return _loaded(cmd_name) if cmd_name in COMMANDS else None
+        return _loaded(cmd_name) if cmd_name in COMMANDS else _added(cmd_name)
 
 
 def _loaded(name: str) -> Any:
@@ -96,15 +127,32 @@ def _loaded(name: str) -> Any:
         return typer.main.get_command(group)
     function = getattr(module, name)
     _, _, more = (function.__doc__ or "").partition("\n\n")
-    single = Commands(add_completion=False, rich_markup_mode=None)
-    single.command(name, help=f"{COMMANDS[name]}\n\n{inspect.cleandoc(more)}")(function)
+    return _single(name, function, f"{COMMANDS[name]}\n\n{inspect.cleandoc(more)}")
+
+
+def _added(name: str) -> Any:
+    """A command that is registered, by its name with its group's; None where none is."""
+    entry = registered_one("commands", name)
+    if entry is None:
+        return None
+    command = entry.load()
+    if isinstance(command, typer.Typer):
+        return typer.main.get_command(command)
+    return _single(name, command, inspect.getdoc(command) or "")
+
+
+def _single(name: str, function: Any, text: str) -> Any:
+    group, _, own = name.rpartition(" ")
+    single = Commands(name=group or None, add_completion=False, rich_markup_mode=None)
+    single.command(own, help=text)(function)
     return typer.main.get_command(single)
 
 
-def group(name: str) -> typer.Typer:
-    """Make the command ``name`` of sub-commands."""
+def group(name: str, about: str = "") -> typer.Typer:
+    """Make the command ``name`` of sub-commands, which is ``about`` something."""
     return Commands(
-        help=COMMANDS[name],
+        name=name,
+        help=about or COMMANDS[name],
         no_args_is_help=True,
         add_completion=False,
         rich_markup_mode=None,

@@ -17,6 +17,8 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args, get_type_hints
 import typer
 from typer.models import OptionInfo
 
+from tomoskin.core import registered
+
 if TYPE_CHECKING:
     from tomoskin.core import Output
 
@@ -84,26 +86,51 @@ class Writes:
         return () if value is None else (Output(value, self.endings, called),)
 
 
-def spread(command: Callable[..., None]) -> Callable[..., None]:
-    """The command with the options of its groups, which are records, as parameters of its own."""
+class Added(tuple[Any, ...]):
+    """Options that extras add to a command: a parameter with this annotation takes their records.
+
+    A record is registered at the seam "options" as ``"COMMAND NAME"``, or ``"GROUP COMMAND NAME"``.
+    What it may do is for the command to say.
+    """
+
+
+def spread(command: Callable[..., None], name: str = "") -> Callable[..., None]:
+    """The command with the options of its groups, which are records, as parameters of its own.
+
+    ``name`` is that of the command, with its group's, for options that are :class:`Added` to it.
+    """
     hints = get_type_hints(command, include_extras=True)
-    groups: dict[str, Any] = {name: hint for name, hint in hints.items() if is_dataclass(hint)}
+    groups: dict[str, tuple[Any, ...]] = {
+        key: _added_to(name) if hint is Added else (hint,)
+        for key, hint in hints.items()
+        if hint is Added or is_dataclass(hint)
+    }
     if not groups:
         return command
 
     def run(**given: Any) -> None:
-        for name, group in groups.items():
-            given[name] = group(**{one.name: given.pop(one.name) for one in fields(group)})
+        for key, records in groups.items():
+            made = Added(
+                record(**{one.name: given.pop(one.name) for one in fields(record)})
+                for record in records
+            )
+            given[key] = made if hints[key] is Added else made[0]
         command(**given)
 
     options: dict[str, tuple[Any, Any]] = {}
-    for name, parameter in inspect.signature(command).parameters.items():
-        if name in groups:
-            own = get_type_hints(groups[name], include_extras=True)
-            options |= {one.name: (own[one.name], one.default) for one in fields(groups[name])}
-        else:
-            options[name] = hints[name], parameter.default
+    for key, parameter in inspect.signature(command).parameters.items():
+        for record in groups.get(key, ()):
+            own = get_type_hints(record, include_extras=True)
+            options |= {one.name: (own[one.name], one.default) for one in fields(record)}
+        if key not in groups:
+            options[key] = hints[key], parameter.default
     return with_options(run, command, options)
+
+
+def _added_to(name: str) -> tuple[Any, ...]:
+    """The records of options that are registered for the command of that ``name``."""
+    entries = registered("options").values()
+    return tuple(entry.load() for entry in entries if entry.name.rpartition(" ")[0] == name)
 
 
 def with_options(

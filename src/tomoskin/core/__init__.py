@@ -22,6 +22,13 @@ from tomoskin.core.errors import (
     meant_or_known as meant_or_known,
     no_such as no_such,
 )
+from tomoskin.core.seams import (
+    Registered as Registered,
+    Seam as Seam,
+    extra_names as extra_names,
+    registered as registered,
+    registered_one as registered_one,
+)
 from tomoskin.core.stages import finished as finished, reach as reach, watch_stages as watch_stages
 from tomoskin.core.units import DIMENSIONS as DIMENSIONS, parse_quantity as parse_quantity
 from tomoskin.core.user_files import (

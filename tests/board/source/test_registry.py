@@ -1,11 +1,9 @@
 """Sources by name."""
 
-from importlib.metadata import EntryPoint, EntryPoints
-
 import pytest
 
 from tomoskin.board.source import open_source, read_options, source_names, transport
-from tomoskin.core import SourceError
+from tomoskin.core import Registered, SourceError
 
 
 def echo(argument, skin):
@@ -14,11 +12,10 @@ def echo(argument, skin):
 
 @pytest.fixture(autouse=True)
 def installed(monkeypatch):
-    known = EntryPoints(
-        EntryPoint(name, f"{__name__}:echo", transport.GROUP) for name in ("twin", "serial")
-    )
-    monkeypatch.setattr(transport, "entry_points", known.select)
-    monkeypatch.setattr(EntryPoint, "load", lambda _: echo)
+    known = {name: Registered(name, f"{__name__}:echo") for name in ("twin", "serial")}
+    monkeypatch.setattr(transport, "registered", lambda _: known)
+    monkeypatch.setattr(transport, "registered_one", lambda _, name: known.get(name))
+    monkeypatch.setattr(Registered, "load", lambda _: echo)
 
 
 def test_names_and_arguments():

@@ -8,19 +8,15 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Protocol, TypeVar, runtime_checkable
 
 from tomoskin.board.wire import Ack, Command, Decoder, Message, encode
-from tomoskin.core import SourceError, no_such
+from tomoskin.core import SourceError, no_such, registered, registered_one
 
 if TYPE_CHECKING:
     from tomoskin.model.skin import Skin
 
 M = TypeVar("M", bound=Message)
-
-GROUP = "tomoskin.sources"
-"""Entry-point group: each entry is a function ``(argument, skin) -> Transport``."""
 
 
 @runtime_checkable
@@ -72,7 +68,7 @@ class Played(Protocol):
 
 def source_names() -> tuple[str, ...]:
     """Names of the installed sources."""
-    return tuple(sorted({entry.name for entry in entry_points(group=GROUP)}))
+    return tuple(sorted(registered("sources")))
 
 
 def open_source(spec: str, skin: Skin) -> Transport:
@@ -84,12 +80,13 @@ def open_source(spec: str, skin: Skin) -> Transport:
         When there is no source of that name, or it cannot be opened.
     """
     name, _, argument = spec.partition(":")
-    for entry in entry_points(group=GROUP, name=name):
-        opener: Callable[[str, Skin], Transport] = entry.load()
-        return opener(argument, skin)
-    raise SourceError(
-        no_such(name, source_names(), "a source"), hint="for example twin or serial:PORT"
-    )
+    entry = registered_one("sources", name)
+    if entry is None:
+        raise SourceError(
+            no_such(name, source_names(), "a source"), hint="for example twin or serial:PORT"
+        )
+    opener: Callable[[str, Skin], Transport] = entry.load()
+    return opener(argument, skin)
 
 
 def read_options(argument: str, known: tuple[str, ...], where: str) -> dict[str, str]:

@@ -7,14 +7,22 @@ import logging
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass
-from importlib.metadata import EntryPoint, entry_points
 
-from tomoskin.core import Capacity, Consumer, Event, Say, SinkError, TomoskinError, Worker, no_such
+from tomoskin.core import (
+    Capacity,
+    Consumer,
+    Event,
+    Registered,
+    Say,
+    SinkError,
+    TomoskinError,
+    Worker,
+    no_such,
+    registered,
+    registered_one,
+)
 from tomoskin.files.messages import Item, Naming, Reporter, Stream
 from tomoskin.pipeline import FrameResult
-
-GROUP = "tomoskin.sinks"
-"""Entry-point group: each entry is a function ``argument -> Sink`` that does no I/O."""
 
 
 class Sink(ABC):
@@ -55,7 +63,7 @@ class Sink(ABC):
 
 def sink_names() -> tuple[str, ...]:
     """Names of the installed sinks."""
-    return tuple(sorted(entry_points(group=GROUP).names))
+    return tuple(sorted(registered("sinks")))
 
 
 def make_sink(spec: str) -> Sink:
@@ -68,10 +76,9 @@ def make_sink(spec: str) -> Sink:
         makes no sink.
     """
     name, _, argument = spec.partition(":")
-    entries = tuple(entry_points(group=GROUP, name=name))
-    if not entries:
+    entry = registered_one("sinks", name)
+    if entry is None:
         raise SinkError(no_such(name, sink_names(), "a sink"))
-    entry = entries[0]
     try:
         sink = entry.load()(argument)
     except TomoskinError:
@@ -83,11 +90,11 @@ def make_sink(spec: str) -> Sink:
     return sink
 
 
-def _faulty(entry: EntryPoint, why: str) -> SinkError:
+def _faulty(entry: Registered, why: str) -> SinkError:
     return SinkError(
         f"cannot be made: {why}",
         where=f"sink {entry.name}",
-        hint=f"it is {entry.value}, which its own package has to mend",
+        hint=f"it is {entry.target}, which its own package has to mend",
     )
 
 

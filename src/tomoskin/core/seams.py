@@ -1,0 +1,108 @@
+"""Seams: where an extra, or a package of a user's own, adds something to the core by its name.
+
+An extra is a folder of :mod:`tomoskin.extras` with a table ``extra.toml``. Each section is a seam,
+each line in it a name and ``module:attribute``, where the module is one of the extra's own. A line
+``uses = ["NAME"]`` at the table's top names the extras that it cannot do without.
+
+Another package says the same by entry points of the group ``tomoskin.SEAM``. The core asks for what
+is registered at a seam, and names no extra.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+from tomoskin.core.errors import DataError, no_such
+
+Seam = Literal[
+    "sources",  # (argument, skin) -> Transport
+    "sinks",  # argument -> Sink
+    "readers",  # a tomoskin.files.imports.Format
+    "exports",  # a tomoskin.files.exports.Format
+    "calibrations",  # a tomoskin.learning.Kind
+    "commands",  # a function of a command, or of "command sub-command"; or typer's app of several
+    "options",  # a record of options that are added to the "command NAME"
+    "flows",  # a class of tomoskin.server.GuidedFlow
+]
+"""Where something can be added, and what it is."""
+
+PREFIX = "tomoskin."
+"""Of the groups of entry points that are seams."""
+
+TABLE = "extra.toml"
+"""Name of an extra's table, which stands in its folder."""
+
+USES = "uses"
+"""Key of that table: the other extras that this one imports."""
+
+
+@dataclass(frozen=True)
+class Registered:
+    """What one ``name`` stands for: an attribute of a module, such as ``"package.module:thing"``.
+
+    ``extra`` is the folder that it comes from, "" where an installed package brings it.
+    """
+
+    name: str
+    target: str
+    extra: str = ""
+
+    def load(self) -> Any:
+        """The thing itself. Raises what the import of its module raises."""
+        module, _, path = self.target.partition(":")
+        found: Any = import_module(module)
+        for part in path.split("."):
+            found = getattr(found, part)
+        return found
+
+
+def registered(seam: Seam) -> Mapping[str, Registered]:
+    """What is registered at a ``seam``, by name: extras in their order, then other packages."""
+    from importlib.metadata import entry_points  # noqa: PLC0415 - loads slowly
+
+    found = {entry.name: entry for entry in _of_extras()[seam]}
+    for entry in entry_points(group=f"{PREFIX}{seam}"):
+        found.setdefault(entry.name, Registered(entry.name, entry.value))
+    return found
+
+
+def registered_one(seam: Seam, name: str) -> Registered | None:
+    """What is registered at a ``seam`` as ``name``; None where nothing is."""
+    ours = next((entry for entry in _of_extras()[seam] if entry.name == name), None)
+    return ours or registered(seam).get(name)
+
+
+def extra_names() -> tuple[str, ...]:
+    """The extras that are here, in alphabetical order."""
+    return tuple(file.parent.name for file in _tables())
+
+
+@cache
+def _of_extras() -> Mapping[Seam, tuple[Registered, ...]]:
+    found: dict[Seam, list[Registered]] = {seam: [] for seam in get_args(Seam)}
+    for file in _tables():
+        extra = file.parent.name
+        for seam, entries in _read(file).items():
+            for name, target in entries.items():
+                found[seam].append(Registered(name, f"tomoskin.extras.{extra}.{target}", extra))
+    return {seam: tuple(entries) for seam, entries in found.items()}
+
+
+def _tables() -> list[Path]:
+    return sorted((Path(__file__).parent.parent / "extras").glob(f"*/{TABLE}"))
+
+
+def _read(file: Path) -> dict[Seam, dict[str, str]]:
+    """The sections of an extra's table. Raises DataError for a section that is no seam."""
+    table: dict[Any, Any] = tomllib.loads(file.read_text(encoding="utf-8"))
+    table.pop(USES, None)
+    for section in table:
+        if section not in get_args(Seam):
+            raise DataError(no_such(section, get_args(Seam), "a seam"), where=str(file))
+    return table

@@ -1,0 +1,1 @@
+"""Features that are whole in a folder each: what one kind of user needs, and others can remove."""
