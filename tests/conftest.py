@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import hashlib
 import importlib.util
 import ipaddress
 import os
@@ -10,7 +11,6 @@ import shutil
 import signal
 import socket
 import subprocess
-import tempfile
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,10 @@ ROOT = Path(__file__).resolve().parent.parent
 DEFAULT_DATA = ROOT.parent / "shared" / "data"
 NOTED = ROOT / "build" / "left-out.txt"
 """What set-up could not bring, a line each, with the command that would."""
+PACKAGE = ROOT / "src" / "tomoskin"
+KEPT = ROOT / "build" / "tests"
+"""What tests need again and again: meshes, and tables of touches."""
+
 NO_ENGINE = "the native engine: it has not been built (install Rust, then: make native)"
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 
@@ -49,13 +53,31 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     """Hear Ctrl-C, which a shell ignores in what it starts in the background; keep tables of
-    touches in one folder for all processes, and in no user's."""
+    touches in one folder for all processes and runs, and in no user's."""
+    del config
     if "TOMOSKIN_CACHE" not in os.environ:
-        folder = tempfile.TemporaryDirectory(prefix="tomoskin-tests-", ignore_cleanup_errors=True)
-        os.environ["TOMOSKIN_CACHE"] = folder.name
-        config.add_cleanup(folder.cleanup)
+        os.environ["TOMOSKIN_CACHE"] = str(kept_tables())
     if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def kept_tables() -> Path:
+    """The folder of what is kept from run to run, by the sources that make it; older ones go."""
+    sources = hashlib.sha256()
+    rooms = ("core", "model", "sensing/fit")
+    for file in sorted(file for room in rooms for file in (PACKAGE / room).rglob("*.py")):
+        sources.update(file.read_bytes())
+    engine = importlib.util.find_spec("tomoskin_core")
+    for part in (engine.submodule_search_locations or ()) if engine else ():
+        sources.update(
+            "".join(sorted(f"{f.name}{f.stat().st_size}" for f in Path(part).glob("*.so"))).encode()
+        )
+    folder = KEPT / sources.hexdigest()[:16]
+    for older in KEPT.glob("*"):
+        if older != folder:
+            shutil.rmtree(older, ignore_errors=True)
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:

@@ -31,6 +31,7 @@ COMMANDS = {
     "live": "Show a skin live on a page; the default is the twin of a textile disc.",
     "record": "Record a session without a page: raw bytes, frames, touches and images.",
     "image": "Reconstruct a recording: images and touches.",
+    "explain": "Say how one frame of a session became touches, step by step.",
     "calibrate": "Learn a calibration from labelled presses, weights, classes or bends.",
     "locate": "Locate touches with a calibration: one per frame, or up to two with --several.",
     "classify": "Classify each frame with a calibration, or call it unknown.",

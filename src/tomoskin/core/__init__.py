@@ -29,7 +29,13 @@ from tomoskin.core.seams import (
     registered as registered,
     registered_one as registered_one,
 )
-from tomoskin.core.stages import finished as finished, reach as reach, watch_stages as watch_stages
+from tomoskin.core.stages import (
+    finished as finished,
+    observe_steps as observe_steps,
+    reach as reach,
+    show as show,
+    watch_stages as watch_stages,
+)
 from tomoskin.core.units import DIMENSIONS as DIMENSIONS, parse_quantity as parse_quantity
 from tomoskin.core.user_files import (
     MAGIC as MAGIC,

@@ -1,7 +1,8 @@
-"""Long work says how far it has come, and may be stopped there by whoever watches it.
+"""Work says how far it has come to whoever watches it, and shows what it has made on the way.
 
-The watcher is the working thread's (a context variable): so a mesh generator need not be handed
-what a page wants to see.
+A watcher of stages may stop long work there. An observer of steps sees the records of a frame as
+the steps of the flow make them, which changes nothing. Both are the working thread's (context
+variables): so a mesh generator need not be handed what a page wants to see.
 """
 
 from __future__ import annotations
@@ -33,6 +34,28 @@ def reach(stage: str = "") -> None:
     """Say that the work has come to ``stage``, or goes on."""
     if (watcher := _watcher.get()) is not None:
         watcher(stage)
+
+
+Observer = Callable[[str, object], None]
+"""Called with what a step of the flow has made, and what that is: "voltages", "detections"."""
+
+_observer: ContextVar[Observer | None] = ContextVar("observer", default=None)
+
+
+@contextmanager
+def observe_steps(observer: Observer) -> Iterator[None]:
+    """While the block lasts, steps of this thread show their records to ``observer``."""
+    before = _observer.set(observer)
+    try:
+        yield
+    finally:
+        _observer.reset(before)
+
+
+def show(step: str, record: object) -> None:
+    """Show what a ``step`` has made; where making it takes work, pass a function that does."""
+    if (observer := _observer.get()) is not None:
+        observer(step, record() if callable(record) else record)
 
 
 def finished(work: Generator[None, None, _T]) -> _T:

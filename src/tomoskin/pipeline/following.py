@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tomoskin.core import Detection, FloatArray, Image, ModelError, Touch, Voltages, reach
+from tomoskin.core import Detection, FloatArray, Image, ModelError, Touch, Voltages, reach, show
 from tomoskin.learning import BODY, Differences, FrameView
 from tomoskin.model.pattern import Scan
 from tomoskin.pipeline import finding
@@ -160,7 +160,9 @@ class Following:
         """Take the voltages of one frame all the way to touches."""
         self._prepare_anew()
         reach("voltages")
+        show("voltages", measured)
         conditioned = self.conditioning.condition(measured)
+        show("conditioned", conditioned)
         if conditioned.differences is None:
             return self._without_touches(measured, conditioned)
         try:
@@ -170,7 +172,10 @@ class Following:
             failed = replace(conditioned, differences=None, problem=problem)
             return self._without_touches(measured, failed)
         reach("tracking")
+        show("detections", detections)
         touches = self._tracker.update(detections, measured.time, measured.host_time)
+        show("touches", touches)
+        show("events", self._tracker.events)
         if self._drives is not None:  # no number is given twice
             ledger, responses = self._tracker.ledger, self._tracker.responses
             ledger.numbered = self._drives.confirm(responses, measured.time, ledger.numbered)
@@ -183,6 +188,7 @@ class Following:
                 reading = applied.read(view, detections, touched=bool(touches))
                 if reading is not None:
                     readings[kind] = reading
+            show("readings", readings)
         reach("baseline")
         self._learn(
             measured.time,
@@ -224,6 +230,7 @@ class Following:
         """What a frame shows, and the touches in it."""
         reach("image")
         image, noise = self._imaging.push(differences.dv, time)
+        show("image", image)
         view = FrameView(time, image, noise, differences)
         reach("touches")
         detections = self._finder.push(view)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tomoskin.board.source import ScanTimer
-from tomoskin.core import DriveSamples, Frame, Mark, Voltages, reach
+from tomoskin.core import DriveSamples, Frame, Mark, Voltages, reach, show
 from tomoskin.imaging import AlphaChoice
 from tomoskin.pipeline.drives import DriveResult
 from tomoskin.pipeline.following import Following, Setting
@@ -140,6 +140,7 @@ class Pipeline:
         if len(frame.samples) != given.scan.n_samples:
             self.refused += 1
             return None
+        show("frame", frame)
         rate = self.tick_rate or given.readout.tick_rate
         scan = self._clock.middle(frame, given.longest_scan, rate)
         return self.follow(given.readout(frame, rate, scan))

@@ -1,6 +1,7 @@
 """Session files: write, read, repair, replay."""
 
 from tomoskin.files.session.channels import schema_of as schema_of
+from tomoskin.files.session.explanation import Explanation as Explanation, explain as explain
 from tomoskin.files.session.info import (
     OWN_FILES as OWN_FILES,
     SessionInfo as SessionInfo,

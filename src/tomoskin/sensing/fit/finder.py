@@ -10,12 +10,19 @@ from operator import is_
 
 import numpy as np
 
-from tomoskin.core import Detection, FloatArray, reach
+from tomoskin.core import Detection, FloatArray, reach, show
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.skin import Skin
 from tomoskin.sensing.fit import policy as decisions
 from tomoskin.sensing.fit.expectation import Expectation, ResidualResponse
-from tomoskin.sensing.fit.hypotheses import CommonModeJump, Explained, Jumps, Rival, challenged
+from tomoskin.sensing.fit.hypotheses import (
+    CommonModeJump,
+    Explained,
+    Jumps,
+    Rival,
+    challenged,
+    weighed,
+)
 from tomoskin.sensing.fit.problem import Matched, Problem
 from tomoskin.sensing.fit.selection import ForwardSelection, SpotDetections, judged
 from tomoskin.sensing.fit.sight import CellDiscs, DriveView, Sight
@@ -211,6 +218,7 @@ class SpotFinder:
             rises = decisions.rises_beside(policy, detected.fit, both.fit, both.ratio)
             if rises and decisions.favours(problem.gain(detected.fit, both.fit)):
                 detected = both
+        show("hypotheses", partial(weighed, problem, detected, rival))
         return detected, rival
 
     def _anew(self, selection: ForwardSelection, most: int) -> SpotDetections:

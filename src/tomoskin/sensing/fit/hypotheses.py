@@ -43,6 +43,46 @@ class Rival:
     odds: float
 
 
+@dataclass(frozen=True, slots=True)
+class FrameHypothesis:
+    """One explanation of a frame.
+
+    Attributes
+    ----------
+    name
+        What it says is there.
+    evidence
+        Logarithm of the probability of the data under it, up to a constant of the frame.
+    ratios
+        By how many deviations of the noise each of its touches stands out.
+    is_taken
+        Whether it is what the frame is held to show.
+    """
+
+    name: str
+    evidence: float
+    ratios: tuple[float, ...] = ()
+    is_taken: bool = False
+
+
+def weighed(problem: Problem, found: SpotDetections, rival: Rival | None) -> list[FrameHypothesis]:
+    """The explanations of a frame that were compared last: nothing, what was found, and a rival
+    that later frames may speak for."""
+    count = len(found.fit.spots)
+    weighed = [FrameHypothesis("nothing", problem.evidence(problem.nothing()), (), count == 0)]
+    if count:
+        ratios = tuple(float(ratio) for ratio in found.ratio)
+        weighed.append(FrameHypothesis(_so_many(count), problem.evidence(found.fit), ratios, True))
+    if rival is not None:
+        name = f"{_so_many(count + 1)}, if frames go on to say so ({rival.odds:+.1f})"
+        weighed.append(FrameHypothesis(name, problem.evidence(rival.detected.fit)))
+    return weighed
+
+
+def _so_many(count: int) -> str:
+    return "1 touch" if count == 1 else f"{count} touches"
+
+
 def challenged(
     selection: ForwardSelection, found: SpotDetections, rival: Rival | None, going_on: GoingOn
 ) -> tuple[SpotDetections, Rival | None]:

@@ -93,6 +93,10 @@ class IdentityLedger:
         """Of a finger, by the likeliest hypothesis."""
         return self._hypotheses[0].names[key]
 
+    def number(self, key: int) -> int:
+        """The identity of a finger, by the likeliest hypothesis."""
+        return self._numbers[self.name(key)]
+
     def touches(self, shown: Sequence[Trace], traces: Sequence[Trace]) -> list[Touch]:
         """Those ``shown`` of all ``traces`` as they are reported: a merged one by the oldest of
         its numbers."""

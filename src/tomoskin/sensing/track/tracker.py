@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
-from tomoskin.core import Detection, Touch
+from tomoskin.core import Detection, Touch, show
 from tomoskin.sensing.track import merging, policy
 from tomoskin.sensing.track.association import FrameOfTouches, ObservedDetection, associate, follow
+from tomoskin.sensing.track.decision import STEP, TrackDecision
 from tomoskin.sensing.track.identity import IdentityLedger
 from tomoskin.sensing.track.motion import TrackSettings, begin
 from tomoskin.sensing.track.sliding import SlideCorrection
@@ -97,12 +99,20 @@ class Tracker:
         fresh = len(found.pairs) < len(frame.observed)
         beside = {m.key: t.alone(now) for t in traces if fresh and t.reported for m in t.members}
         follow(traces, found, frame)
+        for trace in traces:
+            if trace.reported:
+                number = self.ledger.number(trace.key)
+                show(STEP, partial(TrackDecision.followed, trace, number, frame))
         merging.weigh_meetings(traces)
         for index, observed in enumerate(frame.observed):
             detection = observed.detection
-            if index in found.pairs or not policy.may_begin(detection, self.settings.snr):
+            if index in found.pairs:
                 continue
-            if not self.residuals.explain(detection, now, self.traces):
+            if not policy.may_begin(detection, self.settings.snr):
+                show(STEP, partial(TrackDecision.refused, detection, self.settings.snr))
+            elif self.residuals.explain(detection, now, self.traces):
+                show(STEP, partial(TrackDecision.residual, detection))
+            else:
                 self._begin(observed, frame, beside)
         for i, k, odds in found.exchanges:  # while both were seen
             one, other = traces[i], traces[k]
@@ -151,8 +161,10 @@ class Tracker:
             return
         seconds = self._clock.now - trace.since
         if not policy.is_reported(trace.odds, trace.detection, seconds):
+            show(STEP, partial(TrackDecision.waiting, trace))
             return
         if self.residuals.explain(trace.detection, self._clock.now, self.traces):
+            show(STEP, partial(TrackDecision.residual, trace.detection))
             self.traces.remove(trace)
             return
         origin = merging.origin_of(trace, self.traces)
@@ -167,6 +179,7 @@ class Tracker:
     def _report_onset(self, trace: Trace) -> None:
         trace.reported = True
         self.ledger.begin(trace.key, trace.host_since)
+        show(STEP, partial(TrackDecision.initiated, trace, self.ledger.number(trace.key)))
         self._report("onset", trace)
 
     def _split(self, carrier: Trace, branch: Trace) -> None:
@@ -191,6 +204,7 @@ class Tracker:
             self._end(trace)
 
     def _end(self, trace: Trace) -> None:
+        show(STEP, partial(TrackDecision.deleted, trace, self.ledger.number(trace.key)))
         self.traces.remove(trace)
         self.residuals.leave(trace, self._clock.now)
         for touch in self.ledger.end(trace):
