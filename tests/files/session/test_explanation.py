@@ -65,7 +65,7 @@ def test_the_steps_stand_in_the_order_of_the_flow(recorded, results):
 def test_it_says_why_a_touch_began_stayed_and_ended(recorded, results):
     onset, release = (frame_with(results, kind) for kind in ("onset", "release"))
     (began,) = at(recorded, onset).of_touch(1)
-    assert "initiated: the logarithm of its odds has come to" in began
+    assert "initiated: the logarithm of its odds is" in began
     (stayed,) = at(recorded, onset + 5).of_touch(1)
     assert "associated: a detection lies" in stayed
     ended = at(recorded, release).of_touch(1)

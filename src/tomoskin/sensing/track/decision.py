@@ -39,7 +39,7 @@ class TrackDecision:
     @classmethod
     def refused(cls, detection: Detection, threshold: float) -> Self:
         """A detection that may not begin a touch."""
-        why = f"it stands out by {detection.snr:.1f} of its noise; a touch begins at {threshold:g}"
+        why = f"its signal-to-noise ratio is {detection.snr:.1f}, and a touch needs {threshold:g}"
         if detection.weak:
             why = "it is too weak beside others: it can carry a touch on, not begin one"
         return cls(None, detection.x, detection.y, "refused", why)
@@ -54,7 +54,7 @@ class TrackDecision:
     def waiting(cls, trace: Trace) -> Self:
         """A newcomer that is not reported yet."""
         d, needed = trace.detection, policy.BEGUN
-        why = f"the logarithm of the odds for a touch is {trace.odds:.1f}; {needed:.1f} are needed"
+        why = f"the logarithm of its odds is {trace.odds:.1f}, and a touch needs {needed:.1f}"
         if trace.odds >= needed:
             why = "it is a touch, but where is not known well enough yet"
         return cls(None, d.x, d.y, "waiting", why)
@@ -62,9 +62,7 @@ class TrackDecision:
     @classmethod
     def initiated(cls, trace: Trace, touch: int) -> Self:
         """A touch that is reported from this frame on."""
-        why = (
-            f"the logarithm of its odds has come to {trace.odds:.1f}, of {policy.BEGUN:.1f} needed"
-        )
+        why = f"the logarithm of its odds is {trace.odds:.1f}, and a touch needs {policy.BEGUN:.1f}"
         return cls(touch, trace.detection.x, trace.detection.y, "initiated", why)
 
     @classmethod
@@ -74,8 +72,8 @@ class TrackDecision:
         if trace.missing is None:
             away = 1e3 * ((d.x - ahead.x) ** 2 + (d.y - ahead.y) ** 2) ** 0.5
             why = (
-                f"a detection lies {away:.1f} mm from where it was expected, and stands out by "
-                f"{d.snr:.1f} of its noise; the logarithm of its odds is {trace.odds:.1f}"
+                f"a detection lies {away:.1f} mm from where it was expected, its signal-to-noise "
+                f"ratio is {d.snr:.1f}, and the logarithm of its odds {trace.odds:.1f}"
             )
             return cls(touch, d.x, d.y, "associated", why)
         since = frame.clock.now - trace.missing
