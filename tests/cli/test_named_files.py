@@ -332,7 +332,7 @@ def test_labelled_frames_stay_out_of_the_way_of_others(
 
 
 def test_endings_are_those_of_what_writes() -> None:
-    assert set(EXPORTS) == set(EXPORT_WRITERS) | {".mcap", ".rrd"}  # these are the room sink's
+    assert set(EXPORTS) == set(EXPORT_WRITERS)
     assert set(image_module.IMAGES) == set(IMAGE_WRITERS)
     assert RECORDING == SESSION_ENDINGS
 

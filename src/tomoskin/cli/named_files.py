@@ -42,11 +42,15 @@ FIGURE = {".png": "a picture", ".pdf": "a figure", ".svg": "a drawing"}
 
 _PACKAGES = {
     **dict.fromkeys((".png", ".pdf", ".svg", ".gif", ".mp4"), ("matplotlib", "plot")),
-    **dict.fromkeys((".parquet", ".lerobot"), ("pyarrow", "parquet")),
+    ".parquet": ("pyarrow", "parquet"),
     ".h5": ("h5py", "hdf5"),
-    ".rrd": ("rerun", "rerun"),
 }
 """What an output of that ending is made by: the package, and the extra that brings it."""
+
+
+def package_of(ending: str) -> tuple[str, str]:
+    """The package that makes an output of that ``ending``, and the extra that brings it."""
+    return _PACKAGES.get(ending, ("", ""))
 
 
 @dataclass(frozen=True)
@@ -72,10 +76,13 @@ class Writes:
     files
         The files that are written, where it is not just the one: of the value, all arguments,
         and what a person calls the parameter.
+    package
+        Which package makes a file of an ending, and the extra that brings it.
     """
 
     endings: Mapping[str, str]
     files: Callable[[Path | None, Given, str], Iterable[Output]] | None = None
+    package: Callable[[str], tuple[str, str]] = package_of
 
     def outputs(self, value: Path | None, given: Given, called: str) -> Iterable[Output]:
         """The files that are to be checked."""
@@ -164,7 +171,7 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
         from tomoskin.core import check_outputs
 
         outputs = [
-            output
+            (output, writes.package)
             for name, (called, writes) in written.items()
             for output in writes.outputs(given[name], given, called)
         ]
@@ -173,24 +180,24 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
         ]
         overwrite = given.get("force", False)
         consent = "--force" if "force" in given else ""
-        check_outputs(outputs, inputs, overwrite=overwrite, consent=consent)
-        _check_packages(outputs)
+        named = [output for output, _ in outputs]
+        check_outputs(named, inputs, overwrite=overwrite, consent=consent)
+        for output, package in outputs:
+            _check_package(output, *package(output.path.suffix.lower()))
         command(**given)
 
     return run
 
 
-def _check_packages(outputs: Iterable[Output]) -> None:
+def _check_package(output: Output, package: str, extra: str) -> None:
     from tomoskin.core import DataError, install_hint
 
-    for output in outputs:
-        package, extra = _PACKAGES.get(output.path.suffix.lower(), ("", ""))
-        if package and find_spec(package) is None:
-            raise DataError(
-                f"needs {package} to write it, which is not installed",
-                where=f"{output.name} {output.path}".strip(),
-                hint=install_hint(extra),
-            )
+    if package and find_spec(package) is None:
+        raise DataError(
+            f"needs {package} to write it, which is not installed",
+            where=f"{output.name} {output.path}".strip(),
+            hint=install_hint(extra),
+        )
 
 
 def _written(command: Callable[..., None]) -> Iterator[tuple[str, tuple[str, Writes]]]:

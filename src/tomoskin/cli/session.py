@@ -6,18 +6,27 @@ from contextlib import ExitStack
 from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Protocol
 
 import typer
 
 from tomoskin.cli.app import group
-from tomoskin.cli.named_files import RECORDING, ForceFlag, Given, Reads, Writes
+from tomoskin.cli.named_files import (
+    RECORDING,
+    Added,
+    ForceFlag,
+    Given,
+    Reads,
+    Writes,
+    package_of,
+)
 from tomoskin.cli.named_parts import say_notes, span_lines
 from tomoskin.cli.options import TouchesOut
 from tomoskin.cli.output import Bar, JsonFlag, remark, tell
-from tomoskin.core import Output
+from tomoskin.core import Output, registered
 
 if TYPE_CHECKING:
+    from tomoskin.files.exports import Export
     from tomoskin.files.session import Lost, Repaired, SessionInfo
 
 app = group("session")
@@ -35,20 +44,26 @@ EXPORTS = {
     ".parquet": "the same for data tools",
     ".h5": "everything",
     ".npz": "an interchange file",
-    ".lerobot": "a folder, a LeRobot dataset",
     ".mat": "EIDORS' structures",
     ".vtu": "a mesh for each moment",
     ".pvd": "the same",
     ".png": "a sheet of maps",
     ".gif": "a film",
     ".mp4": "a film",
-    ".mcap": "a bag of ROS 2",
-    ".rrd": "a recording of Rerun",
 }
-"""What each ending gives; more is in docs/session-file.md."""
+"""What each ending of our own gives; more is in docs/session-file.md."""
 
-_OF_ROBOTS = (".mcap", ".lerobot", ".rrd")
-"""Endings of what says where a robot's links were, or which touches are its own."""
+_ENDINGS = ", ".join(ending for ending in (*EXPORTS, *registered("exports")) if ending != ".pvd")
+
+
+class ExportOptions(Protocol):
+    """What a record of options does that is added to ``session export``."""
+
+    def check(self, out: Path, touches: Path | None) -> None:
+        """Raise BadParameter where what is given has no effect on these files."""
+
+    def applied(self, job: Export) -> Export:
+        """The export as these options have it."""
 
 
 def _mended(out: Path | None, given: Given, called: str) -> list[Output]:
@@ -62,12 +77,20 @@ def _repaired(file: Path, out: Path | None) -> Path:
 
 def _exported(out: Path | None, _: Given, called: str) -> list[Output]:
     """What an export writes: of a series more than the file that is named."""
-    from tomoskin.files.exports import series_files
+    from tomoskin.files.exports import export_formats, series_files
 
     assert out is not None
+    others = {ending: one.gives for ending, one in export_formats().items() if one.gives}
+    endings = EXPORTS | others
     if out.suffix.lower() in (".vtu", ".pvd"):
-        return [Output(path, EXPORTS, called) for path in series_files(out.with_suffix(".pvd"))]
-    return [Output(out, EXPORTS, called)]
+        return [Output(path, endings, called) for path in series_files(out.with_suffix(".pvd"))]
+    return [Output(out, endings, called)]
+
+
+def _package(ending: str) -> tuple[str, str]:
+    from tomoskin.files.exports import export_formats
+
+    return package_of(ending) if ending in EXPORTS else export_formats()[ending].package
 
 
 @app.command()
@@ -133,9 +156,9 @@ def export(
         Path,
         typer.Argument(
             metavar="OUT",
-            help="X.csv, .parquet, .h5, .npz, .lerobot, .mat, .vtu, .png, .gif, .mp4, .mcap, .rrd.",
+            help=f"X{_ENDINGS}.",
         ),
-        Writes(EXPORTS, _exported),
+        Writes(EXPORTS, _exported, _package),
     ],
     touches: TouchesOut = None,
     every: Annotated[
@@ -144,14 +167,8 @@ def export(
     skin: Annotated[
         str, typer.Option(metavar="NAME", help="One skin of a robot's recording.")
     ] = "",
-    like: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FOLDER",
-            help="Dataset of a robot: X.lerobot has its rate, and its episodes begin at the notes.",
-        ),
-        Reads(),
-    ] = None,
+    *,
+    added: Added,
     robot: Annotated[
         Path | None,
         typer.Option(
@@ -164,31 +181,32 @@ def export(
     force: ForceFlag = False,
 ) -> None:
     """Convert a session to tables, images or the format of another program."""
-    from tomoskin.files.exports import WRITERS, Export, export_touches, omitted
+    from tomoskin.files.exports import Export, export_formats, export_touches, omitted
     from tomoskin.files.session import SessionReader, skins_in
     from tomoskin.model.robot import Robot
     from tomoskin.run import with_joints
 
-    write = WRITERS[out.suffix.lower()]
-    misplaced, partners = "", "X.lerobot"
-    if like is not None and out.suffix.lower() != ".lerobot":
-        misplaced = "--like"
-    elif robot is not None and touches is None and out.suffix.lower() not in _OF_ROBOTS:
-        misplaced, partners = "--robot", "--touches, X.mcap, X.lerobot or X.rrd"
-    if misplaced:
+    form = export_formats()[out.suffix.lower()]
+    options: tuple[ExportOptions, ...] = added
+    for one in options:
+        one.check(out, touches)
+    if robot is not None and touches is None and not form.of_links:
         raise typer.BadParameter(
-            f"expected it together with {partners}, got {out}", param_hint=misplaced
+            f"expected it together with --touches, X.mcap, X.lerobot or X.rrd, got {out}",
+            param_hint="--robot",
         )
     worn = None if robot is None else with_joints(Robot.load(robot))
     names = (skin,) if skin else skins_in(file)
-    if len(names) > 1 and out.suffix.lower() != ".lerobot":
+    if len(names) > 1 and not form.several:
         raise typer.BadParameter(
             f"expected one of {', '.join(names)}, got none", param_hint="--skin"
         )
     with ExitStack() as stack, Bar(f"writing {out}") as bar:
         session, *others = [stack.enter_context(SessionReader(file, name)) for name in names]
-        job = Export(session, every, bar, force, tuple(others), like, worn)
-        write(job, out)
+        job = Export(session, every, bar, force, tuple(others), robot=worn)
+        for one in options:
+            job = one.applied(job)
+        form.write(job, out)
         if touches is not None:
             export_touches(job, touches)
         if session.torn:

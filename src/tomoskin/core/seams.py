@@ -24,7 +24,7 @@ Seam = Literal[
     "sources",  # (argument, skin) -> Transport
     "sinks",  # argument -> Sink
     "readers",  # a tomoskin.files.imports.Format
-    "exports",  # a tomoskin.files.exports.Format
+    "exports",  # ".ending" of a session's files: a tomoskin.files.exports.ExportFormat
     "calibrations",  # a tomoskin.learning.Kind
     "commands",  # a function of a command, or of "command sub-command"; or typer's app of several
     "options",  # a record of options that are added to the "command NAME"

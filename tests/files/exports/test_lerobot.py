@@ -14,7 +14,7 @@ from prose import ROOT
 from run.sinks.test_joint_states import ROBOT, URDF, write_bag
 from tomoskin.core import DataError
 from tomoskin.files.exports import Export
-from tomoskin.files.exports.lerobot import TIME, write_lerobot
+from tomoskin.files.exports.lerobot import TIME, Like, write_lerobot
 from tomoskin.files.messages import FIELDS, SLOTS
 from tomoskin.files.session import (
     SessionReader,
@@ -83,7 +83,8 @@ def dataset(session):
 
 def exported(session, folder, rate=RATE, like=None):
     with SessionReader(session) as reader:
-        write_lerobot(Export(reader, 1 / rate, nothing, like=like), folder)
+        options = () if like is None else (Like(like),)
+        write_lerobot(Export(reader, 1 / rate, nothing, options=options), folder)
     return folder
 
 

@@ -6,7 +6,7 @@ from tomoskin.files.exports.curves import (
     write_merit_table as write_merit_table,
     write_promise as write_promise,
 )
-from tomoskin.files.exports.export import Export as Export
+from tomoskin.files.exports.export import Export as Export, ExportFormat as ExportFormat
 from tomoskin.files.exports.picture import (
     FILMS as FILMS,
     MOST_PANELS as MOST_PANELS,
@@ -21,6 +21,8 @@ from tomoskin.files.exports.published import (
 )
 from tomoskin.files.exports.session_export import (
     WRITERS as WRITERS,
+    Like as Like,
+    export_formats as export_formats,
     export_touches as export_touches,
     omitted as omitted,
 )

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain
 from pathlib import Path
+from typing import Any, TypeVar
 
 from tomoskin.core import DataError
 from tomoskin.files.exports.picture import Panel
@@ -22,6 +23,8 @@ from tomoskin.files.session import (
 from tomoskin.model.robot import Robot
 from tomoskin.pipeline import FrameResult, Prepared
 
+_T = TypeVar("_T")
+
 
 @dataclass(frozen=True)
 class Export:
@@ -29,7 +32,7 @@ class Export:
 
     ``every`` s between two images; ``advance`` is called with how far it is. Files that are
     there are written over with ``overwrite`` only. ``others`` are the sessions of a robot's other
-    skins, and ``like`` the dataset of a robot whose rows are wanted: for formats that take them.
+    skins, for formats that take several. ``options`` are records of what else a format takes.
     ``robot`` is that which wore the skins, where it is known.
     """
 
@@ -38,7 +41,7 @@ class Export:
     advance: Advance = no_report
     overwrite: bool = False
     others: tuple[SessionReader, ...] = ()
-    like: Path | None = None
+    options: tuple[Any, ...] = ()
     robot: Robot | None = None
 
     @cached_property
@@ -53,6 +56,10 @@ class Export:
         place = None if self.robot is None else self.robot.place(session.name, session.path)
         stream = Stream.of(self.prepared, str(session.path), session.epoch, place)
         return replace(stream, replayed=False)  # here events are those of the recording too
+
+    def option(self, kind: type[_T]) -> _T | None:
+        """The record of that ``kind`` among the options."""
+        return next((one for one in self.options if isinstance(one, kind)), None)
 
     def each(self) -> Iterator[Export]:
         """The same export for each of the skins."""
@@ -93,3 +100,28 @@ class Export:
             first = result.host_time if first is None else first
             title = f"{result.host_time - first:.1f} s"
             yield Panel(title, result.image.values, result.touches)
+
+
+@dataclass(frozen=True)
+class ExportFormat:
+    """A format that sessions are exported to.
+
+    Attributes
+    ----------
+    write
+        Writes the file, or the folder, of that name.
+    gives
+        What a person gets, such as "a table of voltages".
+    package
+        What it is written by: the package, and the extra that brings it.
+    several
+        Whether all skins of a recording go into one.
+    of_links
+        Whether it says where a robot's links were, or which touches are its own.
+    """
+
+    write: Callable[[Export, Path], None]
+    gives: str = ""
+    package: tuple[str, str] = ("", "")
+    several: bool = False
+    of_links: bool = False

@@ -33,7 +33,7 @@ from tomoskin.core import (
     write_text,
 )
 from tomoskin.files import messages
-from tomoskin.files.exports.export import Export
+from tomoskin.files.exports.export import Export, ExportFormat
 from tomoskin.files.session import SessionReader
 from tomoskin.model.pattern import Pattern
 
@@ -53,6 +53,13 @@ _QUANTILES = (0.01, 0.1, 0.5, 0.9, 0.99)
 Columns = dict[str, Any]
 
 
+@dataclass(frozen=True)
+class Like:
+    """The dataset of a robot, a folder, whose rate, lengths and tasks are wanted."""
+
+    folder: Path
+
+
 def write_lerobot(job: Export, path: StrPath) -> None:
     """Write the rows of each episode of ``job`` into a new folder.
 
@@ -60,13 +67,14 @@ def write_lerobot(job: Export, path: StrPath) -> None:
     ------
     DataError
         When pyarrow is missing, 1/``job.every`` is no whole number, a session is damaged or too
-        short, the episodes are not those of ``job.like``, or the disk refuses.
+        short, the episodes are not those of :class:`Like`, or the disk refuses.
     OutputError
         When there is something of that name already.
     """
     pa, pq = (needed(name, "parquet", path) for name in ("pyarrow", "pyarrow.parquet"))
     sessions = job.session, *job.others
-    given = None if job.like is None else rows_like(pq, job.like, sessions)
+    like = job.option(Like)
+    given = None if like is None else rows_like(pq, like.folder, sessions)
     rate = _rate(job.every, path) if given is None else given.rate
     tracks = [_Track.of(one) for one in job.each()]
     begin, end = (max(track.times[k] for track in tracks) for k in (0, -1))  # all have a reference
@@ -422,3 +430,13 @@ def _steps(seconds: float, rate: int) -> int:
 
 def _rows_before(seconds: float, rate: int) -> int:
     return int(np.ceil(seconds * rate - 1e-9))
+
+
+FORMAT = ExportFormat(
+    write_lerobot,
+    "a folder, a LeRobot dataset",
+    ("pyarrow", "parquet"),
+    several=True,
+    of_links=True,
+)
+"""What is registered for ``.lerobot``."""

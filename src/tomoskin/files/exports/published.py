@@ -12,7 +12,7 @@ import numpy as np
 from tomoskin import __version__
 from tomoskin.core import CHANGE, MEASURANDS, Event, Image, SinkError, StrPath, needed, written
 from tomoskin.files import messages
-from tomoskin.files.exports.export import Export
+from tomoskin.files.exports.export import Export, ExportFormat
 
 if TYPE_CHECKING:
     from mcap.writer import Writer
@@ -170,3 +170,7 @@ def rerun_recording(rerun: Any, stream: messages.Stream) -> Any:
     recording.set_log_time_enabled(False)
     recording.set_log_tick_enabled(False)
     return recording
+
+
+BAG = ExportFormat(write_bag, "a bag of ROS 2", of_links=True)
+FORMAT = ExportFormat(write_rerun, "a recording of Rerun", ("rerun", "rerun"), of_links=True)

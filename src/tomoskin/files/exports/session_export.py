@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from tomoskin.core import FloatArray, StrPath
-from tomoskin.files.exports.export import Export
-from tomoskin.files.exports.lerobot import write_lerobot
+from tomoskin.core import FloatArray, StrPath, registered
+from tomoskin.files.exports.export import Export, ExportFormat
+from tomoskin.files.exports.lerobot import FORMAT as LEROBOT, Like as Like
 from tomoskin.files.exports.matlab_file import write_matlab
 from tomoskin.files.exports.picture import FILMS, MOST_PANELS, rendered, write_picture
-from tomoskin.files.exports.published import write_bag, write_rerun
+from tomoskin.files.exports.published import BAG, FORMAT as RERUN
 from tomoskin.files.exports.session_table import write_csv, write_hdf5, write_parquet, write_touches
 from tomoskin.files.exports.vtu import write_series
 from tomoskin.files.imports import write_interchange
@@ -104,16 +104,21 @@ WRITERS: dict[str, Callable[[Export, Path], None]] = {
     ".csv": write_csv,
     ".parquet": write_parquet,
     ".h5": write_hdf5,
-    ".lerobot": write_lerobot,
     ".npz": _npz,
     ".mat": _matlab,
-    ".mcap": write_bag,
-    ".rrd": write_rerun,
     **dict.fromkeys((".vtu", ".pvd"), _series),
     ".png": _picture,
     **dict.fromkeys(FILMS, _film),
 }
-"""What writes a file, by the ending of its name."""
+"""What writes a file of our own formats, by the ending of its name."""
+
+
+def export_formats() -> dict[str, ExportFormat]:
+    """Our own formats and those that are registered, by the ending of a file's name."""
+    ours = {ending: ExportFormat(write) for ending, write in WRITERS.items()}
+    ours |= {".lerobot": LEROBOT, ".mcap": BAG, ".rrd": RERUN}
+    return ours | {ending: entry.load() for ending, entry in registered("exports").items()}
+
 
 _TABLES = (".csv", ".parquet", ".npz", ".mat")
 """Files of voltages."""

@@ -1,0 +1,1 @@
+"""Sessions as datasets of LeRobot, and touch in the forms in which policies take it."""
