@@ -17,10 +17,6 @@ from tomoskin.run import CheckFinding
 _T = TypeVar("_T")
 
 
-_EXAMPLES = {"mqtt": "mqtt://127.0.0.1/tomoskin"}
-"""Of sinks that want to know where to."""
-
-
 def doctor(json: JsonFlag = False) -> None:
     """Say what was found, and exit with 1 where something is not as needed."""
     findings = (finding for look in _LOOKS for finding in look())
@@ -57,11 +53,10 @@ def _sources() -> Iterator[CheckFinding]:
 
 def _sinks() -> Iterator[CheckFinding]:
     """Which could be opened; a package that is not here is no fault."""
-    from tomoskin.run.sinks import make_sink, sink_names
+    from tomoskin.run.sinks import example_of, make_sink, sink_names
 
     for name in sink_names():
-        spec = _EXAMPLES.get(name, name)
-        tried = _tried("sink", partial(make_sink, spec), lambda _: "installed")
+        tried = _tried("sink", partial(make_sink, example_of(name)), lambda _: "installed")
         yield replace(tried, text=f"{name}: {tried.text}", optional=True)
 
 

@@ -89,6 +89,6 @@ SinkOption = Annotated[
     typer.Option(
         "--sink",
         metavar="SINK",
-        help="Publish results: foxglove:8766, mqtt://HOST:1883/TOPIC, lsl, ros2, rerun, …",
+        help="Publish results: NAME or NAME:ARGUMENT. tomoskin doctor lists the names.",
     ),
 ]

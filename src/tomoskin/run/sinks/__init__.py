@@ -1,4 +1,4 @@
-"""Where results go while they are made: Foxglove, MQTT, LSL, ROS 2, and others by name."""
+"""Where results go while they are made: sinks, which are registered by their names."""
 
 from tomoskin.files.messages import (
     Contact as Contact,
@@ -12,8 +12,12 @@ from tomoskin.run.sinks.sink import (
     Sink as Sink,
     SinkConsumer as SinkConsumer,
     SinkReport as SinkReport,
+    example_of as example_of,
     make_sink as make_sink,
+    options_of as options_of,
+    port_of as port_of,
     sink_names as sink_names,
     sink_report as sink_report,
     sink_worker as sink_worker,
+    tried_with as tried_with,
 )

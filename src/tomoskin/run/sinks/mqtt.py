@@ -13,7 +13,7 @@ from urllib.parse import SplitResult, unquote, urlsplit
 
 from tomoskin.core import Event, SinkError, encode_json, needed
 from tomoskin.files.messages import Item, Naming, Stream, event_content, happenings
-from tomoskin.run.sinks.sink import Sink, options_of
+from tomoskin.run.sinks.sink import Sink, options_of, tried_with
 
 DEFAULT_PORT, TLS_PORT = 1883, 8883
 
@@ -152,6 +152,7 @@ def _check_answer(answers: SimpleQueue[Any], where: str) -> None:
         raise SinkError(f"the broker refused the connection: {reason}", where=where)
 
 
+@tried_with("//127.0.0.1/tomoskin")
 def open_mqtt(argument: str) -> MqttSink:
     """``mqtt://[USER:PASSWORD@]HOST[:PORT][/TOPIC][?frame=NAME&tls=system|FILE]``."""
     try:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import contextlib
 import logging
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import Any, TypeVar
 
 from tomoskin.core import (
     Capacity,
@@ -23,6 +24,9 @@ from tomoskin.core import (
 )
 from tomoskin.files.messages import Item, Naming, Reporter, Stream
 from tomoskin.pipeline import FrameResult
+
+_Opener = TypeVar("_Opener", bound=Callable[[str], Any])
+_EXAMPLE = "example"
 
 
 class Sink(ABC):
@@ -67,7 +71,7 @@ def sink_names() -> tuple[str, ...]:
 
 
 def make_sink(spec: str) -> Sink:
-    """Sink of ``name`` or ``name:argument``, not opened: ``lsl``, ``mqtt://host/topic``.
+    """Sink of ``name`` or ``name:argument``, not opened.
 
     Raises
     ------
@@ -88,6 +92,24 @@ def make_sink(spec: str) -> Sink:
     if not isinstance(sink, Sink) or not isinstance(getattr(sink, "name", None), str):
         raise _faulty(entry, f"expected a Sink with a name, got {sink!r}")
     return sink
+
+
+def tried_with(argument: str) -> Callable[[_Opener], _Opener]:
+    """Say of what makes a sink with which ``argument`` it can be tried, where it needs one."""
+
+    def mark(opener: _Opener) -> _Opener:
+        vars(opener)[_EXAMPLE] = argument
+        return opener
+
+    return mark
+
+
+def example_of(name: str) -> str:
+    """What the sink of that ``name`` can be made of, to see whether its packages are here."""
+    with contextlib.suppress(Exception):  # which making it says in words
+        example = getattr(registered("sinks")[name].load(), _EXAMPLE, "")
+        return f"{name}:{example}" if example else name
+    return name
 
 
 def _faulty(entry: Registered, why: str) -> SinkError:
