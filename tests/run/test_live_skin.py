@@ -184,7 +184,7 @@ def test_a_replay_ages_as_if_it_were_now(tmp_path, force_file):
 
 
 def test_the_reflex_of_the_documentation_acts_on_newtons(monkeypatch, force_file, tmp_path):
-    program = robot_program("tomoskin")
+    program = robot_program("robot.md", "tomoskin")
     assert len([line for line in program.splitlines() if line.strip()]) <= MOST_LINES
     open_source, wait, opened, said = robot_run.open_source, LiveSkin.wait, [], []
 

@@ -21,7 +21,7 @@ from tomoskin.core import Event, Image
 from tomoskin.pipeline import FrameResult
 from tomoskin.run.sinks import Contacts, Stream
 
-ROBOT = Path(__file__).resolve().parents[3] / "docs" / "robot.md"
+DOCS = Path(__file__).resolve().parents[3] / "docs"
 PATIENCE = 300
 EPOCH = 1_700_000_000.0
 MESH = SKIN.mesh()
@@ -29,6 +29,24 @@ PATTERN = SKIN.pattern()
 VALUES = np.linspace(-1, 1, len(MESH.cells))
 EVENT = Event(0.5, "connected", "board 01")
 STREAM = Stream(SKIN.name, "twin of textile-disc-8", PATTERN, MESH.pixels(48), EPOCH)
+
+
+SCRIPT = """format = 1
+[script]
+duration = "700 ms"
+lead_in = "1.2 s"
+[[press]]
+id = "a"
+radius = "15 mm"
+at = ["20 mm", "-30 mm"]
+start = "0 s"
+force = "3 N"
+hold = "200 ms"
+[[mark]]
+at = "500 ms"
+text = "half"
+"""
+"""A short press with a note."""
 
 
 def result_at(host_time, *touches, sequence=0, **changes):
@@ -99,9 +117,10 @@ def news():
     return News()
 
 
-def robot_program(library, **changes):
-    """A program of docs/robot.md, by the library that it uses."""
-    blocks = re.findall(r"^```python\n(.*?)^```", ROBOT.read_text(), re.DOTALL | re.MULTILINE)
+def robot_program(page, library, **changes):
+    """A program of a page for robots, by the library that it uses."""
+    text = (DOCS / page).read_text()
+    blocks = re.findall(r"^```python\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
     (program,) = (
         block for block in blocks if re.search(rf"^(import|from) {library}\b", block, re.M)
     )
@@ -169,5 +188,5 @@ def program():
 
 @pytest.fixture
 def listener(program):
-    """Start a program of docs/robot.md, by the library that it uses; it ends with the test."""
-    return lambda library, **changes: program("-c", robot_program(library, **changes))
+    """Start a program of a page, by the library that it uses; it ends with the test."""
+    return lambda page, library, **changes: program("-c", robot_program(page, library, **changes))

@@ -10,25 +10,10 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
 from cli.conftest import tomoskin
+from run.sinks.conftest import SCRIPT
 from tomoskin.files.session import SessionReader, as_recorded, replayed
 
 __all__ = ["tomoskin"]
-
-SCRIPT = """format = 1
-[script]
-duration = "700 ms"
-lead_in = "1.2 s"
-[[press]]
-id = "a"
-radius = "15 mm"
-at = ["20 mm", "-30 mm"]
-start = "0 s"
-force = "3 N"
-hold = "200 ms"
-[[mark]]
-at = "500 ms"
-text = "half"
-"""
 
 
 @pytest.fixture

@@ -269,7 +269,7 @@ def test_a_sink_may_be_opened_again(sink, stream):
 
 def test_the_listener_of_the_documentation_hears_touches(listener, domain, stream):
     own = ("DomainParticipant(0)", f"DomainParticipant({domain})")
-    heard = listener("cyclonedds", domain=own)
+    heard = listener("robot.md", "cyclonedds", domain=own)
     sink = make_sink("ros2")
     contacts_at = begin(sink, stream)
     line = heard.hears(lambda number: sink.publish(contacts_at(float(number), TOUCH)))

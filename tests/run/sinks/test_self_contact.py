@@ -11,6 +11,7 @@ import pytest
 from files.session.runs import SKIN, TOUCH
 from run.sinks.conftest import EPOCH, result_at
 from tomoskin.core import SkinError
+from tomoskin.extras.lsl.lsl_sink import touch_sample
 from tomoskin.files.exports import Export, export_touches
 from tomoskin.files.messages import (
     FIELDS,
@@ -25,7 +26,6 @@ from tomoskin.files.session import SessionReader, SessionWriter
 from tomoskin.model.robot import Robot
 from tomoskin.pipeline import prepare
 from tomoskin.run import Member, RobotRun
-from tomoskin.run.sinks.lsl import touch_sample
 from tomoskin.sensing.track import TouchEvent
 
 URDF = """<robot name="arm"><link name="upper"/><link name="fore"/><link name="hand">

@@ -15,10 +15,6 @@ from tomoskin.files.exports.picture import (
     plot as plot,
     write_picture as write_picture,
 )
-from tomoskin.files.exports.published import (
-    RerunView as RerunView,
-    rerun_recording as rerun_recording,
-)
 from tomoskin.files.exports.session_export import (
     WRITERS as WRITERS,
     Like as Like,

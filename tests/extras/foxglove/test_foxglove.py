@@ -20,10 +20,12 @@ import pytest
 from websockets.sync.client import connect
 
 from files.session.runs import TOUCH
-from run.sinks.conftest import EPOCH, EVENT, PATIENCE, begin, contacts_at, free_port
+from run.sinks.conftest import EPOCH, EVENT, PATIENCE, begin, contacts_at, free_port, stream
 from tomoskin.core import SinkError
 from tomoskin.files.session import schema_of
 from tomoskin.run.sinks import make_sink
+
+__all__ = ["stream"]
 
 OPEN = Path("/dev/fd")
 _MESSAGE = struct.Struct("<BIQ")

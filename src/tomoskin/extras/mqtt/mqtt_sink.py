@@ -13,7 +13,7 @@ from urllib.parse import SplitResult, unquote, urlsplit
 
 from tomoskin.core import Event, SinkError, encode_json, needed
 from tomoskin.files.messages import Item, Naming, Stream, event_content, happenings
-from tomoskin.run.sinks.sink import Sink, options_of, tried_with
+from tomoskin.run.sinks import Sink, options_of, tried_with
 
 DEFAULT_PORT, TLS_PORT = 1883, 8883
 

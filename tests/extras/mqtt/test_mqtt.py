@@ -18,12 +18,26 @@ from paho.mqtt import client as paho
 
 from conftest import missing
 from files.session.runs import TOUCH
-from run.sinks.conftest import EPOCH, EVENT, PATIENCE, begin, free_port, result_at, touch_of
+from run.sinks.conftest import (
+    EPOCH,
+    EVENT,
+    PATIENCE,
+    begin,
+    free_port,
+    listener,
+    program,
+    result_at,
+    stream,
+    touch_of,
+)
 from tomoskin.core import Event, SinkError
+from tomoskin.extras.mqtt import mqtt_sink
+from tomoskin.extras.mqtt.mqtt_sink import PERIOD
 from tomoskin.files.messages import Reporter
-from tomoskin.run.sinks import make_sink, mqtt
-from tomoskin.run.sinks.mqtt import PERIOD
+from tomoskin.run.sinks import make_sink
 from tomoskin.sensing.track import TouchEvent
+
+__all__ = ["listener", "program", "stream"]
 
 BROKERS = "/usr/sbin:/usr/local/sbin:/opt/homebrew/sbin"
 
@@ -206,7 +220,7 @@ def test_an_onset_outlasts_a_broker_that_was_away(broker, stream):
 
 
 def test_who_comes_later_gets_the_touches_until_they_are_old(broker, stream, monkeypatch):
-    monkeypatch.setattr(mqtt, "_EXPIRY", 2)
+    monkeypatch.setattr(mqtt_sink, "_EXPIRY", 2)
     sink = make_sink(broker.url)
     contacts_at = begin(sink, stream)
     sink.publish(contacts_at(1.0, TOUCH))
@@ -303,7 +317,7 @@ def test_a_broker_that_goes_is_noticed(broker, heard, stream, monkeypatch):
 
 def test_the_listener_of_the_documentation_hears_touches(broker, listener, stream):
     place = f'client.username_pw_set("me", "secret")\nclient.connect("127.0.0.1", {broker.port})'
-    heard = listener("paho", place=('client.connect("127.0.0.1", 1883)', place))
+    heard = listener("extras/mqtt.md", "paho", place=('client.connect("127.0.0.1", 1883)', place))
     sink = make_sink(broker.url)
     contacts_at = begin(sink, stream)
     line = heard.hears(lambda number: sink.publish(contacts_at(float(number), TOUCH)))

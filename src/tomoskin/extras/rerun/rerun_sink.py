@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from tomoskin.core import Output, SinkError, check_outputs, needed
-from tomoskin.files.exports import RerunView, rerun_recording
+from tomoskin.extras.rerun.rerun_view import RerunView, rerun_recording
 from tomoskin.files.messages import Item, Naming, Stream
-from tomoskin.run.sinks.sink import Sink, options_of, port_of
+from tomoskin.run.sinks import Sink, options_of, port_of
 
 _WHERE = "sink rerun"
 _ADDRESS, _PORT = "127.0.0.1", 9876

@@ -1,59 +1,16 @@
-"""What a session would have had sinks publish: as a bag of ROS 2, which is an MCAP file, and as a
-file of Rerun, the sheet in space, touches and series."""
+"""What a sink or a session says to Rerun: the sheet in space, touches and series."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from uuid import uuid4
 
 import numpy as np
 
-from tomoskin import __version__
 from tomoskin.core import CHANGE, MEASURANDS, Event, Image, SinkError, StrPath, needed, written
 from tomoskin.files import messages
-from tomoskin.files.exports.export import Export, ExportFormat
-
-if TYPE_CHECKING:
-    from mcap.writer import Writer
-
-
-_BETWEEN = "\n" + 80 * "=" + "\n"
-
-
-def write_bag(job: Export, path: StrPath) -> None:
-    """Write the messages that the sink ``ros2`` would have sent; an image every ``job.every`` s.
-
-    Raises
-    ------
-    DataError, OutputError
-        When the session cannot be replayed, or the file not be written.
-    """
-    path = Path(path)
-    from mcap.writer import CompressionType, Writer
-
-    with written(path, overwrite=job.overwrite) as part, part.open("wb") as file:
-        bag = Writer(file, compression=CompressionType.NONE)
-        bag.start(profile="ros2", library=f"tomoskin {__version__}")
-        channels = {topic: _register(bag, job.stream.naming, topic) for topic in messages.TOPICS}
-        for item in job.items():
-            for message in messages.ros_messages(job.stream, item):
-                _put(bag, channels[message.topic], message)
-        bag.finish()  # type: ignore[no-untyped-call]
-
-
-def _register(bag: Writer, naming: messages.Naming, topic: str) -> int:
-    kind = messages.TOPICS[topic]
-    text = _BETWEEN.join(messages.definition(kind))
-    schema = bag.register_schema(kind, "ros2msg", text.encode())
-    about = {"offered_qos_profiles": "", "topic_type_hash": messages.type_hash(kind)}
-    return bag.register_channel(f"/{naming.topic(topic)}", "cdr", schema, about)
-
-
-def _put(bag: Writer, channel: int, message: messages.RosMessage) -> None:
-    data = messages.encode_cdr(messages.TOPICS[message.topic], message.value)
-    bag.add_message(channel, message.stamp, data, message.stamp)
-
+from tomoskin.files.exports import Export, ExportFormat
 
 _WHERE = "rerun"
 _ARROW = 0.02
@@ -172,5 +129,5 @@ def rerun_recording(rerun: Any, stream: messages.Stream) -> Any:
     return recording
 
 
-BAG = ExportFormat(write_bag, "a bag of ROS 2", of_links=True)
 FORMAT = ExportFormat(write_rerun, "a recording of Rerun", ("rerun", "rerun"), of_links=True)
+"""What is registered for ``.rrd``."""

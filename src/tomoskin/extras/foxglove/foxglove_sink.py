@@ -15,7 +15,7 @@ from typing import Any
 from tomoskin.core import Event, SinkError, encode_json, needed
 from tomoskin.files import messages
 from tomoskin.files.session import schema_of
-from tomoskin.run.sinks.sink import Sink, port_of
+from tomoskin.run.sinks import Sink, port_of
 
 DEFAULT_PORT = 8766
 """Foxglove's own default is the port of our page."""

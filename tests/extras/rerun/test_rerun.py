@@ -20,15 +20,25 @@ import pytest
 
 from cli.conftest import tomoskin
 from files.session.runs import TOUCH
-from run.sinks.conftest import EPOCH, EVENT, MESH, PATIENCE, VALUES, begin, free_port, touch_of
-from run.sinks.test_bag import SCRIPT
+from run.sinks.conftest import (
+    EPOCH,
+    EVENT,
+    MESH,
+    PATIENCE,
+    SCRIPT,
+    VALUES,
+    begin,
+    free_port,
+    stream,
+    touch_of,
+)
 from tomoskin.core import CHANGE, OutputError, SinkError
+from tomoskin.extras.rerun.rerun_sink import open_rerun
 from tomoskin.files.session import SessionReader, as_recorded, replayed
-from tomoskin.run.sinks.rerun import open_rerun
 
 pytest.importorskip("rerun", reason="rerun-sdk is not installed: pip install 'tomoskin[rerun]'")
 
-__all__ = ["tomoskin"]
+__all__ = ["stream", "tomoskin"]
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ import numpy as np
 
 from tomoskin.core import MEASURANDS, Event, FloatArray, SinkError, clock_ahead, encode_json, needed
 from tomoskin.files.messages import Contacts, Item, Naming, Stream, row_labels, time_of
-from tomoskin.run.sinks.sink import Sink
+from tomoskin.run.sinks import Sink
 
 MOST_TOUCHES = 5
 """Touches that a sample has room for, the strongest first."""

@@ -1,0 +1,1 @@
+"""A live server for Foxglove, in the schemas of session files."""

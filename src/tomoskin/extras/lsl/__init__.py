@@ -1,0 +1,1 @@
+"""Voltages, touches and events as streams of LSL."""

@@ -1,0 +1,1 @@
+"""Touches and events as JSON for a broker of MQTT."""

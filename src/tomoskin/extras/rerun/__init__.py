@@ -1,0 +1,1 @@
+"""The sheet in space, touches and series for Rerun's viewer, live or of a session."""
