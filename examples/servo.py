@@ -20,9 +20,9 @@ import numpy as np
 import pyarrow.parquet as pq
 
 from tomoskin.core import FloatArray
+from tomoskin.extras.lerobot import FIELDS, SLOTS, PolicyForms, PolicyView, write_lerobot
+from tomoskin.extras.lerobot.dataset import PREFIX, TIME
 from tomoskin.files.exports import Export
-from tomoskin.files.exports.lerobot import PREFIX, TIME, write_lerobot
-from tomoskin.files.messages import FIELDS, SLOTS, PolicyForms, PolicyView
 from tomoskin.files.session import SessionReader, SessionWriter
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, prepare

@@ -22,13 +22,16 @@ ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
 BLOCK = re.compile(r"^```python\n(.*?)^```", re.DOTALL | re.MULTILINE)
 THEORY = [f for f in DOCS.glob("theory/*.md") if BLOCK.search(f.read_text(encoding="utf-8"))]
+RUNS = "A test runs these blocks"
+"""What a page of an extra says where it is so."""
+
 RUN = [
     "build.md",
     "equivalents.md",
     "frequencies.md",
-    "policies.md",
     "python.md",
     *sorted(f"theory/{f.name}" for f in THEORY),
+    *sorted(f"extras/{f.name}" for f in DOCS.glob("extras/*.md") if RUNS in f.read_text("utf-8")),
 ]
 
 

@@ -15,7 +15,8 @@ from lerobot.robots import Robot, RobotConfig, make_robot_from_config
 
 from tomoskin import Skin
 from tomoskin.board.source import open_source
-from tomoskin.files.messages import FIELDS, SLOTS, PolicyForms, row_labels
+from tomoskin.extras.lerobot import FIELDS, SLOTS, PolicyForms
+from tomoskin.files.messages import row_labels
 from tomoskin.pipeline import prepare
 from tomoskin.run import Runner
 from tomoskin.run.sinks import Contacts, Item, Sink

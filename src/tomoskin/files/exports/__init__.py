@@ -17,7 +17,6 @@ from tomoskin.files.exports.picture import (
 )
 from tomoskin.files.exports.session_export import (
     WRITERS as WRITERS,
-    Like as Like,
     export_formats as export_formats,
     export_touches as export_touches,
     omitted as omitted,

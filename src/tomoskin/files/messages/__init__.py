@@ -19,17 +19,6 @@ from tomoskin.files.messages.foxglove_records import (
     touch_colour as touch_colour,
     touch_width as touch_width,
 )
-from tomoskin.files.messages.policy_forms import (
-    FIELDS as FIELDS,
-    POSE as POSE,
-    SLOTS as SLOTS,
-    PolicyForms as PolicyForms,
-    PolicyView as PolicyView,
-    Slots as Slots,
-    last_before as last_before,
-    pose_row as pose_row,
-    still_holds as still_holds,
-)
 from tomoskin.files.messages.reporter import Every as Every, Item as Item, Reporter as Reporter
 from tomoskin.files.messages.ros_types import (
     NODE_TYPES as NODE_TYPES,

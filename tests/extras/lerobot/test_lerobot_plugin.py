@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from claims import ROOT
-from tomoskin.files.messages import FIELDS
+from tomoskin.extras.lerobot import FIELDS
 from tomoskin.model.skin import Skin
 from tomoskin.run import simulate
 from tomoskin.twin import Script

@@ -32,8 +32,17 @@ from tomoskin.core import (
     needed,
     write_text,
 )
-from tomoskin.files import messages
-from tomoskin.files.exports.export import Export, ExportFormat
+from tomoskin.extras.lerobot.policy_forms import (
+    FIELDS,
+    POSE,
+    SLOTS,
+    Slots,
+    last_before,
+    pose_row,
+    still_holds,
+)
+from tomoskin.files.exports import Export, ExportFormat
+from tomoskin.files.messages import Contacts, row_labels
 from tomoskin.files.session import SessionReader
 from tomoskin.model.pattern import Pattern
 
@@ -122,16 +131,16 @@ class _Track:
 
     @classmethod
     def of(cls, job: Export) -> Self:
-        times, valid, change, touches, poses, slots = [], [], [], [], [], messages.Slots()
+        times, valid, change, touches, poses, slots = [], [], [], [], [], Slots()
         for result in job.results():
-            contacts = messages.Contacts.of(job.stream, result)
+            contacts = Contacts.of(job.stream, result)
             if contacts.change is not None:
                 slots = slots.after(contacts)
                 times.append(contacts.when)
                 valid.append(contacts.valid)
                 change.append(contacts.change.astype(np.float32))
                 touches.append(slots.table.ravel().astype(np.float32))
-                poses.append(messages.pose_row(contacts) if contacts.link else [])
+                poses.append(pose_row(contacts) if contacts.link else [])
         if not times:
             raise DataError("holds too few frames for a reference", where=str(job.session.path))
         if (link := contacts.link) is not None and not np.any(poses):
@@ -155,9 +164,9 @@ class _Track:
         The window is flat: LeRobot's tools fail on tables in its rows.
         """
         moments = rows.moments
-        chosen = messages.last_before(self.times, moments, count)
+        chosen = last_before(self.times, moments, count)
         newest, ages = chosen[:, -1], moments[:, None] - self.times[chosen]
-        holds = messages.still_holds(self.times, ages[:, -1])
+        holds = still_holds(self.times, ages[:, -1])
         valid = self.valid[newest] & holds
         window = np.where((ages >= 0)[:, :, None], self.change[chosen], 0).astype(np.float32)
         columns = {
@@ -185,8 +194,8 @@ class _Track:
 
     def names(self, count: int) -> dict[str, list[str]]:
         """What the columns of each feature are, by its name."""
-        labels = messages.row_labels(self.pattern)
-        slots = [f"touch_{n}.{name}" for n in range(messages.SLOTS) for name in messages.FIELDS]
+        labels = row_labels(self.pattern)
+        slots = [f"touch_{n}.{name}" for n in range(SLOTS) for name in FIELDS]
         frames = [f"frame_{n - count + 1}" for n in range(count)]
         window = [f"{frame}.{label}" for frame in frames for label in labels]
         named = {
@@ -194,7 +203,7 @@ class _Track:
             TOUCHES: slots,
             WINDOW: window,
             AGES: frames,
-            LINK: [*messages.POSE],
+            LINK: [*POSE],
         }
         return {self.prefix + name: words for name, words in named.items()}
 

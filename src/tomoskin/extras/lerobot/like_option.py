@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class LikeOptions:
+class LikeOption:
     """What a dataset takes beside the options of every export."""
 
     like: Annotated[
@@ -37,7 +37,7 @@ class LikeOptions:
 
     def applied(self, job: Export) -> Export:
         """The export with the dataset whose rows are wanted."""
-        from tomoskin.files.exports import Like
+        from tomoskin.extras.lerobot.dataset import Like
 
         if self.like is None:
             return job

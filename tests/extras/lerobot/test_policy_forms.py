@@ -9,7 +9,8 @@ import pytest
 
 from run.sinks.test_joint_states import ROBOT, URDF
 from tomoskin.core import Amount
-from tomoskin.files.messages import FIELDS, POSE, SLOTS, Contacts, PolicyForms, Slots, Stream
+from tomoskin.extras.lerobot import FIELDS, POSE, SLOTS, PolicyForms, Slots
+from tomoskin.files.messages import Contacts, Stream
 from tomoskin.files.session import Session
 from tomoskin.model.robot import Robot
 from tomoskin.model.skin import Skin

@@ -5,6 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from examples.conftest import imported
+
+__all__ = ["imported"]
+
 
 @pytest.mark.slow
 def test_a_policy_follows_a_finger_by_touch_alone(imported):

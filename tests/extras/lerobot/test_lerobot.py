@@ -13,9 +13,9 @@ from cli.conftest import tomoskin
 from prose import ROOT
 from run.sinks.test_joint_states import ROBOT, URDF, write_bag
 from tomoskin.core import DataError
+from tomoskin.extras.lerobot import FIELDS, SLOTS, Like, write_lerobot
+from tomoskin.extras.lerobot.dataset import TIME
 from tomoskin.files.exports import Export
-from tomoskin.files.exports.lerobot import TIME, Like, write_lerobot
-from tomoskin.files.messages import FIELDS, SLOTS
 from tomoskin.files.session import (
     SessionReader,
     SessionWriter,
