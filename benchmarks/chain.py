@@ -22,12 +22,11 @@ from bench_rig import served
 from report import Report, progress, table
 from tomoskin.board.source import SerialTransport
 from tomoskin.core import FloatArray
+from tomoskin.extras.robot import Member, PlaceOnRobot, RobotRun
 from tomoskin.files.session import SessionReader
-from tomoskin.model.robot import Place
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import FrameResult, Prepared, prepare
 from tomoskin.run import LiveSkin, Runner, commands
-from tomoskin.run.robot_run import Member, RobotRun
 from tomoskin.run.sinks import Contacts
 from tomoskin.twin import Press, TwinSettings, TwinSkin
 from tomoskin.twin.emulator.board_process import SkinMemory
@@ -260,7 +259,7 @@ def run_boards() -> Iterator[Report]:
 
 def _several(prepared: Prepared, file: Path, ports: list[str], seconds: float) -> dict[str, Any]:
     members = [
-        Member(Place(f"skin{number}"), prepared, partial(SerialTransport, port))
+        Member(PlaceOnRobot(f"skin{number}"), prepared, partial(SerialTransport, port))
         for number, port in enumerate(ports)
     ]
     told: dict[str, list[tuple[int, float, float]]] = {}

@@ -1,7 +1,7 @@
 """Write the tables of the documentation that follow from declarations: `python docs/doc_tables.py`.
 
 Each page is written by hand down to its mark. Below stand the keys of the skin file
-(skin-file.md), of a script (simulate.md) and of a robot (robot-file.md), the numbers of the
+(skin-file.md), of a script (simulate.md) and of a robot (extras/robot.md), the numbers of the
 twin (twin.md), the messages between board and host (protocol.md), and the boards (firmware.md).
 """
 
@@ -15,7 +15,6 @@ from typing import Any
 from tomoskin.board.source import BOARDS
 from tomoskin.board.wire import SCHEMA
 from tomoskin.board.wire.schema import FieldSpec
-from tomoskin.model.robot import SECTIONS as ROBOT_SECTIONS
 from tomoskin.model.section import Key, Section, literal
 from tomoskin.model.skin import SECTIONS
 from tomoskin.twin import (
@@ -104,14 +103,25 @@ def _field_rows(fields: Iterable[FieldSpec], start: int) -> Iterator[list[str]]:
         start += field.size
 
 
-PAGES: dict[str, Callable[[], str]] = {
+def robot_tables() -> str:
+    """The sections of a robot file, which an extra reads."""
+    from tomoskin.extras.robot import SECTIONS as ROBOT_SECTIONS  # noqa: PLC0415
+
+    return tables(ROBOT_SECTIONS.values())
+
+
+_PAGES: dict[str, Callable[[], str]] = {
     "skin-file.md": lambda: tables(SECTIONS.values()),
     "simulate.md": lambda: tables(SCRIPT_SECTIONS.values()),
-    "robot-file.md": lambda: tables(ROBOT_SECTIONS.values()),
+    "extras/robot.md": robot_tables,
     "twin.md": parameter_tables,
     "protocol.md": schema_tables,
     "firmware.md": board_table,
 }
+
+
+PAGES = {page: made for page, made in _PAGES.items() if (FOLDER / page).is_file()}
+"""Those that are here: the page of an extra goes with it."""
 
 
 def written(page: str) -> str:

@@ -19,8 +19,8 @@ from pathlib import Path
 import numpy as np
 
 from tomoskin.core import FloatArray, Touch
+from tomoskin.extras.robot import Robot
 from tomoskin.files.messages import Contacts, Stream
-from tomoskin.model.robot import Robot
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, prepare
 from tomoskin.twin import Press, SteppedSkin, TwinSettings

@@ -74,7 +74,7 @@ def test_every_entry_point_leads_to_a_function() -> None:
 
 
 PACKAGES = (
-    *("core", "model.mesh", "model.pattern", "model.skin", "model.robot", "model.forward"),
+    *("core", "model.mesh", "model.pattern", "model.skin", "model.forward"),
     *("imaging", "board.wire", "board.source", "sensing.signal", "sensing.track"),
     *("sensing.segment", "sensing.fit", "learning", "pipeline", "twin", "twin.emulator"),
     *("files.messages", "files.session", "files.imports", "files.exports", "run.sinks", "run"),

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from tomoskin.model.mesh import Mesh as Mesh
     from tomoskin.model.pattern import Pattern as Pattern
     from tomoskin.model.skin import Skin as Skin
-    from tomoskin.run import open_robot as open_robot, open_skin as open_skin
+    from tomoskin.run import open_skin as open_skin
 
 __version__ = "0.1.0"
 
@@ -26,7 +26,6 @@ _HOME = {
     "Pattern": "model.pattern",
     "Session": "files.session",
     "Skin": "model.skin",
-    "open_robot": "run",
     "open_skin": "run",
     "plot": "files.exports",
 }

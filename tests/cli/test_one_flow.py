@@ -8,18 +8,13 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import h5py
 import numpy as np
 import pytest
-from rosbags.highlevel import AnyReader
-from rosbags.typesys import Stores, get_typestore
 
-from run.board import Board, samples_of
 from run.scripted import fault
 from run.test_replay import Recorded, late
-from run.test_robot_run import Watch as RobotWatch, grown, member, running
 from run.test_runner import Watch
 from tomoskin.core import Touch
 from tomoskin.files.session import (
@@ -28,7 +23,6 @@ from tomoskin.files.session import (
     SessionReader,
     reconstruct_session,
     session_info,
-    split,
 )
 from tomoskin.files.session.scanned import scanned_touches
 from tomoskin.learning import TOUCH, Locator
@@ -54,7 +48,7 @@ B = PRESSES.format(id="b", x=-30, y=-20, start=200, more="")
 SLIDE = PRESSES.format(id="a", x=-30, y=10, start=100, more='path = [["700 ms", "30 mm", "10 mm"]]')
 LOST = fault("cut", "600 ms", "1800 ms", electrode=2)
 SCRIPTS = {"two presses": A + B, "a slide": SLIDE, "an electrode lost": A + LOST}
-WAYS = (*SCRIPTS, "a late recording", "one skin of a robot")
+WAYS = (*SCRIPTS, "a late recording")
 PLAIN = ("two presses", "a slide")
 """Those of which a table of voltages tells all: it holds neither readings at a rail nor the run
 before it."""
@@ -70,18 +64,10 @@ def session(request: pytest.FixtureRequest, tmp_path_factory, fitted: Prepared) 
     path = Path(tmp_path_factory.mktemp("flow") / f"{request.param}.mcap")
     if request.param in SCRIPTS:
         simulate(Script.from_toml(HEAD + SCRIPTS[request.param]), fitted.skin, path)
-    elif request.param == "a late recording":
+    else:
         with Recorded(fitted, path.with_name("whole.mcap")) as live:
             live.idle(REFERENCE_FRAMES)
             late(live, path)
-    else:
-        boards = {name: Board(samples_of(fitted)) for name in ("left", "right")}
-        with running([member(fitted, name, board) for name, board in boards.items()]) as run:
-            run.record(path)
-            RobotWatch(run).until(grown(run, boards))
-            run.stop_recording()
-        split(path)
-        return path.with_name(f"{path.stem}-right.mcap")
     return path
 
 
@@ -138,7 +124,7 @@ def test_all_ways_are_the_same(session: Path, fitted: Prepared, tmp_path: Path, 
     names = ("frame", "id", "x_m", "y_m", "peak")
     assert found == list(zip(*(columns[name].tolist() for name in names), strict=True))
 
-    one, two, bag = tmp_path / "image.csv", tmp_path / "export.csv", tmp_path / "bag.mcap"
+    one, two = tmp_path / "image.csv", tmp_path / "export.csv"
     code, out, err = tomoskin("image", session, "--touches", one)
     assert code == 0, err
     replayed = again(session, fitted)
@@ -157,9 +143,6 @@ def test_all_ways_are_the_same(session: Path, fitted: Prepared, tmp_path: Path, 
         assert list(zip(*(told[c].tolist() for c in ("frame", "id", "x", "y")), strict=True)) == [
             row[:4] for row in found
         ]
-    code, _, err = tomoskin("session", "export", session, bag, "--every", "1e9")
-    assert code == 0, err
-    assert bag_positions(bag) == [(x, y) for _, _, x, y, _ in found]
 
     info = session_info(session)
     assert out.startswith(f"{info.frames} frames, ")
@@ -192,16 +175,6 @@ def test_a_calibration_locates_the_same_by_both_commands(
         assert code == 0, err
     assert table(one) == table(two)
     assert len(table(one)) > 1
-
-
-def bag_positions(path: Path) -> list[tuple[float, float]]:
-    """Positions of all touches, in their order."""
-    with AnyReader([path], default_typestore=get_typestore(Stores.EMPTY)) as reader:
-        chosen = [c for c in reader.connections if c.topic == "/tomoskin/track"]
-        read = reader.messages(chosen)
-        tracks: list[Any] = [reader.deserialize(d, c.msgtype) for c, _, d in read]
-    poses = [track.pose.pose for track in tracks]
-    return [(pose.position.x, pose.position.y) for pose in poses]
 
 
 _TOLD = """import sys; from tomoskin.files.session import Session

@@ -13,11 +13,11 @@ import pytest
 
 from run.board import Board, samples_of
 from run.sinks.conftest import robot_program
-from tomoskin import open_robot, open_skin
+from tomoskin import open_skin
 from tomoskin.core import DataError, SkinError, SourceError
 from tomoskin.learning import FORCE
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
-from tomoskin.run import LiveSkin, Runner, commands, robot_run
+from tomoskin.run import LiveSkin, Runner, commands, live_skin
 from tomoskin.twin import Press
 
 PATIENCE = 300
@@ -153,22 +153,6 @@ def test_one_calibration_needs_no_list(force_file):
         assert FORCE.name in skin.runner.prepared.calibrations
 
 
-def test_the_skins_of_a_robot_file_each_with_its_calibrations(tmp_path, force_file):
-    robot = tmp_path / "robot.toml"
-    robot.write_text(
-        "format = 1\n"
-        f'[[skin]]\nname = "palm"\nskin = "textile-disc-8"\ncalibration = "{force_file}"\n'
-        '[[skin]]\nname = "back"\nskin = "textile-disc-8"\n'
-    )
-    with open_robot(robot) as run:
-        for name, skin in run.skins.items():
-            contacts = until(skin, lambda c: c.valid)
-            assert contacts.skin == name
-            assert contacts.force == pytest.approx(0.0 if name == "palm" else math.nan, nan_ok=True)
-        assert FORCE.name in run.runners["palm"].prepared.calibrations
-        assert not run.runners["back"].prepared.calibrations
-
-
 def test_a_replay_ages_as_if_it_were_now(tmp_path, force_file):
     path = tmp_path / "run.mcap"
     with open_skin("textile-disc-8", "twin", [force_file]) as skin:
@@ -186,7 +170,7 @@ def test_a_replay_ages_as_if_it_were_now(tmp_path, force_file):
 def test_the_reflex_of_the_documentation_acts_on_newtons(monkeypatch, force_file, tmp_path):
     program = robot_program("robot.md", "tomoskin")
     assert len([line for line in program.splitlines() if line.strip()]) <= MOST_LINES
-    open_source, wait, opened, said = robot_run.open_source, LiveSkin.wait, [], []
+    open_source, wait, opened, said = live_skin.open_source, LiveSkin.wait, [], []
 
     def keep(*arguments):
         opened.append(open_source(*arguments))
@@ -203,7 +187,7 @@ def test_the_reflex_of_the_documentation_acts_on_newtons(monkeypatch, force_file
         if words[0] != "hold:":
             raise KeyboardInterrupt  # as a person ends it
 
-    monkeypatch.setattr(robot_run, "open_source", keep)
+    monkeypatch.setattr(live_skin, "open_source", keep)
     monkeypatch.setattr(LiveSkin, "wait", pressed_once_valid)
     monkeypatch.chdir(tmp_path)
     Path("force.npz").write_bytes(force_file.read_bytes())

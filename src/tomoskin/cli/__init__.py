@@ -1,5 +1,33 @@
 """The command line: one module a command, and one line in ``app`` for each; what extras make theirs
 of."""
 
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from tomoskin.cli.app import main as main
-from tomoskin.cli.named_files import Reads as Reads
+from tomoskin.cli.named_files import Otherwise as Otherwise, Reads as Reads
+
+if TYPE_CHECKING:
+    from tomoskin.cli.choices import (
+        chosen_sinks as chosen_sinks,
+        skin_for_source as skin_for_source,
+    )
+    from tomoskin.cli.live import Served as Served, hub_of as hub_of
+    from tomoskin.cli.options import (
+        DEFAULT_SKIN as DEFAULT_SKIN,
+        NamedSkinOption as NamedSkinOption,
+    )
+    from tomoskin.cli.output import Bar as Bar, remark as remark
+    from tomoskin.cli.record import troubles_told as troubles_told
+
+_LATER = ("options", "output", "choices", "record", "live")
+"""Modules that are loaded when one of their names is first asked for: no command waits for what
+another one needs."""
+
+
+def __getattr__(name: str) -> Any:
+    for module in () if name.startswith("_") else _LATER:
+        later = import_module(f"tomoskin.cli.{module}")
+        if hasattr(later, name):
+            return globals().setdefault(name, getattr(later, name))
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -39,7 +39,7 @@ COMMANDS = {
     "simulate": "Run a script on the twin into a session file, or simulate labelled frames.",
     "bench": "Measure speed on this machine.",
     "session": "Show, repair and convert recorded sessions.",
-    "skin": "List, show and check skins, lay them on surfaces, and place them on a robot.",
+    "skin": "List, show and check skins, and lay them on surfaces.",
     "firmware": "Build, flash and emulate the board's firmware.",
     "board": "Check a newly built board before a skin is connected.",
     "doctor": "Check this installation: versions, page, sources, sinks, skins, ports.",

@@ -1,32 +1,29 @@
-"""``tomoskin live``: the main job, from a source to a page; or all skins of a robot on one."""
+"""``tomoskin live``: the main job, from a source to a page."""
 
 from __future__ import annotations
 
 import contextlib
-import itertools
-import re
 import sys
 import webbrowser
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Protocol
 
 import typer
 
 from tomoskin.cli.choices import chosen_sinks, say_headroom, skin_for_source
-from tomoskin.cli.named_files import RECORDING, Otherwise, Reads, Writes
+from tomoskin.cli.named_files import RECORDING, Added, Otherwise, Writes
 from tomoskin.cli.options import CalibrationsOption, SinkOption, SkinsOption, SourcesOption
 from tomoskin.cli.output import Bar, JsonFlag, emit, remark
-from tomoskin.cli.record import ended_by_signals, recording_to, troubles_told
+from tomoskin.cli.record import ended_by_signals, recording_to
 
 if TYPE_CHECKING:
     from socket import socket
 
-    from tomoskin.model.robot import Robot
     from tomoskin.pipeline import Prepared
-    from tomoskin.run import RobotRun, Runner
+    from tomoskin.run import Runner
     from tomoskin.server import AccessPolicy, Hub
 
 
@@ -100,16 +97,19 @@ class Served:
             raise typer.Exit(1)
 
 
+class LiveOptions(Protocol):
+    """What a record of options does that is added to ``live``."""
+
+    def instead(
+        self, skins: list[str], sources: list[str], calibrations: list[Path]
+    ) -> Callable[[list[str] | None, Served, bool], None] | None:
+        """What runs in place of one skin: it is given sinks, how the page is served, and whether
+        drives tell of touches; None where one skin runs. Raises BadParameter."""
+
+
 def live(
     *,
-    robot: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="ROBOT.toml",
-            help="Robot file: run all its skins, instead of --skin and --source.",
-        ),
-        Reads(),
-    ] = None,
+    added: Added,
     skin: SkinsOption = None,
     source: SourcesOption = None,
     calibration: CalibrationsOption = None,
@@ -125,14 +125,18 @@ def live(
     served: Served,
 ) -> None:
     """Run source, pipeline and server until a signal comes."""
-    several = chosen_robot(robot, skin or [], source or [], calibration or [])
+    options: tuple[LiveOptions, ...] = added
+    given = skin or [], source or [], calibration or []
+    instead = next((run for one in options if (run := one.instead(*given)) is not None), None)
+    if instead is None:
+        check_one(*given[:2])
     with ended_by_signals():
         from tomoskin.run import prepared_for
         from tomoskin.server import check_page
 
         check_page()
-        if several is not None:
-            _run_robot(several, sink, served, early=early)
+        if instead is not None:
+            instead(sink, served, early)
             return
         origin = source[0] if source else "twin"
         sinks = chosen_sinks(sink)
@@ -142,6 +146,13 @@ def live(
             prepared = prepared_for(chosen, origin, calibration or ())
         say_headroom(prepared.headroom)
         _run_skin(prepared, origin, sinks, served, early=early)
+
+
+def check_one(skins: list[str], sources: list[str]) -> None:
+    """Raise BadParameter unless there is at most one skin, and one source for it."""
+    for option, given in (("--skin", skins), ("--source", sources)):
+        if len(given) > 1:
+            raise typer.BadParameter(f"expected one, got {len(given)}", param_hint=option)
 
 
 def _run_skin(
@@ -156,14 +167,14 @@ def _run_skin(
     with served.listening() as (listener, policy):
         runner = Runner(prepared, opener, sinks=sinks, memory=BoardMemory.in_cache(), early=early)
         with recording_to(runner, served.record) as stopped:
-            app = application(_hub_of(runner, source, served.folder), policy)
+            app = application(hub_of(runner, source, served.folder), policy)
             served.serve(app, listener, policy, f"{runner.flow.source} is live")
     now = plain_values(state(runner.status()))
     kept = ("frames", "p50_ms", "p99_ms", "stages", "bend", "class", "calibration")
     served.end({name: now[name] for name in kept}, stopped)
 
 
-def _hub_of(runner: Runner, source: str, folder: Path) -> Hub:
+def hub_of(runner: Runner, source: str, folder: Path) -> Hub:
     """What serves the page of one skin, whose frames come from ``source``."""
     from tomoskin.board.source import open_source
     from tomoskin.server import Hub, serve_requests
@@ -172,92 +183,3 @@ def _hub_of(runner: Runner, source: str, folder: Path) -> Hub:
     hub.opener = partial(open_source, source)
     serve_requests(hub, source)
     return hub
-
-
-_NAMED = re.compile(r"[^=./\\]+=.+")
-"""A skin with its name on the robot; not a path that has "=" in it, such as ./a=b.toml."""
-
-
-def chosen_robot(
-    file: Path | None, skins: list[str], sources: list[str], calibrations: list[Path]
-) -> Robot | None:
-    """That of a robot file, or of ``--skin NAME=SKIN``; None where one skin runs alone."""
-    from tomoskin.model.robot import Robot
-
-    if file is not None:
-        if skins or sources or calibrations:
-            raise typer.BadParameter(
-                "--skin, --source and --calibration cannot be combined with --robot: "
-                "the robot file names them"
-            )
-        return Robot.load(file)
-    if sources and len(sources) != max(1, len(skins)):
-        raise typer.BadParameter(
-            f"expected no --source, or one for each --skin: {max(1, len(skins))}; got "
-            f"{len(sources)}",
-            param_hint="--source",
-        )
-    if len(skins) < 2 and not any(map(_NAMED.match, skins)):
-        return None
-    if calibrations:
-        raise typer.BadParameter(
-            "does not say to which skin it belongs: name the calibrations in a robot file",
-            param_hint="--calibration",
-        )
-    given = [
-        {"name": name, "skin": skin, "source": source}
-        for (name, skin), source in zip(
-            map(_named, skins), sources or ["twin"] * len(skins), strict=True
-        )
-    ]
-    return Robot.of({"skin": given}, "command line", Path())
-
-
-def _named(given: str) -> tuple[str, str]:
-    if _NAMED.match(given) is None:
-        raise typer.BadParameter(
-            f'expected NAME=SKIN for each of several skins, got "{given}"', param_hint="--skin"
-        )
-    name, _, skin = given.partition("=")
-    return name, skin
-
-
-def _run_robot(robot: Robot, sinks: list[str] | None, served: Served, *, early: bool) -> None:
-    """Run the skins of a robot and their page until a signal comes."""
-    from tomoskin.run import BoardMemory, Member, RobotRun, with_joints
-
-    robot = with_joints(robot)
-    with Bar("preparing"):
-        members = [
-            Member.of(skin, skin_for_source(skin.skin, skin.source), chosen_sinks(sinks))
-            for skin in robot.skins
-        ]
-    for member in members:
-        if (problem := member.prepared.headroom.problem) is not None:
-            remark(f"{member.place.name}: {problem}")
-    run = RobotRun(members, BoardMemory.in_cache(), early=early)
-    stopped = _serve_robot(robot, run, served)
-    facts = {
-        name: {"frames": s.frames, "p50_ms": 1e3 * s.p50, "p99_ms": 1e3 * s.p99}
-        for name, s in run.statuses().items()
-    }
-    served.end({"skins": facts}, stopped)
-
-
-def _serve_robot(robot: Robot, run: RobotRun, served: Served) -> list[str]:
-    """Until a signal comes; why recordings have ended by themselves."""
-    from tomoskin.server import Overview, robot_application
-
-    ended: list[list[str]] = []
-    with served.listening() as (listener, policy), contextlib.ExitStack() as stack:
-        for skin, runner in run.runners.items():
-            ended.append(stack.enter_context(troubles_told(runner, f"{skin}: ")))
-        stack.callback(run.stop)
-        run.start()
-        if served.record is not None:
-            run.record(served.record)
-        overview = Overview(robot, run, served.folder)
-        hubs = {s.name: _hub_of(run.runners[s.name], s.source, served.folder) for s in robot.skins}
-        app = robot_application(overview, hubs, policy)
-        served.serve(app, listener, policy, f"{len(robot.skins)} skins of {robot.name} are live")
-    return list(itertools.chain(*ended))

@@ -25,9 +25,7 @@ SkinOption = Annotated[
 SkinsOption = Annotated[
     list[str] | None,
     typer.Option(
-        metavar="[NAME=]SKIN",
-        help=f"{_SKIN}. Default: the session's skin, else {DEFAULT_SKIN}. For several skins, "
-        "repeat it with a name for each.",
+        metavar="SKIN", help=f"{_SKIN}. Default: the session's skin, else {DEFAULT_SKIN}."
     ),
 ]
 KnownSkinOption = Annotated[
@@ -47,7 +45,7 @@ _SOURCE = "Source of the frames: twin, serial:PORT, replay:FILE@SPEED, …"
 SourceOption = Annotated[str, typer.Option(help=_SOURCE)]
 SourcesOption = Annotated[
     list[str] | None,
-    typer.Option(help=f"{_SOURCE} Repeat it for several skins, in their order. Default: twins."),
+    typer.Option(help=f"{_SOURCE} Default: a twin."),
 ]
 ReferenceOption = Annotated[
     str | None,

@@ -139,7 +139,7 @@ def split(
     ],
     json: JsonFlag = False,
 ) -> None:
-    """Split the recording of a robot into a session file for each skin: FILE-NAME.mcap."""
+    """Split the recording of several skins into a session file for each skin: FILE-NAME.mcap."""
     from tomoskin.files.session import split, split_targets
 
     with Bar("splitting") as bar:
@@ -165,37 +165,20 @@ def export(
         float, typer.Option(min=1e-3, help="Seconds between two images, for formats with images.")
     ] = 0.1,
     skin: Annotated[
-        str, typer.Option(metavar="NAME", help="One skin of a robot's recording.")
+        str, typer.Option(metavar="NAME", help="One skin of a recording of several.")
     ] = "",
     *,
     added: Added,
-    robot: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="robot.toml",
-            help="The robot that wore the skins: X.mcap and X.lerobot say where its links were. "
-            "They and --touches mark touches by the robot itself, or leave them out as it does.",
-        ),
-        Reads(),
-    ] = None,
     force: ForceFlag = False,
 ) -> None:
     """Convert a session to tables, images or the format of another program."""
     from tomoskin.files.exports import Export, export_formats, export_touches, omitted
     from tomoskin.files.session import SessionReader, skins_in
-    from tomoskin.model.robot import Robot
-    from tomoskin.run import with_joints
 
     form = export_formats()[out.suffix.lower()]
     options: tuple[ExportOptions, ...] = added
     for one in options:
         one.check(out, touches)
-    if robot is not None and touches is None and not form.of_links:
-        raise typer.BadParameter(
-            f"expected it together with --touches, X.mcap, X.lerobot or X.rrd, got {out}",
-            param_hint="--robot",
-        )
-    worn = None if robot is None else with_joints(Robot.load(robot))
     names = (skin,) if skin else skins_in(file)
     if len(names) > 1 and not form.several:
         raise typer.BadParameter(
@@ -203,7 +186,7 @@ def export(
         )
     with ExitStack() as stack, Bar(f"writing {out}") as bar:
         session, *others = [stack.enter_context(SessionReader(file, name)) for name in names]
-        job = Export(session, every, bar, force, tuple(others), robot=worn)
+        job = Export(session, every, bar, force, tuple(others))
         for one in options:
             job = one.applied(job)
         form.write(job, out)

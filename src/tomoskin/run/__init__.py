@@ -5,6 +5,7 @@ from tomoskin.run.board_check import CheckFinding as CheckFinding, check_board a
 from tomoskin.run.board_memory import BoardMemory as BoardMemory
 from tomoskin.run.commands import (
     MAX_FORCE as MAX_FORCE,
+    Opener as Opener,
     SetPose as SetPose,
     SetPresses as SetPresses,
     SetTwin as SetTwin,
@@ -19,16 +20,13 @@ from tomoskin.run.labelled_frames import (
     on_cluster as on_cluster,
     processors as processors,
 )
-from tomoskin.run.recordings import FILE_NAME as FILE_NAME
-from tomoskin.run.robot_run import (
+from tomoskin.run.live_skin import (
     LiveSkin as LiveSkin,
-    Member as Member,
-    RobotRun as RobotRun,
-    open_robot as open_robot,
     open_skin as open_skin,
     prepared_for as prepared_for,
-    with_joints as with_joints,
 )
+from tomoskin.run.publisher import Turns as Turns
+from tomoskin.run.recordings import FILE_NAME as FILE_NAME
 from tomoskin.run.runner import Runner as Runner
 from tomoskin.run.scripted import simulate as simulate
 from tomoskin.run.status import ReplayStatus as ReplayStatus, Status as Status

@@ -12,9 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from tomoskin.core import Capacity, Consumer, Event, Worker, stop_workers
-from tomoskin.files.messages import Stream
+from tomoskin.files.messages import Place, Stream
 from tomoskin.files.session import RunMessage
-from tomoskin.model.robot import Place
 from tomoskin.pipeline import FrameResult, Prepared
 from tomoskin.run.board_memory import BoardMemory
 from tomoskin.run.recordings import Recordings

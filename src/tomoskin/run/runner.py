@@ -10,7 +10,7 @@ from pathlib import Path
 
 from tomoskin.board.source import Transport
 from tomoskin.core import Event, ModelError, OutputError, SourceError, StrPath, WireError
-from tomoskin.model.robot import Place
+from tomoskin.files.messages import Place
 from tomoskin.pipeline import Prepared
 from tomoskin.run import commands
 from tomoskin.run.board_memory import BoardMemory

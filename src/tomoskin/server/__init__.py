@@ -1,5 +1,6 @@
 """The page's server: what a page may ask, and what it is sent."""
 
+from tomoskin.server import page_messages as page_messages
 from tomoskin.server.access import (
     AccessPolicy as AccessPolicy,
     is_loopback as is_loopback,
@@ -7,13 +8,20 @@ from tomoskin.server.access import (
 )
 from tomoskin.server.handlers import serve_requests as serve_requests
 from tomoskin.server.hub import Hub as Hub
-from tomoskin.server.overview import Overview as Overview
+from tomoskin.server.page_connection import (
+    Host as Host,
+    Page as Page,
+    Tasks as Tasks,
+    during as during,
+)
+from tomoskin.server.requests import SetRecording as SetRecording
 from tomoskin.server.server import (
     DEFAULT_PORT as DEFAULT_PORT,
+    STATIC as STATIC,
     Server as Server,
     application as application,
+    application_of_several as application_of_several,
     check_page as check_page,
     listen as listen,
-    robot_application as robot_application,
 )
 from tomoskin.server.views import state as state

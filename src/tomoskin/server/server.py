@@ -27,7 +27,6 @@ from tomoskin.server import views
 from tomoskin.server.access import AccessControl, AccessPolicy
 from tomoskin.server.door import Door
 from tomoskin.server.hub import Hub
-from tomoskin.server.overview import Overview, states
 from tomoskin.server.page_connection import PATIENCE, Host, Page
 
 STATIC = Path(__file__).parent / "static"
@@ -88,19 +87,25 @@ def application(hub: Hub, policy: AccessPolicy, static: StrPath = STATIC) -> ASG
     return _guarded([*_routes(hub), _page(Path(static))], [hub], policy)
 
 
-def robot_application(
-    overview: Overview, hubs: Mapping[str, Hub], policy: AccessPolicy, static: Path = STATIC
+def application_of_several(
+    host: Host,
+    state: Callable[[], str],
+    hubs: Mapping[str, Hub],
+    policy: AccessPolicy,
+    page: Path,
 ) -> ASGIApp:
-    """ASGI application: the page of the whole robot with its ``/ws`` and ``/status``; below
-    ``/skin/NAME/`` what :func:`application` has of one skin."""
+    """ASGI application: the ``page`` of several skins, a file beside that of one, with the ``/ws``
+    of its ``host`` and the ``state`` for programs at ``/status``; below ``/skin/NAME/`` what
+    :func:`application` has of one skin."""
+    static = page.parent
     skins = (Mount(f"/skin/{n}", routes=[*_routes(h), _page(static)]) for n, h in hubs.items())
     routes = [
-        *_ends(overview, lambda: states(overview.run).json),
-        Route("/", partial(_file, static / "robot.html")),
+        *_ends(host, state),
+        Route("/", partial(_file, page)),
         *skins,
         _page(static),
     ]
-    return _guarded(routes, [overview, *hubs.values()], policy)
+    return _guarded(routes, [host, *hubs.values()], policy)
 
 
 def _routes(hub: Hub) -> list[BaseRoute]:
@@ -145,9 +150,7 @@ async def _no_icon(_: Request) -> Response:
     return Response(status_code=204)
 
 
-def _guarded(
-    routes: Sequence[BaseRoute], hosts: Sequence[Hub | Overview], policy: AccessPolicy
-) -> ASGIApp:
+def _guarded(routes: Sequence[BaseRoute], hosts: Sequence[Host], policy: AccessPolicy) -> ASGIApp:
     """Behind the access policy; all ``hosts`` run while it is served."""
 
     @contextlib.asynccontextmanager

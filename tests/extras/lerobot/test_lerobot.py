@@ -10,8 +10,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from cli.conftest import tomoskin
+from extras.robot.test_joint_states import ROBOT, URDF, write_bag
 from prose import ROOT
-from run.sinks.test_joint_states import ROBOT, URDF, write_bag
 from tomoskin.core import DataError
 from tomoskin.extras.lerobot import FIELDS, SLOTS, Like, write_lerobot
 from tomoskin.extras.lerobot.dataset import TIME

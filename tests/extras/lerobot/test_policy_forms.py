@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from run.sinks.test_joint_states import ROBOT, URDF
+from extras.robot.test_joint_states import ROBOT, URDF
 from tomoskin.core import Amount
 from tomoskin.extras.lerobot import FIELDS, POSE, SLOTS, PolicyForms, Slots
+from tomoskin.extras.robot import Robot
 from tomoskin.files.messages import Contacts, Stream
 from tomoskin.files.session import Session
-from tomoskin.model.robot import Robot
 from tomoskin.model.skin import Skin
 from tomoskin.run import simulate
 from tomoskin.twin import Script

@@ -13,7 +13,7 @@ import pytest
 from files.session.runs import TOUCH
 from run.sinks.conftest import result_at
 from tomoskin.core import Event, SinkError, stop_workers
-from tomoskin.model.robot import Place
+from tomoskin.files.messages import Place
 from tomoskin.run.sinks import make_sink, sink_names, sink_worker
 
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "sinks.md"

@@ -23,14 +23,14 @@ from tomoskin.files.messages import (
     TYPES,
     Contact,
     Naming,
+    Place,
     Reporter,
     encode_cdr,
     ros_messages,
     type_hash,
 )
 from tomoskin.files.messages.ros_view import IMAGE, ODOMETRY, POSE, TEXT
-from tomoskin.model.mesh import Cylinder
-from tomoskin.model.robot import Place, Pose
+from tomoskin.model.mesh import Cylinder, Pose
 from tomoskin.sensing.track import TouchEvent
 
 

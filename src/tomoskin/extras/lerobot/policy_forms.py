@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, IntArray, PixelMap, Touch
-from tomoskin.files.messages import Contact, Contacts, Stream
-from tomoskin.model.robot import Place
+from tomoskin.files.messages import Contact, Contacts, Place, Stream
 from tomoskin.pipeline import FrameResult, Prepared
 
 SLOTS = 5

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
-from tomoskin.core import DataError
+from tomoskin.core import DataError, StrPath
 from tomoskin.files.exports.picture import Panel
-from tomoskin.files.messages import Every, Item, Reporter, Stream
+from tomoskin.files.messages import Every, Item, Place, Reporter, Stream
 from tomoskin.files.session import (
     Advance,
     SessionReader,
@@ -20,10 +20,16 @@ from tomoskin.files.session import (
     no_report,
     replayed,
 )
-from tomoskin.model.robot import Robot
 from tomoskin.pipeline import FrameResult, Prepared
 
 _T = TypeVar("_T")
+
+
+class Wearer(Protocol):
+    """What wears skins, and knows where they lie."""
+
+    def place(self, name: str, path: StrPath) -> Place:
+        """That of the skin called so, in a recording ``path``."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +39,7 @@ class Export:
     ``every`` s between two images; ``advance`` is called with how far it is. Files that are
     there are written over with ``overwrite`` only. ``others`` are the sessions of a robot's other
     skins, for formats that take several. ``options`` are records of what else a format takes.
-    ``robot`` is that which wore the skins, where it is known.
+    ``robot`` wore the skins, where it is known.
     """
 
     session: SessionReader
@@ -42,7 +48,7 @@ class Export:
     overwrite: bool = False
     others: tuple[SessionReader, ...] = ()
     options: tuple[Any, ...] = ()
-    robot: Robot | None = None
+    robot: Wearer | None = None
 
     @cached_property
     def prepared(self) -> Prepared:

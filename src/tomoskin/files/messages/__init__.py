@@ -19,6 +19,7 @@ from tomoskin.files.messages.foxglove_records import (
     touch_colour as touch_colour,
     touch_width as touch_width,
 )
+from tomoskin.files.messages.place import FRAME as FRAME, LinkPose as LinkPose, Place as Place
 from tomoskin.files.messages.reporter import Every as Every, Item as Item, Reporter as Reporter
 from tomoskin.files.messages.ros_types import (
     NODE_TYPES as NODE_TYPES,

@@ -15,11 +15,10 @@ from typing import Any, Self
 import numpy as np
 
 from tomoskin.core import MEASURANDS, Detection, Event, FloatArray, Image, Touch
-from tomoskin.files.messages.link_pose import LinkPose
+from tomoskin.files.messages.place import LinkPose
 from tomoskin.files.messages.stream import Stream
 from tomoskin.learning import FORCE
-from tomoskin.model.mesh import Surface
-from tomoskin.model.robot import quaternion
+from tomoskin.model.mesh import Surface, quaternion
 from tomoskin.pipeline import FrameResult
 from tomoskin.sensing.track import TouchEvent
 
@@ -170,7 +169,7 @@ class Contact:
         }
         if self.link is not None:
             content |= {"root_position": self.root_position, "root_normal": self.root_normal}
-            content |= {"self": self.is_self, "self_problem": self.link.others[1]}
+            content |= {"self": self.is_self, "self_problem": self.link.self_problem}
         return content
 
     def _in_space(self, sheet: FloatArray) -> FloatArray:
@@ -268,8 +267,7 @@ class Contacts:
 
     def kept(self) -> Self:
         """The same without touches by the robot's own links, where the robot leaves these out."""
-        own = self.stream.place and self.stream.place.own
-        if not (own and own.leaves_out):
+        if self.stream.place is None or not self.stream.place.leaves_out:
             return self
         return replace(
             self,
@@ -328,7 +326,7 @@ class Contacts:
     @property
     def link(self) -> LinkPose | None:
         """Where the link of the robot was at that time; None where the skin lies on none."""
-        return LinkPose.of(self.stream.place, self.utc)
+        return self.stream.place and self.stream.place.at(self.utc)
 
     @property
     def events(self) -> tuple[Event, ...]:
@@ -365,7 +363,7 @@ def happenings(contacts: Contacts) -> list[dict[str, Any]]:
 
 def own_touches(stream: Stream, result: FrameResult) -> set[int]:
     """Identities of the touches of a frame that links of the robot itself make."""
-    link = LinkPose.of(stream.place, stream.utc(_when(result.scanned, result.host_time)))
+    link = stream.place and stream.place.at(stream.utc(_when(result.scanned, result.host_time)))
     touches = Contact.each(result.touches, stream.surface, link) if link else ()
     return {contact.touch.id for contact in touches if contact.is_self}
 

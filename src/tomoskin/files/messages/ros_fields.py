@@ -15,7 +15,7 @@ from tomoskin.files.messages.foxglove_records import (
     touch_colour,
     touch_width,
 )
-from tomoskin.model.robot import Place
+from tomoskin.files.messages.place import Place
 
 Value = dict[str, Any]
 

@@ -12,9 +12,9 @@ from typing import Self
 import numpy as np
 
 from tomoskin.core import FloatArray, GeometryError, PixelMap, SinkError, StrPath, clock_ahead
-from tomoskin.model.mesh import Mesh, Plane, Surface
+from tomoskin.files.messages.place import FRAME, Place
+from tomoskin.model.mesh import Mesh, Plane, Pose, Surface, pose_numbers
 from tomoskin.model.pattern import Pattern
-from tomoskin.model.robot import FRAME, Place, Pose, pose_numbers
 from tomoskin.pipeline import Prepared, colour_limit
 
 _NAMESPACE = re.compile(r"[A-Za-z]\w*(/[A-Za-z]\w*)*", re.ASCII)

@@ -18,6 +18,12 @@ from tomoskin.model.mesh.polygon import (
     off_segment as off_segment,
     signed_area as signed_area,
 )
+from tomoskin.model.mesh.pose import (
+    Moved as Moved,
+    Pose as Pose,
+    pose_numbers as pose_numbers,
+    quaternion as quaternion,
+)
 from tomoskin.model.mesh.surface import (
     Cap as Cap,
     Plane as Plane,

@@ -10,8 +10,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tomoskin.core import SkinError
-from tomoskin.model.mesh import Cylinder, Plane
-from tomoskin.model.robot import Place, Pose, Robot, Urdf, add_skin
+from tomoskin.extras.robot import Robot, Urdf, add_skin
+from tomoskin.files.messages import Place
+from tomoskin.model.mesh import Cylinder, Plane, Pose
 
 URDF = """<robot name="arm">
   <link name="base"/>

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from tomoskin.core import SkinError
-from tomoskin.model.robot import Urdf
-from tomoskin.model.robot.link_shapes import box, capsule, rod, thinned
+from tomoskin.extras.robot import Urdf
+from tomoskin.extras.robot.link_shapes import box, capsule, rod, thinned
 
 LINKS = """<link name="a">
   <visual><origin xyz="0 0 1"/><geometry><box size="0.2 0.4 0.6"/></geometry></visual>

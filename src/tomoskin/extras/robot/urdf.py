@@ -20,7 +20,7 @@ from tomoskin.core import (
     needed,
     no_such,
 )
-from tomoskin.model.robot.link_shapes import (
+from tomoskin.extras.robot.link_shapes import (
     MOST_TRIANGLES,
     LinkShape,
     Pose,

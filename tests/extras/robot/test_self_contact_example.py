@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from tomoskin.model.robot import Pose
+from examples.conftest import imported
+from tomoskin.model.mesh import Pose
+
+__all__ = ["imported"]
 
 
 def test_own_touches_are_marked_and_others_are_not(imported):

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
 from tomoskin.core import FloatArray, GeometryError, SkinError
-from tomoskin.model.robot.link_shapes import LinkShape
-from tomoskin.model.robot.urdf import Positions, Urdf
+from tomoskin.extras.robot.link_shapes import LinkShape
+from tomoskin.extras.robot.urdf import Positions, Urdf
 
 LINGERS = 0.1
 """Seconds for which a touch goes on after a link has gone: some scans tell that it has ended."""

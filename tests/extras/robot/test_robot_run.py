@@ -13,12 +13,12 @@ from mcap.reader import make_reader
 from run.board import Board, samples_of
 from tomoskin.board.wire import Ping
 from tomoskin.core import DataError, OutputError, SourceError
+from tomoskin.extras.robot import Member, PlaceOnRobot, RobotRun
+from tomoskin.extras.robot.robot_run import board_problems
 from tomoskin.files.session import SessionReader, repair, split, split_targets
-from tomoskin.model.robot import Place, Pose
-from tomoskin.run import Member, RobotRun
+from tomoskin.model.mesh import Pose
 from tomoskin.run.intake import MOST_AT_ONCE
 from tomoskin.run.publisher import Turns
-from tomoskin.run.robot_run import board_problems
 from tomoskin.run.sinks import Contacts, Sink
 
 PATIENCE = 300
@@ -71,7 +71,7 @@ def running(members):
 
 
 def member(prepared, name, board, **more):
-    return Member(Place(name), prepared, board.open, **more)
+    return Member(PlaceOnRobot(name), prepared, board.open, **more)
 
 
 def frames_of(run):
@@ -86,7 +86,9 @@ def grown(run, names, by=40):
 
 def test_all_run_and_each_says_who_it_is(prepared, boards):
     pose = Pose.of((0, 0, 0.1), (0, 0, 0))
-    members = [Member(Place(n, f"{n}_link", pose), prepared, b.open) for n, b in boards.items()]
+    members = [
+        Member(PlaceOnRobot(n, f"{n}_link", pose), prepared, b.open) for n, b in boards.items()
+    ]
     with running(members) as run:
         Watch(run).until(grown(run, boards))
         told = {c.skin: c.frame_id for c in (skin.latest() for skin in run.skins.values())}
@@ -141,7 +143,7 @@ def test_boards_of_one_number_are_said(prepared, boards):
     assert "same id as that of right" in wrong["left"]
     assert "expected 0b" in wrong["hand"]
     assert board_problems({"left": "00", "right": "00"}, {}) == {}  # boards without a number
-    members = [Member(Place(n), prepared, b.open, board="0102") for n, b in boards.items()]
+    members = [Member(PlaceOnRobot(n), prepared, b.open, board="0102") for n, b in boards.items()]
     with running(members) as run:
         Watch(run).until(lambda: "expected 0102" in (run.statuses()["left"].problem or ""))
 
@@ -149,7 +151,7 @@ def test_boards_of_one_number_are_said(prepared, boards):
 def test_a_clock_that_is_set_is_said_and_nothing_stops(prepared, boards, monkeypatch):
     members = [member(prepared, "left", boards["left"])]
     with running(members) as run:
-        monkeypatch.setattr("tomoskin.run.robot_run.epoch", lambda: 5e9)
+        monkeypatch.setattr("tomoskin.extras.robot.robot_run.epoch", lambda: 5e9)
         events = run.runners["left"].events
         Watch(run).until(lambda: any(e.kind == "clock-step" for e in events.since(0)[1]))
 

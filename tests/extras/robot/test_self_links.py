@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from model.robot.test_link_shapes import CORNERS, write_stl
+from extras.robot.test_link_shapes import CORNERS, write_stl
 from tomoskin.core import SkinError
-from tomoskin.model.robot import Robot
+from tomoskin.extras.robot import Robot
 
 SHAPES = {
     "box": '<box size="0.2 0.1 0.06"/>',

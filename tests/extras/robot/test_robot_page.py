@@ -11,16 +11,16 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from run.test_robot_run import Watch
+from extras.robot.test_robot_run import Watch
 from server.serving import PATIENCE, Site
 from server.watching import Watched
 from tomoskin.core import SkinError, WallClock
+from tomoskin.extras.robot import Member, Robot, RobotRun
+from tomoskin.extras.robot.overview import Overview, Stance, robot_application
 from tomoskin.files.session import split_targets
-from tomoskin.model.robot import Robot
-from tomoskin.run import Member, RobotRun, Runner
-from tomoskin.server import Hub, Overview, Server, listen, robot_application, serve_requests
+from tomoskin.run import Runner
+from tomoskin.server import Hub, Server, listen, serve_requests
 from tomoskin.server.access import AccessPolicy
-from tomoskin.server.overview import Stance
 from tomoskin.server.server import STATIC
 from tomoskin.twin import Press, TwinSettings, make_twin
 

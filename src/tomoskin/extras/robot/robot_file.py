@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from tomoskin.core import FloatArray, SkinError, StrPath
-from tomoskin.model.mesh import Surface
-from tomoskin.model.robot.link_shapes import Pose
-from tomoskin.model.robot.self_contact import LINGERS, NearLink, OwnLinks
-from tomoskin.model.robot.urdf import Positions, Urdf
+from tomoskin.core import SkinError, StrPath
+from tomoskin.extras.robot.moving_link import JointPositions, PlaceOnRobot
+from tomoskin.extras.robot.self_contact import OwnLinks
+from tomoskin.extras.robot.urdf import Urdf
+from tomoskin.files.messages import FRAME
+from tomoskin.model.mesh import Pose
 from tomoskin.model.section import (
     Choice,
     OneOrMore,
@@ -35,87 +35,12 @@ FORMAT = 1
 MOST_SKINS = 64
 
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,31}")
-FRAME = re.compile(r"[\w.-]+(/[\w.-]+)*", re.ASCII)
-"""What names a frame of coordinates: that which every program of ROS takes."""
-
 _BOARD = re.compile(r"([0-9a-f]{2}){1,16}")
 _LENGTH = Quantity("length", "mm", -100_000, 100_000)
 _ANGLE = Quantity("angle", "deg", -360, 360)
 _XYZ = Row({"x": _LENGTH, "y": _LENGTH, "z": _LENGTH})
 _RPY = Row({"roll": _ANGLE, "pitch": _ANGLE, "yaw": _ANGLE})
 _FILE = Text(1000)
-
-
-@dataclass(frozen=True)
-class Moved(Surface):
-    """A ``surface`` in the outer frame of a ``pose``."""
-
-    surface: Surface
-    pose: Pose
-
-    def point(self, uv: ArrayLike) -> FloatArray:
-        """Points (n, 3) m of the surface."""
-        return self.pose(self.surface.point(uv))
-
-    def jacobian(self, uv: ArrayLike) -> FloatArray:
-        """Derivatives (n, 3, 2) of the points."""
-        return np.asarray(self.pose.rotation @ self.surface.jacobian(uv))
-
-
-JointPositions = Callable[[float], Positions]
-"""How a robot stands at a time, s since 1970."""
-
-
-@dataclass(frozen=True, slots=True)
-class Place:
-    """Which of a robot's skins it is, and where: ``pose`` in the frame ``link``.
-
-    ``link`` is "" where it is not known: coordinates are then the skin's own. ``own`` are the
-    links of the robot that can touch the skin, and ``joints`` says how it stands.
-    """
-
-    name: str
-    link: str = ""
-    pose: Pose = field(default_factory=Pose)
-    own: OwnLinks | None = None
-    joints: JointPositions | None = None
-
-    def moved(self, surface: Surface) -> Surface:
-        """The skin's ``surface`` in the coordinates of the link."""
-        return Moved(surface, self.pose) if self.link else surface
-
-    def in_root(self, utc: float | None) -> Pose | None:
-        """The pose of the link in the robot's root frame at a time, s since 1970.
-
-        None where there is no link. Raises SkinError where the pose is not known.
-        """
-        return self.own.urdf.pose(self.link, self._positions(utc)) if self.own else None
-
-    @property
-    def unmarked(self) -> str:
-        """Which touches by the robot's own links cannot be told from others, and why; else ""."""
-        if self.own is None or not self.own.others:
-            return ""
-        why = "no joint states are given" if self.joints is None else self.own.problem
-        return why and f"touches by the robot's own links are not marked: {why}"
-
-    def near(self, utc: float | None) -> NearLink | None:
-        """What tells of points whether another link of the robot was near, then or just before.
-
-        None where there is no link. Raises SkinError where the pose of one is not known.
-        """
-        stances = [self._positions(utc and utc - ago) for ago in (0.0, LINGERS)]
-        return self.own.at(*stances) if self.own else None
-
-    def _positions(self, utc: float | None) -> Positions:
-        return _not_told if self.joints is None or utc is None else self.joints(utc)
-
-
-def _not_told(joint: str) -> float:
-    raise SkinError(
-        f'pose unknown: the joint "{joint}" may move, and no joint states are given',
-        hint='name its joint states in the section [robot], as in joints = "ros2"',
-    )
 
 
 class RobotSection(Section, section="robot"):
@@ -197,7 +122,7 @@ class PlacedSkin:
         Paths, at most one of each kind.
     """
 
-    place: Place
+    place: PlaceOnRobot
     skin: str
     source: str = "twin"
     board: str | None = None
@@ -262,7 +187,7 @@ class Robot:
             joints = str(Path(folder) / joints)
         return cls(source, robot.name, skins, urdf, joints)
 
-    def place(self, name: str, path: StrPath) -> Place:
+    def place(self, name: str, path: StrPath) -> PlaceOnRobot:
         """That of the skin called so; of a recording ``path`` without names that of the only one.
 
         Raises SkinError where it has none.
@@ -322,7 +247,7 @@ def _placed(
     own, zero = _own_links(given, urdf, robot, where), np.zeros(3)
     pose = Pose.of(given.position or zero, given.angles or zero)
     return PlacedSkin(
-        place=Place(given.name, given.link or "", pose, own),
+        place=PlaceOnRobot(given.name, given.link or "", pose, own),
         skin=str(folder / given.skin) if given.skin.endswith(".toml") else given.skin,
         source=_from(folder, given.source),
         board=given.board,

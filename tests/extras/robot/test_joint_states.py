@@ -18,10 +18,9 @@ from files.session.runs import SKIN, TOUCH
 from run.sinks.conftest import PATIENCE, contacts_at
 from run.sinks.test_ros2 import domain
 from tomoskin.core import DataError, SinkError, SkinError
+from tomoskin.extras.robot import Robot, with_joints
 from tomoskin.files.messages import Stream
-from tomoskin.model.robot import Robot
 from tomoskin.pipeline import prepare
-from tomoskin.run import with_joints
 from tomoskin.run.sinks import joint_states
 from tomoskin.run.sinks.joint_states import JointStates
 

@@ -11,10 +11,13 @@ import threading
 import httpx
 import pytest
 
-from model.robot.test_robot import URDF
-from tomoskin.cli.live import chosen_robot
+from cli.conftest import tomoskin
+from extras.robot.test_robot import URDF
+from tomoskin.extras.robot import Robot
+from tomoskin.extras.robot.live_option import chosen_robot
 from tomoskin.files.session import split_targets
-from tomoskin.model.robot import Robot
+
+__all__ = ["tomoskin"]
 
 COMMAND = [sys.executable, "-c", "from tomoskin.cli import main; main()"]
 PATIENCE = 300

@@ -11,21 +11,19 @@ import pytest
 from files.session.runs import SKIN, TOUCH
 from run.sinks.conftest import EPOCH, result_at
 from tomoskin.core import SkinError
+from tomoskin.extras.lerobot import FIELDS, Slots
 from tomoskin.extras.lsl.lsl_sink import touch_sample
+from tomoskin.extras.robot import Member, PlacedSkin, Robot, RobotRun
 from tomoskin.files.exports import Export, export_touches
 from tomoskin.files.messages import (
-    FIELDS,
     Contacts,
     Naming,
-    Slots,
     Stream,
     happenings,
     own_touches,
 )
 from tomoskin.files.session import SessionReader, SessionWriter
-from tomoskin.model.robot import Robot
 from tomoskin.pipeline import prepare
-from tomoskin.run import Member, RobotRun
 from tomoskin.sensing.track import TouchEvent
 
 URDF = """<robot name="arm"><link name="upper"/><link name="fore"/><link name="hand">
@@ -194,6 +192,4 @@ def test_a_run_without_states_says_so_once(contacts):
 
 
 def _skins(place):
-    from tomoskin.model.robot import PlacedSkin
-
     return [PlacedSkin(replace(place, joints=None), SKIN.name), PlacedSkin(place, SKIN.name)]

@@ -12,15 +12,27 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from starlette.types import ASGIApp
 
 from tomoskin import __version__
 from tomoskin.core import Amount, FloatArray, SkinError, WireError, encode_json
+from tomoskin.extras.robot.robot_file import PlacedSkin, Robot
+from tomoskin.extras.robot.robot_run import RobotRun
 from tomoskin.files.messages import Contacts, Stream
-from tomoskin.model.robot import PlacedSkin, Pose, Robot
-from tomoskin.run import FILE_NAME, RobotRun, StrictRequest, commands
-from tomoskin.server import page_messages as to_page
-from tomoskin.server.page_connection import Host, Page, Tasks, during
-from tomoskin.server.requests import SetRecording
+from tomoskin.model.mesh import Pose
+from tomoskin.run import FILE_NAME, StrictRequest, commands
+from tomoskin.server import (
+    STATIC,
+    AccessPolicy,
+    Host,
+    Hub,
+    Page,
+    SetRecording,
+    Tasks,
+    application_of_several,
+    during,
+    page_messages as to_page,
+)
 
 PERIOD = 1 / 20
 """Seconds between two looks at the touches."""
@@ -215,3 +227,15 @@ def _more_than(force: Amount | None) -> float | None:
 def _rounded(values: FloatArray) -> Any:
     """To 0.01 mm, which nobody sees."""
     return np.round(values, 5).tolist()
+
+
+def robot_application(
+    overview: Overview, hubs: Mapping[str, Hub], policy: AccessPolicy, static: Path = STATIC
+) -> ASGIApp:
+    """ASGI application: the page of the whole robot, and those of its skins."""
+    state = partial(_state, overview.run)
+    return application_of_several(overview, state, hubs, policy, static / "robot.html")
+
+
+def _state(run: RobotRun) -> str:
+    return states(run).json
