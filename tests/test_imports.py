@@ -142,11 +142,9 @@ def _wrong(module: str, found: Import, sources: Sources) -> str | None:
 def _wrong_with_extras(here: str, there: str | None, found: Import, sources: Sources) -> str | None:
     if not here.startswith(f"{EXTRAS}."):
         return "the core never names an extra"
-    if there is None:
-        own = found.name == "__version__"
+    if there is None or there == here:
+        own = there or found.name == "__version__"
         return None if own else "an extra imports rooms, not the package above them"
-    if there == here:
-        return None
     if there.startswith(f"{EXTRAS}."):
         used = there.partition(".")[2] in uses(here.partition(".")[2])
         return None if used else f'{here} must say so: uses = ["{there[7:]}"] in its extra.toml'

@@ -14,19 +14,18 @@ import pytest
 from mcap.writer import CompressionType, Writer
 from rosbags.typesys import Stores, get_typestore
 
+from extras.ros2.test_ros2 import domain
 from files.session.runs import SKIN, TOUCH
 from run.sinks.conftest import PATIENCE, contacts_at
-from run.sinks.test_ros2 import domain
 from tomoskin.core import DataError, SinkError, SkinError
 from tomoskin.extras.robot import Robot, with_joints
+from tomoskin.extras.ros2 import JointStates, joint_states
 from tomoskin.files.messages import Stream
 from tomoskin.pipeline import prepare
-from tomoskin.run.sinks import joint_states
-from tomoskin.run.sinks.joint_states import JointStates
 
 __all__ = ["domain"]
 
-PUBLISHER = Path(__file__).with_name("joint_publisher.py")
+PUBLISHER = Path(__file__).parents[1] / "ros2" / "joint_publisher.py"
 STORE = get_typestore(Stores.ROS2_JAZZY)
 KIND = "sensor_msgs/msg/JointState"
 BEGUN = 1_700_000_000.0

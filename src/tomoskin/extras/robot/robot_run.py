@@ -21,7 +21,7 @@ from tomoskin.files.session import MessageLog, robot_logs
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, prepare, with_calibrations
 from tomoskin.run import BoardMemory, LiveSkin, Opener, Runner, Status, Turns, commands
-from tomoskin.run.sinks import Sink, joint_states, make_sink
+from tomoskin.run.sinks import Sink, make_sink
 
 _OFTEN = 0.25
 """Seconds between two looks at all runs."""
@@ -206,6 +206,8 @@ def with_joints(robot: Robot) -> Robot:
 
     Raises TomoskinError.
     """
+    from tomoskin.extras.ros2 import joint_states
+
     return robot.moved_by(joint_states(robot.joints)) if robot.joints else robot
 
 

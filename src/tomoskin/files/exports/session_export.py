@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 
 from tomoskin.core import FloatArray, StrPath, registered
-from tomoskin.files.exports.bag import BAG
 from tomoskin.files.exports.export import Export, ExportFormat
 from tomoskin.files.exports.matlab_file import write_matlab
 from tomoskin.files.exports.picture import FILMS, MOST_PANELS, rendered, write_picture
@@ -115,7 +114,6 @@ WRITERS: dict[str, Callable[[Export, Path], None]] = {
 def export_formats() -> dict[str, ExportFormat]:
     """Our own formats and those that are registered, by the ending of a file's name."""
     ours = {ending: ExportFormat(write) for ending, write in WRITERS.items()}
-    ours |= {".mcap": BAG}
     return ours | {ending: entry.load() for ending, entry in registered("exports").items()}
 
 

@@ -13,6 +13,8 @@ from tomoskin.files.messages.contacts import (
     without_frame as without_frame,
 )
 from tomoskin.files.messages.foxglove_records import (
+    TEXT_COLOUR as TEXT_COLOUR,
+    TEXT_HEIGHT as TEXT_HEIGHT,
     grid_message as grid_message,
     log_message as log_message,
     scene_message as scene_message,
@@ -21,21 +23,6 @@ from tomoskin.files.messages.foxglove_records import (
 )
 from tomoskin.files.messages.place import FRAME as FRAME, LinkPose as LinkPose, Place as Place
 from tomoskin.files.messages.reporter import Every as Every, Item as Item, Reporter as Reporter
-from tomoskin.files.messages.ros_types import (
-    NODE_TYPES as NODE_TYPES,
-    TYPES as TYPES,
-    Field as Field,
-    dds_name as dds_name,
-    definition as definition,
-    encode_cdr as encode_cdr,
-    type_hash as type_hash,
-)
-from tomoskin.files.messages.ros_view import (
-    KEPT as KEPT,
-    TOPICS as TOPICS,
-    RosMessage as RosMessage,
-    ros_messages as ros_messages,
-)
 from tomoskin.files.messages.stream import (
     NAMES as NAMES,
     Naming as Naming,

@@ -7,7 +7,6 @@ from tomoskin.files.messages import (
     Naming as Naming,
     Stream as Stream,
 )
-from tomoskin.run.sinks.joint_states import joint_states as joint_states
 from tomoskin.run.sinks.sink import (
     Sink as Sink,
     SinkConsumer as SinkConsumer,

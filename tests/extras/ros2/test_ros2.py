@@ -20,7 +20,9 @@ from files.session.runs import TOUCH
 from run.board import Board
 from run.sinks.conftest import EPOCH, EVENT, MESH, PATIENCE, PATTERN, begin
 from tomoskin.core import SinkError
-from tomoskin.files.messages import TOPICS, dds_name, ros_fields, type_hash
+from tomoskin.extras.ros2 import ros_fields
+from tomoskin.extras.ros2.ros_types import dds_name, type_hash
+from tomoskin.extras.ros2.ros_view import TOPICS
 from tomoskin.files.session import SessionReader
 from tomoskin.run import LiveSkin, Runner
 from tomoskin.run.sinks import make_sink
@@ -269,7 +271,7 @@ def test_a_sink_may_be_opened_again(sink, stream):
 
 def test_the_listener_of_the_documentation_hears_touches(listener, domain, stream):
     own = ("DomainParticipant(0)", f"DomainParticipant({domain})")
-    heard = listener("robot.md", "cyclonedds", domain=own)
+    heard = listener("extras/ros2.md", "cyclonedds", domain=own)
     sink = make_sink("ros2")
     contacts_at = begin(sink, stream)
     line = heard.hears(lambda number: sink.publish(contacts_at(float(number), TOUCH)))

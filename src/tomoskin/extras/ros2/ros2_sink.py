@@ -12,8 +12,10 @@ from typing import Any, NamedTuple
 from uuid import uuid4
 
 from tomoskin.core import SinkError, TomoskinError, needed
-from tomoskin.files import messages
-from tomoskin.run.sinks.sink import Sink, options_of
+from tomoskin.extras.ros2.ros_types import NODE_TYPES, Field, dds_name, encode_cdr, type_hash
+from tomoskin.extras.ros2.ros_view import KEPT, TOPICS, ros_messages
+from tomoskin.files.messages import NAMES, Item, Naming, Stream
+from tomoskin.run.sinks import Sink, options_of
 
 _WHERE = "sink ros2"
 _DEPTH = 10
@@ -24,7 +26,7 @@ _BLOCKING = 100_000_000
 
 
 class Ros2Sink(Sink):
-    """Publishes messages of :data:`~tomoskin.files.messages.TOPICS` by CycloneDDS.
+    """Publishes messages of :data:`TOPICS` by CycloneDDS.
 
     Topics, types and their hashes are as ROS 2 has them, in user data as its own middlewares put
     them there.
@@ -38,13 +40,13 @@ class Ros2Sink(Sink):
     folder
         Where recordings go that nodes ask for; None: nowhere, and nobody may ask.
     release
-        Of :data:`~tomoskin.run.sinks.ros2.GID_SIZES`: whose nodes see its name in the graph.
+        Of :data:`GID_SIZES`: whose nodes see its name in the graph.
     """
 
     def __init__(
         self,
         domain: int,
-        naming: messages.Naming,
+        naming: Naming,
         folder: Path | None = None,
         release: str = "jazzy",
     ) -> None:
@@ -59,7 +61,7 @@ class Ros2Sink(Sink):
         self._writers: dict[str, Any] = {}
         self._readers: dict[str, int] = {}
 
-    def open(self, stream: messages.Stream) -> None:
+    def open(self, stream: Stream) -> None:
         """Join the domain; SinkError when there is no network for it."""
         core = self._dds["core"]
         try:
@@ -67,7 +69,7 @@ class Ros2Sink(Sink):
                 self._domain, qos=core.Qos(core.Policy.Userdata(b"enclave=/;"))
             )
             self._writers = {
-                topic: self._writer(participant, stream.naming, topic) for topic in messages.TOPICS
+                topic: self._writer(participant, stream.naming, topic) for topic in TOPICS
             }
             name, services = stream.naming.namespace, _services(stream, self._folder)
             self._node = Node(self._dds, participant, name, services)
@@ -85,12 +87,12 @@ class Ros2Sink(Sink):
                 "Fixed Frame in RViz, or give parent=LINK,at=X/Y/Z"
             )
 
-    def publish(self, item: messages.Item) -> None:
+    def publish(self, item: Item) -> None:
         """Write the messages of ``item``; the source time is that of the measurement."""
-        for message in messages.ros_messages(self._stream, item):
+        for message in ros_messages(self._stream, item):
             topic = message.topic
-            if topic in messages.KEPT or self._readers.get(topic):
-                encoded = encoded_as(messages.TOPICS[topic], message.value)
+            if topic in KEPT or self._readers.get(topic):
+                encoded = encoded_as(TOPICS[topic], message.value)
                 self._writers[topic].write(encoded, message.stamp)
 
     def close(self) -> None:
@@ -99,16 +101,16 @@ class Ros2Sink(Sink):
             self._node.close()
         self._node, self._writers = None, {}
 
-    def _writer(self, participant: Any, naming: messages.Naming, topic: str) -> Any:
-        core, kind = self._dds["core"], messages.TOPICS[topic]
+    def _writer(self, participant: Any, naming: Naming, topic: str) -> Any:
+        core, kind = self._dds["core"], TOPICS[topic]
         policy = core.Policy
-        kept = topic in messages.KEPT
+        kept = topic in KEPT
         qos = core.Qos(
             policy.Reliability.Reliable(_BLOCKING),
             policy.History.KeepLast(1 if kept else _DEPTH),
             policy.Durability.TransientLocal if kept else policy.Durability.Volatile,
             policy.DataRepresentation(use_cdrv0_representation=True),
-            policy.Userdata(f"typehash={messages.type_hash(kind)};".encode()),
+            policy.Userdata(f"typehash={type_hash(kind)};".encode()),
         )
         name = f"rt/{naming.topic(topic)}"
         entity = self._dds["topic"].Topic(participant, name, struct_of(kind))
@@ -120,7 +122,7 @@ class Ros2Sink(Sink):
         return self._dds["pub"].DataWriter(participant, entity, qos=qos, listener=listener)
 
 
-def _services(stream: messages.Stream, folder: Path | None) -> dict[str, Service]:
+def _services(stream: Stream, folder: Path | None) -> dict[str, Service]:
     """What nodes may ask for, by the full names of services."""
     services = parameter_services(
         {
@@ -150,7 +152,7 @@ def open_ros2(argument: str) -> Ros2Sink:
     Without ``domain`` it is the environment's ROS_DOMAIN_ID, as for ROS 2 itself.
     """
     options = options_of(
-        filter(None, argument.split(",")), ("domain", *messages.NAMES, "folder", "release"), _WHERE
+        filter(None, argument.split(",")), ("domain", *NAMES, "folder", "release"), _WHERE
     )
     folder = Path(options["folder"]) if "folder" in options else None
     if folder is not None and not folder.is_dir():
@@ -162,9 +164,7 @@ def open_ros2(argument: str) -> Ros2Sink:
             where=_WHERE,
             hint="humble is for Humble, jazzy for Iron and all later ones",
         )
-    return Ros2Sink(
-        ros_domain(options, _WHERE), messages.Naming.of(options, _WHERE), folder, release
-    )
+    return Ros2Sink(ros_domain(options, _WHERE), Naming.of(options, _WHERE), folder, release)
 
 
 _MOST_DOMAINS = 232
@@ -367,19 +367,17 @@ def ros_domain(options: Mapping[str, str], where: str) -> int:
 
 @functools.cache
 def struct_of(kind: str) -> Any:
-    """CycloneDDS' class of a message by its name (:data:`~tomoskin.files.messages.NODE_TYPES`)."""
+    """CycloneDDS' class of a message by its name, of :data:`NODE_TYPES`."""
     idl = needed("cyclonedds.idl", "ros2", _WHERE, SinkError)
-    fields = {
-        name: _type_of(messages.Field.of(text)) for name, text in messages.NODE_TYPES[kind].items()
-    }
-    name = messages.dds_name(kind)
+    fields = {name: _type_of(Field.of(text)) for name, text in NODE_TYPES[kind].items()}
+    name = dds_name(kind)
     return idl.make_idl_struct(name.rpartition(":")[2], name.replace("::", "."), fields)
 
 
-def _type_of(field: messages.Field) -> Any:
+def _type_of(field: Field) -> Any:
     types = needed("cyclonedds.idl.types", "ros2", _WHERE, SinkError)
     plain: Mapping[str, Any] = {"string": str, "bool": bool}
-    if field.kind in messages.NODE_TYPES:
+    if field.kind in NODE_TYPES:
         kind = struct_of(field.kind)
     else:
         kind = plain.get(field.kind) or getattr(types, field.kind)
@@ -390,7 +388,7 @@ def _type_of(field: messages.Field) -> Any:
 
 def encoded_as(kind: str, value: Mapping[str, Any]) -> Any:
     """A message of CycloneDDS with those fields; one that is not there is zero, or empty."""
-    return _encoded(struct_of(kind))(messages.encode_cdr(kind, value))
+    return _encoded(struct_of(kind))(encode_cdr(kind, value))
 
 
 @functools.cache

@@ -14,8 +14,8 @@ from typing import Any
 from mcap.reader import make_reader
 
 from tomoskin.core import DataError, SinkError, SkinError, needed
-from tomoskin.run.sinks.ros2 import ros_domain, struct_of
-from tomoskin.run.sinks.sink import options_of
+from tomoskin.extras.ros2.ros2_sink import ros_domain, struct_of
+from tomoskin.run.sinks import options_of
 
 MAX_AGE = 0.5
 """Seconds from a joint state after which it says no more how the robot stands."""

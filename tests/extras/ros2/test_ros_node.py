@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from extras.ros2.test_ros2 import LOOPBACK
 from files.session.runs import TOUCH
 from run.sinks.conftest import EPOCH, EVENT, MESH, begin
-from run.sinks.test_ros2 import LOOPBACK
-from tomoskin.files.messages import TOPICS, dds_name
+from tomoskin.extras.ros2.ros_types import dds_name
+from tomoskin.extras.ros2.ros_view import TOPICS
 from tomoskin.run.sinks import make_sink
 
 NODE = Path(__file__).with_name("ros_node.py")

@@ -16,7 +16,7 @@ import pytest
 
 from tomoskin.run.sinks import make_sink
 
-FOLDER = Path(__file__).resolve().parents[2] / "examples" / "ros2"
+FOLDER = Path(__file__).resolve().parents[3] / "examples" / "ros2"
 
 
 class Configuration:

@@ -8,11 +8,9 @@ from functools import partial
 from typing import Any
 
 from tomoskin.core import Event, Image, encode_json
-from tomoskin.files.messages import ros_fields
-from tomoskin.files.messages.contacts import Contacts, event_content, time_of
-from tomoskin.files.messages.reporter import Item
-from tomoskin.files.messages.ros_fields import Value
-from tomoskin.files.messages.stream import Stream, row_labels
+from tomoskin.extras.ros2 import ros_fields
+from tomoskin.extras.ros2.ros_fields import Value
+from tomoskin.files.messages import Contacts, Item, Stream, event_content, row_labels, time_of
 
 POSE = "geometry_msgs/msg/PoseWithCovarianceStamped"
 ODOMETRY = "nav_msgs/msg/Odometry"

@@ -18,18 +18,9 @@ from scipy.spatial.transform import Rotation
 from files.session.runs import TOUCH
 from run.sinks.conftest import EPOCH, EVENT, MESH, VALUES, contacts_at, result_at, touch_of
 from tomoskin.core import Amount, Event
-from tomoskin.files.messages import (
-    TOPICS,
-    TYPES,
-    Contact,
-    Naming,
-    Place,
-    Reporter,
-    encode_cdr,
-    ros_messages,
-    type_hash,
-)
-from tomoskin.files.messages.ros_view import IMAGE, ODOMETRY, POSE, TEXT
+from tomoskin.extras.ros2.ros_types import TYPES, encode_cdr, type_hash
+from tomoskin.extras.ros2.ros_view import IMAGE, ODOMETRY, POSE, TEXT, TOPICS, ros_messages
+from tomoskin.files.messages import Contact, Naming, Place, Reporter
 from tomoskin.model.mesh import Cylinder, Pose
 from tomoskin.sensing.track import TouchEvent
 

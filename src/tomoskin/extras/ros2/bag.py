@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING
 
 from tomoskin import __version__
 from tomoskin.core import StrPath, written
-from tomoskin.files import messages
-from tomoskin.files.exports.export import Export, ExportFormat
+from tomoskin.extras.ros2.ros_types import definition, encode_cdr, type_hash
+from tomoskin.extras.ros2.ros_view import TOPICS, RosMessage, ros_messages
+from tomoskin.files.exports import Export, ExportFormat
+from tomoskin.files.messages import Naming
 
 if TYPE_CHECKING:
     from mcap.writer import Writer
@@ -30,25 +32,25 @@ def write_bag(job: Export, path: StrPath) -> None:
     with written(path, overwrite=job.overwrite) as part, part.open("wb") as file:
         bag = Writer(file, compression=CompressionType.NONE)
         bag.start(profile="ros2", library=f"tomoskin {__version__}")
-        channels = {topic: _register(bag, job.stream.naming, topic) for topic in messages.TOPICS}
+        channels = {topic: _register(bag, job.stream.naming, topic) for topic in TOPICS}
         for item in job.items():
-            for message in messages.ros_messages(job.stream, item):
+            for message in ros_messages(job.stream, item):
                 _put(bag, channels[message.topic], message)
         bag.finish()  # type: ignore[no-untyped-call]
 
 
-def _register(bag: Writer, naming: messages.Naming, topic: str) -> int:
-    kind = messages.TOPICS[topic]
-    text = _BETWEEN.join(messages.definition(kind))
+def _register(bag: Writer, naming: Naming, topic: str) -> int:
+    kind = TOPICS[topic]
+    text = _BETWEEN.join(definition(kind))
     schema = bag.register_schema(kind, "ros2msg", text.encode())
-    about = {"offered_qos_profiles": "", "topic_type_hash": messages.type_hash(kind)}
+    about = {"offered_qos_profiles": "", "topic_type_hash": type_hash(kind)}
     return bag.register_channel(f"/{naming.topic(topic)}", "cdr", schema, about)
 
 
-def _put(bag: Writer, channel: int, message: messages.RosMessage) -> None:
-    data = messages.encode_cdr(messages.TOPICS[message.topic], message.value)
+def _put(bag: Writer, channel: int, message: RosMessage) -> None:
+    data = encode_cdr(TOPICS[message.topic], message.value)
     bag.add_message(channel, message.stamp, data, message.stamp)
 
 
-BAG = ExportFormat(write_bag, "a bag of ROS 2", of_links=True)
+FORMAT = ExportFormat(write_bag, "a bag of ROS 2", of_links=True)
 """What is registered for ``.mcap``."""

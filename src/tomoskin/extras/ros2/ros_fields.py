@@ -8,14 +8,15 @@ from typing import Any
 import numpy as np
 
 from tomoskin.core import FloatArray, Image, PixelMap
-from tomoskin.files.messages.contacts import Contact, Contacts
-from tomoskin.files.messages.foxglove_records import (
+from tomoskin.files.messages import (
     TEXT_COLOUR,
     TEXT_HEIGHT,
+    Contact,
+    Contacts,
+    Place,
     touch_colour,
     touch_width,
 )
-from tomoskin.files.messages.place import Place
 
 Value = dict[str, Any]
 
