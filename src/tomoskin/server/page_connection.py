@@ -94,6 +94,10 @@ class Host(ABC):
         self.awaited = False
 
     @abstractmethod
+    def running(self) -> contextlib.AbstractAsyncContextManager[None]:
+        """A block that lasts while it is served."""
+
+    @abstractmethod
     def first(self) -> Iterable[Message]:
         """The messages that a new page is sent first."""
 

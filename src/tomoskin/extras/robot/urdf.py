@@ -23,13 +23,13 @@ from tomoskin.core import (
 from tomoskin.extras.robot.link_shapes import (
     MOST_TRIANGLES,
     LinkShape,
-    Pose,
     name_of,
     origin_of,
     part_of,
     read_shapes,
     thinned,
 )
+from tomoskin.model.mesh import Pose
 from tomoskin.model.skin import read_text
 
 _LARGEST = 20_000_000

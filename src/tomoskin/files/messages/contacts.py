@@ -326,7 +326,7 @@ class Contacts:
     @property
     def link(self) -> LinkPose | None:
         """Where the link of the robot was at that time; None where the skin lies on none."""
-        return self.stream.place and self.stream.place.at(self.utc)
+        return self.stream.link(self.utc)
 
     @property
     def events(self) -> tuple[Event, ...]:
@@ -363,7 +363,7 @@ def happenings(contacts: Contacts) -> list[dict[str, Any]]:
 
 def own_touches(stream: Stream, result: FrameResult) -> set[int]:
     """Identities of the touches of a frame that links of the robot itself make."""
-    link = stream.place and stream.place.at(stream.utc(_when(result.scanned, result.host_time)))
+    link = stream.link(stream.utc(_when(result.scanned, result.host_time)))
     touches = Contact.each(result.touches, stream.surface, link) if link else ()
     return {contact.touch.id for contact in touches if contact.is_self}
 

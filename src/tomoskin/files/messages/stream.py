@@ -12,7 +12,7 @@ from typing import Self
 import numpy as np
 
 from tomoskin.core import FloatArray, GeometryError, PixelMap, SinkError, StrPath, clock_ahead
-from tomoskin.files.messages.place import FRAME, Place
+from tomoskin.files.messages.place import FRAME, LinkPose, Place
 from tomoskin.model.mesh import Mesh, Plane, Pose, Surface, pose_numbers
 from tomoskin.model.pattern import Pattern
 from tomoskin.pipeline import Prepared, colour_limit
@@ -169,6 +169,10 @@ class Stream:
         """The link that the skin is known to lie on; "" where none is."""
         mount = self.naming.mount or self.place
         return "" if mount is None else mount.link
+
+    def link(self, utc: float | None) -> LinkPose | None:
+        """Where the link that the skin lies on was at a time, s since 1970; None of no link."""
+        return None if self.place is None else self.place.at(utc)
 
     def named(self, naming: Naming) -> Self:
         """The same, called as ``naming`` says, and each of a robot's skins below it."""
