@@ -14,7 +14,10 @@ from functools import partial
 import httpx
 import numpy as np
 import pytest
+import typer
 
+from tomoskin.cli.live import Served, check_one, live
+from tomoskin.cli.named_files import Added
 from tomoskin.core import Frame, Mark
 from tomoskin.files.session import SessionReader, SessionWriter, session_info
 from tomoskin.model.skin import Skin
@@ -180,3 +183,27 @@ def test_it_replays_with_the_skin_in_the_file(start, refused, tmp_path):
     code, _, errors = refused("--port", "0", "--source", "replay:none.mcap")
     assert code == 1
     assert "there is no such file" in errors
+
+
+@pytest.mark.parametrize("given", [(["a", "b"], []), ([], ["twin", "twin"])])
+def test_several_are_refused_where_nothing_runs_them(given):
+    with pytest.raises(typer.BadParameter, match="expected one, got 2"):
+        check_one(*given)
+
+
+def test_an_option_that_is_added_may_take_over(monkeypatch):
+    """It is asked with what was given, and runs in place of the one skin."""
+    asked, ran = [], []
+
+    class Several:
+        def instead(self, *given):
+            asked.append(given)
+            return (lambda *served: ran.append(served)) if given[0] else None
+
+    added = Added((Several(),))
+    live(added=added, skin=["a", "b"], sink=["lines:x"], early=True, served=Served())
+    assert asked == [(["a", "b"], [], [])]
+    assert ran == [(["lines:x"], Served(), True)]
+    monkeypatch.setattr("tomoskin.cli.live.skin_for_source", lambda *_: pytest.fail("one skin"))
+    with pytest.raises(pytest.fail.Exception, match="one skin"):
+        live(added=added, served=Served())
