@@ -293,20 +293,20 @@ class _Grid:
     def of(cls, prepared: Prepared, size: int) -> Self:
         pixels = prepared.mesh.pixels(size)
         (height, width), step = pixels.cells.shape, abs(pixels.x[1] - pixels.x[0])
-        top, left = (size - height) // 2, (size - width) // 2
+        top, column = (size - height) // 2, (size - width) // 2
         mask = np.zeros((size, size), dtype=bool)
-        mask[top : top + height, left : left + width] = pixels.cells >= 0
-        x = pixels.x[0] + step * (np.arange(size) - left)
+        mask[top : top + height, column : column + width] = pixels.cells >= 0
+        x = pixels.x[0] + step * (np.arange(size) - column)
         y = pixels.y[0] - step * (np.arange(size) - top)
-        return cls(pixels, x, y, (top, left), mask)
+        return cls(pixels, x, y, (top, column), mask)
 
     def conductance(self, contacts: Contacts) -> FloatArray:
         """The image, which is 0 outside of the sheet."""
         drawn = np.zeros(self.mask.shape)
         if contacts.image is not None:
             values = contacts.image.on_pixels(self.pixels)
-            (top, left), (height, width) = self.corner, values.shape
-            drawn[top : top + height, left : left + width] = np.nan_to_num(values)
+            (top, column), (height, width) = self.corner, values.shape
+            drawn[top : top + height, column : column + width] = np.nan_to_num(values)
         return drawn
 
     def pressure(self, contacts: Contacts) -> FloatArray:

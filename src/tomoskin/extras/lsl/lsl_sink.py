@@ -95,6 +95,6 @@ def touch_sample(contacts: Contacts) -> FloatArray:
         touch, detection = contact.touch, contact.touch.detection
         row[number] = touch.id, detection.x, detection.y, detection.peak
         amounts = (touch.amounts.get(name) for name in MEASURANDS)
-        told = *(amount and amount.value for amount in amounts), contact.is_self
-        more[:, number] = [np.nan if value is None else value for value in told]
+        values = *(amount and amount.value for amount in amounts), contact.is_self
+        more[:, number] = [np.nan if value is None else value for value in values]
     return np.concatenate((row.ravel(), more.ravel(), [float(contacts.valid)]))

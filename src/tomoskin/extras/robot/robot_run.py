@@ -152,12 +152,12 @@ class RobotRun(AbstractContextManager["RobotRun"]):
     def statuses(self) -> dict[str, Status]:
         """How each skin is doing now, by its name."""
         problems = self._problems
-        found = {}
+        statuses = {}
         for name, runner in self.runners.items():
             status = runner.status()
             problem = status.problem or problems.get(name)
-            found[name] = replace(status, problem=problem, source=status.source or name)
-        return found
+            statuses[name] = replace(status, problem=problem, source=status.source or name)
+        return statuses
 
     def _close_log(self) -> None:
         logs, self._logs = self._logs, {}
@@ -214,14 +214,14 @@ def with_joints(robot: Robot) -> Robot:
 _STEPPED = "the clock of this computer was set by {:+.1f} s: messages keep the time of the start"
 
 
-def board_problems(found: Mapping[str, str], wanted: Mapping[str, str | None]) -> dict[str, str]:
+def board_problems(ids: Mapping[str, str], wanted: Mapping[str, str | None]) -> dict[str, str]:
     """What is wrong with the boards' unique ids, in a sentence, by the names of the skins.
 
     Boards without a number have zeros only, and cannot be told apart.
     """
     problems = {}
-    for name, number in found.items():
-        others = [o for o, n in found.items() if n == number and o != name and n.strip("0")]
+    for name, number in ids.items():
+        others = [o for o, n in ids.items() if n == number and o != name and n.strip("0")]
         if wanted.get(name) not in (None, number):
             problems[name] = (
                 f"board {number} answers, expected {wanted[name]}: check whether two "
