@@ -380,7 +380,7 @@ def test_lerobot_merges_sessions(session, dataset, lerobot, tmp_path):
 def test_lerobot_joins_it_to_a_robots_dataset_and_merges_those(session, lerobot, tmp_path):
     """As the documentation does."""
     dataset_class, tools = lerobot
-    page = (ROOT / "docs/policies.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs/extras/lerobot.md").read_text(encoding="utf-8")
     program = page.partition("```python\nimport numpy")[2].partition("\nmonday = ")[0]
     names = {}
     exec("import numpy" + program, names)
