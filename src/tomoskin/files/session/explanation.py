@@ -29,7 +29,7 @@ _LONG = 100
 
 
 @dataclass(frozen=True)
-class Step:
+class FrameStep:
     """What one ``name``-d step has made: the ``record`` itself, and ``lines`` that describe it."""
 
     name: str
@@ -59,7 +59,7 @@ class Explanation:
 
     frame: int
     time: float
-    steps: tuple[Step, ...]
+    steps: tuple[FrameStep, ...]
     result: FrameResult | None
 
     def of_touch(self, touch: int) -> tuple[str, ...]:
@@ -91,10 +91,10 @@ def explain(session: SessionReader, frame: int) -> Explanation:
         When the session cannot be replayed, or has no such frame.
     """
     prepared = as_recorded(session)
-    steps: list[Step] = []
+    steps: list[FrameStep] = []
 
     def note(name: str, record: object) -> None:
-        steps.append(Step(name, record))
+        steps.append(FrameStep(name, record))
 
     last = -1
     with observe_steps(note):
