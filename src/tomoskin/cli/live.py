@@ -160,12 +160,12 @@ def _run_skin(
 ) -> None:
     from tomoskin.board.source import open_source
     from tomoskin.core import plain_values
-    from tomoskin.run import BoardMemory, Runner
+    from tomoskin.run import Runner
     from tomoskin.server import application, state
 
     opener = partial(open_source, source, prepared.skin)
     with served.listening() as (listener, policy):
-        runner = Runner(prepared, opener, sinks=sinks, memory=BoardMemory.in_cache(), early=early)
+        runner = Runner(prepared, opener, sinks=sinks, early=early)
         with recording_to(runner, served.record) as stopped:
             app = application(hub_of(runner, source, served.folder), policy)
             served.serve(app, listener, policy, f"{runner.flow.source} is live")

@@ -2,7 +2,6 @@
 
 from tomoskin.run import commands as commands
 from tomoskin.run.board_check import CheckFinding as CheckFinding, check_board as check_board
-from tomoskin.run.board_memory import BoardMemory as BoardMemory
 from tomoskin.run.commands import (
     MAX_FORCE as MAX_FORCE,
     Opener as Opener,

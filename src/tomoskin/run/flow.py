@@ -21,7 +21,6 @@ from tomoskin.core import DriveSamples, Event, Frame, Mark, MarkedFrame, Tomoski
 from tomoskin.files.messages import NO_REFERENCE, Contacts, without_frame
 from tomoskin.files.session import BoardInfo, RawRead, Truth
 from tomoskin.pipeline import FrameResult, Pipeline, Prepared, ReferenceState
-from tomoskin.run.board_memory import Recall
 from tomoskin.run.intake import Intake, Marker, replay_status
 from tomoskin.run.publisher import Audience, Publisher
 from tomoskin.run.status import CostMeter, Latency, ReplayStatus, Status
@@ -77,8 +76,9 @@ class Flow:
         )
         self.latency, self.costs = Latency(), CostMeter(time.perf_counter)
         self._clock, self.turns, self._early = audience.clock, audience.turns, audience.early
-        self._recall, self.intake = Recall(audience.memory), Intake()
+        self.intake = Intake()
         self._ended = False
+        self._board_id: bytes | None = None
 
     def now(self) -> float:
         """Monotonic time of the host, s."""
@@ -227,16 +227,10 @@ class Flow:
             or standstill
             or (self.prepared.headroom.problem if self.source else None)
             or (result.problem if result else None)
-            or self._recall.problem
             or _doubt(self.prepared, reference),
             board=self.board,
             board_name=self.board_name,
         )
-
-    def remember(self) -> None:
-        """Keep what the next start of this board begins with."""
-        if self._recall.is_due(self._clock(), at_end=True):
-            self._recall.keep(self.prepared, self.out)
 
     def _note_board(self, info: Info | None, name: str) -> None:
         self.board, self.board_name = info, name
@@ -245,8 +239,10 @@ class Flow:
         self.out.put(BoardInfo(self._clock(), info, name))
         if info.tick_rate:
             self.pipeline.tick_rate = info.tick_rate
-        if self.marker.replay is None:
-            self._recall.meet(info, self)
+        before, self._board_id = self._board_id, info.unique_id
+        if self.marker.replay is None and before not in (None, info.unique_id):
+            self.out.say("other-board", "another board answers: a new reference is taken")
+            self.marker.reference = True
 
     def _mark(self, frame: Frame, *, late: bool) -> None:
         mark = self.marker.mark(frame, late=late)
@@ -275,7 +271,6 @@ class Flow:
             return
         ready, decode = self._clock(), begun - read + intake.waited
         self.latency.add_result(decode, ready - begun)
-        self._recall.see(result, self)
         self.out.recordings.put(result)
         result = self.pipeline.early(result)
         self.newest = Snapshot(result, _truth(self, frame), decode + ready - begun, ready)

@@ -13,7 +13,6 @@ from tomoskin.core import SkinError, StrPath
 from tomoskin.files.session import SessionReader, as_recorded, parse_replay
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, prepare, with_calibrations
-from tomoskin.run.board_memory import BoardMemory
 from tomoskin.run.runner import Runner
 from tomoskin.run.sinks import Contacts, make_sink
 
@@ -130,7 +129,6 @@ def open_skin(
         prepared,
         partial(open_source, source, prepared.skin),
         sinks=[make_sink(str(sink)) for sink in _each(sinks)],
-        memory=BoardMemory.in_cache(),
         early=early,
     )
     runner.start()

@@ -233,7 +233,6 @@ class Loop:
         except TomoskinError as error:
             future.set_exception(error)
             return None
-        self.flow.remember()
         self.flow.out.stop()
         self.flow, self.open = Flow(change.prepared, self._audience), opener
         self.flow.begin(transport)

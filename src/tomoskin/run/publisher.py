@@ -15,7 +15,6 @@ from tomoskin.core import Capacity, Consumer, Event, Worker, stop_workers
 from tomoskin.files.messages import Place, Stream
 from tomoskin.files.session import RunMessage
 from tomoskin.pipeline import FrameResult, Prepared
-from tomoskin.run.board_memory import BoardMemory
 from tomoskin.run.recordings import Recordings
 from tomoskin.run.sinks import Sink, SinkConsumer, SinkReport, sink_report, sink_worker
 
@@ -127,8 +126,6 @@ class Audience:
         Which of a robot's skins it is; None where there is no robot.
     turns
         Taken for each frame; those of a robot's skins share them.
-    memory
-        Where boards are remembered from one start to the next; None: nowhere.
     early
         Whether drives tell of touches before their scan ends, where the board can.
     obey
@@ -141,13 +138,12 @@ class Audience:
         sinks: Sequence[Sink] = (),
         place: Place | None = None,
         turns: Turns | None = None,
-        memory: BoardMemory | None = None,
         *,
         early: bool = False,
     ) -> None:
         self.early = early
         self.clock, self.sinks, self.events = clock, sinks, EventLog()
-        self.place, self.turns, self.memory = place, turns or Turns(), memory
+        self.place, self.turns = place, turns or Turns()
         self.obey: Callable[[str, Path], str] | None = None
         self._calls: list[Callable[[], None]] = []
         self._subscribers: tuple[Worker[Subscriber], ...] = ()

@@ -71,11 +71,6 @@ class PreRoll:
         if len(self._waiting) > _DELAY:
             self._untouched.append(self._waiting.popleft())
 
-    @property
-    def untouched(self) -> tuple[Frame, ...]:
-        """The newest frames in which nothing touched, as many as a recording begins with."""
-        return tuple(self._untouched)
-
     def invalidate(self) -> None:
         """The pipeline is no longer what these frames would make of a new one."""
         self._complete = False
@@ -139,11 +134,6 @@ class Recordings:
         """The file that is being written, or None."""
         worker = self._awaiting or self._current
         return None if worker is None or worker.ending.done() else worker.consumer.path
-
-    @property
-    def untouched(self) -> tuple[Frame, ...]:
-        """The newest frames in which nothing touched."""
-        return self._pre_roll.untouched
 
     @property
     def frames(self) -> int:

@@ -13,7 +13,6 @@ from tomoskin.core import Event, ModelError, OutputError, SourceError, StrPath, 
 from tomoskin.files.messages import Place
 from tomoskin.pipeline import Prepared
 from tomoskin.run import commands
-from tomoskin.run.board_memory import BoardMemory
 from tomoskin.run.flow import Flow, News, Snapshot
 from tomoskin.run.intake import PAUSED, play
 from tomoskin.run.loop import Loop
@@ -73,8 +72,6 @@ class Runner:
         Where results go, beside those who take :attr:`newest`; a slow one delays nobody.
     robot
         Which of a robot's skins it is, and the turns that its runs share.
-    memory
-        Where boards are remembered from one start to the next; None: nowhere.
     early
         Whether drives tell of touches before their scan ends, where the board can.
 
@@ -95,11 +92,10 @@ class Runner:
         clock: Callable[[], float] = time.monotonic,
         sinks: Sequence[Sink] = (),
         robot: tuple[Place, Turns] | None = None,
-        memory: BoardMemory | None = None,
         early: bool = False,
     ) -> None:
         place, turns = robot or (None, None)
-        self.audience = Audience(clock, tuple(sinks), place, turns, memory, early=early)
+        self.audience = Audience(clock, tuple(sinks), place, turns, early=early)
         self.audience.obey = self.obey
         self.events = self.audience.events
         self._loop = Loop(prepared, open_transport, self.audience)
@@ -142,7 +138,6 @@ class Runner:
         self._loop.stop()
         if self._thread is not None:
             self._thread.join()
-        self._loop.flow.remember()
         self._loop.flow.out.stop()
 
     def submit(self, command: commands.Command) -> Future[None]:

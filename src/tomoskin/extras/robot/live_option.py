@@ -96,7 +96,6 @@ def _run_robot(robot: Robot, sinks: list[str] | None, served: Served, *, early: 
     """Run the skins of a robot and their page until a signal comes."""
     from tomoskin.cli import chosen_sinks, skin_for_source
     from tomoskin.extras.robot.robot_run import Member, RobotRun, with_joints
-    from tomoskin.run import BoardMemory
 
     robot = with_joints(robot)
     with Bar("preparing"):
@@ -107,7 +106,7 @@ def _run_robot(robot: Robot, sinks: list[str] | None, served: Served, *, early: 
     for member in members:
         if (problem := member.prepared.headroom.problem) is not None:
             remark(f"{member.place.name}: {problem}")
-    run = RobotRun(members, BoardMemory.in_cache(), early=early)
+    run = RobotRun(members, early=early)
     stopped = _serve_robot(robot, run, served)
     facts = {
         name: {"frames": s.frames, "p50_ms": 1e3 * s.p50, "p99_ms": 1e3 * s.p99}

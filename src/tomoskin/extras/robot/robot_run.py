@@ -20,7 +20,7 @@ from tomoskin.files.messages import epoch
 from tomoskin.files.session import MessageLog, robot_logs
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, prepare, with_calibrations
-from tomoskin.run import BoardMemory, LiveSkin, Opener, Runner, Status, Turns, commands
+from tomoskin.run import LiveSkin, Opener, Runner, Status, Turns, commands
 from tomoskin.run.sinks import Sink, make_sink
 
 _OFTEN = 0.25
@@ -65,9 +65,7 @@ class RobotRun(AbstractContextManager["RobotRun"]):
         By the names of the skins, in their order: what runs each, and what a program reads.
     """
 
-    def __init__(
-        self, members: Sequence[Member], memory: BoardMemory | None = None, *, early: bool = False
-    ) -> None:
+    def __init__(self, members: Sequence[Member], *, early: bool = False) -> None:
         turns = Turns()
         self.runners: Mapping[str, Runner] = {
             m.place.name: Runner(
@@ -75,7 +73,6 @@ class RobotRun(AbstractContextManager["RobotRun"]):
                 m.open,
                 sinks=m.sinks,
                 robot=(m.place, turns),
-                memory=memory,
                 early=early,
             )
             for m in members
@@ -196,7 +193,7 @@ def open_robot(file: StrPath, sinks: Sequence[str] = ()) -> RobotRun:
         Member.of(placed, Skin.load(placed.skin), [*map(make_sink, sinks)])
         for placed in with_joints(Robot.load(file)).skins
     ]
-    run = RobotRun(members, BoardMemory.in_cache())
+    run = RobotRun(members)
     run.start()
     return run
 
