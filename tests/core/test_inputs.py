@@ -8,7 +8,7 @@ import pytest
 
 from tomoskin.core import DataError, GeometryError, load_arrays, open_input
 from tomoskin.files.imports.reader import read_recording
-from tomoskin.files.imports.text_logs import text_lines
+from tomoskin.files.imports.text_lines import text_lines
 from tomoskin.files.session import SessionReader
 from tomoskin.files.session.repair import repair
 from tomoskin.model.mesh import Mesh

@@ -5,7 +5,13 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from tomoskin.cli.app import main as main
-from tomoskin.cli.named_files import Otherwise as Otherwise, Reads as Reads
+from tomoskin.cli.named_files import (
+    SKIN as SKIN,
+    ForceFlag as ForceFlag,
+    Otherwise as Otherwise,
+    Reads as Reads,
+    Writes as Writes,
+)
 
 if TYPE_CHECKING:
     from tomoskin.cli.choices import (
@@ -15,7 +21,9 @@ if TYPE_CHECKING:
     from tomoskin.cli.live import Served as Served, hub_of as hub_of
     from tomoskin.cli.options import (
         DEFAULT_SKIN as DEFAULT_SKIN,
+        ImageOptions as ImageOptions,
         NamedSkinOption as NamedSkinOption,
+        RecordingArgument as RecordingArgument,
     )
     from tomoskin.cli.output import Bar as Bar, remark as remark
     from tomoskin.cli.record import troubles_told as troubles_told

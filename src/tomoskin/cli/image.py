@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from contextlib import suppress
 from dataclasses import asdict, dataclass
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,7 +14,7 @@ import typer
 
 from tomoskin.cli import options
 from tomoskin.cli.choices import quantity, skin_for_file, with_recorded_calibrations
-from tomoskin.cli.named_files import TABLE, ForceFlag, Writes
+from tomoskin.cli.named_files import TABLE, Added, ForceFlag, Writes
 from tomoskin.cli.named_parts import Recorded, first_time, reconstructed, say_notes, span_lines
 from tomoskin.cli.output import Bar, JsonFlag, remark, tell
 from tomoskin.core import MEASURANDS, DataError, no_such
@@ -158,6 +159,7 @@ def image(
     *,
     tuned: Tuned,
     shown: Shown,
+    added: Added,
     results: Results,
     json: JsonFlag = False,
 ) -> None:
@@ -179,7 +181,8 @@ def image(
         else:
             prepared = with_recorded_calibrations(prepared, recording)
     given = Recorded(recording, data, prepared.skin, reference, prepared.pattern)
-    _say_order(data, prepared)
+    for doubt in chain.from_iterable(one.doubts(data, prepared) for one in added):
+        remark(doubt)
     say_notes(given.data)
     with Bar("reconstructing") as bar:
         result = reconstructed(given, prepared, frames, bar, rule=rule)
@@ -245,20 +248,6 @@ def _lines(result: Reconstruction, spans: tuple[Span, ...], prepared: Prepared) 
             "times count from the first frame; --touches X.csv writes each touch in each frame"
         )
     return lines
-
-
-def _say_order(recording: Recording, prepared: Prepared) -> None:
-    """Say on stderr that electrodes of another board's file seem to stand in another order."""
-    from tomoskin.pipeline import order_fault
-
-    if recording.board_known:
-        return
-    resistance = prepared.model.transfer_resistance(prepared.skin.conductivity)
-    if fault := order_fault(recording, resistance):
-        remark(
-            f"{recording.source}: {fault}: check its tables, or say where each electrode is "
-            "by positions in [electrodes] of the skin file"
-        )
 
 
 def _warn(recorded: Recording, result: Reconstruction, skin: Skin) -> None:

@@ -3,12 +3,17 @@ is in :mod:`tomoskin.cli.choices` and :mod:`tomoskin.cli.named_parts`."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from tomoskin.cli.named_files import CALIBRATION, TABLE, Reads, Writes
+
+if TYPE_CHECKING:
+    from tomoskin.pipeline import Prepared
+    from tomoskin.sensing.signal import Recording
 
 DEFAULT_SKIN = "textile-disc-8"
 
@@ -90,3 +95,11 @@ SinkOption = Annotated[
         help="Publish results: NAME or NAME:ARGUMENT. tomoskin doctor lists the names.",
     ),
 ]
+
+
+class ImageOptions:
+    """Base of options that are added to ``image``, and what else may be added to it."""
+
+    def doubts(self, recording: Recording, prepared: Prepared) -> Iterable[str]:  # noqa: ARG002
+        """What looks wrong with a recording, as sentences."""
+        return ()

@@ -9,7 +9,7 @@ import typer
 
 from tomoskin.cli.app import group
 from tomoskin.cli.named_files import SKIN, ForceFlag, Reads, Writes
-from tomoskin.cli.options import RecordingArgument, SkinArgument
+from tomoskin.cli.options import SkinArgument
 from tomoskin.cli.output import JsonFlag, remark, tell
 from tomoskin.cli.skin_figures import alpha, merit
 from tomoskin.core import DIMENSIONS, DataError, SkinError, no_such, write_text
@@ -70,28 +70,6 @@ def check(file: SkinArgument, json: JsonFlag = False) -> None:
     )
     document = {"ok": True, "mesh": figures, "headroom": headroom.figures()}
     tell(_summary(skin) | document, [line, f"expected: {headroom.text}"], json=json)
-
-
-@app.command()
-def guess(
-    recording: RecordingArgument,
-    out: Annotated[
-        Path | None,
-        typer.Option(metavar="X.toml", help="File for the skin. Default: it is printed."),
-        Writes(SKIN),
-    ] = None,
-    force: ForceFlag = False,
-) -> None:
-    """Write a skin file for a recording of another board; comments say what is sure in it."""
-    from tomoskin.files.imports import read_recording
-    from tomoskin.pipeline import guess_skin
-
-    text = guess_skin(read_recording(recording))
-    if out is None:
-        typer.echo(text)
-        return
-    write_text(out, text, overwrite=force)
-    typer.echo(f"{out}: check its comments; next: tomoskin image {recording} --skin {out}")
 
 
 @app.command()

@@ -11,7 +11,6 @@ from tomoskin.pipeline.frame_result import (
     ModelAgreement as ModelAgreement,
     ReferenceState as ReferenceState,
 )
-from tomoskin.pipeline.guess import guess_skin as guess_skin, order_fault as order_fault
 from tomoskin.pipeline.imaging import Unresolved as Unresolved
 from tomoskin.pipeline.offline import (
     ALONE as ALONE,

@@ -478,7 +478,7 @@ def test_the_interchange_table(tmp_path):
         ("v_1_0_2_3\nmany\n", 'line 2.*v_1_0_2_3, got "many"'),
         ("v_1_0_2_3,v_1_0_2_3\n1,1\n", "each column once"),
         ("v_1_0_2_3\n", "empty"),
-        ("nothing,known\n1,2\n", "known text log"),
+        ("nothing,known\n1,2\n", "session, .*, a log of OpenEIT"),
         ("", "is an empty file"),
     ],
 )

@@ -8,7 +8,7 @@ from scipy.io import savemat
 from scipy.io.matlab import MatlabOpaque
 
 from tomoskin.core import DataError
-from tomoskin.files.imports import read_recording, reader
+from tomoskin.files.imports import matlab, read_recording
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.pattern import Pattern
 from tomoskin.model.skin import Skin
@@ -104,6 +104,6 @@ def test_matlab_objects_are_refused_with_what_to_do(tmp_path, monkeypatch):
     path = tmp_path / "class.mat"
     savemat(path, {"a": 1.0})
     thing = MatlabOpaque(np.zeros(1, dtype=[("s0", "O"), ("s1", "O"), ("s2", "O"), ("arr", "O")]))
-    monkeypatch.setattr(reader, "load_matlab", lambda _: {"eit": thing, "n": np.ones(2)})
+    monkeypatch.setattr(matlab, "load_matlab", lambda _: {"eit": thing, "n": np.ones(2)})
     with pytest.raises(DataError, match=r"objects \(eit\), which only MATLAB.*struct\(object\)"):
         read_recording(path)

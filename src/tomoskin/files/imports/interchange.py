@@ -35,10 +35,10 @@ from tomoskin.core import (
     whole_number,
 )
 from tomoskin.files.imports.tables import checked_currents, voltages_of
-from tomoskin.files.imports.text_logs import text_lines
+from tomoskin.files.imports.text_lines import text_lines
 from tomoskin.sensing.signal import Recording
 
-OWN = "board_known"
+BOARD_KNOWN = "board_known"
 """Key of a file whose noise the skin's own read-out predicts: the export of a session."""
 
 REQUIRED = frozenset({"drive", "measure"})
@@ -71,7 +71,7 @@ def parse(arrays: Arrays, source: str) -> Recording:
         is_change=key == "dv",
     )
     idle = whole_number(arrays, "idle", source) if "idle" in arrays else 1
-    return replace(recording, idle=idle, board_known=OWN in arrays)
+    return replace(recording, idle=idle, board_known=BOARD_KNOWN in arrays)
 
 
 def _drives(arrays: Arrays, source: str) -> NDArray[Any]:
@@ -98,7 +98,7 @@ def write_interchange(path: StrPath, recording: Recording, *, overwrite: bool = 
     if recording.labels is not None:
         arrays["xy_m"] = recording.labels
     if recording.board_known:
-        arrays[OWN] = np.array(True)
+        arrays[BOARD_KNOWN] = np.array(True)
     save_arrays(path, arrays, overwrite=overwrite)
 
 

@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.io import loadmat, whosmat
+from scipy.io.matlab import MatlabObject, MatlabOpaque
 from scipy.sparse import issparse
 
-from tomoskin.core import DataError, FloatArray, IntArray, check_fits, numeric
-from tomoskin.files.imports.interchange import OWN
+from tomoskin.core import Arrays, DataError, FloatArray, IntArray, check_fits, numeric
+from tomoskin.files.imports.interchange import BOARD_KNOWN
 from tomoskin.files.imports.tables import drives_of, pairs_of, voltages_of
 from tomoskin.sensing.signal import Recording
 
@@ -143,7 +144,7 @@ def read_eidors(variables: Mapping[str, Any], source: str) -> Recording:
     return replace(
         recording,
         idle=int(idle) if idle is not None and idle in range(1, len(voltages) + 1) else 1,
-        board_known=OWN in variables,
+        board_known=BOARD_KNOWN in variables,
     )
 
 
@@ -219,3 +220,27 @@ def _dense(value: Any, where: str) -> NDArray[Any]:
     sparse: Any = value
     array = numeric(sparse.toarray() if issparse(value) else value, DataError, where=where)
     return array.astype(np.complex128 if array.dtype.kind == "c" else np.float64, copy=False)
+
+
+def read_matlab(path: Path, source: str) -> Recording | Arrays:
+    """The recording in EIDORS' structures, or else the file's arrays of numbers by name.
+
+    Raises
+    ------
+    DataError
+        As :func:`load_matlab` and :func:`read_eidors` do, and for objects of MATLAB's.
+    """
+    variables = load_matlab(path)
+    if is_eidors(variables):
+        return read_eidors(variables, source)
+    if objects := [k for k, v in variables.items() if isinstance(v, MatlabObject | MatlabOpaque)]:
+        raise DataError(
+            f"holds MATLAB objects ({', '.join(objects)}), which only MATLAB can read",
+            where=source,
+            hint='in MATLAB: s = struct(object); save("plain.mat", "-struct", "s", "-v7")',
+        )
+    return {
+        key: value
+        for key, value in variables.items()
+        if isinstance(value, np.ndarray) and value.dtype.kind in "biufc"
+    }

@@ -2,40 +2,59 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
-from scipy.io.matlab import MatlabObject, MatlabOpaque
 
-from tomoskin.core import EMPTY, MAGIC, Arrays, DataError, StrPath, load_arrays, open_input
-from tomoskin.files.imports import interchange, matrices, sixteen, text_logs
-from tomoskin.files.imports.matlab import is_eidors, is_matlab, load_matlab, read_eidors
-from tomoskin.files.imports.text_logs import bytes_lines, text_lines
+from tomoskin.core import (
+    EMPTY,
+    MAGIC,
+    Arrays,
+    DataError,
+    StrPath,
+    load_arrays,
+    open_input,
+    registered,
+)
+from tomoskin.files.imports import interchange
+from tomoskin.files.imports.text_lines import bytes_lines, text_lines
 from tomoskin.files.session import read_session
 from tomoskin.sensing.signal import Recording
 
-Format = tuple[Callable[[Any], bool], Callable[[Any, str], Recording]]
 
-ARRAY_FORMATS: tuple[Format, ...] = (
-    (interchange.detects, interchange.parse),
-    (sixteen.detects, sixteen.parse),
-    (matrices.is_eskin, matrices.read_eskin),
-    (matrices.is_ktc, matrices.read_ktc),
-    (matrices.is_pyeit, matrices.read_pyeit),
-)
-"""What recognises a format by its arrays, and what reads it."""
+@dataclass(frozen=True)
+class Format:
+    """A format of recordings; others than these are registered at the seam "readers".
 
-TEXT_FORMATS: tuple[Format, ...] = (
-    (interchange.is_table, interchange.read_table),
-    (text_logs.is_open_eit, text_logs.read_open_eit),
-    (text_logs.is_eit_kit, text_logs.read_eit_kit),
-    (text_logs.is_sciospec, text_logs.read_sciospec),
-    (text_logs.is_serial_log, text_logs.read_serial_log),
+    Attributes
+    ----------
+    name
+        Whose files they are, in words.
+    kind
+        What it is known by, and made of. "arrays": by the arrays of an archive, made of these.
+        "text": by a list of its first lines, made of all lines. "file": by its first bytes, made of
+        its path; then it may also give arrays, which are taken for an archive's.
+    detects
+        Whether something is of this format.
+    parse
+        The recording in it, whose source is named; or arrays.
+    """
+
+    name: str
+    kind: Literal["file", "arrays", "text"]
+    detects: Callable[[Any], bool]
+    parse: Callable[[Any, str], Recording | Arrays]
+
+
+FORMATS = (
+    Format("an interchange file", "arrays", interchange.detects, interchange.parse),
+    Format("a table of voltages", "text", interchange.is_table, interchange.read_table),
 )
-"""The same for text, by its first lines."""
+"""Those that are looked for first."""
 
 _HEAD = 128
 _FIRST_LINES = 300
@@ -61,8 +80,8 @@ def _read(path: Path) -> Recording:
     head = _beginning(path)
     if head.startswith(MAGIC):
         return read_session(path)
-    if is_matlab(head):
-        return _from_matlab(load_matlab(path), path)
+    if (made := _parsed("file", head, path, str(path))) is not None:
+        return made if isinstance(made, Recording) else _from_arrays(made, path)
     if head.startswith(_ZIP):
         return _from_arrays(load_arrays(path), path)
     return _from_text(head, path)
@@ -74,11 +93,11 @@ def is_session(path: StrPath) -> bool:
 
 
 def _from_arrays(arrays: Arrays, path: Path) -> Recording:
-    recording = _parsed(ARRAY_FORMATS, arrays, arrays, str(path))
+    recording = _parsed("arrays", arrays, arrays, str(path))
     if recording is None and set(arrays) == {"raw"} and arrays["raw"].dtype == np.uint8:
         lines = list(bytes_lines(arrays["raw"].tobytes()))
-        recording = _parsed(TEXT_FORMATS, lines[:_FIRST_LINES], lines, str(path))
-    if recording is not None:
+        recording = _parsed("text", lines[:_FIRST_LINES], lines, str(path))
+    if isinstance(recording, Recording):
         return recording
     raise DataError(
         f"expected an interchange file (voltages or dv, drive, measure), got the keys "
@@ -86,23 +105,6 @@ def _from_arrays(arrays: Arrays, path: Path) -> Recording:
         where=str(path),
         hint="docs/interchange.md lists what can be read",
     )
-
-
-def _from_matlab(variables: dict[str, Any], path: Path) -> Recording:
-    if is_eidors(variables):
-        return read_eidors(variables, str(path))
-    if objects := [k for k, v in variables.items() if isinstance(v, MatlabObject | MatlabOpaque)]:
-        raise DataError(
-            f"holds MATLAB objects ({', '.join(objects)}), which only MATLAB can read",
-            where=str(path),
-            hint='in MATLAB: s = struct(object); save("plain.mat", "-struct", "s", "-v7")',
-        )
-    arrays = {
-        key: value
-        for key, value in variables.items()
-        if isinstance(value, np.ndarray) and value.dtype.kind in "biufc"
-    }
-    return _from_arrays(arrays, path)
 
 
 def _from_text(head: bytes, path: Path) -> Recording:
@@ -119,22 +121,28 @@ def _from_text(head: bytes, path: Path) -> Recording:
             hint="save plain arrays as .npz",
         )
     first = list(islice(text_lines(path), _FIRST_LINES))
-    recording = _parsed(TEXT_FORMATS, first, text_lines(path), str(path))
-    if recording is not None:
+    recording = _parsed("text", first, text_lines(path), str(path))
+    if isinstance(recording, Recording):
         return recording
+    names = ", ".join(dict.fromkeys(known.name for known in _formats()))
     raise DataError(
-        "is not a complete .npz archive, a session, a MATLAB file or a known text log",
+        f"is not a complete .npz archive, a session, {names}",
         where=str(path),
         hint="docs/interchange.md lists what can be read",
     )
 
 
-def _parsed(
-    formats: tuple[Format, ...], head: object, content: object, source: str
-) -> Recording | None:
-    """What the first of the ``formats`` that knows the ``head`` makes of the content."""
-    reader = next((parse for detects, parse in formats if detects(head)), None)
-    return None if reader is None else reader(content, source)
+def _formats() -> Iterator[Format]:
+    """Ours, then those that are registered."""
+    yield from FORMATS
+    yield from (entry.load() for entry in registered("readers").values())
+
+
+def _parsed(kind: str, head: object, content: object, source: str) -> Recording | Arrays | None:
+    """What the first format of a ``kind`` that knows the ``head`` makes of the content."""
+    some = (known for known in _formats() if known.kind == kind)
+    known = next((known for known in some if known.detects(head)), None)
+    return None if known is None else known.parse(content, source)
 
 
 def _beginning(path: Path) -> bytes:

@@ -3,20 +3,16 @@ every other line is counted and listed."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from itertools import combinations
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tomoskin.core import DataError, IntArray, check_fits, open_input, read_refusals
+from tomoskin.core import DataError, IntArray
 from tomoskin.files.imports import tables
 from tomoskin.sensing.signal import Recording
-
-LONGEST_LINE = 1 << 16
-"""Bytes of a line; what follows is a line of its own."""
 
 _LISTED = 8
 
@@ -44,25 +40,6 @@ class Skipped:
         )
 
 
-def text_lines(path: Path) -> Iterator[str]:
-    """Lines of a file, without their ends; what is no UTF-8 is replaced.
-
-    Raises
-    ------
-    DataError
-        When the file cannot be read or is too large for memory.
-    """
-    with read_refusals(path), open_input(path) as file:
-        check_fits(path.stat().st_size, str(path))
-        while line := file.readline(LONGEST_LINE):
-            yield _text(line)
-
-
-def bytes_lines(data: bytes) -> Iterator[str]:
-    """Lines of bytes that are in memory."""
-    return (_text(line) for line in data.split(b"\n"))
-
-
 def numbers_in(text: str, separator: str = ",") -> list[float] | None:
     """Numbers between separators, an empty one at the end left out; None when one is none."""
     parts = text.strip().rstrip(separator).split(separator)
@@ -70,10 +47,6 @@ def numbers_in(text: str, separator: str = ",") -> list[float] | None:
         return [float(part) for part in parts]
     except ValueError:
         return None
-
-
-def _text(line: bytes) -> str:
-    return line.rstrip(b"\r\n").decode("utf-8", errors="replace").removeprefix("\ufeff")
 
 
 _ORIGIN = "origin frame"

@@ -1,0 +1,1 @@
+"""Recordings of other instruments and programs, and a skin file guessed from one."""
