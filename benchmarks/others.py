@@ -17,9 +17,9 @@ from scipy.sparse import csr_array
 from report import Report, recordings, table
 from tomoskin import Skin
 from tomoskin.core import FloatArray
-from tomoskin.files.imports import read_recording
-from tomoskin.files.imports.tables import touches_drive, voltages_of
-from tomoskin.files.imports.text_logs import rows_of
+from tomoskin.extras.instruments.tables import touches_drive
+from tomoskin.extras.instruments.text_logs import rows_of
+from tomoskin.files.imports import read_recording, voltages_of
 from tomoskin.model.mesh import Mesh
 from tomoskin.pipeline import prepare, reconstruct
 from tomoskin.sensing.signal import Recording

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import tomllib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
@@ -23,7 +24,7 @@ from tomoskin.cli.app import COMMANDS, Commands
 from tomoskin.cli.image import WRITERS as IMAGE_WRITERS
 from tomoskin.cli.named_files import RECORDING, ForceFlag, Otherwise, Reads, Writes
 from tomoskin.cli.session import EXPORTS
-from tomoskin.core import RECORDING as SESSION_ENDINGS, OutputError
+from tomoskin.core import RECORDING as SESSION_ENDINGS, OutputError, registered
 from tomoskin.core.user_files import MAGIC
 from tomoskin.files.exports import WRITERS as EXPORT_WRITERS
 from tomoskin.model.forward import ForwardModel
@@ -81,7 +82,6 @@ CASES = {
     ("design", "out"): Case("design --skin {skin} --out {out}", ".png", ("--electrodes", "")),
     ("skin alpha", "out"): Case("skin alpha {skin} --rule light-touch --out {out}", ".png"),
     ("skin merit", "out"): Case("skin merit {skin} --out {out}", ".csv"),
-    ("skin guess", "out"): Case("skin guess {presses} --out {out}", ".toml"),
     ("skin lay", "out"): Case("skin lay {surface} --electrodes {places} --out {out}", ".toml"),
     ("session export", "out"): Case("session export {session} {out}", ".csv"),
     ("session export", "touches"): Case("session export {session} {other} --touches {out}", ".csv"),
@@ -90,7 +90,12 @@ CASES = {
         "simulate --script {population} --skin {skin} --presses 1 --processes 1 --out {out}", ".npz"
     ),
 }
-"""One for each output that may be written over with --force."""
+"""One for each output that may be written over with --force; extras have theirs beside their
+tests."""
+
+for file in sorted((Path(__file__).parents[1] / "extras").glob("*/outputs.toml")):
+    for given, more in tomllib.loads(file.read_text(encoding="utf-8")).items():
+        CASES[tuple(given.rsplit(" ", 1))] = Case(**more)  # type: ignore[index]
 
 NEW_ONLY = {
     ("record", "file"): Case("record {out} --skin {skin} --source twin:fast --frames 1", ".mcap"),
@@ -345,15 +350,15 @@ OUTPUT_WORDS = {"out", "output", "to", "into", "dest", "save", "record", "touche
 
 def commands() -> Iterator[tuple[str, Callable[..., None]]]:
     """Every command as it is registered, by its words."""
+    found: dict[str, Any] = {name: entry.load() for name, entry in registered("commands").items()}
     for name in COMMANDS:
         module = import_module(f"tomoskin.cli.{name}")
-        app = getattr(module, "app", None)
-        if app is None:
-            app = Commands()
-            app.command(name)(getattr(module, name))
-            prefix = ""
-        else:
-            prefix = f"{name} "
+        found[name] = getattr(module, "app", None) or getattr(module, name)
+    for name, command in found.items():
+        prefix, app = f"{name} ", command
+        if not isinstance(command, typer.Typer):
+            prefix, app = "", Commands()
+            app.command(name)(command)
         for info in app.registered_commands:
             assert info.callback is not None
             yield prefix + (info.name or info.callback.__name__), info.callback

@@ -7,6 +7,7 @@ from tomoskin.pipeline.finding import (
 )
 from tomoskin.pipeline.following import Setting as Setting
 from tomoskin.pipeline.frame_result import (
+    DOUBTED as DOUBTED,
     FrameResult as FrameResult,
     ModelAgreement as ModelAgreement,
     ReferenceState as ReferenceState,

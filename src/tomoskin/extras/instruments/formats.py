@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from tomoskin.files.imports import Format, matlab, matrices, sixteen, text_logs
+from tomoskin.extras.instruments import matlab, matrices, sixteen, text_logs
+from tomoskin.files.imports import Format
 
 MATLAB = Format("a MATLAB file", "file", matlab.is_matlab, matlab.read_matlab)
 SIXTEEN = Format("a tank of EIDORS", "arrays", sixteen.detects, sixteen.parse)

@@ -27,8 +27,8 @@ def guess(
     force: ForceFlag = False,
 ) -> None:
     """Write a skin file for a recording of another board; comments say what is sure in it."""
+    from tomoskin.extras.instruments.guess import guess_skin
     from tomoskin.files.imports import read_recording
-    from tomoskin.pipeline.guess import guess_skin
 
     text = guess_skin(read_recording(recording))
     if out is None:
@@ -44,7 +44,7 @@ class Order(ImageOptions):
 
     def doubts(self, recording: Recording, prepared: Prepared) -> Iterator[str]:
         """What to check in the file's tables, or nothing."""
-        from tomoskin.pipeline.guess import order_fault
+        from tomoskin.extras.instruments.guess import order_fault
 
         if recording.board_known:
             return

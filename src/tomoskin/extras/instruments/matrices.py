@@ -13,7 +13,8 @@ from tomoskin.core import (
     numbers,
     real_numbers,
 )
-from tomoskin.files.imports import tables
+from tomoskin.extras.instruments import tables
+from tomoskin.files.imports import voltages_of
 from tomoskin.sensing.signal import Recording
 
 _MM = 1e-3
@@ -57,7 +58,7 @@ def read_eskin(arrays: Arrays, source: str) -> Recording:
     else:
         values = _frames(arrays, kind, n_rows, source)
     inj, meas = (electrode_table(arrays, key, source) for key in ("inj", "meas"))
-    return tables.voltages_of(
+    return voltages_of(
         source,
         values,
         (inj[:, ::-1], meas),
@@ -149,7 +150,7 @@ def read_ktc(arrays: Arrays, source: str) -> Recording:
         if rows[0].shape[1] > 2:
             turned = rows[0][:, tables.clockwise(np.arange(n_electrodes), n_electrodes)]
         rows = turned, tables.clockwise(rows[1], n_electrodes)
-    return tables.voltages_of(source, frames, rows, reference=water).without_repeats()
+    return voltages_of(source, frames, rows, reference=water).without_repeats()
 
 
 def _flat(values: FloatArray, n_injections: int, n_pairs: int) -> FloatArray:
@@ -187,7 +188,7 @@ def read_pyeit(arrays: Arrays, source: str) -> Recording:
             f"expected v (n_frames, {count}), got {voltages.shape}: its protocol has {count} rows",
             where=source,
         )
-    return tables.voltages_of(source, voltages, rows, reference=reference)
+    return voltages_of(source, voltages, rows, reference=reference)
 
 
 def _rows(arrays: Arrays, source: str) -> tuple[IntArray, IntArray]:

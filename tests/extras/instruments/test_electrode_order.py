@@ -12,11 +12,11 @@ import pytest
 from scipy.io import savemat
 
 from tomoskin.core import DataError, FloatArray, IntArray, PatternError
+from tomoskin.extras.instruments import guess_skin, order_fault
 from tomoskin.files.imports import column_names, read_recording
 from tomoskin.model.pattern import Pattern
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, prepare, recorded_frames
-from tomoskin.pipeline.guess import guess_skin, order_fault
 
 N = 16
 RING = np.column_stack([np.arange(N), (np.arange(N) + 1) % N])

@@ -29,7 +29,7 @@ from tomoskin.core import (
     real_numbers,
     refuse_first,
 )
-from tomoskin.files.imports.tables import voltages_of
+from tomoskin.files.imports import voltages_of
 from tomoskin.sensing.signal import Recording, frame_times
 
 _N = 16

@@ -18,8 +18,8 @@ from scipy.io.matlab import MatlabObject, MatlabOpaque
 from scipy.sparse import issparse
 
 from tomoskin.core import Arrays, DataError, FloatArray, IntArray, check_fits, numeric
-from tomoskin.files.imports.interchange import BOARD_KNOWN
-from tomoskin.files.imports.tables import drives_of, pairs_of, voltages_of
+from tomoskin.extras.instruments.tables import drives_of, pairs_of
+from tomoskin.files.imports import BOARD_KNOWN, voltages_of
 from tomoskin.sensing.signal import Recording
 
 _HEAD = 128

@@ -8,7 +8,8 @@ from scipy.io import savemat
 from scipy.io.matlab import MatlabOpaque
 
 from tomoskin.core import DataError
-from tomoskin.files.imports import matlab, read_recording
+from tomoskin.extras.instruments import matlab
+from tomoskin.files.imports import read_recording
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.pattern import Pattern
 from tomoskin.model.skin import Skin
@@ -84,19 +85,6 @@ def test_sciospec_files_that_are_not_one_frame(tmp_path):
         path.write_text(wrong)
         with pytest.raises(DataError, match=message):
             read_recording(path)
-
-
-def test_complex_voltages_as_text(tmp_path):
-    path = tmp_path / "complex.csv"
-    path.write_text("time_s,v_1_0_2_3,v_1_0_3_4\n0,1.5,2\n1,1.5-0.2j,2+1e-1i\n2, ,-1j\n")
-    got = read_recording(path)
-    assert got.voltages[:2].tolist() == [[1.5, 2.0], [1.5 - 0.2j, 2 + 0.1j]]
-    assert np.isnan(got.voltages[2, 0])
-    assert got.voltages[2, 1] == -1j
-    assert got.time.tolist() == [0.0, 1.0, 2.0]
-    path.write_text("time_s,v_1_0_2_3\n1j,1.5\n")
-    with pytest.raises(DataError, match="real numbers in time_s"):
-        read_recording(path)
 
 
 def test_matlab_objects_are_refused_with_what_to_do(tmp_path, monkeypatch):

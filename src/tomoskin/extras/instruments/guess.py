@@ -15,7 +15,7 @@ from tomoskin.core import DataError, FloatArray, IntArray, PatternError
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.pattern import Pattern, electrodes_of, named, signed, undirected
 from tomoskin.model.skin import Skin
-from tomoskin.pipeline.frame_result import DOUBTED, ModelAgreement
+from tomoskin.pipeline import DOUBTED, ModelAgreement
 from tomoskin.sensing.signal import Recording
 
 _LARGEST = 32

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import DataError, IntArray
-from tomoskin.files.imports import tables
+from tomoskin.extras.instruments import tables
+from tomoskin.files.imports import voltages_of
 from tomoskin.sensing.signal import Recording
 
 _LISTED = 8
@@ -97,7 +98,7 @@ def read_eit_kit(lines: Iterable[str], source: str) -> Recording:
     rows, used = tables.adjacent_scan(_SIZES[n_values])
     origin = next((np.array(block.values)[used] for block in kept if block.is_origin), None)
     voltages = np.array(frames)[:, used]
-    return tables.voltages_of(source, voltages, rows, reference=origin, notes=skipped.notes())
+    return voltages_of(source, voltages, rows, reference=origin, notes=skipped.notes())
 
 
 def _blocks(lines: Iterable[str], skipped: Skipped) -> list[_Block]:
@@ -165,7 +166,7 @@ def read_open_eit(lines: Iterable[str], source: str) -> Recording:
             hint="numbers must have a decimal point, not a comma",
         )
     rows = rows_of(len(frames[0]))
-    recording = tables.voltages_of(source, np.array(frames), rows, notes=skipped.notes())
+    recording = voltages_of(source, np.array(frames), rows, notes=skipped.notes())
     return recording.without_repeats()
 
 
@@ -257,7 +258,7 @@ def read_serial_log(lines: Iterable[str], source: str) -> Recording:
 def _recording(frames: list[list[_Row]], skipped: Skipped, source: str) -> Recording:
     rows, used = tables.adjacent_scan(_N)
     values = np.array([[value for row in frame for value in row.values] for frame in frames])
-    return tables.voltages_of(
+    return voltages_of(
         source,
         _MILLI * values[:, used],
         rows,
@@ -360,4 +361,4 @@ def _potentials(
 def _of_injections(drives: IntArray, potentials: NDArray[np.complex128], source: str) -> Recording:
     rows, kept = tables.scan_of(drives, tables.neighbours(potentials.shape[1]))
     values = potentials - np.roll(potentials, -1, axis=1)
-    return tables.voltages_of(source, values.reshape(1, -1)[:, kept], rows)
+    return voltages_of(source, values.reshape(1, -1)[:, kept], rows)
