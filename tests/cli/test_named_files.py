@@ -79,7 +79,6 @@ CASES = {
     ("calibrate mapping", "out"): Case(
         "calibrate mapping {presses} --skin {skin} --out {out}", ".toml"
     ),
-    ("design", "out"): Case("design --skin {skin} --out {out}", ".png", ("--electrodes", "")),
     ("skin alpha", "out"): Case("skin alpha {skin} --rule light-touch --out {out}", ".png"),
     ("skin merit", "out"): Case("skin merit {skin} --out {out}", ".csv"),
     ("skin lay", "out"): Case("skin lay {surface} --electrodes {places} --out {out}", ".toml"),

@@ -4,10 +4,14 @@ of."""
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from tomoskin.cli.app import main as main
+from tomoskin.cli.app import group as group, main as main
 from tomoskin.cli.named_files import (
+    FIGURE as FIGURE,
     SKIN as SKIN,
+    TABLE as TABLE,
+    Added as Added,
     ForceFlag as ForceFlag,
+    Given as Given,
     Otherwise as Otherwise,
     Reads as Reads,
     Writes as Writes,
@@ -16,6 +20,8 @@ from tomoskin.cli.named_files import (
 if TYPE_CHECKING:
     from tomoskin.cli.choices import (
         chosen_sinks as chosen_sinks,
+        quantity as quantity,
+        say_headroom as say_headroom,
         skin_for_source as skin_for_source,
     )
     from tomoskin.cli.live import Served as Served, hub_of as hub_of
@@ -24,8 +30,15 @@ if TYPE_CHECKING:
         ImageOptions as ImageOptions,
         NamedSkinOption as NamedSkinOption,
         RecordingArgument as RecordingArgument,
+        SkinArgument as SkinArgument,
     )
-    from tomoskin.cli.output import Bar as Bar, remark as remark
+    from tomoskin.cli.output import (
+        Bar as Bar,
+        JsonFlag as JsonFlag,
+        remark as remark,
+        tables as tables,
+        tell as tell,
+    )
     from tomoskin.cli.record import troubles_told as troubles_told
 
 _LATER = ("options", "output", "choices", "record", "live")

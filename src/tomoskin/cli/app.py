@@ -35,7 +35,6 @@ COMMANDS = {
     "calibrate": "Learn a calibration from labelled presses, weights, classes or bends.",
     "locate": "Locate touches with a calibration: one per frame, or up to two with --several.",
     "classify": "Classify each frame with a calibration, or call it unknown.",
-    "design": "Predict what a skin can resolve before it is built.",
     "simulate": "Run a script on the twin into a session file, or simulate labelled frames.",
     "bench": "Measure speed on this machine.",
     "session": "Show, repair and convert recorded sessions.",

@@ -17,7 +17,7 @@ from tomoskin.sensing.fit import (
     row_covariance,
     spots_of,
 )
-from tomoskin.sensing.fit.bounds import detection_bound, fisher_information, least_content
+from tomoskin.sensing.fit.bound import fisher_information
 from tomoskin.sensing.signal import Readout
 
 ALONG = np.column_stack([np.linspace(0.0, 0.085, 8), np.zeros(8)])
@@ -59,9 +59,6 @@ def test_half_the_noise_is_a_quarter_of_the_covariance() -> None:
     half = Whitener.of(covariance() / 4)
     whole = position_bound(sheet(), spots, whitener())
     assert position_bound(sheet(), spots, half) == pytest.approx(whole / 4, rel=1e-6)
-    assert detection_bound(sheet(), spots, half) == pytest.approx(
-        2 * detection_bound(sheet(), spots, whitener())
-    )
 
 
 def test_knowing_size_and_strength_can_only_help() -> None:
@@ -77,13 +74,6 @@ def test_rows_that_share_a_sample_are_better_than_their_deviations_say() -> None
     alone = Whitener.of(np.sqrt(np.diag(covariance())))
     shared = position_bound(sheet(), spots, whitener())
     assert np.trace(position_bound(sheet(), spots, alone)[0]) > 2 * np.trace(shared[0])
-
-
-def test_the_least_press_is_as_large_as_asked() -> None:
-    spots = spots_of(ALONG[::4], 0.02, -0.01)
-    faint = spots.copy()
-    faint[:, 3] = least_content(sheet(), spots, whitener(), 5.0)
-    assert detection_bound(sheet(), faint, whitener()) == pytest.approx(5.0, rel=0.05)
 
 
 def test_data_that_say_nothing_bound_nothing() -> None:

@@ -4,7 +4,6 @@ from tomoskin.files.exports.curves import (
     write_choices as write_choices,
     write_merit as write_merit,
     write_merit_table as write_merit_table,
-    write_promise as write_promise,
 )
 from tomoskin.files.exports.export import Export as Export, ExportFormat as ExportFormat
 from tomoskin.files.exports.picture import (
@@ -12,7 +11,10 @@ from tomoskin.files.exports.picture import (
     MOST_PANELS as MOST_PANELS,
     Display as Display,
     Panel as Panel,
+    dress as dress,
+    new_figure as new_figure,
     plot as plot,
+    save_figure as save_figure,
     write_picture as write_picture,
 )
 from tomoskin.files.exports.session_export import (

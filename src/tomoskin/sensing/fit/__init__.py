@@ -1,12 +1,6 @@
 """Touches fitted to voltages by their parameters, with the exact forward model."""
 
-from tomoskin.sensing.fit.bounds import (
-    Demand as Demand,
-    ResolutionBounds as ResolutionBounds,
-    position_bound as position_bound,
-    resolution_bounds as resolution_bounds,
-    variants as variants,
-)
+from tomoskin.sensing.fit.bound import position_bound as position_bound
 from tomoskin.sensing.fit.drive_evidence import (
     DriveEvidence as DriveEvidence,
     DriveFilter as DriveFilter,
@@ -24,6 +18,12 @@ from tomoskin.sensing.fit.noise import (
 )
 from tomoskin.sensing.fit.policy import EXHAUSTIVE as EXHAUSTIVE, LIVE as LIVE, Pace as Pace
 from tomoskin.sensing.fit.sight import DriveView as DriveView, NoiseKey as NoiseKey
-from tomoskin.sensing.fit.spot import Response as Response, Spots as Spots, spots_of as spots_of
+from tomoskin.sensing.fit.spot import (
+    CONTENT as CONTENT,
+    N_PARAMETERS as N_PARAMETERS,
+    Response as Response,
+    Spots as Spots,
+    spots_of as spots_of,
+)
 from tomoskin.sensing.fit.spot_fit import SpotPrior as SpotPrior
 from tomoskin.sensing.fit.spot_model import SpotModel as SpotModel

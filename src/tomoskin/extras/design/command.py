@@ -8,10 +8,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tomoskin.cli.choices import quantity, say_headroom
-from tomoskin.cli.named_files import FIGURE, ForceFlag, Writes
-from tomoskin.cli.options import DEFAULT_SKIN, NamedSkinOption
-from tomoskin.cli.output import Bar, JsonFlag, tables, tell
+from tomoskin.cli import (
+    DEFAULT_SKIN,
+    FIGURE,
+    Bar,
+    ForceFlag,
+    JsonFlag,
+    NamedSkinOption,
+    Writes,
+    quantity,
+    say_headroom,
+    tables,
+    tell,
+)
 from tomoskin.core import DataError, TomoskinError
 
 if TYPE_CHECKING:
@@ -19,8 +28,8 @@ if TYPE_CHECKING:
 
     from rich.table import Table
 
+    from tomoskin.extras.design.bounds import Demand
     from tomoskin.model.skin import Skin
-    from tomoskin.sensing.fit import Demand
 
 _ELECTRODES = "8,16,32"
 _PATTERNS = "adjacent,skip:2,opposite"
@@ -61,7 +70,7 @@ class PressAsked:
         """On a ``skin``; DataError for a press that covers the sheet, which has no place."""
         import numpy as np
 
-        from tomoskin.sensing.fit import Demand
+        from tomoskin.extras.design.bounds import Demand
 
         radius = quantity(self.radius, "length", "--radius") if self.radius else None
         most = float(np.ptp(skin.mesh().points, axis=0)[:2].min()) / 2
@@ -92,14 +101,16 @@ def design(
     force: ForceFlag = False,
     json: JsonFlag = False,
 ) -> None:
-    """Bound what a skin can resolve, and compare it with variants.
+    """Predict what a skin can resolve before it is built.
+
+    Bounds of the skin, compared with variants.
 
     The bounds are for the position of a press and for the faintest press, with the skin's own
     read-out. No method can do better without more knowledge (Cramér–Rao).
     """
-    from tomoskin.files.exports import write_promise
+    from tomoskin.extras.design.bounds import resolution_bounds
+    from tomoskin.extras.design.design_map import write_promise
     from tomoskin.model.skin import Skin
-    from tomoskin.sensing.fit import resolution_bounds
 
     counts = _counts(electrodes)
     chosen = Skin.load(skin)
@@ -143,8 +154,8 @@ def _part(bar: Bar, number: int, jobs: int) -> Callable[[float, float], None]:
 def _compared(
     skin: Skin, demand: Demand, counts: list[int], patterns: list[str], bar: Bar
 ) -> list[dict[str, Any]]:
+    from tomoskin.extras.design.bounds import resolution_bounds, variants
     from tomoskin.model.pattern import Scan
-    from tomoskin.sensing.fit import resolution_bounds, variants
 
     rows: list[dict[str, Any]] = []
     jobs = 1 + len(counts) * len(patterns)

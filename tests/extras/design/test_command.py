@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from tomoskin.cli import design
 from tomoskin.core import DataError
+from tomoskin.extras.design import command as design
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -50,7 +50,7 @@ def test_without_matplotlib_it_says_so_before_the_work(
         raise AssertionError("the work has begun")
 
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    monkeypatch.setattr("tomoskin.sensing.fit.resolution_bounds", work)
+    monkeypatch.setattr("tomoskin.extras.design.bounds.resolution_bounds", work)
     code, out, err = tomoskin("design", "--out", tmp_path / "map.png", "--electrodes", "")
     assert (code, out) == (1, "")
     assert "needs matplotlib to write it, which is not installed" in err
@@ -63,7 +63,7 @@ def test_a_map_that_cannot_be_written_does_not_cost_the_table(
     def full(*_: object, **__: object) -> None:
         raise DataError("cannot be written: No space left on device")
 
-    monkeypatch.setattr("tomoskin.files.exports.write_promise", full)
+    monkeypatch.setattr("tomoskin.extras.design.design_map.write_promise", full)
     code, out, err = tomoskin("design", "--out", tmp_path / "map.png", "--electrodes", "")
     assert code == 1
     assert "No space left" in err

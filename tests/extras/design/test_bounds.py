@@ -7,21 +7,19 @@ from functools import cache
 import numpy as np
 import pytest
 
+from sensing.fit.test_bound import ALONG, covariance, sheet, whitener
 from tomoskin.core import ModelError
+from tomoskin.extras.design import Demand, ResolutionBounds, resolution_bounds, variants
+from tomoskin.extras.design.bounds import detection_bound, least_content
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.pattern import Scan
 from tomoskin.model.skin import Skin
 from tomoskin.sensing.fit import (
-    Demand,
-    ResolutionBounds,
     Response,
     Whitener,
-    resolution_bounds,
     row_covariance,
     spots_of,
-    variants,
 )
-from tomoskin.sensing.fit.bounds import detection_bound
 from tomoskin.sensing.signal import Readout
 
 PLACES = 40
@@ -155,3 +153,18 @@ def test_what_saturates_tells_nothing() -> None:
     np.testing.assert_allclose(found.rms, less.rms, rtol=1e-6)
     with pytest.raises(ModelError, match="a current of"):
         resolution_bounds(skin.altered({"readout": {"gain": 400}}), PRESS, 8)
+
+
+def test_the_least_press_is_as_large_as_asked() -> None:
+    spots = spots_of(ALONG[::4], 0.02, -0.01)
+    faint = spots.copy()
+    faint[:, 3] = least_content(sheet(), spots, whitener(), 5.0)
+    assert detection_bound(sheet(), faint, whitener()) == pytest.approx(5.0, rel=0.05)
+
+
+def test_half_the_noise_doubles_what_a_press_is_noticed_by() -> None:
+    spots = spots_of(ALONG, 0.02, -0.4)
+    half = Whitener.of(covariance() / 4)
+    assert detection_bound(sheet(), spots, half) == pytest.approx(
+        2 * detection_bound(sheet(), spots, whitener())
+    )
