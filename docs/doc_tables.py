@@ -9,12 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import fields
+from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from tomoskin.board.source import BOARDS
 from tomoskin.board.wire import SCHEMA
 from tomoskin.board.wire.schema import FieldSpec
+from tomoskin.core import extra_names
 from tomoskin.model.section import Key, Section, literal
 from tomoskin.model.skin import SECTIONS
 from tomoskin.twin import (
@@ -103,25 +106,18 @@ def _field_rows(fields: Iterable[FieldSpec], start: int) -> Iterator[list[str]]:
         start += field.size
 
 
-def robot_tables() -> str:
-    """The sections of a robot file, which an extra reads."""
-    from tomoskin.extras.robot import SECTIONS as ROBOT_SECTIONS  # noqa: PLC0415
-
-    return tables(ROBOT_SECTIONS.values())
-
-
-_PAGES: dict[str, Callable[[], str]] = {
+PAGES: dict[str, Callable[[], str]] = {
     "skin-file.md": lambda: tables(SECTIONS.values()),
     "simulate.md": lambda: tables(SCRIPT_SECTIONS.values()),
-    "extras/robot.md": robot_tables,
     "twin.md": parameter_tables,
     "protocol.md": schema_tables,
     "firmware.md": board_table,
 }
 
-
-PAGES = {page: made for page, made in _PAGES.items() if (FOLDER / page).is_file()}
-"""Those that are here: the page of an extra goes with it."""
+for extra in extra_names():
+    own = getattr(import_module(f"tomoskin.extras.{extra}"), "SECTIONS", ())
+    if own:
+        PAGES[f"extras/{extra}.md"] = partial(tables, getattr(own, "values", lambda: own)())
 
 
 def written(page: str) -> str:

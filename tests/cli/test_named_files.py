@@ -85,9 +85,6 @@ CASES = {
     ("session export", "out"): Case("session export {session} {out}", ".csv"),
     ("session export", "touches"): Case("session export {session} {other} --touches {out}", ".csv"),
     ("session import", "out"): Case("session import {presses} {out}", ".npz"),
-    ("simulate", "out"): Case(
-        "simulate --script {population} --skin {skin} --presses 1 --processes 1 --out {out}", ".npz"
-    ),
 }
 """One for each output that may be written over with --force; extras have theirs beside their
 tests."""
@@ -103,6 +100,11 @@ NEW_ONLY = {
 }
 """One for each output that is always a new recording."""
 
+if ("simulate", "out") not in CASES:
+    NEW_ONLY["simulate", "out"] = Case(
+        "simulate --script {script} --skin {skin} --out {out}", ".mcap"
+    )
+
 BOTH = [pytest.param(case, id=" ".join(name)) for name, case in (CASES | NEW_ONLY).items()]
 FORCED = [pytest.param(case, id=" ".join(name)) for name, case in CASES.items()]
 LONG = {"skin alpha out", "design out"}
@@ -117,7 +119,7 @@ def force(case: Case) -> tuple[str, ...]:
 
 NAMES = {
     "presses": ".npz", "bends": ".npz", "calibration": ".npz", "class": ".npz", "skin": ".toml",
-    "surface": ".stl", "places": ".csv", "session": ".mcap", "population": ".toml",
+    "surface": ".stl", "places": ".csv", "session": ".mcap", "script": ".toml",
     "rubbed": ".npz",
 }  # fmt: skip
 
@@ -139,7 +141,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     files = {name: folder / f"{name}{ending}" for name, ending in NAMES.items()}
     files["skin"].write_text(COARSE.to_toml())
     write_all(files["session"])
-    files["population"].write_text(examples("simulate.md")[1])
+    files["script"].write_text(examples("simulate.md")[0])
     np.savez(files["presses"], **presses())
     np.savez(files["rubbed"], **{key: v for key, v in presses(160).items() if key != "xy_m"})
     np.savez(files["bends"], **bends())
@@ -225,11 +227,11 @@ def test_where_nothing_can_be_written_is_said_before_the_work(
     tomoskin: Run, tmp_path: Path, broken: dict[str, Path], case: Case
 ) -> None:
     target = tmp_path / "no such folder" / f"x{case.ending}"
-    if not case.words.startswith("simulate"):  # which makes folders
+    folders = "--presses" in case.words  # it makes them, and may fill one
+    if not folders:
         code, _, err = tomoskin(*case.line(broken, target))
         assert (code, "there is no folder" in err) == (2, True)
     code, _, err = tomoskin(*case.line(broken, tmp_path))
-    folders = case.words.startswith("simulate")  # it may fill one
     assert ((code, "got a folder" in err) == (2, True)) != folders
     code, _, err = tomoskin(*case.line(broken, tmp_path / "x.doc"))
     assert (code, f"{case.ending} (" in err) == (2, True)
@@ -314,25 +316,6 @@ def test_the_parts_of_a_series_are_outputs_too(
     (tmp_path / "x_000001.vtu").write_text("mine")
     code, _, err = tomoskin("session", "export", broken["session"], tmp_path / f"x{ending}")
     assert (code, "x_000001.vtu: exists already" in err) == (2, True)
-
-
-def test_labelled_frames_stay_out_of_the_way_of_others(
-    tomoskin: Run, tmp_path: Path, whole: dict[str, Path]
-) -> None:
-    """A file of a shard's name that is no shard; and a file where a folder is to be."""
-    words = ("simulate", "--skin", whole["skin"], "--presses", "1", "--processes", "1")
-    part = tmp_path / "part-00000.npz"
-    np.savez(part, mine=np.ones(2))
-    mine = part.read_bytes()
-    code, _, err = tomoskin(*words, "--out", tmp_path)
-    assert (code, part.read_bytes(), "no part of a set" in err) == (2, mine, True)
-    code, _, err = tomoskin(*words, "--out", whole["skin"].with_suffix(""), "--force")
-    assert code == 0, err
-    (tmp_path / "set").write_text("mine")
-    code, _, err = tomoskin(*words, "--out", tmp_path / "set", "--force")
-    assert (code, "expected a name that ends in .npz" in err) == (2, True)
-    code, _, err = tomoskin(*words, "--out", tmp_path, "--force")
-    assert (code, part.read_bytes() != mine) == (0, True)
 
 
 def test_endings_are_those_of_what_writes() -> None:

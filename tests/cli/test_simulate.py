@@ -14,9 +14,8 @@ from tomoskin.cli.output import Bar
 from tomoskin.files.imports import read_recording
 from tomoskin.files.session import SessionReader
 from tomoskin.model.skin import Skin
-from tomoskin.twin.labelled import SHARD_FRAMES
 
-EXAMPLE, PRESSES_EXAMPLE = examples("simulate.md")
+(EXAMPLE,) = examples("simulate.md")
 
 SCRIPT = """format = 1
 [script]
@@ -64,35 +63,11 @@ def test_a_session_holds_frames_and_truth_and_is_the_same_again(tomoskin, script
     assert change[pressed].max() > 3 * change[~pressed][:5].max()  # idle frames: the noise of two
 
 
-@pytest.mark.slow
-def test_a_set_is_the_same_whoever_makes_it_and_goes_on(tomoskin, tmp_path):
-    n = SHARD_FRAMES + 2
-    common = ("simulate", "--presses", n, "--seed", 3, "--json")
-    one, two, single = tmp_path / "one", tmp_path / "two", tmp_path / "set.npz"
-    assert tomoskin(*common, "--out", one, "--processes", 1)[0] == 0
-    assert tomoskin(*common, "--out", two, "--processes", 2)[0] == 0
-    parts = ["part-00000.npz", "part-00001.npz"]
-    assert [(one / p).read_bytes() for p in parts] == [(two / p).read_bytes() for p in parts]
-    torn = (two / parts[1]).read_bytes()
-    (two / parts[1]).write_bytes(torn[:-100])
-    _, text, _ = tomoskin(*common, "--out", two, "--processes", 1)
-    assert (json.loads(text)["made"], json.loads(text)["found"]) == (1, 1)
-    assert (two / parts[1]).read_bytes() == torn
-    code, _, error = tomoskin("simulate", "--presses", n, "--seed", 4, "--out", one)
-    assert code == 2
-    assert "belongs to another set" in error
-    assert tomoskin(*common, "--out", single, "--processes", 1)[0] == 0
-    recording = read_recording(single)
-    assert len(recording) == n
-    assert np.hypot(*recording.labels.T).max() < 0.0951
-
-
 @pytest.mark.parametrize(
     ("text", "message"),
     [
         (SCRIPT.replace("3 N", "-3 N"), '[[press]] 1 "a" force'),
         (SCRIPT.replace("20 mm", "200 mm"), "off the skin"),
-        (PRESSES_EXAMPLE, "--presses N"),
     ],
 )
 def test_bad_scripts_leave_no_file(tomoskin, script, tmp_path, text, message):
@@ -113,8 +88,7 @@ class Stop(Bar):
 
 
 def test_ctrl_c(tomoskin, script, tmp_path, monkeypatch):
-    out, folder = tmp_path / "a.mcap", tmp_path / "set"
-    drawn = ("simulate", "--presses", 3, "--processes", 1, "--out", folder)
+    out = tmp_path / "a.mcap"
     with monkeypatch.context() as patch:
         patch.setattr(tomoskin_simulate, "Bar", Stop)
         code, _, error = tomoskin("simulate", "--script", script, "--out", out)
@@ -123,46 +97,27 @@ def test_ctrl_c(tomoskin, script, tmp_path, monkeypatch):
             f"tomoskin: stopped; {out} holds the simulation until then, "
             "and says that it was stopped\n",
         )
-        code, _, error = tomoskin(*drawn)
-        assert code == 1
-        assert "the same command continues from here" in error
     with SessionReader(out) as session:
         assert [note.text for note in session.notes()][-1].startswith("stopped after")
-    assert tomoskin(*drawn)[0] == 0
 
 
-@pytest.mark.parametrize("how", ["--script", "--presses"])
-def test_a_skin_whose_board_does_not_settle(tomoskin, script, tmp_path, how):
+def test_a_skin_whose_board_does_not_settle(tomoskin, script, tmp_path):
     skin = tmp_path / "fast.toml"
     text = Skin.load("textile-disc-8").to_toml()
     skin.write_text(text.replace('settling = "2 ms"', 'settling = "10 us"'), encoding="utf-8")
-    what = script if how == "--script" else 3
-    out = tmp_path / ("out.mcap" if how == "--script" else "out")
-    code, _, error = tomoskin("simulate", "--skin", skin, how, what, "--out", out)
+    out = tmp_path / "out.mcap"
+    code, _, error = tomoskin("simulate", "--skin", skin, "--script", script, "--out", out)
     assert code == 1
     assert f"{skin}: [readout] settling: expected at least 51 us, got 10 us" in error
     assert not out.exists()
 
 
-@pytest.mark.slow
-def test_a_cluster_that_is_not_there(tomoskin, tmp_path):
-    drawn = ("simulate", "--presses", 3, "--out", tmp_path / "set")
-    code, _, error = tomoskin(*drawn, "--cluster", "nonsense://")
-    assert code == 1
-    assert error.startswith("tomoskin: nonsense://: ")
-    assert tomoskin(*drawn, "--cluster", "tcp://127.0.0.1:1", "--processes", 2)[0] == 2
-
-
-def test_wrong_usage(tomoskin, script, tmp_path):
+def test_wrong_usage(tomoskin, tmp_path):
     out = ("--out", tmp_path / "x.mcap")
     assert tomoskin("simulate", *out)[0] == 2
-    assert tomoskin("simulate", "--script", script, "--processes", 2, *out)[0] == 2
     assert tomoskin("simulate", "--script", tmp_path / "none.toml", *out)[0] == 1
 
 
 def test_the_examples_of_the_page(tomoskin, script, tmp_path):
-    from tomoskin.twin import Population
-
-    Population.from_toml(PRESSES_EXAMPLE)
     script.write_text(EXAMPLE, encoding="utf-8")
     assert tomoskin("simulate", "--script", script, "--out", tmp_path / "x.mcap")[0] == 0

@@ -19,7 +19,6 @@ from tomoskin.files import exports, imports
 from tomoskin.files.exports import matlab_file, vtu
 from tomoskin.files.session import SessionReader
 from tomoskin.model.pattern import Pattern
-from tomoskin.run.labelled_frames import write_whole
 from tomoskin.sensing.signal import Recording
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -127,7 +126,6 @@ def writes(write: Callable[..., Any], *arguments: Any) -> Callable[..., None]:
 WRITERS: dict[str, Callable[..., None]] = {
     "x.toml": writes(core.write_text, "text"),
     "x.npz": writes(core.save_arrays, {"a": np.ones(2)}),
-    "whole.npz": writes(write_whole, {"a": np.ones(2)}),
     "interchange.npz": writes(imports.write_interchange, recording),
     "touches.csv": writes(exports.write_touches, ()),
     "merit.csv": writes(exports.write_merit_table, {}),

@@ -1,8 +1,9 @@
 """The command line: one module a command, and one line in ``app`` for each; what extras make theirs
 of."""
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 from tomoskin.cli.app import group as group, main as main
 from tomoskin.cli.named_files import (
@@ -16,6 +17,7 @@ from tomoskin.cli.named_files import (
     Reads as Reads,
     Writes as Writes,
 )
+from tomoskin.core import later
 
 if TYPE_CHECKING:
     from tomoskin.cli.choices import (
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
         ImageOptions as ImageOptions,
         NamedSkinOption as NamedSkinOption,
         RecordingArgument as RecordingArgument,
+        SimulateOptions as SimulateOptions,
         SkinArgument as SkinArgument,
     )
     from tomoskin.cli.output import (
@@ -41,14 +44,4 @@ if TYPE_CHECKING:
     )
     from tomoskin.cli.record import troubles_told as troubles_told
 
-_LATER = ("options", "output", "choices", "record", "live")
-"""Modules that are loaded when one of their names is first asked for: no command waits for what
-another one needs."""
-
-
-def __getattr__(name: str) -> Any:
-    for module in () if name.startswith("_") else _LATER:
-        later = import_module(f"tomoskin.cli.{module}")
-        if hasattr(later, name):
-            return globals().setdefault(name, getattr(later, name))
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+__getattr__ = later(__name__, "choices", "named_parts", "options", "output", "record", "live")

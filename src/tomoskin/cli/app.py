@@ -35,7 +35,7 @@ COMMANDS = {
     "calibrate": "Learn a calibration from labelled presses, weights, classes or bends.",
     "locate": "Locate touches with a calibration: one per frame, or up to two with --several.",
     "classify": "Classify each frame with a calibration, or call it unknown.",
-    "simulate": "Run a script on the twin into a session file, or simulate labelled frames.",
+    "simulate": "Run a script on the twin into a session file.",
     "bench": "Measure speed on this machine.",
     "session": "Show, repair and convert recorded sessions.",
     "skin": "List, show and check skins, and lay them on surfaces.",

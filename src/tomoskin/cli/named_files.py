@@ -108,7 +108,7 @@ def spread(command: Callable[..., None], name: str = "") -> Callable[..., None]:
     """
     hints = get_type_hints(command, include_extras=True)
     groups: dict[str, tuple[Any, ...]] = {
-        key: _added_to(name) if hint is Added else (hint,)
+        key: added_to(name) if hint is Added else (hint,)
         for key, hint in hints.items()
         if hint is Added or is_dataclass(hint)
     }
@@ -134,7 +134,7 @@ def spread(command: Callable[..., None], name: str = "") -> Callable[..., None]:
     return with_options(run, command, options)
 
 
-def _added_to(name: str) -> tuple[Any, ...]:
+def added_to(name: str) -> tuple[Any, ...]:
     """The records of options that are registered for the command of that ``name``."""
     entries = registered("options").values()
     return tuple(entry.load() for entry in entries if entry.name.rpartition(" ")[0] == name)

@@ -3,15 +3,17 @@ is in :mod:`tomoskin.cli.choices` and :mod:`tomoskin.cli.named_parts`."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import typer
 
-from tomoskin.cli.named_files import CALIBRATION, TABLE, Reads, Writes
+from tomoskin.cli.named_files import CALIBRATION, TABLE, Given, Reads, Writes
 
 if TYPE_CHECKING:
+    from tomoskin.core import Output
+    from tomoskin.model.skin import Skin
     from tomoskin.pipeline import Prepared
     from tomoskin.sensing.signal import Recording
 
@@ -103,3 +105,33 @@ class ImageOptions:
     def doubts(self, recording: Recording, prepared: Prepared) -> Iterable[str]:  # noqa: ARG002
         """What looks wrong with a recording, as sentences."""
         return ()
+
+
+class SimulateOptions:
+    """Base of options that are added to ``simulate``, and what else may be added to it.
+
+    Attributes
+    ----------
+    ENDINGS
+        Of files that it makes, and what each holds.
+    """
+
+    ENDINGS: ClassVar[Mapping[str, str]] = {}
+
+    @classmethod
+    def outputs(cls, out: Path, given: Given, called: str) -> list[Output] | None:  # noqa: ARG003
+        """The files that it writes to ``out`` where it is asked to; None where it is not."""
+        return None
+
+    def run(
+        self,
+        skin: Skin,
+        script: Path | None,
+        out: Path,
+        seed: int | None,
+        *,
+        json: bool,
+    ) -> bool:
+        """Do what these options ask for; False where they ask for nothing."""
+        del skin, script, out, seed, json
+        return False

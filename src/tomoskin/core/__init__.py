@@ -22,6 +22,7 @@ from tomoskin.core.errors import (
     meant_or_known as meant_or_known,
     no_such as no_such,
 )
+from tomoskin.core.later import later as later
 from tomoskin.core.seams import (
     Registered as Registered,
     Seam as Seam,

@@ -11,14 +11,6 @@ from tomoskin.run.commands import (
     StrictRequest as StrictRequest,
 )
 from tomoskin.run.flow import Snapshot as Snapshot
-from tomoskin.run.labelled_frames import (
-    Workers as Workers,
-    in_processes as in_processes,
-    in_this_process as in_this_process,
-    make_set as make_set,
-    on_cluster as on_cluster,
-    processors as processors,
-)
 from tomoskin.run.live_skin import (
     LiveSkin as LiveSkin,
     open_skin as open_skin,

@@ -31,13 +31,6 @@ from tomoskin.twin.held_scanning import (
     Question as Question,
     Setting as Setting,
 )
-from tomoskin.twin.labelled import (
-    COMMON_PRESSES as COMMON_PRESSES,
-    Population as Population,
-    SetPlan as SetPlan,
-    SteppedSkin as SteppedSkin,
-    make_shard as make_shard,
-)
 from tomoskin.twin.material import MaterialSettings as MaterialSettings
 from tomoskin.twin.presets import PRESETS as PRESETS, TwinSettings as TwinSettings
 from tomoskin.twin.probe import (
@@ -62,8 +55,10 @@ from tomoskin.twin.script import (
     check_script as check_script,
     check_settling as check_settling,
 )
+from tomoskin.twin.script_schema import FORMAT as FORMAT, SECTIONS as SECTIONS
 from tomoskin.twin.sheet import TwinSkin as TwinSkin
 from tomoskin.twin.source import (
+    Scans as Scans,
     SheetTransport as SheetTransport,
     TwinTransport as TwinTransport,
     make_electronics as make_electronics,
@@ -72,3 +67,4 @@ from tomoskin.twin.source import (
     read_board as read_board,
     read_settings as read_settings,
 )
+from tomoskin.twin.stepped import SteppedSkin as SteppedSkin

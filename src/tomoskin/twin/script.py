@@ -66,12 +66,6 @@ class Script:
         """
         with located("", ScriptError, SkinError):
             tables = toml_tables(text, source, schema.FORMAT, schema.SECTIONS)
-            if schema.PressesSection.section in tables:
-                raise ScriptError(
-                    "describes labelled frames, not a timeline",
-                    where=f"{source}: {schema.PressesSection.heading}",
-                    hint="give the number of frames: --presses N",
-                )
             head = schema.ScriptSection.read(tables.get("script", {}), f"{source}: [script]")
             presses = tuple(_press(s, w) for s, w in schema.PressSection.each(tables, source))
             faults = tuple(_fault(s, w) for s, w in schema.FaultSection.each(tables, source))

@@ -7,8 +7,6 @@ from typing import Any
 from tomoskin.model.section import (
     Choice,
     Number,
-    OneOrMore,
-    OneOrSpan,
     Quantity,
     Row,
     Section,
@@ -224,34 +222,6 @@ class MarkSection(Section, section="mark", many=True):
     text: str = key(Text(), "The note itself.")
 
 
-class PressesSection(Section, section="presses"):
-    """Distribution of labelled frames (`--presses N`), instead of a timeline. Every frame is drawn
-    independently. Every value of a range is equally likely."""
-
-    count: tuple[int, int] = key(OneOrSpan(Whole(0, 8)), "Number of presses at once.", default=1)
-    shapes: tuple[str, ...] = key(
-        OneOrMore(Choice(("circle", "square", "finger")), different=True),
-        "Shapes of the faces. All are equally likely.",
-        default="circle",
-    )
-    size: tuple[float, float] = key(
-        OneOrSpan(_SIZE),
-        "Radius of a circle, half the side of a square, or length of a fingertip. It is rounded "
-        "to 0.5 mm.",
-    )
-    force: tuple[float, float] = key(OneOrSpan(_FORCE), "Force of each press.")
-    hold: float = key(
-        Quantity("time", "s", 0.01, 3600),
-        "How long the sheet has been pressed. It creeps meanwhile.",
-        default="1 s",
-    )
-    margin: float = key(_GAP, "Smallest distance of a probe's middle from the rim.", default="5 mm")
-    apart: float = key(
-        _GAP, "Smallest distance between the middles of two probes.", default="40 mm"
-    )
-    preset: str | None = key(_PRESET, _PRESET_MEANING, default=None)
-
-
 SECTIONS: dict[str, type[Section]] = {
     one.section: one
     for one in (
@@ -261,7 +231,6 @@ SECTIONS: dict[str, type[Section]] = {
         StretchSection,
         FaultSection,
         MarkSection,
-        PressesSection,
     )
 }
 """Every section by its name, in the order of the documentation."""

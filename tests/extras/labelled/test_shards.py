@@ -10,17 +10,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import tomoskin.twin.labelled
 from tomoskin.core import ScriptError, SourceError
-from tomoskin.model.skin import Skin
-from tomoskin.run import (
+from tomoskin.extras.labelled import (
+    COMMON_PRESSES,
+    Population,
+    SetPlan,
     in_processes,
     in_this_process,
-    labelled_frames as labelled,
     make_set,
     on_cluster,
+    population,
+    shards as labelled,
 )
-from tomoskin.twin import COMMON_PRESSES, Population, SetPlan
+from tomoskin.model.skin import Skin
 
 SKIN = Skin.load("textile-disc-8").altered({"mesh": {"cells": 300}}).to_toml()
 CROWD = Population.read(
@@ -35,7 +37,7 @@ def quiet(done: int, total: int) -> None:
 @pytest.fixture
 def plan(monkeypatch: pytest.MonkeyPatch) -> SetPlan:
     """Seven frames in three shards."""
-    monkeypatch.setattr(tomoskin.twin.labelled, "SHARD_FRAMES", 3)
+    monkeypatch.setattr(population, "SHARD_FRAMES", 3)
     return SetPlan(SKIN, COMMON_PRESSES, "textile", 1, 7)
 
 
@@ -130,7 +132,7 @@ def test_ctrl_c_before_a_cluster(plan, whole, tmp_path, scheduler):
 
 
 def test_what_a_worker_of_a_cluster_cannot_do_is_said_here(scheduler, monkeypatch):
-    monkeypatch.setattr(tomoskin.twin.labelled, "_TRIES", 5)
+    monkeypatch.setattr(population, "_TRIES", 5)
     crowd = SetPlan(SKIN, CROWD, "textile", 1, 7)
     with pytest.raises(ScriptError, match="found no position 5 mm from the rim and 100 mm from"):
         list(on_cluster(scheduler)(crowd, [0]))

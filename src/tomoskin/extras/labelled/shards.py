@@ -29,7 +29,7 @@ from tomoskin.core import (
     load_arrays,
     save_arrays,
 )
-from tomoskin.twin import SetPlan, make_shard
+from tomoskin.extras.labelled.population import SetPlan, make_shard
 
 _PATIENCE = 10.0
 """Seconds for a scheduler to answer."""
@@ -140,7 +140,7 @@ def on_cluster(address: str) -> Workers:
 
     def run(plan: SetPlan, shards: Sequence[int]) -> Made:
         try:
-            from dask import distributed  # noqa: PLC0415
+            from dask import distributed
         except ImportError as error:
             raise SourceError(
                 "needs Dask's distributed", where=address, hint=install_hint("cluster")

@@ -1,13 +1,12 @@
-"""Without a clock, for programs that learn: labelled frames of presses drawn at random, and a twin
-that is pressed step by step."""
+"""Labelled frames: what presses are drawn from at random, and the frames of a set."""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any, NamedTuple, Self
+from typing import Any, Self
 
 import msgspec
 import numpy as np
@@ -15,22 +14,72 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from tomoskin import __version__
-from tomoskin.core import FloatArray, Frame, ScriptError, SkinError, Touch, located
+from tomoskin.core import FloatArray, ScriptError, SkinError, located
 from tomoskin.model.mesh import Outline
-from tomoskin.model.section import toml_tables
+from tomoskin.model.section import (
+    Choice,
+    OneOrMore,
+    OneOrSpan,
+    Quantity,
+    Section,
+    Whole,
+    key,
+    toml_tables,
+)
 from tomoskin.model.skin import Skin
-from tomoskin.pipeline import REFERENCE_FRAMES, FrameResult, Pipeline, Prepared
+from tomoskin.pipeline import REFERENCE_FRAMES
 from tomoskin.sensing.signal import Readout
-from tomoskin.twin.presets import TwinSettings
-from tomoskin.twin.probe import FACES, Probe
-from tomoskin.twin.script_schema import FORMAT, SECTIONS, PressesSection
-from tomoskin.twin.source import Scans
+from tomoskin.twin import (
+    FACES,
+    FORMAT,
+    PRESETS,
+    SECTIONS as SCRIPT_SECTIONS,
+    Probe,
+    Scans,
+    TwinSettings,
+)
+
+_GAP = Quantity("length", "mm", 0, 1000)
 
 _STEP = 0.5e-3
 """Half extents are rounded to this, m: the dent of a face is solved once and used again."""
 
 _TRIES = 2000
 """Places drawn for one probe before there is taken to be no room for it."""
+
+
+class PressesSection(Section, section="presses"):
+    """Distribution of labelled frames (`--presses N`), instead of a timeline. Every frame is drawn
+    independently. Every value of a range is equally likely."""
+
+    count: tuple[int, int] = key(OneOrSpan(Whole(0, 8)), "Number of presses at once.", default=1)
+    shapes: tuple[str, ...] = key(
+        OneOrMore(Choice(("circle", "square", "finger")), different=True),
+        "Shapes of the faces. All are equally likely.",
+        default="circle",
+    )
+    size: tuple[float, float] = key(
+        OneOrSpan(Quantity("length", "mm", 0.5, 1000)),
+        "Radius of a circle, half the side of a square, or length of a fingertip. It is rounded "
+        "to 0.5 mm.",
+    )
+    force: tuple[float, float] = key(
+        OneOrSpan(Quantity("force", "N", 0, 1000)), "Force of each press."
+    )
+    hold: float = key(
+        Quantity("time", "s", 0.01, 3600),
+        "How long the sheet has been pressed. It creeps meanwhile.",
+        default="1 s",
+    )
+    margin: float = key(_GAP, "Smallest distance of a probe's middle from the rim.", default="5 mm")
+    apart: float = key(
+        _GAP, "Smallest distance between the middles of two probes.", default="40 mm"
+    )
+    preset: str | None = key(
+        Choice(tuple(PRESETS)),
+        "The twin's material and board, instead of the skin's own.",
+        default=None,
+    )
 
 
 class Population(PressesSection):
@@ -49,7 +98,7 @@ class Population(PressesSection):
             For an unknown or missing key, or a value that cannot be meant.
         """
         with located("", ScriptError, SkinError):
-            tables = toml_tables(text, source, FORMAT, SECTIONS)
+            tables = toml_tables(text, source, FORMAT, [*SCRIPT_SECTIONS, cls.section])
             others = [name for name in tables if name != cls.section]
             if others or cls.section not in tables:
                 raise ScriptError(
@@ -104,6 +153,9 @@ class Population(PressesSection):
         face = FACES[shape](max(size, _STEP))
         return Probe(face, float(position[0]), float(position[1]), float(force), float(angle))
 
+
+SECTIONS = (PressesSection,)
+"""Sections of a script that are its own."""
 
 COMMON_PRESSES = Population(
     count=(1, 1),
@@ -260,94 +312,3 @@ def _labels(
         "angle_rad": angle,
         "shape": name,
     }
-
-
-class Step(NamedTuple):
-    """What one scan shows.
-
-    Attributes
-    ----------
-    voltages
-        (n_meas,) V.
-    touches
-        Tracked touches; empty where the voltages alone are asked for.
-    """
-
-    voltages: FloatArray
-    touches: tuple[Touch, ...]
-
-
-class SteppedSkin:
-    """Scan after scan of a twin, each under the presses that it is given.
-
-    A step is the time of one scan. There is neither board nor wire; the frames go through the
-    pipeline of a live run, so that touches are what a robot would be given.
-
-    Parameters
-    ----------
-    prepared
-        What was made once for the skin.
-    settings
-        Of the twin; without them those of the skin's preset. The seed is that of its channels
-        and spread, and of the first episode.
-    with_touches
-        Whether touches are looked for, which takes most of the time.
-
-    Attributes
-    ----------
-    period
-        Seconds of a scan.
-    frame, result
-        The newest scan as a board sends it, and all that the pipeline makes of it; None where the
-        voltages alone are asked for.
-    """
-
-    frame: Frame
-    result: FrameResult | None = None
-
-    def __init__(
-        self,
-        prepared: Prepared,
-        settings: TwinSettings | None = None,
-        *,
-        with_touches: bool = True,
-    ) -> None:
-        skin = prepared.skin
-        self._prepared, self._with_touches = prepared, with_touches
-        if with_touches:
-            prepared.warm_up()
-        self._seed = (settings or TwinSettings()).seed
-        self._scans = Scans(skin, settings or TwinSettings.preset(skin.twin.preset))
-        self.period = self._scans.table.seconds
-        self.reset()
-
-    def reset(self, seed: int | None = None) -> Step:
-        """Lift everything and forget the past; the last of the frames that make the reference.
-
-        ``seed``: of the episode's noise and temperature; without it that of the episode before.
-        """
-        self._seed = self._seed if seed is None else seed
-        self._scans.renew(np.random.SeedSequence(self._seed))
-        self._pipeline = Pipeline(self._prepared)
-        self._steps = 0
-        return [self.step(()) for _ in range(REFERENCE_FRAMES if self._with_touches else 1)][-1]
-
-    def step(self, presses: Sequence[Probe]) -> Step:
-        """One scan while ``presses`` press.
-
-        Raises
-        ------
-        GeometryError
-            When the centre of one is off the skin; then nothing is changed.
-        """
-        self._scans.electronics.sheet.set_presses(tuple(presses))
-        time = self._steps * self.period
-        self._steps += 1
-        self.frame = frame = self._scans.frame(self._steps, time)
-        if not self._with_touches:
-            return Step(self._prepared.readout(frame).values, ())
-        result = self._pipeline.push(frame)
-        if result is None:
-            raise AssertionError("a frame of the skin's own scan is never left out")
-        self.result = result
-        return Step(result.voltages, result.touches)
