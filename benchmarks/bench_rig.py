@@ -24,13 +24,10 @@ from tomoskin.run import Runner
 from tomoskin.server import AccessPolicy, Hub, Server, application, listen
 from tomoskin.server.settings_handlers import SettingsHandlers
 from tomoskin.twin import (
-    COMMON_PRESSES,
     Faults,
     Press,
-    SetPlan,
     SteppedSkin,
     TwinSettings,
-    make_shard,
 )
 from tomoskin.twin.source import Scans
 
@@ -149,6 +146,8 @@ def stage(electrodes: int) -> Prepared:
 
 def labelled_presses(skin: Skin, seed: int, count: int) -> tuple[Floats, Floats]:
     """(n, n_meas) V of single presses on the textile twin, and where they are, (n, 2) m."""
+    from tomoskin.extras.labelled import COMMON_PRESSES, SetPlan, make_shard
+
     made = make_shard(SetPlan(skin.to_toml(), COMMON_PRESSES, "textile", seed, count), 0)
     return made["voltages"] - made["reference"], made["xy_m"]
 

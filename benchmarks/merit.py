@@ -9,16 +9,8 @@ import numpy as np
 
 from report import Report, mm, table
 from tomoskin.core import ModelError
-from tomoskin.imaging import (
-    Greit,
-    LinearProblem,
-    Merit,
-    Spectrum,
-    Targets,
-    along,
-    figures,
-    noise_figure,
-)
+from tomoskin.extras.greit import Greit, Merit, Targets, along, figures
+from tomoskin.imaging import LinearProblem, Spectrum, noise_figure
 from tomoskin.imaging.choice import where_it_falls
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.skin import Skin

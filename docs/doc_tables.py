@@ -8,7 +8,7 @@ twin (twin.md), the messages between board and host (protocol.md), and the board
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import fields
+from dataclasses import fields, replace
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -18,8 +18,8 @@ from tomoskin.board.source import BOARDS
 from tomoskin.board.wire import SCHEMA
 from tomoskin.board.wire.schema import FieldSpec
 from tomoskin.core import extra_names
-from tomoskin.model.section import Key, Section, literal
-from tomoskin.model.skin import SECTIONS
+from tomoskin.model.section import Choice, Key, Section, literal
+from tomoskin.model.skin import METHODS, SECTIONS
 from tomoskin.twin import (
     PRESETS,
     BendSettings,
@@ -43,13 +43,25 @@ _STAGES = {
 """Title and settings of each stage of the twin, by its name in a preset."""
 
 
+_KEY_HEAD = ["key", "value", "default", "meaning"]
+
+
 def tables(sections: Iterable[type[Section]]) -> str:
     """Heading, meaning and table of keys of each section."""
     return "\n".join(
         f"## {section.heading}\n\n{section.meaning}\n\n"
-        + _table(["key", "value", "default", "meaning"], map(_key_row, section.keys))
+        + _table(_KEY_HEAD, map(_key_row, filter(None, map(_of_core, section.keys))))
         for section in sections
     )
+
+
+def _of_core(key: Key) -> Key | None:
+    """The key without the methods that extras add, whose own keys stand on their pages."""
+    if METHODS and key.options is METHODS:
+        first = key.meaning.split(f" {next(iter(METHODS))}: ")[0]
+        meaning = f"{first} Extras add others."
+        return replace(key, kind=Choice((str(key.default),)), meaning=meaning)
+    return None if key.when and set(key.when[1]) <= set(METHODS) else key
 
 
 def parameter_tables() -> str:

@@ -32,8 +32,8 @@ import figures
 from figure_file import chosen, parser_of
 from lab import report
 from tomoskin.core import FloatArray, written
+from tomoskin.extras.absolute import RandomField
 from tomoskin.files.imports import read_recording
-from tomoskin.imaging import RandomField
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Disc, ElectrodeArc, extrude, ring, triangulate
 from tomoskin.model.pattern import Pattern

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tomoskin.core import Detection, FloatArray, Image
-from tomoskin.imaging import ThesisMetrics
+from tomoskin.extras.greit import ThesisMetrics
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import prepare, reconstruct
 from tomoskin.sensing.segment import Segmenter

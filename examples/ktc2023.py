@@ -29,7 +29,13 @@ from scipy.spatial import cKDTree
 
 from tomoskin import core
 from tomoskin.core import CHANGE, DataError, FloatArray, TomoskinError
-from tomoskin.imaging import AbsoluteImaging, Observation, Segmented, ShapeImaging, homogeneous
+from tomoskin.extras.absolute import (
+    AbsoluteImaging,
+    Observation,
+    Segmented,
+    ShapeImaging,
+    homogeneous,
+)
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Disc, ElectrodeArc, Mesh, triangulate
 from tomoskin.model.pattern import Pattern

@@ -30,7 +30,7 @@ import figures
 from imaging import Imager
 from lab import FRAMES, Lab, in_front_of, open_lab, report
 from tomoskin.core import FloatArray
-from tomoskin.imaging import ThesisMetrics
+from tomoskin.extras.greit import ThesisMetrics
 from tomoskin.model.pattern import match_rows
 from tomoskin.twin import Circle, Probe
 

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from tomoskin.core import FloatArray
-from tomoskin.imaging import ShapeImaging
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.pattern import Pattern, Scan
 from tomoskin.model.skin import Skin
@@ -58,7 +57,6 @@ def given() -> dict[str, Any]:
         "drive": pattern.drive, "measure": pattern.measure,
         "detections": (), "time": 0.1, "host_time": 0.1,
         "sheet": TwinSkin.of(Skin.load("textile-square-16"), TwinSettings.preset("ideal", seed=1)),
-        "ShapeImaging": ShapeImaging,
     }  # fmt: skip
 
 
@@ -68,6 +66,11 @@ def test_what_a_page_takes_as_given_is_all_it_needs(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(DOCS.parent / "examples")
+    run_blocks(page, given)
+
+
+def run_blocks(page: str, given: dict[str, Any]) -> None:
+    """Run what a page shows, one block after the other."""
     names = dict(given)
     blocks = BLOCK.findall((DOCS / f"{page}.md").read_text(encoding="utf-8"))
     assert blocks

@@ -76,7 +76,7 @@ def test_a_press_is_found_where_it_was(save, image, tmp_path, reference) -> None
 def test_a_file_that_is_the_reference_is_read_once(
     save, image, frames, tmp_path, monkeypatch
 ) -> None:
-    """Whatever is made of the frames: smooth and sharp images, a longer search."""
+    """Whatever is made of the frames: images, a longer search."""
     read, own = [], imports.read_recording
 
     def noted(path):
@@ -85,7 +85,7 @@ def test_a_file_that_is_the_reference_is_read_once(
 
     monkeypatch.setattr(imports, "read_recording", noted)
     idle = save("idle.npz", voltages=frames[:3])
-    ways = "--sharp", "--thorough", tmp_path / "all.csv"
+    ways = "--thorough", tmp_path / "all.csv"
     assert image(save(), "--reference", idle, "--frames", "3:4", *ways)[0] == 0
     assert read.count(Path(idle)) == 1
 
@@ -390,7 +390,7 @@ def test_a_time_constant_needs_times_that_go_on(save, image) -> None:
         (("--reference", "banana"), "expected first:N, frame:K, previous or a file"),
         (("--reference", ""), 'expected first:N, frame:K, previous or a file, got ""'),
         (("--frames", "3:9"), "within 0:4"),
-        (("--skin", "tank-16"), "rows are not in the recording"),
+        (("--skin", "textile-disc-16"), "rows are not in the recording"),
         (("--skin", "nothing"), "built-in skins"),
     ],
 )

@@ -177,7 +177,9 @@ def test_it_replays_with_the_skin_in_the_file(start, refused, tmp_path):
     process = start("--port", "0", "--source", f"replay:{path}")
     assert process.stdout.readline().startswith(f"textile-disc-16 on replay:{path.name} ")
     assert end(process, signal.SIGTERM)[0] == 0
-    code, _, errors = refused("--port", "0", "--source", f"replay:{path}", "--skin", "tank-16")
+    code, _, errors = refused(
+        "--port", "0", "--source", f"replay:{path}", "--skin", "textile-disc-32"
+    )
     assert code == 1
     assert "leave out --skin" in errors
     code, _, errors = refused("--port", "0", "--source", "replay:none.mcap")

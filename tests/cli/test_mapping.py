@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from labelled_presses import labelled_presses
 from tomoskin.learning import ChannelMapping, ring_of
 from tomoskin.model.skin import Skin
-from tomoskin.twin import COMMON_PRESSES, SetPlan, make_shard
 
 NAME = "textile-disc-8"
 SKIN = Skin.load(NAME)
@@ -26,7 +26,7 @@ Run = Callable[..., tuple[int, str, str]]
 @pytest.fixture
 def presses(tmp_path: Path) -> Path:
     true = replace(WIRING, reversed=False).applied(SKIN)
-    arrays = make_shard(SetPlan(true.to_toml(), COMMON_PRESSES, "textile", 1, 12), 0)
+    arrays = labelled_presses(true, 1, 12)
     kept = {key: arrays[key] for key in KEYS}
     kept["voltages"], kept["reference"] = -kept["voltages"], -kept["reference"]
     path = tmp_path / "presses.npz"

@@ -80,7 +80,6 @@ CASES = {
         "calibrate mapping {presses} --skin {skin} --out {out}", ".toml"
     ),
     ("skin alpha", "out"): Case("skin alpha {skin} --rule light-touch --out {out}", ".png"),
-    ("skin merit", "out"): Case("skin merit {skin} --out {out}", ".csv"),
     ("skin lay", "out"): Case("skin lay {surface} --electrodes {places} --out {out}", ".toml"),
     ("session export", "out"): Case("session export {session} {out}", ".csv"),
     ("session export", "touches"): Case("session export {session} {other} --touches {out}", ".csv"),

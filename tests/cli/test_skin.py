@@ -15,7 +15,6 @@ def test_list(tomoskin):
         "textile-disc-16",
         "textile-disc-32",
         "textile-square-16",
-        "tank-16",
     ):
         assert name in out
 

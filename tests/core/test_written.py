@@ -128,7 +128,6 @@ WRITERS: dict[str, Callable[..., None]] = {
     "x.npz": writes(core.save_arrays, {"a": np.ones(2)}),
     "interchange.npz": writes(imports.write_interchange, recording),
     "touches.csv": writes(exports.write_touches, ()),
-    "merit.csv": writes(exports.write_merit_table, {}),
     "curves.png": writes(exports.write_choices, "none", ()),
     "x.vtu": writes(exports.write_vtu, SKIN.mesh, {}),
     "x.pvd": writes(vtu.write_series, SKIN.mesh, ()),

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from PIL import Image, ImageSequence
 
+pytest.importorskip("tomoskin.extras.absolute", reason="it uses an extra that is not here")
+
 
 @pytest.fixture
 def example(imported):

@@ -11,6 +11,8 @@ import pytest
 from tomoskin.core import DataError, WallClock
 from tomoskin.twin import TwinSettings, make_twin
 
+pytest.importorskip("tomoskin.extras.greit", reason="it uses an extra that is not here")
+
 MEASURED = [
     "fig52_potentials",
     "fig54_reference",

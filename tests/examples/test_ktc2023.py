@@ -16,6 +16,8 @@ from tomoskin.core import DataError, OutputError
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Disc, ElectrodeArc, triangulate
 
+pytest.importorskip("tomoskin.extras.absolute", reason="it uses an extra that is not here")
+
 FILE = Path(__file__).resolve().parents[2] / "examples" / "ktc2023.py"
 LEVELS = range(1, 8)
 

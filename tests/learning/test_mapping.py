@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
+from labelled_presses import labelled_presses
 from tomoskin.core import DataError, FloatArray
 from tomoskin.learning import ChannelMapping, ring_of, solve_channel_mapping
 from tomoskin.model.pattern import match_rows
 from tomoskin.model.skin import Skin
-from tomoskin.twin import COMMON_PRESSES, SetPlan, make_shard
 
 SKIN = Skin.load("textile-disc-8")
 RING = ring_of(SKIN)
@@ -36,7 +36,7 @@ def pressed(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Changes, labels and reference of a twin that is wired so."""
     true = replace(wiring, reversed=False).applied(SKIN)
-    arrays = make_shard(SetPlan(true.to_toml(), COMMON_PRESSES, "textile", seed, n), 0)
+    arrays = labelled_presses(true, seed, n)
     single = np.isfinite(arrays["xy_m"]).all(axis=1)
     sign = -1.0 if wiring.reversed else 1.0
     reference = sign * arrays["reference"]
@@ -167,7 +167,7 @@ def test_what_cannot_be_is_refused() -> None:
 def test_a_public_skin_is_oriented(data_dir: Path, steps: int) -> None:
     """Within one electrode of what the set's notes state, which is fitted to a few degrees."""
     place = {"count": 16, "first": "-99 deg", "order": "counter-clockwise", "width": "5 mm"}
-    skin = Skin.load("tank-16").altered(
+    skin = Skin.load("textile-disc-16").altered(
         {
             "outline": {"shape": "disc", "diameter": "170 mm"},
             "electrodes": place | {"positions": None},

@@ -83,31 +83,15 @@ def test_rows_of_zero_are_left_out_where_they_would_divide() -> None:
         assert np.isfinite(found.images).all()
 
 
-@pytest.mark.parametrize(
-    ("skin", "own"), [("textile-disc-16", "light-touch"), ("tank-16", "greit")]
-)
-def test_a_board_that_is_not_known_has_no_noise_to_predict(skin: str, own: str) -> None:
+def test_a_board_that_is_not_known_has_no_noise_to_predict() -> None:
     """The skin's own read-out chooses only for what it has recorded itself."""
-    made = prepared(skin=skin)
+    made = prepared()
     values = touched(made)
     rules = []
     for known in (False, True):
         one = replace(recording(made, values), board_known=known)
         rules.append(reconstruct(made, one, values[:1]).choice.rule)
-    assert rules == ["model-error", own]
-
-
-def test_a_trained_operator_shows_two_objects_of_another_board_apart() -> None:
-    """Their distance is that of objects in a tank of others that were one maximum."""
-    made = prepare(Skin.load("tank-16"))
-    ends = np.array([[-0.0425, -0.05], [0.0425, -0.05]])
-    sigma = np.full(len(made.mesh.cells), made.skin.conductivity)
-    far = [np.linalg.norm(made.mesh.centroids - p, axis=1) for p in (*ends, ends.mean(axis=0))]
-    sigma[np.minimum(*far[:2]) < 0.02] *= 0.5
-    values = np.array([made.model.solve(s).voltages for s in (made.skin.conductivity, sigma)])
-    image = reconstruct(made, recording(made, values), values[:1]).images[1]
-    one, other, middle = (-image[away < 0.012].mean() for away in far)
-    assert middle < 0.95 * min(one, other)
+    assert rules == ["model-error", "light-touch"]
 
 
 def test_changes_in_common_show_unless_idle_frames_have_them_too() -> None:

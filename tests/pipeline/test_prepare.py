@@ -7,15 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tomoskin.core import DataError, Detection, ModelError, SkinError
-from tomoskin.imaging import Greit, OneStep
+from tomoskin.core import DataError, Detection, ModelError
+from tomoskin.imaging import OneStep
 from tomoskin.learning import FORCE, AmountModel, LabelledPresses
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.pattern import Pattern
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import prepare
-from tomoskin.pipeline.rest import tuned_by_rule
 from tomoskin.sensing.segment import Segmenter
 
 PREPARED = prepare(Skin.load("textile-disc-8").altered({"inverse": {"alpha": 0.1}}))
@@ -38,25 +37,6 @@ def test_an_operator_of_another_pattern_with_as_many_rows() -> None:
 def test_a_segmenter_of_another_mesh() -> None:
     with pytest.raises(ModelError, match=f"the segmenter to mesh {MOVED.identity}"):
         replace(PREPARED, segmenter=Segmenter(MOVED, PREPARED.skin.touch))
-
-
-def test_a_greit_skin_is_prepared_with_the_trained_operator() -> None:
-    coarse = Skin.load("tank-16").altered({"mesh": {"cells": 600}})
-    prepared = prepare(coarse)
-    assert isinstance(prepared.operator, Greit)
-    assert (prepared.choice.rule, prepared.light_touch) == ("greit", None)
-    assert prepared.operator.noise_figure == coarse.inverse.noise_figure == 1.0
-    fewer = prepared.without(np.arange(5))
-    assert isinstance(fewer.operator, Greit)
-    assert fewer.operator.matrix.shape[1] == prepared.operator.matrix.shape[1] - 5
-
-
-def test_a_rule_cannot_choose_the_alpha_of_a_method_without_one() -> None:
-    prepared = prepare(Skin.load("tank-16").altered({"mesh": {"cells": 600}}))
-    with pytest.raises(ModelError, match=r'method "one-step".*"greit"'):
-        tuned_by_rule(prepared, "noise-figure", None)
-    with pytest.raises(SkinError, match=r"needs method"):
-        prepared.skin.altered({"inverse": {"alpha": 0.1}})
 
 
 def test_a_calibration_that_cannot_serve_with_new_settings_is_refused() -> None:

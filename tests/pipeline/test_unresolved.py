@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tomoskin.core import DataError, IntArray, ModelError
+from tomoskin.core import DataError, IntArray
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, Unresolved, prepare
 
 NONE = np.empty(0, np.int64)
-TRAINED = {"method": "greit", **dict.fromkeys(("prior", "alpha", "exponent", "time_constant"))}
 
 
 @pytest.fixture(scope="module")
@@ -42,9 +41,3 @@ def test_a_lost_electrode_leaves_more_open_beside_it(prepared: Prepared) -> None
     assert lost.max() > 0.1
     with pytest.raises(DataError, match="at least one row"):
         open_part(prepared, np.arange(prepared.pattern.n_meas))
-
-
-def test_a_trained_operator_has_no_prior(prepared: Prepared) -> None:
-    trained = prepare(prepared.skin.altered({"inverse": TRAINED}), prepared)
-    with pytest.raises(ModelError, match="a trained operator has no prior"):
-        open_part(trained)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from server.test_settings import Heard
-from tomoskin.pipeline import Unresolved, prepare
+from tomoskin.pipeline import Unresolved
 from tomoskin.server.hub import run_handlers
 from tomoskin.server.page_connection import Tasks
 from tomoskin.server.requests import AskUnresolved, decode_request
@@ -54,10 +54,3 @@ def test_before_the_first_frame_all_measurements_count(prepared, tmp_path):
     whole = asked(runner, tmp_path)
     runner.newest = None
     assert asked(runner, tmp_path) == whole
-
-
-def test_why_there_is_none_is_said(prepared, tmp_path):
-    method = {"method": "greit", **dict.fromkeys(("prior", "alpha", "exponent", "time_constant"))}
-    told = asked(at_one_moment(prepare(prepared.skin.altered({"inverse": method}))), tmp_path)
-    assert told["values"] is None
-    assert "a trained operator has no prior" in told["problem"]

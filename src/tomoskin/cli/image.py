@@ -64,14 +64,6 @@ class Tuned:
         ),
     ] = None
     calibration: options.CalibrationsOption = None
-    sharp: Annotated[
-        bool,
-        typer.Option(
-            "--sharp",
-            help="Images with edges, by total variation, instead of smooth ones; slower. Touches "
-            "stay as they are.",
-        ),
-    ] = False
 
     def of(self, skin: Skin) -> tuple[Skin, str | None]:
         """The skin with them, and the rule that is to choose alpha, if one was named."""
@@ -166,7 +158,7 @@ def image(
     """Write the images of a recording and the touches in them, or say what they are."""
     from tomoskin.files.exports import write_touches
     from tomoskin.files.imports import read_recording
-    from tomoskin.pipeline import ALONE, located_alone, prepare, sharpened, with_calibrations
+    from tomoskin.pipeline import ALONE, located_alone, prepare, with_calibrations
     from tomoskin.sensing.track import touch_spans
 
     own = skin_for_file(skin, recording)
@@ -186,9 +178,8 @@ def image(
     say_notes(given.data)
     with Bar("reconstructing") as bar:
         result = reconstructed(given, prepared, frames, bar, rule=rule)
-    if tuned.sharp:
-        with Bar("sharpening") as bar:
-            result = sharpened(result, prepared, given.data, given.against, bar)
+    for one in added:
+        result = one.changed(result, prepared, given.data, given.against)
     surface, measured = prepared.skin.surface, prepared.calibrations
     tables = {touches: result}
     if thorough is not None:

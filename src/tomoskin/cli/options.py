@@ -14,7 +14,7 @@ from tomoskin.cli.named_files import CALIBRATION, TABLE, Given, Reads, Writes
 if TYPE_CHECKING:
     from tomoskin.core import Output
     from tomoskin.model.skin import Skin
-    from tomoskin.pipeline import Prepared
+    from tomoskin.pipeline import Idle, Prepared, Reconstruction
     from tomoskin.sensing.signal import Recording
 
 DEFAULT_SKIN = "textile-disc-8"
@@ -105,6 +105,16 @@ class ImageOptions:
     def doubts(self, recording: Recording, prepared: Prepared) -> Iterable[str]:  # noqa: ARG002
         """What looks wrong with a recording, as sentences."""
         return ()
+
+    def changed(
+        self,
+        result: Reconstruction,
+        prepared: Prepared,  # noqa: ARG002
+        recording: Recording,  # noqa: ARG002
+        idle: Idle,  # noqa: ARG002
+    ) -> Reconstruction:
+        """Other images of the ``recording`` whose frames were held against ``idle``."""
+        return result
 
 
 class SimulateOptions:

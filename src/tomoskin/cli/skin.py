@@ -11,7 +11,7 @@ from tomoskin.cli.app import group
 from tomoskin.cli.named_files import SKIN, ForceFlag, Reads, Writes
 from tomoskin.cli.options import SkinArgument
 from tomoskin.cli.output import JsonFlag, remark, tell
-from tomoskin.cli.skin_figures import alpha, merit
+from tomoskin.cli.skin_figures import alpha
 from tomoskin.core import DIMENSIONS, DataError, SkinError, no_such, write_text
 
 if TYPE_CHECKING:
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 app = group("skin")
 app.command("alpha")(alpha)
-app.command("merit")(merit)
 
 
 @app.command("list")

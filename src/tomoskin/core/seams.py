@@ -23,6 +23,8 @@ from tomoskin.core.errors import DataError, no_such
 Seam = Literal[
     "sources",  # (argument, skin) -> Transport
     "sinks",  # argument -> Sink
+    "skins",  # a pathlib.Path of a skin file
+    "methods",  # a tomoskin.imaging.Method
     "readers",  # a tomoskin.files.imports.Format
     "exports",  # ".ending" of a session's files: a tomoskin.files.exports.ExportFormat
     "calibrations",  # a tomoskin.learning.Kind

@@ -14,7 +14,7 @@ from scipy.spatial.distance import cdist
 
 from tomoskin.core import DataError, FloatArray, ModelError, no_such, reach
 from tomoskin.imaging.linear.spectrum import Spectrum
-from tomoskin.imaging.trained.merit import deviations, noise_figure
+from tomoskin.imaging.noise_figure import deviations, noise_figure
 from tomoskin.model.mesh import Mesh
 
 RADIUS = 0.055

@@ -18,7 +18,6 @@ from tomoskin.pipeline.offline import (
     Gathered as Gathered,
     Reconstruction as Reconstruction,
     reconstruct as reconstruct,
-    sharpened as sharpened,
 )
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES as REFERENCE_FRAMES, Pipeline as Pipeline
 from tomoskin.pipeline.prepare import (

@@ -15,9 +15,9 @@ from tomoskin.board.source import Configuration, ScanSettings
 from tomoskin.core import DataError, FloatArray, Image, IntArray, ModelError, StrPath, reach
 from tomoskin.imaging import (
     AlphaChoice,
-    Greit,
     LightTouch,
     LinearProblem,
+    Method,
     Modes,
     Operator,
     Spectrum,
@@ -26,7 +26,7 @@ from tomoskin.learning import Calibration, Kind, load_calibration
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.pattern import Pattern, Scan
-from tomoskin.model.skin import Skin
+from tomoskin.model.skin import METHODS, Skin
 from tomoskin.sensing.fit import SpotModel
 from tomoskin.sensing.segment import ImageNoise, Segmenter
 from tomoskin.sensing.signal import Headroom, NuisanceSubspace, Readout, Reference, difference_noise
@@ -326,11 +326,20 @@ def _same_spots(one: Skin, other: Skin) -> bool:
     return _same_difference(one, other) and one.touch.sign == other.touch.sign
 
 
+def image_method(skin: Skin) -> Method | None:
+    """What makes the skin's images where it is not one step."""
+    method: Method | None = None
+    if skin.inverse.method in METHODS:
+        method = skin.inverse.record("method")
+    return method
+
+
 def _chosen(
     problem: LinearProblem, skin: Skin, readout: Readout, light_touch: LightTouch | None
 ) -> tuple[LightTouch | None, AlphaChoice, Operator]:
-    if skin.inverse.method == "greit":
-        return None, *_trained(problem.model, skin)
+    if (method := image_method(skin)) is not None:
+        made = method.operator(problem.model, skin.conductivity, problem.difference)
+        return None, *made
     alpha = skin.inverse.alpha
     if not isinstance(alpha, str):
         by_hand = AlphaChoice(alpha, "hand", "set by hand")
@@ -339,18 +348,6 @@ def _chosen(
     choice = light_touch(_predicted(problem, readout))
     choice = replace(choice, reason=f"{choice.reason}, as its read-out predicts it")
     return light_touch, choice, light_touch.spectrum.operator(choice.alpha)
-
-
-def _trained(model: ForwardModel, skin: Skin) -> tuple[AlphaChoice, Operator]:
-    figure = skin.inverse.noise_figure
-    operator = Greit(
-        model,
-        conductivity=skin.conductivity,
-        difference=skin.inverse.difference,
-        noise_figure=figure,
-    )
-    reason = f"trained operator, its noise weighed for a noise figure of {figure:g}"
-    return AlphaChoice(operator.noise_weight, "greit", reason), operator
 
 
 def _predicted(problem: LinearProblem, readout: Readout) -> FloatArray:

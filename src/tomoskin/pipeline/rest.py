@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, ModelError, Voltages
-from tomoskin.imaging import AlphaChoice, Greit, Spectrum, choose, for_recording
-from tomoskin.model.skin import InverseSettings
+from tomoskin.imaging import AlphaChoice, Spectrum, choose, for_recording
 from tomoskin.pipeline.frame_result import NO_AGREEMENT, ModelAgreement
-from tomoskin.pipeline.prepare import Prepared
+from tomoskin.pipeline.prepare import Prepared, image_method
 from tomoskin.sensing.fit import SpotModel
 from tomoskin.sensing.signal import Reference
 
@@ -195,14 +194,6 @@ def with_choice(prepared: Prepared, choice: AlphaChoice) -> Prepared:
     return replace(found, light_touch=None)
 
 
-_GREIT_ERROR = 0.003
-"""What a model gets wrong in a measurement, as a part of the data of a training target."""
-
-_GREIT_RADIUS = 0.125
-"""Radius with which targets are shown: objects nearer than two of them have one maximum. With so
-little noise it may be less than usual. Chosen of 0.15, 0.125, 0.1 and 0.075 on the rigs that the
-error was chosen by, and the even cases of KIT4: it alone loses none and shows no ghost."""
-
 _COMMON = 10.0
 """All voltages waver in common where their sum's variance is so many times that of noise."""
 
@@ -221,8 +212,11 @@ def tuned_by_file(prepared: Prepared, reference: Reference | None, frames: Float
         kept = prepared.skin.altered({"signal": {"common_modes": "kept"}})
         prepared = replace(prepared, skin=kept)
     inverse = prepared.skin.inverse
-    if inverse.method == "greit":
-        return _trained_by_file(prepared, reference)
+    if (method := image_method(prepared.skin)) is not None:
+        made = method.for_recording(prepared.operator, _weights(prepared, reference))
+        if made is None:
+            return prepared
+        return replace(prepared, choice=made[0], operator=made[1])
     if prepared.light_touch is None:
         return prepared
     problem = prepared.problem.weighed(inverse.record("prior"), _weights(prepared, reference))
@@ -249,19 +243,6 @@ def _weights(prepared: Prepared, reference: Reference | None) -> FloatArray:
     model, mean = np.abs(problem.reference), np.abs(reference.mean)
     measured = mean * (model @ mean / (mean @ mean))
     return np.asarray(np.minimum(model, np.maximum(measured, 1e-6 * model.max())) ** 2)
-
-
-def _trained_by_file(prepared: Prepared, reference: Reference | None) -> Prepared:
-    """The trained operator, where its noise figure is the usual one; it says what it rests on."""
-    operator = prepared.operator
-    figure = prepared.skin.inverse.noise_figure
-    if not isinstance(operator, Greit) or figure != InverseSettings.noise_figure:
-        return prepared
-    weight = _GREIT_ERROR**2 * prepared.pattern.n_meas
-    noise = 1.0 / np.sqrt(_weights(prepared, reference))
-    trained = operator.weighed(noise, weight, _GREIT_RADIUS)
-    reason = f"measurements are trusted to {100 * _GREIT_ERROR:g} % of a target's data"
-    return replace(prepared, operator=trained, choice=AlphaChoice(weight, "model-error", reason))
 
 
 _APART = 0.06

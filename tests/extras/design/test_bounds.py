@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from sensing.fit.test_bound import ALONG, covariance, sheet, whitener
+from sensing.fit.test_bound import ALONG, covariance, sheet, whitener  # type: ignore[attr-defined]
 from tomoskin.core import ModelError
 from tomoskin.extras.design import Demand, ResolutionBounds, resolution_bounds, variants
 from tomoskin.extras.design.bounds import detection_bound, least_content

@@ -18,6 +18,8 @@ from tomoskin.model.pattern import Pattern
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Prepared, prepare, recorded_frames
 
+pytest.importorskip("tomoskin.extras.greit", reason="the tank is a skin of another extra")
+
 N = 16
 RING = np.column_stack([np.arange(N), (np.arange(N) + 1) % N])
 SCAN = np.repeat(RING, N, axis=0), np.tile(RING, (N, 1))

@@ -17,6 +17,8 @@ from tomoskin.model.forward import ForwardModel
 from tomoskin.model.pattern import Pattern
 from tomoskin.model.skin import Skin
 
+pytest.importorskip("tomoskin.extras.greit", reason="the tank is a skin of another extra")
+
 
 def disc_of(n):
     """A round tank with ``n`` electrodes, the first at the top, clockwise."""

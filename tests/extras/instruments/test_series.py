@@ -15,6 +15,8 @@ from tomoskin.files.imports import read_recording
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Reconstruction, prepare, reconstruct
 
+pytest.importorskip("tomoskin.extras.greit", reason="the tank is a skin of another extra")
+
 pytestmark = pytest.mark.data
 
 RADIUS = 0.15

@@ -14,6 +14,8 @@ from tomoskin.model.forward import ForwardModel
 from tomoskin.model.pattern import Pattern
 from tomoskin.model.skin import Skin
 
+pytest.importorskip("tomoskin.extras.greit", reason="the tank is a skin of another extra")
+
 
 def kit4(factor=1.0):
     """A file of that tank: adjacent injections, then those of the first reversed."""

@@ -34,7 +34,7 @@ class Labelled(SimulateOptions):
             help="Simulate N labelled frames of random presses instead of a recording; --out is "
             "then a folder or FILE.npz.",
         ),
-    ] = (None,)
+    ] = None
     processes: Annotated[
         int | None,
         typer.Option(

@@ -1,10 +1,6 @@
 """Recordings, images and touches in the formats of other programs; pictures and films."""
 
-from tomoskin.files.exports.curves import (
-    write_choices as write_choices,
-    write_merit as write_merit,
-    write_merit_table as write_merit_table,
-)
+from tomoskin.files.exports.curves import write_choices as write_choices
 from tomoskin.files.exports.export import Export as Export, ExportFormat as ExportFormat
 from tomoskin.files.exports.picture import (
     FILMS as FILMS,

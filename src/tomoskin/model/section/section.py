@@ -228,7 +228,9 @@ def _add_parameters(cls: type[Section]) -> None:
                 raise TypeError(
                     f"{', '.join(words)}: {parameter} is a key of {cls.__name__} already"
                 )
-            of = replace(own, when=declared.when, effective=(name, words))
+            of = own
+            if own.when is None:
+                of = replace(own, when=declared.when, effective=(name, words))
             setattr(cls, parameter, field(default=default, metadata={"key": of}))
             annotations[parameter] = "Any"
     cls.__annotations__ = annotations

@@ -15,6 +15,7 @@ from tomoskin.model.skin.hysteresis import (
 )
 from tomoskin.model.skin.lay import lay as lay
 from tomoskin.model.skin.processing import (
+    METHODS as METHODS,
     InverseSettings as InverseSettings,
     TouchSettings as TouchSettings,
     regions_doubt as regions_doubt,

@@ -6,7 +6,15 @@ from importlib.resources import files
 from os import PathLike, fspath
 from pathlib import Path
 
-from tomoskin.core import EMPTY, SkinError, StrPath, meant, open_input
+from tomoskin.core import (
+    EMPTY,
+    SkinError,
+    StrPath,
+    meant,
+    open_input,
+    registered,
+    registered_one,
+)
 
 BUILT_IN = "built-in"
 """Source of the skins that come with tomoskin."""
@@ -16,10 +24,11 @@ _LARGEST = 1_000_000
 
 
 def built_in_names() -> tuple[str, ...]:
-    """Names of the built-in skins, sorted."""
+    """Names of the built-in skins and of those that are registered, sorted."""
     folder = files("tomoskin.model.skin") / "builtin"
     names = [entry.name.removesuffix(".toml") for entry in folder.iterdir()]
-    return tuple(sorted(name for name in names if not name.startswith("_")))
+    ours = (name for name in names if not name.startswith("_"))
+    return tuple(sorted({*ours, *registered("skins")}))
 
 
 def skin_text(skin: str | PathLike[str]) -> tuple[str, str]:
@@ -29,6 +38,8 @@ def skin_text(skin: str | PathLike[str]) -> tuple[str, str]:
     """
     if isinstance(skin, str) and skin in built_in_names():
         entry = files("tomoskin.model.skin") / "builtin" / f"{skin}.toml"
+        if (added := registered_one("skins", skin)) is not None:
+            entry = added.load()
         return entry.read_text(encoding="utf-8"), BUILT_IN
     path = Path(fspath(skin))
     try:

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+from tomoskin.core import registered
 from tomoskin.model.prior import PRIORS
 from tomoskin.model.section import Choice, Number, NumberOrWord, Quantity, Section, Whole, key
 
 _ONE_STEP = "one-step"
 _IN_IMAGE = ("method", ("image",))
+
+METHODS: dict[str, Any] = {name: one.load() for name, one in registered("methods").items()}
+"""What else than one step makes an image, by the word for it; see ``tomoskin.imaging.Method``."""
 
 
 class MeshSettings(Section, section="mesh"):
@@ -23,10 +29,11 @@ class InverseSettings(Section, section="inverse"):
     """How voltages become an image."""
 
     method: str = key(
-        Choice((_ONE_STEP, "greit")),
-        "one-step: the most likely image under a prior. greit: an operator trained to "
-        "show small targets as a stated response; truer positions, not sharper.",
+        Choice((_ONE_STEP, *METHODS)),
+        "one-step: the most likely image under a prior."
+        + "".join(f" {name}: {one.meaning}" for name, one in METHODS.items()),
         default=_ONE_STEP,
+        options=METHODS,
     )
     prior: str = key(
         Choice(tuple(PRIORS)),
@@ -41,12 +48,6 @@ class InverseSettings(Section, section="inverse"):
         "Weight of the prior; it enters squared. auto: chosen by the noise, for a light touch.",
         default="auto",
         method=_ONE_STEP,
-    )
-    noise_figure: float = key(
-        Number(0.1, 100),
-        "Ratio of the signal-to-noise ratio of the voltages to that of the image.",
-        default=1.0,
-        method="greit",
     )
     difference: str = key(
         Choice(("plain", "normalised")), "v − v_ref, or (v − v_ref)/|v_ref|.", default="plain"

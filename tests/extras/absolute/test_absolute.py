@@ -10,9 +10,9 @@ import pytest
 
 from shapes import box, disc, patched
 from tomoskin.core import DataError, FloatArray, ModelError
-from tomoskin.imaging import AbsoluteImaging, Observation, homogeneous
-from tomoskin.imaging.iterative.newton import Descent, Goal, descend, minimiser
-from tomoskin.imaging.iterative.unknowns import Joint, LinearMap, Unknowns, others
+from tomoskin.extras.absolute import AbsoluteImaging, Observation, homogeneous
+from tomoskin.extras.absolute.newton import Descent, Goal, descend, minimiser
+from tomoskin.extras.absolute.unknowns import Joint, LinearMap, Unknowns, others
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.pattern import Pattern

@@ -7,7 +7,8 @@ import pytest
 
 from shapes import box, disc, mapped, strip
 from tomoskin.core import FloatArray, ModelError
-from tomoskin.imaging import Observation, OneStep, SharpDifference
+from tomoskin.extras.absolute import Observation, SharpDifference
+from tomoskin.imaging import OneStep
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.pattern import Pattern

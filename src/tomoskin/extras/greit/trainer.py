@@ -20,8 +20,8 @@ from scipy.optimize import brentq
 from scipy.sparse import csr_array
 
 from tomoskin.core import FloatArray, ModelError, check_positive, refuse_first
-from tomoskin.imaging.linear.operator import Operator
-from tomoskin.imaging.trained.merit import Balls, Targets, centre_of, deviations, noise_figure
+from tomoskin.extras.greit.merit import Balls, Targets, centre_of
+from tomoskin.imaging import Operator, deviations, noise_figure
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Mesh
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tomoskin.core import DataError
-from tomoskin.imaging import Observation
+from tomoskin.extras.absolute import Observation
 
 N_MEAS = 6
 

@@ -20,9 +20,9 @@ from scipy.spatial.distance import cdist
 from scipy.special import expit, ndtr
 
 from tomoskin.core import FloatArray, ModelError, check_positive
-from tomoskin.imaging.iterative.absolute import Absolute, medium
-from tomoskin.imaging.iterative.newton import Goal, descend
-from tomoskin.imaging.iterative.unknowns import (
+from tomoskin.extras.absolute.absolute import Absolute, medium
+from tomoskin.extras.absolute.newton import Goal, descend
+from tomoskin.extras.absolute.unknowns import (
     BACKGROUND_SPREAD,
     Contacts,
     Joint,

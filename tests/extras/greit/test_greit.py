@@ -12,9 +12,10 @@ from scipy.optimize import brentq
 from golden import mismatch
 from shapes import box, disc, patched
 from tomoskin.core import DataError, FloatArray, ModelError
-from tomoskin.imaging import Greit, Merit, OneStep, Targets, along, figures
-from tomoskin.imaging.trained.merit import Balls
-from tomoskin.imaging.trained.trainer import DESIRED_RADIUS
+from tomoskin.extras.greit import Greit, Merit, Targets, along, figures
+from tomoskin.extras.greit.merit import Balls
+from tomoskin.extras.greit.trainer import DESIRED_RADIUS
+from tomoskin.imaging import OneStep
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import ElectrodeArc, Mesh, Rectangle, triangulate
 from tomoskin.model.pattern import Pattern

@@ -11,9 +11,14 @@ from scipy.spatial.distance import cdist
 
 from shapes import box, disc
 from tomoskin.core import DataError, FloatArray, ModelError
-from tomoskin.imaging import Observation, RandomField, Segmented, ShapeImaging
-from tomoskin.imaging.iterative import shapes as shapes_module
-from tomoskin.imaging.iterative.shapes import BACKGROUND, LESS, MORE, Phases
+from tomoskin.extras.absolute import (
+    Observation,
+    RandomField,
+    Segmented,
+    ShapeImaging,
+    shapes as shapes_module,
+)
+from tomoskin.extras.absolute.shapes import BACKGROUND, LESS, MORE, Phases
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.pattern import Pattern

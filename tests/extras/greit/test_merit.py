@@ -13,8 +13,9 @@ import pytest
 from golden import SHARED, Golden, mismatch
 from shapes import box, disc, mapped
 from tomoskin.core import DataError, FloatArray, ModelError
-from tomoskin.imaging import Merit, OneStep, Operator, Targets, along, figures, noise_figure
-from tomoskin.imaging.trained.merit import Balls
+from tomoskin.extras.greit import Merit, Targets, along, figures
+from tomoskin.extras.greit.merit import Balls
+from tomoskin.imaging import OneStep, Operator, noise_figure
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.pattern import Pattern

@@ -10,7 +10,7 @@ from hypothesis import given, strategies as st
 
 from shapes import box, grid
 from tomoskin.core import DataError, FloatArray, Image
-from tomoskin.imaging import ThesisMetrics
+from tomoskin.extras.greit import ThesisMetrics
 from tomoskin.model.mesh import Mesh
 
 

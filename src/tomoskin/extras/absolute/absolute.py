@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tomoskin.core import FloatArray, Image, ModelError, check_positive
-from tomoskin.imaging.iterative.newton import Descent, Goal, descend
-from tomoskin.imaging.iterative.unknowns import (
+from tomoskin.extras.absolute.newton import Descent, Goal, descend
+from tomoskin.extras.absolute.unknowns import (
     Contacts,
     ImageMap,
     Joint,

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from tomoskin.core import DataError
-from tomoskin.files.exports import write_merit, write_merit_table
-from tomoskin.imaging import Merit
+from tomoskin.extras.greit import Merit
+from tomoskin.extras.greit.merit_curves import write_merit, write_merit_table
 
 LINE = np.linspace(0, 0.08, 5)
 MERIT = Merit(LINE, 1 + LINE, -LINE, LINE, 3 * LINE, 0.1 + LINE, np.full(5, np.nan), 0.7)

@@ -1,1 +1,0 @@
-"""Imaging by iteration: absolute, segmented, and difference images with sharp edges."""
