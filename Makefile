@@ -36,7 +36,7 @@ suite: programs native page
 
 firmware-test: dev  ## the firmware alone: GoogleTest, mutants, host build, emulator
 	@sh scripts/firmware.sh
-	@$(PY) -m pytest -m "" tests/firmware tests/twin/emulator tests/board/wire/test_fuzz.py $(ARGS)
+	@$(PY) -m pytest -m "" tests/firmware tests/board/wire/test_fuzz.py $(ARGS)
 
 fuzz: dev  ## ten million mutated streams through the parsers of board and host; ten minutes
 	@sh scripts/firmware.sh
@@ -104,7 +104,7 @@ lock: dev  ## pin the newest packages, with hashes, in requirements/*.txt
 	@for out in $(LOCKS); do $(MAKE) --no-print-directory lock-$$out || exit 1; done
 
 clean:  ## remove everything that make made
-	rm -rf $(VENV) build dist src/tomoskin/server/static src/tomoskin/twin/emulator/images web/node_modules
+	rm -rf $(VENV) build dist src/tomoskin/server/static firmware/emulator/tomoskin_emulator/images web/node_modules
 	rm -rf .mypy_cache .ruff_cache .pytest_cache .hypothesis
 
 # Set-up. A stamp's time says when its step was last done.

@@ -17,8 +17,8 @@ from tomoskin.board.source import BOARDS, Link, ScanSettings, SerialTransport, T
 from tomoskin.core import Event, Frame
 from tomoskin.model.pattern import Pattern, Scan
 from tomoskin.sensing.signal import FIGURES
-from tomoskin.twin.emulator.board_process import BoardProcess, Front, OwnVoltages, SkinMemory
-from tomoskin.twin.emulator.program import programs_of
+from tomoskin_emulator.board_process import BoardProcess, Front, OwnVoltages, SkinMemory
+from tomoskin_emulator.program import programs_of
 
 FRAMES, PICO_FRAMES, CHOPPED_FRAMES = 100_000, 2_000, 100
 """Of a case of the Mega, of the Pico, and with alternating drive."""

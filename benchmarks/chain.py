@@ -29,9 +29,9 @@ from tomoskin.pipeline import FrameResult, Prepared, prepare
 from tomoskin.run import LiveSkin, Runner, commands
 from tomoskin.run.sinks import Contacts
 from tomoskin.twin import Press, TwinSettings, TwinSkin
-from tomoskin.twin.emulator.board_process import SkinMemory
-from tomoskin.twin.emulator.program import BUILD, make_firmware
-from tomoskin.twin.emulator.source import front_of
+from tomoskin_emulator.board_process import SkinMemory
+from tomoskin_emulator.program import BUILD, make_firmware
+from tomoskin_emulator.source import front_of
 
 SKIN, SEED = "textile-disc-8", 5
 SETTLING = "228 us"

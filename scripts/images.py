@@ -27,7 +27,8 @@ def build(root: Path) -> None:
         When a build fails, or a compiler is missing: the other boards' images are there, stale
         ones are removed.
     """
-    folder, firmware = root / "src" / "tomoskin" / "twin" / "emulator" / "images", root / "firmware"
+    firmware = root / "firmware"
+    folder = firmware / "emulator" / "tomoskin_emulator" / "images"
     table = root / "src" / "tomoskin" / "board" / "source" / "boards.toml"
     boards = [
         board for board in tomllib.loads(table.read_text("utf-8")).values() if "firmware" in board

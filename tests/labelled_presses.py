@@ -19,12 +19,14 @@ def labelled_presses(skin: Skin, seed: int, n: int) -> dict[str, NDArray[Any]]:
     """Arrays of an interchange file: ``n`` frames, each of a sheet that nothing pressed before."""
     scans = Scans(skin, TwinSettings.preset("textile", seed))
     readout, sheet = Readout.of(scans.scan, skin.readout), scans.electronics.sheet
-    random, reach = np.random.default_rng(seed), 0.9 * skin.outline.radius
+    random = np.random.default_rng(seed)
+    reach = 0.9 * np.linalg.norm(skin.electrode_centres, axis=1).min()
     turn, far = random.uniform(0, 2 * np.pi, n), reach * np.sqrt(random.random(n))
     xy = far[:, None] * np.c_[np.cos(turn), np.sin(turn)]
     sizes = 0.5e-3 * np.round(random.uniform(16, 40, n))
     forces = random.uniform(1.0, 8.0, n)
-    pressed = [[Press(*at, f, size)] for at, f, size in zip(xy, forces, sizes, strict=True)]
+    drawn = zip(xy.tolist(), forces.tolist(), sizes.tolist(), strict=True)
+    pressed = [[Press(x, y, force, size)] for (x, y), force, size in drawn]
     read = []
     for number, presses in enumerate([*[[]] * 20, *pressed], start=1):
         sheet.renew()

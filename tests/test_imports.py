@@ -22,7 +22,7 @@ UNITS = {
     "sensing": ("signal", "track", "segment", "fit"),
     "learning": (),
     "pipeline": (),
-    "twin": (".", "emulator"),
+    "twin": (),
     "files": ("messages", "session", "imports", "exports"),
     "run": ("sinks", "."),
     "server": (),

@@ -75,7 +75,7 @@ def test_every_entry_point_leads_to_a_function() -> None:
 PACKAGES = (
     *("core", "model.mesh", "model.pattern", "model.skin", "model.forward"),
     *("imaging", "board.wire", "board.source", "sensing.signal", "sensing.track"),
-    *("sensing.segment", "sensing.fit", "learning", "pipeline", "twin", "twin.emulator"),
+    *("sensing.segment", "sensing.fit", "learning", "pipeline", "twin"),
     *("files.messages", "files.session", "files.imports", "files.exports", "run.sinks", "run"),
 )
 

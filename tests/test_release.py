@@ -17,14 +17,14 @@ from types import ModuleType
 import pytest
 
 from conftest import missing
+from firmware.emulator.pico import check_boot
 from tomoskin import __version__
-from twin.emulator.pico import check_boot
 
 pytestmark = pytest.mark.slow  # make release looks at the same
 
 ROOT = Path(__file__).resolve().parent.parent
 STATIC = "tomoskin/server/static/"
-IMAGES = "tomoskin/twin/emulator/images/"
+IMAGES = "tomoskin_emulator/images/"
 MOST_MB = 6.0
 
 

@@ -19,7 +19,7 @@ struct skin_faults {
     uint8_t reading[SKIN_MOST];
 };
 
-/* A seqlock: `sequence` is odd while the rest is written. Python: tomoskin.twin.emulator.memory. */
+/* A seqlock: `sequence` is odd while the rest is written. Python: tomoskin_emulator.memory. */
 struct skin_memory {
     uint64_t magic;
     uint32_t sequence;

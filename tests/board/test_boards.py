@@ -34,9 +34,9 @@ from tomoskin.twin import Board, ElectronicsSettings, Faults, SampleTable, TwinT
 from tomoskin.twin.circuit import line_potentials
 from tomoskin.twin.device import TwinDevice
 from tomoskin.twin.electronics import convert
-from tomoskin.twin.emulator import build_firmware, program
-from tomoskin.twin.emulator.program import programs_of
 from tomoskin.twin.source import read_board
+from tomoskin_emulator import build_firmware, program
+from tomoskin_emulator.program import programs_of
 
 TEXT = files("tomoskin.board.source").joinpath("boards.toml").read_text(encoding="utf-8")
 THIRD = """

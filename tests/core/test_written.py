@@ -183,9 +183,6 @@ def test_a_series_asks_for_its_parts_too(tmp_path: Path) -> None:
 OWN_WAYS = {
     "core/written.py": "the way",
     "files/session/session_writer.py": "a session, while it happens, into a file that must be new",
-    "twin/emulator/program.py": "a lock beside what make builds",
-    "twin/emulator/board_process.py": "in a temporary folder of its own",
-    "twin/emulator/flash.py": "in a temporary folder of its own",
 }
 OPENERS = {"write_text", "write_bytes", "savefig", "savemat", "ParquetWriter", "mkstemp", "File"}
 

@@ -14,7 +14,7 @@ import numpy as np
 from tomoskin.board.source import ScanSettings
 from tomoskin.board.wire import Decoder, Message, encode
 from tomoskin.model.pattern import Pattern, Scan
-from tomoskin.twin.emulator.program import build_alone
+from tomoskin_emulator.program import build_alone
 
 ROOT = Path(__file__).parents[2]
 FIRMWARE = ROOT / "firmware"

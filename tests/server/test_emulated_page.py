@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
+from firmware.emulator.conftest import programs
 from server.serving import Site
 from server.watching import distance
 from tomoskin.run import Runner
 from tomoskin.server.handlers import TwinHandlers
-from tomoskin.twin.emulator.source import open_emulator
-from twin.emulator.conftest import programs
+from tomoskin_emulator.source import open_emulator
 
 __all__ = ["programs"]
 
@@ -20,7 +20,7 @@ PLACE = (0.03, 0.02)
 
 @pytest.fixture
 def site(programs, prepared, monkeypatch):
-    monkeypatch.setattr("tomoskin.twin.emulator.source.programs_of", lambda _: programs)
+    monkeypatch.setattr("tomoskin_emulator.source.programs_of", lambda _: programs)
     runner = Runner(prepared, lambda: open_emulator("seed=1", prepared.skin))
     runner.start()
     site = Site(runner, take=TwinHandlers)

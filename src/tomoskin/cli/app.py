@@ -39,7 +39,6 @@ COMMANDS = {
     "bench": "Measure speed on this machine.",
     "session": "Show, repair and convert recorded sessions.",
     "skin": "List, show and check skins, and lay them on surfaces.",
-    "firmware": "Build, flash and emulate the board's firmware.",
     "board": "Check a newly built board before a skin is connected.",
     "doctor": "Check this installation: versions, page, sources, sinks, skins, ports.",
 }

@@ -12,6 +12,7 @@ from tomoskin.board.source import BOARDS, DEFAULT_BOARD
 from tomoskin.cli.app import group
 from tomoskin.cli.choices import quantity
 from tomoskin.cli.output import JsonFlag, concluded
+from tomoskin.core import registered_one
 
 if TYPE_CHECKING:
     from tomoskin.board.source import Transport
@@ -77,8 +78,8 @@ def _findings(
 
     if meter:
         yield from _readings(current, channels, read)
-    name, _, board = source.partition(":")
-    record = BOARDS.get(board if name == "emulator" else "", BOARDS[DEFAULT_BOARD])
+    _, _, board = source.partition(":")
+    record = BOARDS.get(board, BOARDS[DEFAULT_BOARD])
     ring = LoadRing.for_current(channels, current, record.ring_drop)
     with _opened(source, ring, current) as transport:
         yield from check_board(transport, ring, current, five_volts=read.get(FIVE))
@@ -123,11 +124,10 @@ def _asked(question: str) -> float | None:
 def _opened(source: str, ring: LoadRing, current: float) -> Iterator[Transport]:
     from tomoskin.board.source import open_source
     from tomoskin.model.skin import Skin
-    from tomoskin.twin.emulator import emulate_load
 
-    name, _, board = source.partition(":")
-    if name == "emulator" and (board or DEFAULT_BOARD) in BOARDS:
-        with emulate_load(ring.resistance, current, board or DEFAULT_BOARD) as transport:
+    name, _, argument = source.partition(":")
+    if (entry := registered_one("loads", name)) is not None:
+        with entry.load()(argument, ring.resistance, current) as transport:
             yield transport
         return
     transport = open_source(source, Skin.load("textile-disc-8"))

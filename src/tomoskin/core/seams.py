@@ -22,6 +22,7 @@ from tomoskin.core.errors import DataError, no_such
 
 Seam = Literal[
     "sources",  # (argument, skin) -> Transport
+    "loads",  # (argument, transfer resistances, current) -> a context of the Transport of a board
     "sinks",  # argument -> Sink
     "skins",  # a pathlib.Path of a skin file
     "methods",  # a tomoskin.imaging.Method

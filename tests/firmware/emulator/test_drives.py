@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from firmware.boards import running, star_counts
+from firmware.emulator.pico import powered, star
+from firmware.emulator.test_emulator import PATIENCE
+from firmware.emulator.watch import CLOCK, Watch
 from tomoskin.board.source import Link, ScanSettings, SerialTransport
 from tomoskin.core import DriveSamples, Event, Frame
 from tomoskin.model.pattern import Pattern, Scan
-from tomoskin.twin.emulator.program import PicoPrograms, Programs
-from twin.emulator.pico import powered, star
-from twin.emulator.test_emulator import PATIENCE
-from twin.emulator.watch import CLOCK, Watch
+from tomoskin_emulator.program import PicoPrograms, Programs
 
 SINGLY = ScanSettings(4, 200e-6, current_limit=0.1, adc_bits=10, singly=True)
 

@@ -15,10 +15,10 @@ from tomoskin.cli.app import app
 from tomoskin.core import Frame, SourceError
 from tomoskin.model.skin import Skin
 from tomoskin.twin import Press, TwinSettings, TwinSkin
-from tomoskin.twin.emulator import EmulatorTransport, emulate_board, program as building
-from tomoskin.twin.emulator.board_process import Front, SkinMemory
-from tomoskin.twin.emulator.program import Programs
-from tomoskin.twin.emulator.source import front_of, open_emulator
+from tomoskin_emulator import EmulatorTransport, emulate_board, program as building
+from tomoskin_emulator.board_process import Front, SkinMemory
+from tomoskin_emulator.program import Programs
+from tomoskin_emulator.source import front_of, open_emulator
 
 PATIENCE = 120.0
 
@@ -88,7 +88,7 @@ def test_stop_and_closing_end_it(programs: Programs, skin: Skin, quiet: TwinSett
 
 
 def test_the_skins_own_scan(programs: Programs, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tomoskin.twin.emulator.source.programs_of", lambda _: programs)
+    monkeypatch.setattr("tomoskin_emulator.source.programs_of", lambda _: programs)
     skin = Skin.load("textile-disc-8")
     with Link(open_emulator("seed=2", skin), SCAN, ScanSettings.of(skin)) as link:
         assert link.connect().unique_id == b"emulated"
@@ -126,7 +126,7 @@ def test_the_memory_is_the_c_structs(tmp_path: Path) -> None:
 
 
 def test_a_board_for_another_host(programs: Programs, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tomoskin.twin.emulator.source.programs_of", lambda _: programs)
+    monkeypatch.setattr("tomoskin_emulator.source.programs_of", lambda _: programs)
     skin = Skin.load("textile-disc-8")
     with emulate_board(skin) as board, Link(SerialTransport(board.port), SCAN, SETTINGS) as link:
         frames_of(link, 2)

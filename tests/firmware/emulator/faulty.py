@@ -6,7 +6,7 @@ import struct
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
-from tomoskin.twin.emulator.board_process import MOST_ELECTRODES
+from tomoskin_emulator.board_process import MOST_ELECTRODES
 
 _FAULTS = struct.Struct(f"<4I{MOST_ELECTRODES}s{MOST_ELECTRODES}s{MOST_ELECTRODES}s")
 

@@ -9,12 +9,12 @@ import pytest
 from typer.testing import CliRunner
 
 from firmware.boards import FIRMWARE
+from firmware.emulator.pico import boot_checksum, check_boot, powered
 from tomoskin.cli.app import app
 from tomoskin.core import SourceError
-from tomoskin.twin.emulator import write_uf2
-from tomoskin.twin.emulator.flash import find_boot_drive
-from tomoskin.twin.emulator.program import FLASH, PicoPrograms, pack_uf2
-from twin.emulator.pico import boot_checksum, check_boot, powered
+from tomoskin_emulator import write_uf2
+from tomoskin_emulator.flash import find_boot_drive
+from tomoskin_emulator.program import FLASH, PicoPrograms, pack_uf2
 
 IMAGE = bytes(range(256)) * 2 + b"end"
 ABOUT = "UF2 Bootloader v3.0\nModel: Raspberry Pi RP2\nBoard-ID: {}\n"

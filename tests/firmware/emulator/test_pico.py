@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 
 from firmware.boards import FIRMWARE, SCAN, Talk, make
+from firmware.emulator.faulty import BoardFaults
+from firmware.emulator.pico import CURRENT, PATIENCE, Pico, events_of, frames_of, powered, star
 from tomoskin.board.source import Link, ScanSettings, SerialTransport, Timing
 from tomoskin.board.wire import (
     SCHEMA,
@@ -40,11 +42,9 @@ from tomoskin.model.skin import Skin
 from tomoskin.pipeline import prepare
 from tomoskin.run import Runner
 from tomoskin.twin import TwinSettings, TwinSkin
-from tomoskin.twin.emulator.board_process import BoardProcess, SkinMemory
-from tomoskin.twin.emulator.program import PicoPrograms, pack_uf2
-from tomoskin.twin.emulator.source import front_of, open_emulator
-from twin.emulator.faulty import BoardFaults
-from twin.emulator.pico import CURRENT, PATIENCE, Pico, events_of, frames_of, powered, star
+from tomoskin_emulator.board_process import BoardProcess, SkinMemory
+from tomoskin_emulator.program import PicoPrograms, pack_uf2
+from tomoskin_emulator.source import front_of, open_emulator
 
 SETTLING = 84e-6
 """s: the slowest that the decks give."""
@@ -309,7 +309,7 @@ def test_a_host_that_does_not_read_costs_whole_frames(pico: PicoPrograms, tmp_pa
 def test_one_skin_file_runs_on_either_board(
     pico: PicoPrograms, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("tomoskin.twin.emulator.source.programs_of", lambda _: pico)
+    monkeypatch.setattr("tomoskin_emulator.source.programs_of", lambda _: pico)
     quiet = TwinSettings.preset("ideal").with_noise(0.0)
     monkeypatch.setattr("tomoskin.twin.read_settings", lambda *_: quiet)
     skin = Skin.load("textile-disc-8")

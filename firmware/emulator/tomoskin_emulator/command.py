@@ -9,13 +9,10 @@ from typing import Annotated
 import typer
 
 from tomoskin.board.source import BOARDS, DEFAULT_BOARD, BoardRecord
-from tomoskin.cli.app import group
-from tomoskin.cli.choices import quantity
-from tomoskin.cli.options import DEFAULT_SKIN, NamedSkinOption
-from tomoskin.cli.output import Bar
+from tomoskin.cli import DEFAULT_SKIN, Bar, NamedSkinOption, group, quantity
 from tomoskin.core import no_such
 
-app = group("firmware")
+app = group("firmware", "Build, flash and emulate the board's firmware.")
 
 
 def _eight_bytes(name: str | None) -> str | None:
@@ -65,7 +62,7 @@ def _record(board: str, channels: int) -> BoardRecord:
 @app.command()
 def build(channels: Channels = 8, board: Board = DEFAULT_BOARD) -> None:
     """Build the firmware of a board: the ELF of an ATmega2560, the UF2 of a Pico."""
-    from tomoskin.twin.emulator import build_firmware
+    from tomoskin_emulator import build_firmware
 
     record = _record(board, channels)
     with Bar("building"):
@@ -86,7 +83,7 @@ def flash(
     board: Board = DEFAULT_BOARD,
 ) -> None:
     """Write the firmware to a board: to a Mega with avrdude, to a Pico's boot drive as UF2."""
-    from tomoskin.twin.emulator import write_firmware
+    from tomoskin_emulator import write_firmware
 
     record = _record(board, channels)
     if record.flash == "avrdude" and port is None:
@@ -130,8 +127,8 @@ def configure(
 ) -> None:
     """Write a board's current and id into its EEPROM and read them back; without either, show
     them and the board's name. Of a Pico the current alone is written, to its flash."""
+    import tomoskin_emulator as emulator
     from tomoskin.model.skin import Skin
-    from tomoskin.twin import emulator
 
     asked = None if current is None else quantity(current, "current", "--current")
     of_skin = Skin.load(skin).current if skin else None
@@ -157,7 +154,7 @@ def configure(
 
 
 def _configure_pico(drive: Path, current: float | None, name: str | None) -> None:
-    from tomoskin.twin.emulator import settings_uf2, write_uf2
+    from tomoskin_emulator import settings_uf2, write_uf2
 
     if name is not None:
         raise typer.BadParameter("the id of a Pico is its flash chip's, and cannot be changed")
@@ -171,7 +168,7 @@ def _configure_pico(drive: Path, current: float | None, name: str | None) -> Non
 
 
 def _say_resistor(current: float) -> None:
-    from tomoskin.twin.emulator import sense_resistor
+    from tomoskin_emulator import sense_resistor
 
     ohms = f"{sense_resistor(current):.4g} Ω"
     typer.echo(
@@ -183,7 +180,7 @@ def _say_resistor(current: float) -> None:
 def emulate(skin: NamedSkinOption = DEFAULT_SKIN, board: Board = DEFAULT_BOARD) -> None:
     """Run the firmware on a simulated board until Ctrl-C; its serial port is printed."""
     from tomoskin.model.skin import Skin
-    from tomoskin.twin.emulator import emulate_board
+    from tomoskin_emulator import emulate_board
 
     with emulate_board(Skin.load(skin), board) as process:
         typer.echo(process.port)

@@ -13,6 +13,9 @@ import numpy as np
 import pytest
 
 from firmware.boards import SCAN, Talk
+from firmware.emulator.test_mutants import mutated as mutated_elf
+from firmware.emulator.test_pico import mutated as mutated_image
+from firmware.emulator.watch import CLOCK, Watch
 from tomoskin.board.source import Link, ScanSettings, SerialTransport, Timing
 from tomoskin.board.wire import (
     Ack,
@@ -34,16 +37,13 @@ from tomoskin.board.wire import (
     encode,
 )
 from tomoskin.core import Frame, SourceError
-from tomoskin.twin.emulator.board_process import (
+from tomoskin_emulator.board_process import (
     BoardProcess,
     BoardPrograms,
     Front,
     OwnVoltages,
     SkinMemory,
 )
-from twin.emulator.test_mutants import mutated as mutated_elf
-from twin.emulator.test_pico import mutated as mutated_image
-from twin.emulator.watch import CLOCK, Watch
 
 CURRENT, N = 0.1, 8
 POTENTIALS = np.array([3, -7, 0, 12, -20, 5, 9, -4]) * 1e-3

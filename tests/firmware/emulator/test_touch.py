@@ -14,8 +14,8 @@ from tomoskin.model.skin import Skin
 from tomoskin.pipeline import FrameResult, prepare
 from tomoskin.run import Runner, commands
 from tomoskin.twin import Press
-from tomoskin.twin.emulator.program import Programs
-from tomoskin.twin.emulator.source import open_emulator
+from tomoskin_emulator.program import Programs
+from tomoskin_emulator.source import open_emulator
 
 MOST_FRAMES = 400
 FORCE, RADIUS = 8.0, 0.01
@@ -35,7 +35,7 @@ def test_a_press_is_found_where_it_is(
     place: tuple[float, float],
     most: float,
 ) -> None:
-    monkeypatch.setattr("tomoskin.twin.emulator.source.programs_of", lambda _: programs)
+    monkeypatch.setattr("tomoskin_emulator.source.programs_of", lambda _: programs)
     skin = Skin.load(name)
     runner, came = Runner(prepare(skin), lambda: open_emulator("seed=1", skin)), threading.Event()
     with runner.audience.watch(came.set):

@@ -14,8 +14,8 @@ from pathlib import Path
 from tomoskin.board.source import BOARDS_SINCE, BoardRecord, Exchange, SerialTransport, Transport
 from tomoskin.board.wire import BoardLimits, GetBoard, GetInfo, Info
 from tomoskin.core import SourceError, StrPath
-from tomoskin.twin.emulator.board_process import BoardIdentity
-from tomoskin.twin.emulator.program import FLASH, PAGE, firmware_image, pack_uf2, run_tool
+from tomoskin_emulator.board_process import BoardIdentity
+from tomoskin_emulator.program import FLASH, PAGE, firmware_image, pack_uf2, run_tool
 
 _SETTINGS = 0x1FF000
 """Where the flash's last sector begins: ``firmware/pico/flash.c``."""

@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 
 from firmware.boards import running
+from firmware.emulator.test_emulator import frames_of
+from firmware.emulator.watch import CLOCK, Watch, symbol
 from tomoskin.board.source import Link, ScanSettings, SerialTransport
 from tomoskin.model.pattern import Pattern, Scan
-from tomoskin.twin.emulator.program import Programs
-from twin.emulator.test_emulator import frames_of
-from twin.emulator.watch import CLOCK, Watch, symbol
+from tomoskin_emulator.program import Programs
 
 MOST_FLASH, MOST_RAM, MEMORY = 16 * 1024, 4 * 1024, 8 * 1024
 MOST_STACK = 256

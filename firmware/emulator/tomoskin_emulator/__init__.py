@@ -1,6 +1,6 @@
 """The board's real firmware on a simulated processor, before the twin's sheet."""
 
-from tomoskin.twin.emulator.flash import (
+from tomoskin_emulator.flash import (
     check_current as check_current,
     read_identity as read_identity,
     say_board as say_board,
@@ -11,8 +11,8 @@ from tomoskin.twin.emulator.flash import (
     write_identity as write_identity,
     write_uf2 as write_uf2,
 )
-from tomoskin.twin.emulator.program import build_firmware as build_firmware
-from tomoskin.twin.emulator.source import (
+from tomoskin_emulator.program import build_firmware as build_firmware
+from tomoskin_emulator.source import (
     EmulatorTransport as EmulatorTransport,
     emulate_board as emulate_board,
     emulate_load as emulate_load,

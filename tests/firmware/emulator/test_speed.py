@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from firmware.boards import running, star_counts
+from firmware.emulator.test_emulator import frames_of
 from tomoskin.board.source import Link, ScanSettings, SerialTransport
 from tomoskin.model.pattern import Pattern, Scan
-from tomoskin.twin.emulator.program import Programs
-from twin.emulator.test_emulator import frames_of
+from tomoskin_emulator.program import Programs
 
 # Electrodes, settling s, least frames/s; prescaler 64, no oversampling.
 PROMISED = [(8, 2e-3, 40), (8, 200e-6, 180), (16, 2e-3, 17), (16, 200e-6, 55)]

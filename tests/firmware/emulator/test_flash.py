@@ -9,14 +9,14 @@ import pytest
 
 from firmware.boards import SCAN, SETTINGS, built, running
 from firmware.conftest import need
+from firmware.emulator.bootloader import Mega
+from firmware.emulator.test_emulator import frames_of
 from tomoskin.board.source import Link, SerialTransport
 from tomoskin.cli import main
 from tomoskin.core import SourceError
-from tomoskin.twin.emulator import program
-from tomoskin.twin.emulator.board_process import BoardIdentity
-from tomoskin.twin.emulator.flash import ask_info
-from twin.emulator.bootloader import Mega
-from twin.emulator.test_emulator import frames_of
+from tomoskin_emulator import program
+from tomoskin_emulator.board_process import BoardIdentity
+from tomoskin_emulator.flash import ask_info
 
 
 @pytest.fixture

@@ -17,9 +17,9 @@ from typing import IO
 
 from tomoskin.board.source import BOARDS, BoardRecord, FirmwareFiles
 from tomoskin.core import SourceError, written
-from tomoskin.twin.emulator.board_process import BoardPrograms
+from tomoskin_emulator.board_process import BoardPrograms
 
-FOLDER = Path(__file__).resolve().parents[4] / "firmware"
+FOLDER = Path(__file__).resolve().parents[2]
 """Where the sources are, in a checkout."""
 
 IMAGES = Path(__file__).parent / "images"
@@ -173,7 +173,7 @@ def firmware_image(record: BoardRecord, channels: int) -> Path:
     SourceError
         When it cannot be built, or the wheel was made where it could not be.
     """
-    files, in_checkout = _files(record), FOLDER.is_dir()
+    files, in_checkout = _files(record), (FOLDER / "Makefile").is_file()
     if in_checkout:
         _make(record, files.make_image, channels)
     image = (BUILD if in_checkout else IMAGES) / files.image.format(channels)

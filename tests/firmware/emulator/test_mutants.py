@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from firmware.boards import FIRMWARE, SCAN, Process, Talk, make, star_counts
+from firmware.emulator.watch import CLOCK, Watch
 from tomoskin.board.source import SerialTransport
 from tomoskin.board.wire import (
     Ack,
@@ -27,8 +28,7 @@ from tomoskin.board.wire import (
     Start,
 )
 from tomoskin.core import Frame
-from tomoskin.twin.emulator.program import Programs
-from twin.emulator.watch import CLOCK, Watch
+from tomoskin_emulator.program import Programs
 
 SETTLING, DEAD, OVERSAMPLING = 200, 45, 2
 LONGEST_ON = 1e-6 * SETTLING + 2 * 6 * OVERSAMPLING * 14 * 64 / CLOCK + 2.5e-3

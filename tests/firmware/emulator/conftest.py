@@ -8,7 +8,7 @@ from conftest import missing
 from firmware.boards import built
 from firmware.conftest import need
 from tomoskin.core import SourceError
-from tomoskin.twin.emulator.program import PicoPrograms, Programs, programs_of
+from tomoskin_emulator.program import PicoPrograms, Programs, programs_of
 
 
 @pytest.fixture(scope="session")

@@ -7,13 +7,13 @@ from typing import Any
 
 import pytest
 
+from firmware.emulator.faulty import BoardFaults
 from tomoskin.board.source import BOARDS
 from tomoskin.cli import main
 from tomoskin.run import CheckFinding, check_board
 from tomoskin.sensing.signal import LoadRing
-from tomoskin.twin.emulator import emulate_load
-from tomoskin.twin.emulator.program import Programs
-from twin.emulator.faulty import BoardFaults
+from tomoskin_emulator import emulate_load
+from tomoskin_emulator.program import Programs
 
 CURRENT = 0.1
 FAULTS = {
@@ -31,7 +31,7 @@ FAULTS = {
 
 @pytest.fixture(autouse=True)
 def _built(programs: Programs, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tomoskin.twin.emulator.source.programs_of", lambda _: programs)
+    monkeypatch.setattr("tomoskin_emulator.source.programs_of", lambda _: programs)
 
 
 def findings(
@@ -81,7 +81,7 @@ def test_a_board_of_sixteen_passes() -> None:
 
 @pytest.mark.slow
 def test_a_pico_passes(pico: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tomoskin.twin.emulator.source.programs_of", lambda _: pico)
+    monkeypatch.setattr("tomoskin_emulator.source.programs_of", lambda _: pico)
     record = BOARDS["pico"]
     ring = LoadRing.for_current(8, CURRENT, record.ring_drop)
     with emulate_load(ring.resistance, CURRENT, "pico") as transport:

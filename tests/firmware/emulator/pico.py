@@ -16,8 +16,8 @@ import numpy as np
 from tomoskin.board.source import Link, ScanSettings, SerialTransport
 from tomoskin.core import Event, Frame
 from tomoskin.model.pattern import Scan
-from tomoskin.twin.emulator.board_process import BoardProcess, Front, SkinMemory
-from tomoskin.twin.emulator.program import PicoPrograms
+from tomoskin_emulator.board_process import BoardProcess, Front, SkinMemory
+from tomoskin_emulator.program import PicoPrograms
 
 CURRENT = 0.1
 LEVELS, REFERENCE = 4096.0, 3.3

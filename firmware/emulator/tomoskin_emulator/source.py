@@ -6,23 +6,23 @@ import math
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import AbstractContextManager, ExitStack, closing, contextmanager
 from pathlib import Path
 
 import numpy as np
 
 from tomoskin import twin
 from tomoskin.board.source import BOARDS, DEFAULT_BOARD, SerialTransport, Transport, read_options
-from tomoskin.core import FloatArray, SourceError
+from tomoskin.core import FloatArray, SourceError, no_such
 from tomoskin.model.skin import Skin
-from tomoskin.twin.emulator.board_process import (
+from tomoskin_emulator.board_process import (
     BoardProcess,
     BoardPrograms,
     Front,
     OwnVoltages,
     SkinMemory,
 )
-from tomoskin.twin.emulator.program import programs_of
+from tomoskin_emulator.program import programs_of
 
 _STEP = 0.01
 """Between two looks at the sheet, s."""
@@ -180,6 +180,19 @@ def emulate_load(
         closing(SerialTransport(process.port)) as transport,
     ):
         yield transport
+
+
+def open_load(
+    argument: str, resistance: FloatArray, current: float
+) -> AbstractContextManager[Transport]:
+    """``emulator`` or ``emulator:BOARD`` on a network of resistors; see :func:`emulate_load`.
+
+    Raises SourceError for a board that is not known.
+    """
+    board = argument or DEFAULT_BOARD
+    if board not in BOARDS:
+        raise SourceError(no_such(board, BOARDS, "a board"), where=f"emulator:{argument}")
+    return emulate_load(resistance, current, board)
 
 
 def own_of(skin: Skin, settings: twin.TwinSettings) -> tuple[OwnVoltages, twin.ThermalVoltages]:

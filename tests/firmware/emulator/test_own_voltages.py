@@ -15,14 +15,14 @@ from tomoskin.model.pattern import Pattern, Scan
 from tomoskin.model.skin import Skin
 from tomoskin.twin import ElectronicsSettings, TwinSettings, table_of
 from tomoskin.twin.circuit import Electrodes
-from tomoskin.twin.emulator.board_process import (
+from tomoskin_emulator.board_process import (
     BoardProcess,
     BoardPrograms,
     Front,
     OwnVoltages,
     SkinMemory,
 )
-from tomoskin.twin.emulator.source import open_emulator, own_of
+from tomoskin_emulator.source import open_emulator, own_of
 
 BITS = {"mega": 10, "pico": 12}
 CURRENT, MIDDLE, REFERENCE = 0.04, 2.5, 5.0
@@ -84,7 +84,7 @@ def test_double_layers_charge_as_the_twins(
 def test_a_skin_that_polarises_does_so_before_an_emulated_board_too(
     pico: BoardPrograms, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("tomoskin.twin.emulator.source.programs_of", lambda _: pico)
+    monkeypatch.setattr("tomoskin_emulator.source.programs_of", lambda _: pico)
     settings = TwinSettings.preset("ideal").with_noise(0.0)
     monkeypatch.setattr("tomoskin.twin.read_settings", lambda *_: settings)
     plain = Skin.load("textile-disc-8")

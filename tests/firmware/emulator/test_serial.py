@@ -11,6 +11,8 @@ from pathlib import Path
 import pytest
 
 from firmware.boards import PATIENCE, SCAN, SETTINGS, Talk, running
+from firmware.emulator.test_emulator import frames_of
+from firmware.emulator.watch import CLOCK, Watch
 from tomoskin.board.source import Link, SerialTransport, open_source
 from tomoskin.board.wire import Fault, FaultCode, Reset
 from tomoskin.files.session import SessionReader
@@ -18,11 +20,9 @@ from tomoskin.model.skin import Skin
 from tomoskin.pipeline import prepare
 from tomoskin.run import Runner, commands
 from tomoskin.twin import TwinSettings, TwinSkin
-from tomoskin.twin.emulator.board_process import SkinMemory
-from tomoskin.twin.emulator.program import Programs
-from tomoskin.twin.emulator.source import front_of
-from twin.emulator.test_emulator import frames_of
-from twin.emulator.watch import CLOCK, Watch
+from tomoskin_emulator.board_process import SkinMemory
+from tomoskin_emulator.program import Programs
+from tomoskin_emulator.source import front_of
 
 HOST = """
 import sys
