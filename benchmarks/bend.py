@@ -152,9 +152,10 @@ def _skin() -> Skin:
 
 
 def _reading(result: FrameResult) -> BodyReading:
-    if result.bend is None:
+    if "body" not in result.readings:
         raise AssertionError("every frame is read")
-    return result.bend
+    reading: BodyReading = result.readings["body"]
+    return reading
 
 
 def _row(name: str, bodies: Sequence[Body]) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from msgspec import inspect
 
+from tomoskin.learning import ShownReading
 from tomoskin.run import StrictRequest
 from tomoskin.server import frames, page_messages, requests, settings_messages
 
@@ -37,7 +38,7 @@ def types() -> str:
     }
     roots = [*to_skin, *page_messages.ROBOT_MESSAGES, *sent]
     made: dict[str, str] = {}
-    for info in inspect.multi_type_info([*roots, page_messages.RobotTouches]):
+    for info in inspect.multi_type_info([*roots, page_messages.RobotTouches, ShownReading]):
         _type(info, made)
     parts = [*made.values()]
     for name, members in unions.items():
@@ -50,7 +51,7 @@ def types() -> str:
 
 
 def _records() -> Iterator[str]:
-    """The readers of the frame's records, its flags, and the words of its numbers."""
+    """The readers of the frame's records, and its flags."""
     for name, record in frames.RECORDS.items():
         yield f"export const {name.upper()}_BYTES = {record.itemsize};"
         lines = "\n".join(
@@ -60,10 +61,8 @@ def _records() -> Iterator[str]:
         )
         yield f"export const read{name} = (data: DataView, at: number) => ({{\n{lines}\n}});"
     flags = ", ".join(f"{_camel(flag.name or '')}: {flag.value}" for flag in frames.Flag)
-    words = ", ".join(f'"{state}"' for state in frames.BEND_STATES)
     yield f"export const FLAGS = {{ {flags} }} as const;"
     yield f"export const MAGIC = 0x{int.from_bytes(frames.MAGIC, 'little'):x};"
-    yield f"export const BEND_STATES = [{words}] as const;"
     yield f"export const DENT_STEP = {frames.DENT_STEP:g};"
 
 

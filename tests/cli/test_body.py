@@ -155,7 +155,7 @@ def test_the_live_pipeline_reads_the_bend_and_sees_no_touch_in_it(recorded):
         prepared = prepare(session.skin).calibrated(BODY.read(recorded / "c.npz"))
     pipeline = Pipeline(prepared)
     results = [result for frame in frames if (result := pipeline.push(frame)) is not None]
-    bends = [result.bend for result in results if result.bend is not None]
+    bends = [result.readings["body"] for result in results if "body" in result.readings]
     assert len(bends) >= 20
     assert np.degrees(max(bend.angle for bend in bends)) == pytest.approx(40, abs=ROUGH)
     late = results[-4:]

@@ -12,11 +12,11 @@ from tomoskin.core import DataError
 from tomoskin.learning import (
     BODY,
     DEPTH,
-    KINDS,
     TOUCH,
     Calibration,
     Kind,
     Locator,
+    calibration_kinds,
     load_calibration,
 )
 from tomoskin.model.pattern import Pattern
@@ -25,7 +25,7 @@ PATTERN = Pattern.adjacent(8)
 ABOUT = ("kind", "version", "drive", "measure", "n_electrodes", "skin_name", "pattern")
 OPTIONAL = ("skin", "strength", "spread_m2", "method", "session", "angle_rad", "axis_rad")
 """Keys of what a file is of, and of what a calibration can do without: a body's states too."""
-EARLIER = [kind for kind in KINDS if kind is not DEPTH]
+EARLIER = [kind for kind in calibration_kinds() if kind is not DEPTH]
 RENAMED = {"force_n": "amount"}
 """Kinds of which there are files of before, and keys that these have for what is called so now."""
 

@@ -56,9 +56,9 @@ def test_a_replay_reads_bends_and_touches_again_to_the_bit(run, bending):
     got = {r.sequence: touches_of(r) for r in again if r.ready}
     assert len(live) > 20
     assert all(same(got[number], rows) for number, rows in live.items())
-    angles = [r.bend.angle for r in again if r.bend]
+    angles = [r.readings["body"].angle for r in again if "body" in r.readings]
     assert len(angles) > 20
-    assert angles == [r.bend.angle for r in first if r.bend]
+    assert angles == [r.readings["body"].angle for r in first if "body" in r.readings]
 
 
 def test_without_them_the_touches_would_be_others(run):
@@ -122,7 +122,7 @@ def test_the_command_line_takes_them_beside_a_calibration(run, calibration, monk
 
     def until_bent(_server, _listener):
         runner = runners[0]
-        Watch(runner).until(lambda: runner.status().bend is not None)
+        Watch(runner).until(lambda: "body" in runner.status().readings)
 
     monkeypatch.setattr(room, "Runner", Noted)
     monkeypatch.setattr(server.Server, "run_on", until_bent)

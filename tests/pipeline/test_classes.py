@@ -18,7 +18,6 @@ from tomoskin.files.session.session_reader import tick_rate
 from tomoskin.learning import CLASSES, Classifier, ClassReading
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Pipeline, prepare, reconstruct
-from tomoskin.server.views import state as message
 
 NAMES = ("idle", "left", "right")
 EACH = 12
@@ -62,24 +61,26 @@ def run(prepared, classes, tmp_path_factory):
 
 def test_a_run_says_which_class_it_shows(run):
     _, _, status = run
-    shown = status.class_reading
+    shown = status.readings["class"]
     assert shown == ClassReading("right", shown.probability, False)
     assert status.text.endswith(f", right {100 * shown.probability:.0f} %")
-    told = json.loads(message(status).json)["class"]
-    assert told == {"name": "right", "probability": shown.probability, "unknown": False}
-    assert json.loads(message(replace(status, class_reading=None)).json)["class"] is None
+    assert shown.now == {"name": "right", "probability": shown.probability, "unknown": False}
+    assert shown.shown.words == f"Class: right, {100 * shown.probability:.0f} %"
+    assert shown.shown.place == "touches"
+    unknown = replace(shown, unknown=True)
+    assert (unknown.word, unknown.shown.words) == ("unknown", "Class unknown (nearest: right)")
 
 
 def test_a_replay_tells_the_same_classes_to_the_bit(run):
     path, taught, status = run
     with SessionReader(path) as session:
-        again = [result.class_reading for result in replayed(as_recorded(session), session)]
+        again = [result.readings.get("class") for result in replayed(as_recorded(session), session)]
         frames = [item.frame for item in session.frames()]
         pipeline = Pipeline(taught)
         pipeline.tick_rate = tick_rate(session)
-    here = [pipeline.push(frame).class_reading for frame in frames]
+    here = [pipeline.push(frame).readings.get("class") for frame in frames]
     assert again == here
-    assert again[-1] == status.class_reading
+    assert again[-1] == status.readings["class"]
     assert again[: FIRST - 1] == [None] * (FIRST - 1), "no reference yet"
     names = [state.name for state in again[FIRST:]]
     assert (
@@ -93,7 +94,7 @@ def test_a_recording_says_the_same_off_line(run):
     path, taught, _ = run
     recording = read_recording(path).in_order_of(taught.pattern)
     found = reconstruct(taught, recording, recording.voltages[:FIRST])
-    assert [s.name for s in found.classes][-12:] == ["idle"] * 6 + ["right"] * 6
+    assert [s.name for s in found.readings["class"]][-12:] == ["idle"] * 6 + ["right"] * 6
     untaught = taught.uncalibrated(CLASSES)
     assert reconstruct(untaught, recording, recording.voltages[:5]).classes == ()
 

@@ -9,8 +9,8 @@ import pytest
 
 from tomoskin.core import Detection, Touch
 from tomoskin.files.session import SessionReader, as_recorded, replayed
+from tomoskin.learning.body.body_reader import looks_bent
 from tomoskin.model.skin import Skin
-from tomoskin.pipeline.frame_result import looks_bent
 from tomoskin.run import simulate
 from tomoskin.twin import Script
 

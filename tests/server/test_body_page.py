@@ -46,10 +46,10 @@ def site(prepared):
 
 
 def test_the_pressure_of_a_finger_that_curls_is_beside_the_sheet(opened):
-    read, words = opened.test_id("coordinate"), opened.test_id("bend-words")
+    read, words = opened.test_id("bend-note"), opened.test_id("bend-words")
     words.filter(has_text="at rest").wait_for()
     opened.site.runner.ask(SetPose(BendRequest(50 / KPA_A_RAD, length=WIDTH)))
     words.filter(has_text="moved").wait_for()
     read.filter(has_text=re.compile(r"^pressure [45]\d\.?\d* ± \d")).wait_for()
-    assert opened.page.get_by_test_id("bend-angle-read").count() == 0
+    assert opened.page.get_by_test_id("bend-value").count() == 0
     assert look_in_both(opened.page, "body") == {}

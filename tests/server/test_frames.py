@@ -1,14 +1,16 @@
 """The binary message, read back as the page reads it: by offsets, not by our own types."""
 
+import json
 import math
 import struct
 from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
 import pytest
 
 from tomoskin.core import Amount, Detection, Image, Touch
-from tomoskin.learning import BODY, BodyReading, DentMap
+from tomoskin.learning import CalibrationHealth, DentMap, Reading, ShownReading
 from tomoskin.pipeline import FrameResult
 from tomoskin.server.frames import encode_result
 from tomoskin.twin import Finger, Press, Probe
@@ -60,15 +62,12 @@ def decode(data):
         head["amounts"].append(struct.unpack_from("<6f", data, at + 40))
         at += 64
     head["truth"] = [floats(4) for _ in range(head["n_truth"])]
-    if head["flags"] & 8:
-        head["bend"] = struct.unpack_from("<3fI", data, at)
-        at += 16
     head["labels"] = list(data[at : at + head["n_cells"]])
     at += math.ceil(head["n_cells"] / 4) * 4
     n = head["n_dent"]
     head["dent"] = np.reshape(struct.unpack_from(f"<{2 * n}H", data, at), (2, n)) * 2e-6
     at += 4 * n
-    assert at == len(data)
+    head["readings"] = json.loads(data[at:] or b"{}")
     return head
 
 
@@ -160,17 +159,21 @@ def test_a_touch_carries_its_whole_covariance():
     assert found["touches"][0][-1] == pytest.approx(-2e-6)
 
 
-@pytest.mark.parametrize(
-    ("state", "number"), [("idle", 0), ("bend", 1), ("bend and touch", 3), ("unknown", 4)]
-)
-def test_a_bend_goes_before_the_labels(state, number):
-    bend = BodyReading(
-        names=("angle",), values=np.array([0.5]), deviations=np.array([0.01]), angle=0.5, sd=0.01,
-        axis=1.25, state=state, moved=np.zeros(3),
-    )  # fmt: skip
-    found = decode(encode_result(make(5, (touch(1, [4]),), readings={BODY.name: bend}), [], 0.0))
-    assert found["flags"] == 0b1001
-    assert found["bend"] == (0.5, pytest.approx(0.01), 1.25, number)
+class Said(Reading):
+    """A reading of a kind that only this test has."""
+
+    key, listed = "weather", "weathers"
+    text = word = "rain"
+    facts: ClassVar = {}
+    shown = ShownReading("rain", "It rains", "sheet", drawn=(0.5, 1.25))
+
+
+def test_what_calibrations_read_goes_last():
+    readings = {"sky": Said(), "touch": CalibrationHealth(0, 1.0)}
+    found = decode(encode_result(make(5, (touch(1, [4]),), readings=readings), [], 0.0))
+    assert list(found["readings"]) == ["weather"]
+    told = found["readings"]["weather"]
+    assert (told["words"], told["drawn"], told["notes"]) == ("rain", [0.5, 1.25], [])
     assert found["labels"] == [0, 0, 0, 0, 1]
 
 

@@ -1,7 +1,7 @@
 /** The page: a line of state, the sheet, its panels and drawers, the commands. */
 
 import { TimeLine } from "./flows/TimeLine";
-import { BendPanel } from "./panels/Bend";
+import { ReadingsBesideSheet } from "./panels/Readings";
 import { Controls } from "./panels/Controls";
 import { Legend } from "./panels/Legend";
 import { Side } from "./panels/Side";
@@ -16,7 +16,7 @@ export function App() {
         <Sheet />
         <div class="beside">
           <Legend />
-          <BendPanel />
+          <ReadingsBesideSheet />
         </div>
         <Side />
       </main>

@@ -30,13 +30,15 @@ export type Touch = Readonly<ReturnType<typeof touchAt>>;
 
 export type Truth = Readonly<ReturnType<typeof wire.readTruth>>;
 
-function bendAt(data: DataView, at: number) {
-  const { state, ...angles } = wire.readBend(data, at);
-  return { ...angles, state: wire.BEND_STATES[state] ?? "unknown" };
-}
+/** What calibrations read beside touches, by their keys. */
+export type Readings = Readonly<Record<string, wire.ShownReading>>;
 
-/** How the sheet is bent; angles in rad. */
-export type Bend = Readonly<ReturnType<typeof bendAt>>;
+const NOTHING_READ: Readings = {};
+
+function readingsAt(buffer: ArrayBuffer, at: number): Readings {
+  if (buffer.byteLength <= at) return NOTHING_READ;
+  return JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, at))) as Readings;
+}
 
 /** By how much each node of the mesh has given way, and the deviation of that, in `wire.DENT_STEP`. */
 export interface Dent {
@@ -57,12 +59,11 @@ export interface Frame {
   readonly reference: Float32Array;
   readonly touches: readonly Touch[];
   readonly truths: readonly Truth[];
-  /** Null: the bends of this skin were not learnt. */
-  readonly bend: Bend | null;
   /** 0 none, k: the cell belongs to the k-th touch. */
   readonly labels: Uint8Array;
   /** Null: nothing touches, the page has not asked for it, or depths are uncalibrated. */
   readonly dent: Dent | null;
+  readonly readings: Readings;
 }
 
 /** Decode one frame. Throws RangeError for bytes that are not one. */
@@ -72,11 +73,9 @@ export function decodeFrame(buffer: ArrayBuffer): Frame {
     throw new RangeError("expected a frame beginning with TSK1");
   }
   const { sequence, hostTime, nCells, nMeas, nTouches, nTruth, flags, latencyUs, nDent } = wire.readHeader(data, 0);
-  const bent = (flags & wire.FLAGS.bent) !== 0;
   const touchesAt = wire.HEADER_BYTES + 4 * (nCells + 2 * nMeas);
   const truthsAt = touchesAt + wire.TOUCH_BYTES * nTouches;
-  const bendsAt = truthsAt + wire.TRUTH_BYTES * nTruth;
-  const labelsAt = bendsAt + (bent ? wire.BEND_BYTES : 0);
+  const labelsAt = truthsAt + wire.TRUTH_BYTES * nTruth;
   const dentAt = labelsAt + 4 * Math.ceil(nCells / 4);
   if (buffer.byteLength < (nDent ? dentAt + 4 * nDent : labelsAt + nCells)) {
     throw new RangeError(
@@ -95,7 +94,6 @@ export function decodeFrame(buffer: ArrayBuffer): Frame {
     reference: floats(nCells + nMeas, nMeas),
     touches: Array.from({ length: nTouches }, (_, k) => touchAt(data, touchesAt + wire.TOUCH_BYTES * k)),
     truths: Array.from({ length: nTruth }, (_, k) => wire.readTruth(data, truthsAt + wire.TRUTH_BYTES * k)),
-    bend: bent ? bendAt(data, bendsAt) : null,
     labels: new Uint8Array(buffer, labelsAt, nCells),
     dent: nDent
       ? {
@@ -103,5 +101,6 @@ export function decodeFrame(buffer: ArrayBuffer): Frame {
           deviation: new Uint16Array(buffer, dentAt + 2 * nDent, nDent),
         }
       : null,
+    readings: readingsAt(buffer, dentAt + 4 * nDent),
   };
 }

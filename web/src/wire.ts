@@ -85,8 +85,6 @@ export interface RunState {
   readonly recording: string | null;
   readonly sinks: readonly SinkReport[];
   readonly replay: ReplayStatus | null;
-  readonly bend: BendNow | null;
-  readonly class: ClassReading | null;
   readonly calibration: CalibrationNow | null;
   readonly problem: string | null;
   readonly text: string;
@@ -146,29 +144,6 @@ export interface ReplayStatus {
   readonly speed: number | null;
   readonly loop: boolean;
   readonly ended: boolean;
-}
-
-/** How the body stands: its bend, where an angle was learnt, and its other coordinates. */
-export interface BendNow {
-  readonly angle_rad: number | null;
-  readonly sd_rad: number | null;
-  readonly axis_rad: number | null;
-  readonly state: string;
-  readonly coordinates: readonly CoordinateNow[];
-}
-
-/** A coordinate of the body, with its deviation, in its own unit. */
-export interface CoordinateNow {
-  readonly name: string;
-  readonly value: number;
-  readonly sd: number;
-}
-
-/** What one frame shows. */
-export interface ClassReading {
-  readonly name: string;
-  readonly probability: number;
-  readonly unknown: boolean;
 }
 
 /** How touches fit the calibration that locates them; ``broken``: someone must act. */
@@ -785,6 +760,19 @@ export interface SpaceTouch {
   readonly is_self: boolean | null;
 }
 
+/** What the page shows of a reading. */
+export interface ShownReading {
+  readonly words: string;
+  readonly sentence: string;
+  readonly place: "sheet" | "touches";
+  readonly wrong: boolean;
+  readonly unit: string;
+  readonly value: string;
+  readonly deviation: string;
+  readonly drawn: readonly [number, number] | null;
+  readonly notes: readonly string[];
+}
+
 export type ServerMessage =
   | Scene
   | Scale
@@ -900,19 +888,8 @@ export const readTruth = (data: DataView, at: number) => ({
   radius: data.getFloat32(at + 12, true),
 });
 
-export const BEND_BYTES = 16;
-
-export const readBend = (data: DataView, at: number) => ({
-  angle: data.getFloat32(at, true),
-  sd: data.getFloat32(at + 4, true),
-  axis: data.getFloat32(at + 8, true),
-  state: data.getUint32(at + 12, true),
-});
-
-export const FLAGS = { ready: 1, noImage: 2, rowsLeftOut: 4, bent: 8 } as const;
+export const FLAGS = { ready: 1, noImage: 2, rowsLeftOut: 4 } as const;
 
 export const MAGIC = 0x314b5354;
-
-export const BEND_STATES = ["idle", "bend", "touch", "bend and touch", "unknown"] as const;
 
 export const DENT_STEP = 2e-06;

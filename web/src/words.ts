@@ -4,7 +4,7 @@ import type { Amount, Measurand } from "./decode";
 import { duration, fixed } from "./format";
 
 import type { LinkState } from "./socket";
-import type { ClassReading, FlowNow, Scene, RunState } from "./wire";
+import type { FlowNow, Scene, RunState } from "./wire";
 
 export interface Warning {
   readonly text: string;
@@ -161,12 +161,6 @@ export function alpha(status: RunState): string {
 export function alphaInFull(status: RunState): string {
   const by = status.rule === "hand" ? "set by hand" : `chosen by the rule ${status.rule}`;
   return `Weight of the prior, ${status.alpha.toPrecision(4)}, ${by}`;
-}
-
-/** The class that the sheet shows. */
-export function classInWords({ name, probability, unknown }: ClassReading): string {
-  if (unknown) return `Class unknown (nearest: ${name})`;
-  return `Class: ${name}, ${fixed(100 * probability, 0)} %`;
 }
 
 /** How each is shown: in a unit, so many to one of SI, with its decimals; and what its axis ends with,

@@ -43,20 +43,16 @@ describe("decodeFrame", () => {
     expect(frame.touches[0].force).toEqual({ value: 4, low: 3.5, high: 4.75 });
     expect(frame.touches[0].depth).toBeNull();
     expect(frame.truths[0].radius).toBeCloseTo(0.008);
-    expect(frame.bend).toBeNull();
+    expect(frame.readings).toEqual({});
   });
 
-  it("reads how the sheet is bent before the labels", () => {
-    const plain = new Uint8Array(sample());
-    const bytes = new Uint8Array(plain.length + 16);
-    bytes.set(plain.subarray(0, 164));
-    bytes.set(plain.subarray(164), 180);
-    const data = new DataView(bytes.buffer);
-    data.setUint32(28, 9, true);
-    [0.5, 0.01, 1.25].forEach((v, k) => data.setFloat32(164 + 4 * k, v, true));
-    data.setUint32(176, 3, true);
+  it("reads what calibrations have read after all else", () => {
+    const said = new TextEncoder().encode('{"bend":{"words":"bent","value":"29°"}}');
+    const bytes = new Uint8Array(172 + said.length);
+    bytes.set(new Uint8Array(sample()));
+    bytes.set(said, 172);
     const frame = decodeFrame(bytes.buffer);
-    expect(frame.bend).toMatchObject({ angle: 0.5, axis: 1.25, state: "bend and touch" });
+    expect(frame.readings).toEqual({ bend: { words: "bent", value: "29°" } });
     expect([...frame.labels]).toEqual([0, 1, 1, 0, 0]);
   });
 

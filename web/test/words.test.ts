@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 import type { FlowNow, Scene, RunState } from "../src/wire";
 import { backOff, socketAddress } from "../src/socket";
-import { alpha, alphaInFull, classInWords, facts, headline } from "../src/words";
+import { alpha, alphaInFull, facts, headline } from "../src/words";
 
 const scene = { source: "twin of textile-disc-8" } as Scene;
 const status: RunState = {
@@ -11,7 +11,6 @@ const status: RunState = {
   fps: 124.6,
   frames: 900,
   sinks: [],
-  bend: null,
   dropped: 1,
   corrupt: 2,
   gaps: 3,
@@ -23,7 +22,6 @@ const status: RunState = {
   baseline: null,
   sick: [],
   replay: null,
-  class: null,
   calibration: null,
   noise_v: 1e-5,
   alpha: 0.0509,
@@ -134,16 +132,4 @@ it("waits longer after each failed try, up to a bound", () => {
 it("finds the socket beside the page and leaves the token out", () => {
   expect(socketAddress({ href: "http://127.0.0.1:8765/?token=a" })).toBe("ws://127.0.0.1:8765/ws");
   expect(socketAddress({ href: "https://lab:1/x/" })).toBe("wss://lab:1/x/ws");
-});
-
-describe("the class that the sheet shows", () => {
-  it("is named with its probability", () => {
-    expect(classInWords({ name: "bend", probability: 0.974, unknown: false })).toBe("Class: bend, 97 %");
-  });
-
-  it("is said to be unknown where it is none that was learnt", () => {
-    expect(classInWords({ name: "bend", probability: 1, unknown: true })).toMatch(
-      /^Class unknown \(nearest: bend\)$/,
-    );
-  });
 });

@@ -279,7 +279,7 @@ def depth(
 def _amount(
     labelled: Recorded, name: str, given: list[str] | None, unit: str | None, advice: str
 ) -> LearningOutcome:
-    from tomoskin.learning import KINDS, MEASURED, AmountModel, report_of
+    from tomoskin.learning import MEASURED, AmountModel, calibration_kinds, report_of
 
     skin, path, of = labelled.drawn, labelled.path, MEASURED[name]
     amount = labels.amounts(path, len(labelled.recording), given, unit, of)
@@ -292,7 +292,7 @@ def _amount(
     for doubtful in model.remarks:
         who = "" if doubtful.press is None else f"press {doubtful.press:>4}  uncertain: "
         lines.append(f"{who}{doubtful.reason}")
-    kind = next(kind for kind in KINDS if kind.name == name)
+    kind = next(kind for kind in calibration_kinds() if kind.name == name)
     return LearningOutcome(kind.of(model, labelled.pattern, skin).write, facts, lines)
 
 

@@ -211,7 +211,7 @@ def image(
 def _lines(result: Reconstruction, spans: tuple[Span, ...], prepared: Prepared) -> list[str]:
     import numpy as np
 
-    from tomoskin.learning import MEASURED
+    from tomoskin.learning import MEASURED, calibration_kinds
 
     number = "1 touch" if len(spans) == 1 else f"{len(spans)} touches"
     lines = [f"{len(result.frames) + len(result.unseen)} frames, {number}"]
@@ -224,10 +224,10 @@ def _lines(result: Reconstruction, spans: tuple[Span, ...], prepared: Prepared) 
     if prepared.modes is not None:
         seconds = prepared.skin.inverse.time_constant
         lines.append(f"filtered over frames, time constant {seconds:g} s")
-    bends = [reading.state for reading in result.bends if reading]
-    classes = [("unknown" if one.unknown else one.name) for one in result.classes if one]
-    for names in filter(None, (bends, classes)):
-        counts = Counter(names).items()
+    for kind in calibration_kinds():
+        if kind.reading is None or not any(result.readings.get(kind.name, ())):
+            continue
+        counts = Counter(one.word for one in result.readings[kind.name] if one).items()
         lines.append(", ".join(f"{name}: {count} frames" for name, count in counts))
     lines += span_lines(spans, result.unit)
     amounts = [touch.amounts for touches in result.touches for touch in touches]
@@ -289,16 +289,7 @@ def _document(
         "alpha": result.choice.alpha,
         "rule": result.choice.rule,
         "time_constant_s": prepared.skin.inverse.time_constant,
-        "bends": [
-            {"frame": f, **b.facts}
-            for f, b in zip(result.frames.tolist(), result.bends, strict=False)
-            if b
-        ],
-        "classes": [
-            {"frame": f, **asdict(state)}
-            for f, state in zip(result.frames.tolist(), result.classes, strict=False)
-            if state
-        ],
+        **_readings(result),
         "spans": [
             {
                 "id": span.id,
@@ -323,6 +314,23 @@ def _document(
             for f, touches in zip(result.frames.tolist(), result.touches, strict=True)
             for t in touches
         ],
+    }
+
+
+def _readings(result: Reconstruction) -> dict[str, list[dict[str, Any]]]:
+    """What calibrations read in each frame beside its touches, one list for each kind."""
+    from tomoskin.learning import calibration_kinds
+
+    return {
+        kind.reading.listed: [
+            {"frame": frame, **reading.facts}
+            for frame, reading in zip(
+                result.frames.tolist(), result.readings.get(kind.name, ()), strict=False
+            )
+            if reading
+        ]
+        for kind in calibration_kinds()
+        if kind.reading is not None
     }
 
 

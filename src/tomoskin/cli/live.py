@@ -160,6 +160,7 @@ def _run_skin(
 ) -> None:
     from tomoskin.board.source import open_source
     from tomoskin.core import plain_values
+    from tomoskin.learning import calibration_kinds
     from tomoskin.run import Runner
     from tomoskin.server import application, state
 
@@ -169,9 +170,14 @@ def _run_skin(
         with recording_to(runner, served.record) as stopped:
             app = application(hub_of(runner, source, served.folder), policy)
             served.serve(app, listener, policy, f"{runner.flow.source} is live")
-    now = plain_values(state(runner.status()))
-    kept = ("frames", "p50_ms", "p99_ms", "stages", "bend", "class", "calibration")
-    served.end({name: now[name] for name in kept}, stopped)
+    status = runner.status()
+    now = plain_values(state(status))
+    document = {name: now[name] for name in ("frames", "p50_ms", "p99_ms", "stages")}
+    for kind in calibration_kinds():
+        if kind.reading is not None:
+            reading = status.readings.get(kind.name)
+            document[kind.reading.key] = reading and plain_values(reading.now)
+    served.end({**document, "calibration": now["calibration"]}, stopped)
 
 
 def hub_of(runner: Runner, source: str, folder: Path) -> Hub:

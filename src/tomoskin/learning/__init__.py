@@ -38,9 +38,14 @@ from tomoskin.learning.kind import (
     Differences as Differences,
     FrameView as FrameView,
     Kind as Kind,
+    Reading as Reading,
+    ShownReading as ShownReading,
     TouchFit as TouchFit,
 )
-from tomoskin.learning.kinds import KINDS as KINDS, load_calibration as load_calibration
+from tomoskin.learning.kinds import (
+    calibration_kinds as calibration_kinds,
+    load_calibration as load_calibration,
+)
 from tomoskin.learning.mapping.mapping import ChannelMapping as ChannelMapping, ring_of as ring_of
 from tomoskin.learning.mapping.solve import (
     MappingAnswer as MappingAnswer,

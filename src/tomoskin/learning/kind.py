@@ -1,8 +1,9 @@
 """One concept of calibration: what is learnt from examples, kept in a file, and applied to frames.
 
-A kind says what its model is learnt from, how it is checked and how it is applied; files, sessions,
-the pipeline and the command line go through the kinds and know none of them by name. A further kind
-is one folder that makes a :class:`Kind`, which stands in :data:`tomoskin.learning.KINDS`.
+A kind says what its model is learnt from, how it is checked, how it is applied, and how what it
+reads is shown; files, sessions, the pipeline, the page and the command line go through the kinds
+and know none of them by name. A further kind is a :class:`Kind` that is registered at the seam
+"calibrations".
 
 Keys of a file, an .npz: ``kind``, ``version``; ``drive``, ``measure`` (n_meas, 2),
 ``n_electrodes``; ``skin_name``; and what the kind's model is learnt from. It is learnt again when
@@ -11,10 +12,11 @@ the file is read, which gives the same model: a file outlives the method.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from inspect import signature
-from typing import Any, Generic, Protocol, Self, TypeVar
+from typing import Any, ClassVar, Generic, Literal, Protocol, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +32,7 @@ from tomoskin.core import (
     ModelError,
     PatternError,
     StrPath,
+    Touch,
     electrode_table,
     load_arrays,
     located,
@@ -39,6 +42,7 @@ from tomoskin.core import (
     whole_number,
 )
 from tomoskin.learning.record_arrays import pack, unpack
+from tomoskin.model.mesh import Mesh
 from tomoskin.model.pattern import Pattern
 from tomoskin.model.skin import Skin
 from tomoskin.sensing.fit import Response
@@ -147,6 +151,79 @@ class TouchFit:
     detect: Detect
 
 
+@dataclass(frozen=True, slots=True)
+class ShownReading:
+    """What the page shows of a reading.
+
+    Attributes
+    ----------
+    words
+        What was read, in a few words; ``wrong``: someone must look.
+    sentence
+        The same for who hears it, or points at it.
+    place
+        Where it is shown: beside the ``sheet``, or above the list of ``touches``.
+    unit, value, deviation
+        A figure in large type, what it is, and how sure; "" where there is none.
+    drawn
+        Angle and axis, rad, of the bent sheet that is drawn below it; None: none is.
+    notes
+        Lines below that.
+    """
+
+    words: str
+    sentence: str
+    place: Literal["sheet", "touches"]
+    wrong: bool = False
+    unit: str = ""
+    value: str = ""
+    deviation: str = ""
+    drawn: tuple[float, float] | None = None
+    notes: tuple[str, ...] = ()
+
+
+class Reading(ABC):
+    """What a calibration reads in one frame beside its touches, and how it is shown.
+
+    ``key``: its name in what is said of a run; ``listed``: that of all of a recording's.
+    ``problem``: what is wrong, in a sentence, or None.
+    """
+
+    key: ClassVar[str]
+    listed: ClassVar[str]
+    problem: str | None = None
+
+    @property
+    @abstractmethod
+    def text(self) -> str:
+        """In words, for one line of a report."""
+
+    @property
+    @abstractmethod
+    def word(self) -> str:
+        """What frames are counted by."""
+
+    @property
+    @abstractmethod
+    def facts(self) -> dict[str, Any]:
+        """For programs that read a recording."""
+
+    @property
+    def now(self) -> dict[str, Any]:
+        """For programs that watch a run."""
+        return self.facts
+
+    @property
+    @abstractmethod
+    def shown(self) -> ShownReading:
+        """For the page."""
+
+    @property
+    def is_rest(self) -> bool:
+        """Whether a reference may be taken of such a frame."""
+        return True
+
+
 class Conditions(Protocol):
     """Under which a calibration is applied, from one reference on."""
 
@@ -220,8 +297,8 @@ class Kind(Generic[M]):
     Attributes
     ----------
     name
-        Its key in :data:`tomoskin.learning.KINDS`, and the sub-command of ``tomoskin calibrate``
-        that makes one.
+        Its key among :func:`tomoskin.learning.calibration_kinds`, and the sub-command of
+        ``tomoskin calibrate`` that makes one.
     title
         What its file says that it is.
     subject
@@ -242,6 +319,11 @@ class Kind(Generic[M]):
     directions
         Model → (n_meas, k) V along which what it reads moves the data: images do without them.
         None where it reads nothing of that sort.
+    reading
+        What it reads in frames that is shown; None where that is nothing.
+    lacking
+        Touches of a frame in which nothing was read, and the mesh → a sentence where they look as
+        if such a calibration were needed, else None.
     locates
         Whether its positions stand in for those of the detections.
     fits
@@ -259,6 +341,8 @@ class Kind(Generic[M]):
     apply: Callable[[M, Conditions], Applied]
     check: Callable[[Calibration[M], Skin], None] | None = None
     directions: Callable[[M], FloatArray] | None = None
+    reading: type[Reading] | None = None
+    lacking: Callable[[Sequence[Touch], Mesh], str | None] | None = None
     locates: bool = False
     fits: bool = False
     own_settings: bool = False

@@ -1,24 +1,33 @@
 """The kinds of calibrations that are applied to frames, and a file of any of them."""
 
+from functools import cache
 from pathlib import Path
 from typing import Any
 
-from tomoskin.core import DataError, StrPath, load_arrays
+from tomoskin.core import DataError, StrPath, load_arrays, registered
 from tomoskin.learning.amount.amount_model import DEPTH, FORCE
 from tomoskin.learning.body.body_reader import BODY
 from tomoskin.learning.classes.classifier import CLASSES
 from tomoskin.learning.kind import Calibration, Kind, Progress, silent
 from tomoskin.learning.touch.located_touch import TOUCH
 
-KINDS: tuple[Kind[Any], ...] = (TOUCH, FORCE, DEPTH, BODY, CLASSES)
-"""Every kind whose calibrations are applied to frames, in the order in which they are applied."""
+
+@cache
+def calibration_kinds() -> tuple[Kind[Any], ...]:
+    """Every kind whose calibrations are applied to frames, in the order in which they are applied.
+
+    Those of the core come first, then those that are registered, in the order of
+    :func:`tomoskin.core.registered`.
+    """
+    more = (one.load() for one in registered("calibrations").values())
+    return (TOUCH, FORCE, DEPTH, BODY, CLASSES, *more)
 
 
 def load_calibration(path: StrPath, progress: Progress = silent) -> Calibration[Any]:
-    """Read a file of any of the :data:`KINDS`. Raises DataError where it is of none."""
+    """Read a file of any of the :func:`calibration_kinds`. Raises DataError where it is of none."""
     arrays = load_arrays(Path(path))
     title = str(arrays.get("kind", ""))
-    kind = next((kind for kind in KINDS if kind.title == title), None)
+    kind = next((kind for kind in calibration_kinds() if kind.title == title), None)
     if kind is None:
         raise DataError(
             "is not a calibration", where=str(path), hint="make one: tomoskin calibrate --help"

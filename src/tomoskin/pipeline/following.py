@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tomoskin.core import Detection, FloatArray, Image, ModelError, Touch, Voltages, reach, show
-from tomoskin.learning import BODY, Differences, FrameView
+from tomoskin.learning import Differences, FrameView, Reading, calibration_kinds
 from tomoskin.model.pattern import Scan
 from tomoskin.pipeline import finding
 from tomoskin.pipeline.conditioning import (
@@ -20,7 +20,7 @@ from tomoskin.pipeline.conditioning import (
     GivenDifferences,
 )
 from tomoskin.pipeline.drives import DriveResult, DriveWatch
-from tomoskin.pipeline.frame_result import FrameResult, looks_bent
+from tomoskin.pipeline.frame_result import FrameResult
 from tomoskin.pipeline.imaging import Filtered, SingleFrame
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.pipeline.rest import BodySheets, Rest, tune, tuned_sheet
@@ -316,8 +316,7 @@ class Following:
         readings: dict[str, Any],
     ) -> FrameResult:
         shows = conditioned.differences is not None
-        body = readings.get(BODY.name)
-        bent = body.problem if body else looks_bent(touches, self.prepared.mesh)
+        doubt = self._doubt(touches, readings)
         return FrameResult(
             sequence=measured.sequence,
             host_time=measured.host_time,
@@ -333,10 +332,22 @@ class Following:
             baseline=self.conditioning.state,
             readings=readings,
             calibrated=self._calibrated,
-            unexplained=bent or conditioned.problem or (shows and self._finder.problem) or None,
+            unexplained=doubt or conditioned.problem or (shows and self._finder.problem) or None,
             scanned=measured.scanned,
             scan_time=measured.scan_time,
         )
+
+    def _doubt(self, touches: tuple[Touch, ...], readings: dict[str, Any]) -> str | None:
+        """What is wrong with what was read, or looks as if more should be; in a sentence."""
+        for kind in calibration_kinds():
+            reading, doubt = readings.get(kind.name), None
+            if isinstance(reading, Reading):
+                doubt = reading.problem
+            elif reading is None and kind.lacking is not None:
+                doubt = kind.lacking(touches, self.prepared.mesh)
+            if doubt:
+                return doubt
+        return None
 
 
 def _imaging(

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Self
 
 import numpy as np
 
 from tomoskin.core import FloatArray, Image, Touch, Voltages
-from tomoskin.learning import BODY, CLASSES, TOUCH, BodyReading, CalibrationHealth, ClassReading
-from tomoskin.model.mesh import Mesh
+from tomoskin.learning import TOUCH, CalibrationHealth, Reading
 from tomoskin.sensing.signal import BaselineState, Health
 from tomoskin.sensing.track import TouchEvent
 
@@ -147,14 +146,10 @@ class FrameResult:
         )
 
     @property
-    def bend(self) -> BodyReading | None:
-        """How the sheet is bent; None where its bends were not learnt."""
-        return self.readings.get(BODY.name)
-
-    @property
-    def class_reading(self) -> ClassReading | None:
-        """Which of the classes that were learnt it shows; None where none were."""
-        return self.readings.get(CLASSES.name)
+    def shown_readings(self) -> dict[str, Reading]:
+        """Those of the readings that are shown, by the name of their kind."""
+        every = self.readings.items()
+        return {kind: reading for kind, reading in every if isinstance(reading, Reading)}
 
     @property
     def calibration(self) -> CalibrationHealth | None:
@@ -183,29 +178,6 @@ class FrameResult:
             f"{rows} are at a rail of the converter or without a reference: the image is made "
             "without them"
         )
-
-
-_FOLD = 3
-"""Touches in a line that are doubted; a sheet that is bent by 15° or more shows as many."""
-
-_ACROSS, _ASIDE = 0.7, 0.1
-"""They go across this part of the sheet, and lie within this part of it beside their line."""
-
-
-def looks_bent(touches: Sequence[Touch], mesh: Mesh) -> str | None:
-    """A sentence where touches lie in a line across the sheet, as those of a fold do; else None."""
-    if len(touches) < _FOLD:
-        return None
-    places = np.array([(touch.detection.x, touch.detection.y) for touch in touches])
-    places -= places.mean(axis=0)
-    along, aside = np.linalg.svd(places, full_matrices=False)[2]
-    size = float(np.ptp(mesh.points[:, :2] @ along))
-    if np.ptp(places @ along) < _ACROSS * size or np.ptp(places @ aside) > _ASIDE * size:
-        return None
-    return (
-        f"{len(touches)} touches lie in a line across the sheet: if it is bent, they are its fold, "
-        "and others are misplaced; teach its motion with tomoskin calibrate body"
-    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,6 @@ from threadpoolctl import threadpool_limits
 
 from tomoskin.core import DataError, FloatArray, Image, IntArray, Touch, Voltages, check_fits
 from tomoskin.imaging import AlphaChoice
-from tomoskin.learning import BODY, CLASSES, BodyReading, ClassReading
 from tomoskin.pipeline.following import Setting
 from tomoskin.pipeline.frame_result import FrameResult, ModelAgreement
 from tomoskin.pipeline.pipeline import Pipeline
@@ -129,16 +128,6 @@ class Reconstruction:
     def agreement(self) -> float:
         """Cosine between the reference and the model's voltages, NaN where there is none."""
         return self.model_agreement.cosine
-
-    @property
-    def bends(self) -> tuple[BodyReading | None, ...]:
-        """How the sheet was bent in each frame; empty where its bends were not learnt."""
-        return self.readings.get(BODY.name, ())
-
-    @property
-    def classes(self) -> tuple[ClassReading | None, ...]:
-        """The class of each frame; empty where none were learnt."""
-        return self.readings.get(CLASSES.name, ())
 
 
 ALONE = Setting(pace=EXHAUSTIVE, alone=True)

@@ -220,8 +220,7 @@ class Flow:
             choice=self.pipeline.choice,
             left_out=result.left_out if result else 0,
             electrodes=result.health.sick if result and result.health else (),
-            bend=result.bend if result and result.ready else None,
-            class_reading=result.class_reading if result and result.ready else None,
+            readings=result.shown_readings if result and result.ready else {},
             calibration=result.calibration if result and result.ready else None,
             problem=trouble
             or standstill

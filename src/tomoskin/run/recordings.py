@@ -65,8 +65,8 @@ class PreRoll:
         if result.touches or (result.baseline is not None and result.baseline.held):
             self._waiting.clear()
             return
-        if result.bend is not None and result.bend.state != "idle":
-            return  # a reference is of the straight sheet
+        if not all(reading.is_rest for reading in result.shown_readings.values()):
+            return
         self._waiting.append(self._newest)
         if len(self._waiting) > _DELAY:
             self._untouched.append(self._waiting.popleft())

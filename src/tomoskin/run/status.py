@@ -4,9 +4,9 @@ took its time for; and all of it for a person and for a program."""
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from operator import attrgetter
 from pathlib import Path
@@ -16,7 +16,7 @@ import numpy as np
 from tomoskin.board.wire import Info
 from tomoskin.core import Frame, watch_stages
 from tomoskin.imaging import AlphaChoice
-from tomoskin.learning import BodyReading, CalibrationHealth, ClassReading
+from tomoskin.learning import CalibrationHealth, Reading
 from tomoskin.pipeline import ReferenceState
 from tomoskin.run.sinks import SinkReport
 from tomoskin.sensing.signal import ElectrodeHealth
@@ -253,10 +253,8 @@ class Status:
         Where a replay is; None where the source is another.
     electrodes
         Those that are not good.
-    bend
-        How the sheet is bent; None where its bends were not learnt.
-    state
-        Which of the learnt classes it shows; None where none was learnt.
+    readings
+        What calibrations read that is shown, by the name of their kind.
     calibration
         How touches fit the calibration that locates them; None where none does.
     problem
@@ -288,8 +286,7 @@ class Status:
     sinks: tuple[SinkReport, ...] = ()
     electrodes: tuple[ElectrodeHealth, ...] = ()
     replay: ReplayStatus | None = None
-    bend: BodyReading | None = None
-    class_reading: ClassReading | None = None
+    readings: Mapping[str, Reading] = field(default_factory=dict)
     calibration: CalibrationHealth | None = None
     board: Info | None = None
     board_name: str = ""
@@ -309,6 +306,4 @@ class Status:
             f"{self.source}: {self.fps:.0f} frames/s, {self.dropped} dropped, "
             f"p99 {1e3 * self.p99:.1f} ms, drift {100 * drift:.1f} %"
         )
-        if self.bend is not None:
-            text += f", {self.bend.text}"
-        return text if self.class_reading is None else f"{text}, {self.class_reading.text}"
+        return ", ".join([text, *(reading.text for reading in self.readings.values())])

@@ -11,15 +11,15 @@ each                  several, n > 1: n that have merged), own u8 (1: a link of 
                       y, sd_x, sd_y (NaN unknown), area, peak, since (s ago), cov_xy (m²), force
                       and its interval (N), depth and its interval (m; NaN uncalibrated) f32
 truth, 16 bytes each  x, y (m), force (N), radius (m) f32: the presses on the twin
-bend, 16 bytes        with flag bit 3 only: angle, its deviation, axis (rad) f32, state u32 (a
-                      place in :data:`BEND_STATES`)
 labels                u8 [n_cells], 0 none, k = cells of the k-th touch; padded to 4 bytes
 dent                  u16 [n_dent] twice: by how much each node of the mesh has given way, and the
                       deviation of that, in :data:`DENT_STEP`; n_dent is 0 where none is asked for
+readings              all bytes that follow: JSON, what the page shows of what calibrations read,
+                      by its key; none where nothing was read
 ====================  ======================================================================
 
 Flags: bit 0 the reference stands; bit 1 too many rows are unusable, there is no image;
-bit 2 some rows are left out of the image; bit 3 bends of this skin were learnt.
+bit 2 some rows are left out of the image.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ from enum import IntFlag
 
 import numpy as np
 
-from tomoskin.core import Touch
-from tomoskin.learning import BodyReading, DentMap
+from tomoskin.core import Touch, encode_json
+from tomoskin.learning import DentMap
 from tomoskin.pipeline import FrameResult
 from tomoskin.sensing.track import amount_values
 from tomoskin.twin import Probe
@@ -44,11 +44,7 @@ class Flag(IntFlag):
     READY = 1
     NO_IMAGE = 2
     ROWS_LEFT_OUT = 4
-    BENT = 8
 
-
-BEND_STATES = ("idle", "bend", "touch", "bend and touch", "unknown")
-"""States of a :class:`~tomoskin.learning.BodyReading`, as they are numbered here."""
 
 DENT_STEP = 2e-6
 """Metres by which a dent is counted: a page has up to 131 mm."""
@@ -85,7 +81,6 @@ RECORDS = {
         ]
     ),
     "Truth": np.dtype([(name, "<f4") for name in ("x", "y", "force", "radius")]),
-    "Bend": np.dtype([("angle", "<f4"), ("sd", "<f4"), ("axis", "<f4"), ("state", "<u4")]),
 }
 """The records of the message; ``scripts/page_types.py`` makes the page's readers of them."""
 
@@ -124,9 +119,9 @@ def encode_result(
             result.reference.astype("<f4").tobytes(),
             _touches(touches, result.host_time, own),
             _record("Truth", [(p.x, p.y, p.force, p.radius) for p in truth]),
-            _bend(result.bend),
             _labels(touches, len(result.image.values)),
             np.rint(np.minimum(np.array(dent or ()) / DENT_STEP, 65535)).astype("<u2").tobytes(),
+            _readings(result),
         ]
     )
 
@@ -135,7 +130,7 @@ def _header(
     result: FrameResult, n_touches: int, n_truth: int, latency: float, dent: DentMap | None
 ) -> bytes:
     flags = Flag.READY * result.ready | Flag.NO_IMAGE * (not result.has_image)
-    flags |= Flag.ROWS_LEFT_OUT * (result.left_out > 0) | Flag.BENT * bool(_bend(result.bend))
+    flags |= Flag.ROWS_LEFT_OUT * (result.left_out > 0)
     values = (
         MAGIC,
         result.sequence % 2**32,
@@ -174,10 +169,9 @@ def _touches(touches: Sequence[Touch], now: float, own: Container[int]) -> bytes
     return _record("Touch", rows)
 
 
-def _bend(bend: BodyReading | None) -> bytes:
-    if bend is None or bend.angle != bend.angle:  # the page shows angles only
-        return b""
-    return _record("Bend", (bend.angle, bend.sd, bend.axis, BEND_STATES.index(bend.state)))
+def _readings(result: FrameResult) -> bytes:
+    shown = {reading.key: reading.shown for reading in result.shown_readings.values()}
+    return encode_json(shown) if shown else b""
 
 
 def _labels(touches: Sequence[Touch], n_cells: int) -> bytes:

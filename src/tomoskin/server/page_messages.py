@@ -13,7 +13,6 @@ from typing import Any, Literal, Self
 import msgspec
 
 from tomoskin.core import encode_json
-from tomoskin.learning import ClassReading
 from tomoskin.run import ReplayStatus
 from tomoskin.run.sinks import SinkReport
 from tomoskin.sensing.signal import ElectrodeHealth
@@ -146,24 +145,6 @@ class SlowFrame(MessagePart, frozen=True):
     text: str
 
 
-class CoordinateNow(MessagePart, frozen=True):
-    """A coordinate of the body, with its deviation, in its own unit."""
-
-    name: str
-    value: float
-    sd: float
-
-
-class BendNow(MessagePart, frozen=True):
-    """How the body stands: its bend, where an angle was learnt, and its other coordinates."""
-
-    angle_rad: float | None
-    sd_rad: float | None
-    axis_rad: float | None
-    state: str
-    coordinates: tuple[CoordinateNow, ...]
-
-
 class CalibrationNow(MessagePart, frozen=True):
     """How touches fit the calibration that locates them; ``broken``: someone must act."""
 
@@ -201,8 +182,6 @@ class RunState(Message, frozen=True, tag="state"):
     recording: str | None
     sinks: tuple[SinkReport, ...]
     replay: ReplayStatus | None
-    bend: BendNow | None
-    class_: ClassReading | None = msgspec.field(name="class")
     calibration: CalibrationNow | None
     problem: str | None
     text: str

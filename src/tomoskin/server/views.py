@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import starmap
 from typing import Any
 
 import numpy as np
@@ -62,7 +61,7 @@ def scene(
 
 def state(status: Status) -> to_page.RunState:
     """The state of the run as the page gets it."""
-    reference, baseline, bend = status.reference, status.reference.baseline, status.bend
+    reference, baseline = status.reference, status.reference.baseline
     return to_page.RunState.of(
         status,
         p50_ms=1e3 * status.p50,
@@ -83,15 +82,6 @@ def state(status: Status) -> to_page.RunState:
         alpha=status.choice.alpha,
         rule=status.choice.rule,
         recording=None if status.recording is None else status.recording.name,
-        bend=bend
-        and to_page.BendNow.of(
-            bend,
-            angle_rad=bend.angle,
-            sd_rad=bend.sd,
-            axis_rad=bend.axis,
-            coordinates=tuple(starmap(to_page.CoordinateNow, bend.besides_angle)),
-        ),
-        class_=status.class_reading,
         calibration=status.calibration and to_page.CalibrationNow.of(status.calibration),
     )
 

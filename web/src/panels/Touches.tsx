@@ -6,8 +6,9 @@ import { fixed, inScale, millimetres, scaleFor, type Scale } from "../format";
 import { fingers } from "../screen";
 import { limit, link, scene, shown, status } from "../state";
 import { halfAxes } from "../sheet/overlay";
-import { amountInWords, classInWords, MEASURANDS } from "../words";
+import { amountInWords, MEASURANDS } from "../words";
 import { next, several, showNext, shownAs } from "./amounts";
+import { ReadingsAboveTouches } from "./Readings";
 
 const ROWS = 4;
 
@@ -137,18 +138,6 @@ function Announcer() {
   );
 }
 
-/** The class that the sheet shows. */
-function ClassOfSheet() {
-  const shown = status.value?.reference.ready ? status.value.class : null;
-  if (!shown) return null;
-  const words = classInWords(shown);
-  return (
-    <span class="reading-of-class" title={words} data-testid="sheet-class">
-      {words}
-    </span>
-  );
-}
-
 export function Touches() {
   const touches = shown.value?.touches ?? [];
   const scale = scaleFor(limit.value, scene.value?.unit ?? "S");
@@ -158,7 +147,7 @@ export function Touches() {
       <h2>
         <span id="touches-title">Touches</span>
         {touches.length > ROWS && <span class="small">{touches.length - ROWS} more on the sheet</span>}
-        <ClassOfSheet />
+        <ReadingsAboveTouches />
       </h2>
       <div class="list" data-testid="touch-list">
         {touches.length === 0 ? (

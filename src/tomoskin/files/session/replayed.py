@@ -23,7 +23,7 @@ from tomoskin.files.session.session_reader import (
     tick_rate,
     touches_before,
 )
-from tomoskin.learning import KINDS, Calibration
+from tomoskin.learning import Calibration, calibration_kinds
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.pattern import Scan
 from tomoskin.pipeline import (
@@ -57,7 +57,7 @@ def recorded_calibrations(
     Those that are ``known``, by the name of their kind, to the byte are not learnt again.
     """
     held = session.attachments()
-    for kind in KINDS:
+    for kind in calibration_kinds():
         if (data := held.get(kind.attachment)) is not None:
             same = (known or {}).get(kind.name)
             if same is not None and same.encode() == data:

@@ -5,13 +5,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
-from tomoskin.core import Detection, FloatArray
+from tomoskin.core import Detection, FloatArray, Touch
 from tomoskin.learning.body.body_model import TENSOR, BodyModel
-from tomoskin.learning.kind import Applied, Conditions, FrameView, Kind, TouchFit
+from tomoskin.learning.kind import (
+    Applied,
+    Conditions,
+    FrameView,
+    Kind,
+    Reading,
+    ShownReading,
+    TouchFit,
+)
+from tomoskin.model.mesh import Mesh
 from tomoskin.sensing.fit import Response, spots_of
 from tomoskin.sensing.signal import independent
 from tomoskin.sensing.track import RESIDUAL
@@ -42,8 +51,38 @@ _BEYOND = 0.1
 """Part of the learnt range beyond which a state is outside, and by three times that no farther."""
 
 
+_WORDS = {
+    "idle": "not bent",
+    "bend": "bent",
+    "touch": "touched, not bent",
+    "bend and touch": "bent and touched",
+    "unknown": "neither a bend nor a touch explains this",
+}
+"""States as people read them, where an angle was learnt, and where none was."""
+
+_WORDS_WITHOUT_ANGLE = {
+    "idle": "at rest",
+    "bend": "moved",
+    "touch": "touched, at rest",
+    "bend and touch": "moved and touched",
+    "unknown": "neither the body nor a touch explains this",
+}
+
+
+def _fixed(value: float, decimals: int) -> str:
+    """A number as the page writes it; a dash where it is none."""
+    if not np.isfinite(value):
+        return "–"
+    text = f"{abs(value):.{decimals}f}"
+    return f"−{text}" if value < 0 and float(text) else text
+
+
+def _degrees(angle: float, decimals: int = 0) -> str:
+    return f"{_fixed(float(np.degrees(angle)), decimals)}°"
+
+
 @dataclass(frozen=True, slots=True)
-class BodyReading:
+class BodyReading(Reading):
     """How the body stands in one frame.
 
     Attributes
@@ -65,6 +104,8 @@ class BodyReading:
         What is wrong with the state, in a sentence, or None.
     """
 
+    key: ClassVar[str] = "bend"
+    listed: ClassVar[str] = "bends"
     names: tuple[str, ...]
     values: FloatArray
     deviations: FloatArray
@@ -84,22 +125,72 @@ class BodyReading:
     @property
     def facts(self) -> dict[str, Any]:
         """For programs; an angle that was not learnt is None."""
-        angle, sd = (None if np.isnan(one) else one for one in (self.angle, self.sd))
         own = zip(self.names, self.values.tolist(), self.deviations.tolist(), strict=True)
         return {
-            "angle_rad": angle,
-            "sd_rad": sd,
-            "axis_rad": self.axis,
-            "state": self.state,
+            **self._bend,
             "body": {name: {"value": value, "sd": away} for name, value, away in own},
             "problem": self.problem,
         }
+
+    @property
+    def now(self) -> dict[str, Any]:
+        """The bend, and beside it the coordinates that it does not tell."""
+        others = [{"name": name, "value": at, "sd": sd} for name, at, sd in self.besides_angle]
+        return {**self._bend, "coordinates": others}
+
+    @property
+    def _bend(self) -> dict[str, Any]:
+        angle, sd = (None if np.isnan(one) else one for one in (self.angle, self.sd))
+        return {"angle_rad": angle, "sd_rad": sd, "axis_rad": self.axis, "state": self.state}
+
+    @property
+    def word(self) -> str:
+        """The state."""
+        return self.state
+
+    @property
+    def is_rest(self) -> bool:
+        """Whether it stands as when the reference is taken."""
+        return self.state == "idle"
+
+    @property
+    def shown(self) -> ShownReading:
+        """The angle in large figures, the others below it, and the state in words."""
+        notes = tuple(
+            f"{name} {_fixed(value, _decimals(sd))} ± {_fixed(sd, _decimals(sd))}"
+            for name, value, sd in self.besides_angle
+        )
+        unknown = self.state == "unknown"
+        if np.isnan(self.angle):
+            words = _WORDS_WITHOUT_ANGLE[self.state]
+            return ShownReading(words, f"Body: {words}", "sheet", unknown, notes=notes)
+        words = _WORDS[self.state]
+        angle, sd, axis = _degrees(self.angle), _degrees(self.sd, 1), _degrees(self.axis)
+        by, sentence = f"{angle} ± {sd} about an axis {axis} from x", f"Body: {words}"
+        if self.state not in ("idle", "touch"):
+            sentence += f"; bent by {by} if anything" if unknown else f" by {by}"
+        return ShownReading(
+            words,
+            sentence,
+            "sheet",
+            unknown,
+            unit="bend",
+            value=angle,
+            deviation=f"± {sd}, axis {axis}",
+            drawn=(self.angle, self.axis),
+            notes=notes,
+        )
 
     @property
     def text(self) -> str:
         """The state in words, for one line of a report."""
         shown = "body" if np.isnan(self.angle) else f"bend {np.degrees(self.angle):.0f}°"
         return f"{shown} ({self.state})"
+
+
+def _decimals(sd: float) -> int:
+    """That show a deviation with one or two digits."""
+    return min(6, max(0, 1 - int(np.floor(np.log10(sd))))) if sd > 0 else 6
 
 
 class BodyReader:
@@ -297,6 +388,29 @@ class BodyApplied(Applied):
         return reading
 
 
+_FOLD = 3
+"""Touches in a line that are doubted; a sheet that is bent by 15° or more shows as many."""
+
+_ACROSS, _ASIDE = 0.7, 0.1
+"""They go across this part of the sheet, and lie within this part of it beside their line."""
+
+
+def looks_bent(touches: Sequence[Touch], mesh: Mesh) -> str | None:
+    """A sentence where touches lie in a line across the sheet, as those of a fold do; else None."""
+    if len(touches) < _FOLD:
+        return None
+    places = np.array([(touch.detection.x, touch.detection.y) for touch in touches])
+    places -= places.mean(axis=0)
+    along, aside = np.linalg.svd(places, full_matrices=False)[2]
+    size = float(np.ptp(mesh.points[:, :2] @ along))
+    if np.ptp(places @ along) < _ACROSS * size or np.ptp(places @ aside) > _ASIDE * size:
+        return None
+    return (
+        f"{len(touches)} touches lie in a line across the sheet: if it is bent, they are its fold, "
+        "and others are misplaced; teach its motion with tomoskin calibrate body"
+    )
+
+
 def _apply(model: BodyModel, conditions: Conditions) -> Applied:
     fit = conditions.touch_fit()
     return Applied() if fit is None else BodyApplied(model, fit)
@@ -311,6 +425,8 @@ BODY = Kind(
     exclude=BodyModel.without,
     apply=_apply,
     directions=lambda model: model.directions,
+    reading=BodyReading,
+    lacking=looks_bent,
     fits=True,
 )
 """The body's motion; its model is a :class:`BodyModel`. Title and attachment are older than the

@@ -3,8 +3,8 @@ calibration that it makes."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Self
+from dataclasses import asdict, dataclass, replace
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,7 +21,7 @@ from tomoskin.learning.classes.mixture import (
     session_mean,
     shows,
 )
-from tomoskin.learning.kind import Applied, Conditions, FrameView, Kind
+from tomoskin.learning.kind import Applied, Conditions, FrameView, Kind, Reading, ShownReading
 from tomoskin.learning.touch.presses import frames
 from tomoskin.model.pattern import Pattern
 
@@ -51,7 +51,7 @@ class Answers:
 
 
 @dataclass(frozen=True, slots=True)
-class ClassReading:
+class ClassReading(Reading):
     """What one frame shows.
 
     Attributes
@@ -64,13 +64,34 @@ class ClassReading:
         Whether the frame looks like none of them.
     """
 
+    key: ClassVar[str] = "class"
+    listed: ClassVar[str] = "classes"
     name: str
     probability: float
     unknown: bool
 
     @property
+    def word(self) -> str:
+        """The class, or that it is none."""
+        return "unknown" if self.unknown else self.name
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """The class, and how sure it is."""
+        return asdict(self)
+
+    @property
+    def shown(self) -> ShownReading:
+        """One line above the touches."""
+        if self.unknown:
+            words = f"Class unknown (nearest: {self.name})"
+        else:
+            words = f"Class: {self.name}, {100 * self.probability:.0f} %"
+        return ShownReading(words, words, "touches")
+
+    @property
     def text(self) -> str:
-        """The class as the page and the terminal show it."""
+        """The class as the terminal shows it."""
         if self.unknown:
             return f"unknown class (nearest: {self.name})"
         return f"{self.name} {100 * self.probability:.0f} %"
@@ -335,6 +356,7 @@ CLASSES: Kind[Classifier] = Kind(
     learn=Classifier.learn,
     exclude=Classifier.without,
     apply=ClassesApplied,
+    reading=ClassReading,
     own_settings=True,
 )
 """Classes of frames; its model is a :class:`Classifier`."""
