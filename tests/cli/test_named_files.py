@@ -32,16 +32,19 @@ from tomoskin.model.skin import Skin
 
 Run = Callable[..., tuple[int, str, str]]
 COARSE = Skin.load("textile-disc-8").altered({"mesh": {"cells": 300}})
-BODY = ("--bend", "0=0:8", "--bend", "30=8:16", "--bend", "60=16:24")
 
 
 @dataclass(frozen=True)
 class Case:
-    """A command line with one output, and the ending of that; the first input is its own."""
+    """A command line with one output, and the ending of that; the first input is its own.
+
+    ``makes``: what other cases call its output, where they read it.
+    """
 
     words: str
     ending: str
     options: tuple[str, ...] = ()
+    makes: str = ""
 
     def line(self, files: dict[str, Path], out: Path, *more: str) -> list[str]:
         """With the ``files`` by their names."""
@@ -61,20 +64,14 @@ CASES = {
     ("locate", "touches"): Case(
         "locate {presses} --calibration {calibration} --touches {out}", ".csv"
     ),
-    ("classify", "out"): Case("classify {presses} --calibration {class} --out {out}", ".csv"),
-    ("calibrate touch", "out"): Case("calibrate touch {presses} --out {out}", ".npz"),
-    ("calibrate rub", "out"): Case("calibrate rub {rubbed} --skin {skin} --out {out}", ".npz"),
-    ("calibrate class", "out"): Case(
-        "calibrate class {presses} --class a=0:8 --class b=8:16 --out {out}", ".npz"
+    ("calibrate touch", "out"): Case(
+        "calibrate touch {presses} --out {out}", ".npz", makes="calibration"
     ),
     ("calibrate force", "out"): Case(
         "calibrate force {presses} --skin {skin} --out {out}", ".npz", ("--weight", "4=0:16")
     ),
     ("calibrate depth", "out"): Case(
         "calibrate depth {presses} --skin {skin} --out {out}", ".npz", ("--depth", "1=0:16")
-    ),
-    ("calibrate body", "out"): Case(
-        "calibrate body {bends} --skin {skin} --out {out}", ".npz", BODY
     ),
     ("calibrate mapping", "out"): Case(
         "calibrate mapping {presses} --skin {skin} --out {out}", ".toml"
@@ -117,10 +114,10 @@ def force(case: Case) -> tuple[str, ...]:
 # What there is to read: for the refusals nothing of use, so that whoever looks at it says so.
 
 NAMES = {
-    "presses": ".npz", "bends": ".npz", "calibration": ".npz", "class": ".npz", "skin": ".toml",
+    "presses": ".npz", "bends": ".npz", "calibration": ".npz", "skin": ".toml",
     "surface": ".stl", "places": ".csv", "session": ".mcap", "script": ".toml",
     "rubbed": ".npz",
-}  # fmt: skip
+} | {case.makes: case.ending for case in CASES.values() if case.makes}  # fmt: skip
 
 
 @pytest.fixture
@@ -148,10 +145,9 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     meshio.write(files["surface"], meshio.Mesh(flat, [("triangle", disc(cells=300).cells)]))
     turn = 2 * np.pi * np.arange(8) / 8
     np.savetxt(files["places"], 100 * np.c_[np.cos(turn), np.sin(turn), 0 * turn], "%.3f", ",")
-    for name in ("touch", "class"):
-        case, out = CASES[f"calibrate {name}", "out"], "calibration" if name == "touch" else name
+    for case in filter(lambda case: case.makes, CASES.values()):
         with pytest.raises(SystemExit) as end:
-            import_module("tomoskin.cli").main(case.line(files, files[out]))
+            import_module("tomoskin.cli").main(case.line(files, files[case.makes]))
         assert not end.value.code
     return files
 

@@ -8,13 +8,13 @@ import pytest
 from learning.labelled import RADIUS, Floats, places
 from tomoskin import ForwardModel, Locator, Pattern, Skin
 from tomoskin.learning import label_doubts
+from tomoskin.learning.touch.model_fit import model_responses
 from tomoskin.learning.touch.per_channel import (
     ChannelMaps,
     Envelope,
     likeliest_envelope,
     rings,
 )
-from tomoskin.learning.touch.unlabelled import model_responses
 from tomoskin.sensing.segment import Region
 
 PATTERN = Pattern.adjacent(8)

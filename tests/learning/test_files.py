@@ -8,26 +8,16 @@ from typing import Any
 import numpy as np
 import pytest
 
+from learning.earlier_files import check_nothing_may_lack, read_earlier
 from tomoskin.core import DataError
-from tomoskin.learning import (
-    BODY,
-    DEPTH,
-    TOUCH,
-    Calibration,
-    Kind,
-    Locator,
-    calibration_kinds,
-    load_calibration,
-)
+from tomoskin.learning import FORCE, TOUCH, Calibration, Kind, Locator
 from tomoskin.model.pattern import Pattern
 
 PATTERN = Pattern.adjacent(8)
-ABOUT = ("kind", "version", "drive", "measure", "n_electrodes", "skin_name", "pattern")
-OPTIONAL = ("skin", "strength", "spread_m2", "method", "session", "angle_rad", "axis_rad")
-"""Keys of what a file is of, and of what a calibration can do without: a body's states too."""
-EARLIER = [kind for kind in calibration_kinds() if kind is not DEPTH]
-RENAMED = {"force_n": "amount"}
-"""Kinds of which there are files of before, and keys that these have for what is called so now."""
+EARLIER = [TOUCH, FORCE]
+"""Kinds of the core of which there are files of before."""
+
+FILES = Path(__file__).parent / "files"
 
 
 @pytest.fixture(scope="module")
@@ -100,33 +90,12 @@ def test_damaged_files_are_refused(
 
 @pytest.mark.parametrize("kind", EARLIER, ids=lambda kind: kind.name)
 def test_files_of_earlier_versions_are_read(kind: Kind[Any]) -> None:
-    """Each was written before files were packed by the annotations of what they hold."""
-    path = Path(__file__).parent / "files" / f"{kind.name}.npz"
-    known = kind.read(path)
-    assert load_calibration(path).kind is kind
-    assert (known.skin_name, known.pattern.identity) == ("a skin", PATTERN.identity)
-    assert getattr(known.model, "skin_id", "a skin's identity") == "a skin's identity"
-    with np.load(path) as kept:
-        own = kind.pack(known.model)
-        then = {RENAMED.get(key, key): kept[key] for key in {*kept} - {*ABOUT}}
-        if kind is BODY:  # its one angle is now the first coordinate of a state
-            assert own.pop("names").tolist() == ["angle"]
-            then["state"] = then.pop("angle_rad")[:, None]
-            then["axis_rad"] = then["axis_rad"][0]
-        assert {*own} - {"measurand", "modelled"} == {*then}
-        for key, array in then.items():
-            np.testing.assert_array_equal(own[key], array)
+    own, then = read_earlier(FILES / f"{kind.name}.npz", kind)
+    assert {*own} - {"measurand", "modelled"} == {*then}
+    for key, array in then.items():
+        np.testing.assert_array_equal(own[key], array)
 
 
 @pytest.mark.parametrize("kind", EARLIER, ids=lambda kind: kind.name)
 def test_files_that_lack_something_are_refused(kind: Kind[Any], tmp_path: Path) -> None:
-    path = Path(__file__).parent / "files" / f"{kind.name}.npz"
-    with np.load(path) as kept:
-        arrays = dict(kept)
-    for key in {*arrays} - {*ABOUT, *OPTIONAL}:
-        np.savez(tmp_path / "c.npz", **{k: v for k, v in arrays.items() if k != key})
-        with pytest.raises(
-            DataError, match=f"expected {RENAMED.get(key, key)} in the file"
-        ) as caught:
-            kind.read(tmp_path / "c.npz")
-        assert "c.npz" in str(caught.value)
+    check_nothing_may_lack(FILES / f"{kind.name}.npz", kind, tmp_path)

@@ -263,10 +263,11 @@ export interface Calibrations {
   readonly most: Readonly<Record<string, number>>;
 }
 
-/** The guided flow; ``kind`` null: none goes on. */
+/** The guided flow; ``kind`` null: none goes on. ``offered``: those that may be begun. */
 export interface FlowNow {
   readonly type: "flow";
-  readonly kind: "depth" | "force" | "mapping" | "rub" | "touch" | null;
+  readonly offered: readonly string[];
+  readonly kind: string | null;
   readonly paused: boolean;
   readonly phase: "hold" | "name" | "press" | "release" | "rest" | "rub" | "several";
   readonly dot: readonly [number, number] | null;
@@ -676,10 +677,10 @@ export interface Connect {
   readonly source: string;
 }
 
-/** Ask for presses: where the dot is, to learn touch or to find the channel mapping; with known weights or to known depths, to learn these; everywhere, to learn touch without labels. */
+/** Ask for presses: where the dot is, to learn touch or to find the channel mapping; with known weights or to known depths, to learn these; or as another flow of those that are offered. */
 export interface BeginFlow {
   readonly type: "flow_begin";
-  readonly kind: "depth" | "force" | "mapping" | "rub" | "touch";
+  readonly kind: string;
 }
 
 /** This page shows the flow, or hides it: while no page shows it, it is paused. */

@@ -72,7 +72,7 @@ function warningsOf(status: RunState, age: number | null): Warning[] {
   return found;
 }
 
-const TEACHING = { touch: "touch", rub: "touch", force: "forces", depth: "depths", mapping: "channels" } as const;
+const TEACHING: Readonly<Record<string, string>> = { force: "forces", depth: "depths", mapping: "channels" };
 
 /** A guided flow, in place of the calm word of a live skin; any other word stays. */
 function withFlow(
@@ -81,7 +81,7 @@ function withFlow(
   live: boolean,
 ): readonly [word: string, remark: string] {
   if (!flow?.kind) return [word, remark];
-  const name = TEACHING[flow.kind];
+  const name = TEACHING[flow.kind] ?? "touch";
   const count = flow.rubbed ? `${flow.rubbed.touches} touches` : `${flow.presses.length} recorded`;
   const said = flow.paused
     ? `Teaching ${name} is paused, ${count}: ${live ? "open Set up to go on or to leave it" : "go back to live to go on"}`

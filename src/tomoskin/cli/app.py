@@ -32,9 +32,8 @@ COMMANDS = {
     "record": "Record a session without a page: raw bytes, frames, touches and images.",
     "image": "Reconstruct a recording: images and touches.",
     "explain": "Say how one frame of a session became touches, step by step.",
-    "calibrate": "Learn a calibration from labelled presses, weights, classes or bends.",
+    "calibrate": "Learn a calibration from labelled examples.",
     "locate": "Locate touches with a calibration: one per frame, or up to two with --several.",
-    "classify": "Classify each frame with a calibration, or call it unknown.",
     "simulate": "Run a script on the twin into a session file.",
     "bench": "Measure speed on this machine.",
     "session": "Show, repair and convert recorded sessions.",
@@ -75,7 +74,9 @@ class Contents(TyperGroup):
             formatter.write_dl([(name, self.sentence(ctx, name)) for name in self.commands])
 
     def sentence(self, ctx: Any, name: str) -> str:
-        """What the command does: the first paragraph of its help."""
+        """What the command does: what its table says, or the first paragraph of its help."""
+        if about := _about(f"{self.name} {name}" if self.name in COMMANDS else name):
+            return about
         command = self.get_command(ctx, name)
         first = ((command and command.help) or "").partition("\n\n")[0]
         return " ".join(first.split())
@@ -137,7 +138,16 @@ def _added(name: str) -> Any:
     command = entry.load()
     if isinstance(command, typer.Typer):
         return typer.main.get_command(command)
-    return _single(name, command, inspect.getdoc(command) or "")
+    text = inspect.getdoc(command) or ""
+    if entry.about:
+        text = f"{entry.about}\n\n{text.partition(chr(10) * 2)[2]}"
+    return _single(name, command, text)
+
+
+def _about(name: str) -> str:
+    """What the table of a registered command says of it; "" where it says nothing."""
+    entry = registered_one("commands", name)
+    return entry.about if entry else ""
 
 
 def _single(name: str, function: Any, text: str) -> Any:

@@ -1,99 +1,40 @@
 """``tomoskin calibrate KIND``: learn from labelled examples, one command for every kind.
 
-A kind is a function of what was recorded and of the options that it alone has; :func:`_kind` makes
-its command, with the options that all kinds share.
+A kind is a function of what was recorded and of the options that it alone has; what all kinds share
+is in :mod:`tomoskin.cli.learning_command`.
 """
 
 from __future__ import annotations
 
-import inspect
-from collections.abc import Callable
-from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 import typer
 
 from tomoskin.cli import calibrate_labels as labels, calibrate_reports as reports
 from tomoskin.cli.app import group
-from tomoskin.cli.named_files import SKIN, ForceFlag, Reads, Writes, with_options
-from tomoskin.cli.named_parts import Recorded, labelled_frames, reconstructed
-from tomoskin.cli.options import CalibrationOut, KnownSkinOption, ReferenceOption, SkinOption
-from tomoskin.cli.output import Bar, JsonFlag, remark, tell
+from tomoskin.cli.learning_command import LearningOutcome, calibration_command
+from tomoskin.cli.named_files import SKIN, Added, Reads, Writes
+from tomoskin.cli.named_parts import Recorded, found_touches, labelled_frames
+from tomoskin.cli.options import KnownSkinOption
+from tomoskin.cli.output import Bar, remark
 from tomoskin.core import DataError, FloatArray, write_text
 
 if TYPE_CHECKING:
     from tomoskin.core import IntArray
-    from tomoskin.learning import Locator
-    from tomoskin.pipeline import Reconstruction
+    from tomoskin.learning import Calibration, Locator
 
 app = group("calibrate")
 
 
-@dataclass(frozen=True)
-class LearningOutcome:
-    """What came of it: ``write`` makes the file, ``facts`` and ``lines`` say it to programs and to
-    people; a ``problem`` is raised at the end."""
-
-    write: Callable[..., None] | None
-    facts: dict[str, Any]
-    lines: list[str] = field(default_factory=list)
-    problem: DataError | None = None
+TOUCHED = "Frames with labels, one touch in each."
+"""What learns from touches is given."""
 
 
-Learn = Callable[..., LearningOutcome]
-
-
-def _kind(
-    name: str, about: str, skin: Any = SkinOption, out: Any = CalibrationOut
-) -> Callable[[Learn], Learn]:
-    """Make a function the command ``name``, whose input is ``about`` something; a decorator.
-
-    Its first parameter is what was recorded, the others are its own options.
-    """
-
-    def register(learn: Learn) -> Learn:
-        def command(
-            recording: Path,
-            out: Path,
-            skin: str | None,
-            reference: str | None,
-            force: bool,
-            json: bool,
-            **own: Any,
-        ) -> None:
-            outcome = learn(Recorded.of(recording, skin, reference, needs_skin=needs_skin), **own)
-            if outcome.write is not None:
-                outcome.write(out, overwrite=force)
-            tell(outcome.facts, outcome.lines, json=json)
-            if outcome.problem is not None:
-                raise outcome.problem
-
-        needs_skin = skin is SkinOption
-        hints, needed = get_type_hints(learn, include_extras=True), inspect.Parameter.empty
-        own = list(inspect.signature(learn).parameters.values())[1:]
-        argument = Annotated[Path, typer.Argument(metavar="INPUT", help=about), Reads()]
-        options = {
-            "recording": (argument, needed),
-            "out": (out, needed),
-            "skin": (skin, None),
-            **{one.name: (hints[one.name], one.default) for one in own},
-            "reference": (ReferenceOption, None),
-            "force": (ForceFlag, False),
-            "json": (JsonFlag, False),
-        }
-        app.command(name)(with_options(command, learn, options))
-        return learn
-
-    return register
-
-
-_TOUCHED = "Frames with labels, one touch in each."
-
-
-@_kind("touch", _TOUCHED, KnownSkinOption)
+@app.command("touch")
+@calibration_command(TOUCHED, KnownSkinOption)
 def touch(
     labelled: Recorded,
     onto: Annotated[
@@ -105,40 +46,25 @@ def touch(
         ),
         Reads(),
     ] = None,
-    unlabelled: Annotated[
-        bool,
-        typer.Option(
-            "--unlabelled",
-            help="With --onto: frames without a label are touches too, all over the skin. They "
-            "align the old calibration to today, and labels are optional.",
-        ),
-    ] = False,
+    *,
+    added: Added,
 ) -> LearningOutcome:
     """Learn where a touch is from presses at known positions."""
-    from tomoskin.learning import TOUCH, Locator, label_doubts
+    from tomoskin.learning import TOUCH, label_doubts
 
-    if unlabelled and not onto:
-        raise DataError(
-            "--unlabelled aligns an older calibration, but none is given",
-            hint="add --onto OLD.npz",
-        )
     old = TOUCH.read(onto) if onto else None
-    given = labelled.onto(old)
-    dv, xy = given.dv, given.labels if unlabelled else given.xy
-    frames = np.arange(len(dv)) if unlabelled else labelled_frames(xy)
-    dv, xy = dv[frames], xy[frames]
-    if old is None:
-        with Bar("learning") as bar:
-            locator = Locator.fit(dv, xy, pattern=given.pattern, skin=given.skin, progress=bar)
-        calibration = TOUCH.of(locator, given.pattern, given.skin)
-    elif unlabelled:
-        calibration = old.with_model(_aligned(old.model, dv, xy))
+    given, older = labelled.onto(old), None
+    aligned = next(filter(None, (one.aligned(given, old) for one in added)), None)
+    if aligned is not None:
+        calibration, dv, xy = aligned, given.dv, given.labels
+        frames = np.arange(len(dv))
     else:
-        with Bar("learning") as bar:
-            calibration = old.with_model(old.model.updated(dv, xy, progress=bar))
-    added = _added(calibration.model, frames, dv, xy)
-    older = old.model if old is not None and not unlabelled else None
-    facts = reports.touch_facts(calibration.model, added, older)
+        frames = labelled_frames(given.xy)
+        dv, xy = given.dv[frames], given.xy[frames]
+        calibration = _learnt(given, old, dv, xy)
+        older = None if old is None else old.model
+    newest = _newest(calibration.model, frames, dv, xy)
+    facts = reports.touch_facts(calibration.model, newest, older)
     if given.skin is not None and (doubts := label_doubts(calibration.model, given.skin)):
         remark(f"{given.path}: {doubts}")
     if facts["is_guess"]:
@@ -150,72 +76,26 @@ def touch(
     return LearningOutcome(calibration.write, facts, reports.touch_lines(facts))
 
 
-def _aligned(locator: Locator, dv: FloatArray, xy: FloatArray) -> Locator:
-    """The locator for the session of these frames; what has changed is said."""
-    from tomoskin.learning import SessionAlignment
+def _learnt(
+    given: Recorded, old: Calibration[Locator] | None, dv: FloatArray, xy: FloatArray
+) -> Calibration[Locator]:
+    """A calibration of presses, beside those of the ``old`` one where there is one."""
+    from tomoskin.learning import TOUCH, Locator
 
-    alignment = SessionAlignment.of(locator, dv, xy)
-    if not alignment.holds:
-        raise DataError("; ".join(alignment.findings))
-    for finding in alignment.findings:
-        remark(finding)
     with Bar("learning") as bar:
-        return locator.aligned(alignment, bar)
+        if old is not None:
+            return old.with_model(old.model.updated(dv, xy, progress=bar))
+        locator = Locator.fit(dv, xy, pattern=given.pattern, skin=given.skin, progress=bar)
+    return TOUCH.of(locator, given.pattern, given.skin)
 
 
-def _added(locator: Locator, frames: IntArray, dv: FloatArray, xy: FloatArray) -> list[int]:
+def _newest(locator: Locator, frames: IntArray, dv: FloatArray, xy: FloatArray) -> list[int]:
     """Frames that are the locator's last presses: all, or after an alignment the labelled ones."""
     presses = locator.presses.dv
     for some in (np.arange(len(dv)), labelled_frames(xy)):
         if len(some) and np.array_equal(presses[-len(some) :], dv[some], equal_nan=True):
             return list(frames[some].tolist())
     return []
-
-
-def _reconstruction(labelled: Recorded) -> Reconstruction:
-    """The touches that the pipeline finds in each frame."""
-    from tomoskin.pipeline import prepare
-
-    with Bar("preparing"):
-        prepared = prepare(labelled.drawn)
-    with Bar("finding touches") as bar:
-        return reconstructed(labelled, prepared, None, bar)
-
-
-@_kind("rub", _TOUCHED)
-def rub(labelled: Recorded) -> LearningOutcome:
-    """Learn where a touch is from one finger that rubs the whole skin, without labels.
-
-    The skin file says where the electrodes are. Five frames with a label improve the result.
-    """
-    from tomoskin.learning import TOUCH, Rubbing
-
-    dv, skin, frames = labelled.dv, labelled.drawn, np.arange(len(labelled.dv))
-    if labelled.noise is not None:
-        result = _reconstruction(labelled)
-        frames = result.frames[[len(touches) == 1 for touches in result.touches]]
-    xy = None if labelled.data.labels is None else labelled.data.labels[frames]
-    with Bar("learning") as bar:
-        rubbing = Rubbing.of(dv[frames], skin, xy)
-        if not rubbing.holds:
-            raise DataError("; ".join(rubbing.findings), where=str(labelled.path))
-        locator = rubbing.locator(bar).sliding(labelled.data.time[frames], dv[frames])
-    for finding in rubbing.findings:
-        remark(finding)
-    lag = 1e3 * (locator.presses.slide_lag or 0.0)
-    facts = {
-        "touched_frames": len(frames),
-        "used": len(rubbing.presses),
-        "labelled": rubbing.labelled,
-        "deviation_mm": 1e3 * rubbing.deviation,
-        "alike": rubbing.alike,
-        "slide_lag_mm": lag,
-    }
-    lines = [f"{len(frames)} frames with a touch, {rubbing.text}"]
-    if lag:
-        lines.append(f"the sheet lags {lag:.0f} mm behind a finger that slides: this is corrected")
-    made = TOUCH.of(locator, labelled.pattern, skin)
-    return LearningOutcome(made.write, facts, lines)
 
 
 Unit = StrEnum("Unit", {"N": "N", "G": "g", "KG": "kg"})
@@ -225,7 +105,8 @@ Length = StrEnum("Length", {"UM": "um", "MM": "mm", "CM": "cm", "M": "m"})
 """Units in which labels of depth are given."""
 
 
-@_kind("force", "Frames; some have a label with their force.")
+@app.command("force")
+@calibration_command("Frames; some have a label with their force.")
 def force(
     labelled: Recorded,
     weight: Annotated[
@@ -249,7 +130,8 @@ def force(
     )
 
 
-@_kind("depth", "Frames; some have a label with the depth of their press.")
+@app.command("depth")
+@calibration_command("Frames; some have a label with the depth of their press.")
 def depth(
     labelled: Recorded,
     depth: Annotated[
@@ -283,7 +165,7 @@ def _amount(
 
     skin, path, of = labelled.drawn, labelled.path, MEASURED[name]
     amount = labels.amounts(path, len(labelled.recording), given, unit, of)
-    result = _reconstruction(labelled)
+    result = found_touches(labelled)
     presses = labels.labelled_presses(path, result, amount, labelled.data.time, of)
     with Bar("learning"):
         model = AmountModel.fit(presses, skin)
@@ -296,95 +178,6 @@ def _amount(
     return LearningOutcome(kind.of(model, labelled.pattern, skin).write, facts, lines)
 
 
-@_kind("class", "Frames; some have a label with their class.", KnownSkinOption)
-def classes(
-    labelled: Recorded,
-    label: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--class",
-            metavar="NAME=A:B",
-            help="Label: frames A to B-1 show this class. Can be repeated. Default: class or "
-            "flags of the file.",
-        ),
-    ] = None,
-    onto: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="OLD.npz",
-            help="Calibration of another session. These frames, labelled or not, align it to "
-            "this one.",
-        ),
-        Reads(),
-    ] = None,
-) -> LearningOutcome:
-    """Learn the class of a frame, or flags, from a few examples of each."""
-    from tomoskin.learning import CLASSES, Classifier
-
-    with Bar("learning from the older calibration"):
-        old = CLASSES.read(onto) if onto else None
-    given = labelled.onto(old)
-    codes = old.model.examples.codes if old else None
-    examples = labels.class_examples(given.path, given.dv, label, codes)
-    with Bar("learning"):
-        if old is None:
-            skin_id = given.skin.identity if given.skin else ""
-            made = CLASSES.of(Classifier.learn(examples, skin_id), given.pattern, given.skin)
-        else:
-            made = old.with_model(old.model.in_session(examples.dv, examples.flags))
-    facts = reports.class_facts(made.model, len(given.dv))
-    return LearningOutcome(
-        made.write, facts, reports.class_lines(made.model, facts, is_aligned=old is not None)
-    )
-
-
-@_kind("body", "A recorded motion of the body, without touches.")
-def body(
-    labelled: Recorded,
-    bend: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="DEG[@AXIS]=A:B",
-            help="Label: frames A to B-1 are bent by this angle about an axis in this direction "
-            f"from x (default {labels.ALONG_Y:.0f}). Can be repeated. Default: the session's own "
-            "truth.",
-        ),
-    ] = None,
-    states: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="TABLE.csv",
-            help="Encoder values: columns frame and one to three coordinates, as angle_deg, "
-            "stretch.",
-        ),
-        Reads(),
-    ] = None,
-) -> LearningOutcome:
-    """Learn how a body moves under the skin: touches are then separated from it, and its state
-    estimated.
-
-    Without angles or encoder values the state has no unit.
-    """
-    from tomoskin.learning import BODY, BodyModel
-    from tomoskin.pipeline import prepare, voltage_covariance
-
-    skin, rest = labelled.drawn, labelled.rest
-    if rest is None:
-        raise DataError(
-            "expected voltages with untouched frames, got none", where=str(labelled.path)
-        )
-    with Bar("preparing"):
-        prepared = prepare(skin)
-    examples = labels.body_examples(labelled.path, labelled.data, rest.mean, bend, states)
-    with Bar("learning"):
-        model = BodyModel.learn(examples, voltage_covariance(prepared, rest))
-    for problem in model.doubts():
-        remark(f"{labelled.path}: {problem}")
-    facts = reports.body_facts(model)
-    made = BODY.of(model, labelled.pattern, skin)
-    return LearningOutcome(made.write, facts, reports.body_lines(model, facts))
-
-
 _MappedOut = Annotated[
     Path,
     typer.Option(
@@ -394,7 +187,8 @@ _MappedOut = Annotated[
 ]
 
 
-@_kind("mapping", _TOUCHED, out=_MappedOut)
+@app.command("mapping")
+@calibration_command(TOUCHED, out=_MappedOut)
 def mapping(labelled: Recorded) -> LearningOutcome:
     """Find rotation, mirroring, swapped wires and polarity from some presses.
 

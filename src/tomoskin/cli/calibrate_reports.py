@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from tomoskin.learning import BodyModel, Classifier, Locator, MappingAnswer
+    from tomoskin.learning import Locator, MappingAnswer
     from tomoskin.model.skin import Skin
 
 _SHOWN, _DRIFTED = 10, 2.0
 """Remarks that are listed, and growth of the errors from which the skin has changed."""
-
-_HARDLY = 0.5
-"""Part of the labelled frames that are right, below which labels hardly depend on the data."""
 
 
 def touch_facts(
@@ -85,35 +81,6 @@ def touch_lines(facts: dict[str, Any]) -> list[str]:
     return [*lines, f"the next press is most useful at x {x:+.0f} mm, y {y:+.0f} mm"]
 
 
-def class_facts(classifier: Classifier, n_frames: int) -> dict[str, Any]:
-    """Names, how many frames, and how well left-out ones are classified."""
-    examples, alignment = classifier.examples, classifier.alignment
-    return {
-        "names": examples.codes.names,
-        "exclusive": examples.codes.exclusive,
-        "frames": n_frames,
-        "labelled": int(examples.part(examples.newest).labelled.sum()),
-        "sessions": int(examples.session.max()) + 1,
-        "right_when_left_out": classifier.right,
-        "alignment": None if alignment is None else asdict(alignment),
-    }
-
-
-def class_lines(classifier: Classifier, facts: dict[str, Any], *, is_aligned: bool) -> list[str]:
-    """What :func:`class_facts` gave, in sentences."""
-    kind = "classes" if facts["exclusive"] else "flags"
-    lines = [
-        f"{len(facts['names'])} {kind}: {', '.join(facts['names'])}",
-        f"{facts['labelled']} of {facts['frames']} frames labelled; in cross-validation, "
-        f"{100 * classifier.right:.0f} % of the labelled frames are right",
-    ]
-    if classifier.right < _HARDLY:
-        lines.append("the labels hardly depend on the data: check that they belong to these frames")
-    if is_aligned and classifier.alignment is not None:
-        lines.append(classifier.alignment.text)
-    return lines
-
-
 def mapping_facts(answer: MappingAnswer, skin: Skin, frames: list[int]) -> dict[str, Any]:
     """The mapping and how sure it is; ``frames`` are those of the presses."""
     from tomoskin.learning import ring_of
@@ -154,36 +121,5 @@ def mapping_lines(facts: dict[str, Any]) -> list[str]:
         lines.append(
             f"frame {doubtful['frame']:>4}  uncertain: fits a press at x {x:+.0f} mm, y "
             f"{y:+.0f} mm better"
-        )
-    return lines
-
-
-def body_facts(model: BodyModel) -> dict[str, Any]:
-    """Coordinates of the body, and by how much left-out states are missed."""
-    return {
-        "frames": len(model.body.time),
-        "directions": model.n_modes,
-        "errors": dict(zip(model.body.names, model.error.tolist(), strict=True)),
-        "remembers": model.remembers,
-    }
-
-
-def body_lines(model: BodyModel, facts: dict[str, Any]) -> list[str]:
-    """What :func:`body_facts` gave, in sentences."""
-    errors = ", ".join(
-        f"{name} {np.degrees(error):.2f}°" if name.startswith("angle") else f"{name} {error:.3g}"
-        for name, error in facts["errors"].items()
-    )
-    lines = [
-        f"{facts['frames']} frames, {facts['directions']} directions; in cross-validation "
-        f"the RMS errors of the state are: {errors}"
-    ]
-    if model.remembers:
-        lines.append("the sheet's memory is part of the calibration: process frames in their order")
-    if not model.examples.names:
-        lines.append("nothing measured the state, so it has no unit: --states TABLE.csv gives one")
-    elif not model.body.turns and "angle" in model.body.names:
-        lines.append(
-            "the axis of a bend is estimated from three directions on; here the given axis is used"
         )
     return lines

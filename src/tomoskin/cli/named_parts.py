@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 import typer
 
 from tomoskin.cli.choices import skin_for_file, skin_if_any
-from tomoskin.cli.output import remark
+from tomoskin.cli.output import Bar, remark
 from tomoskin.core import DataError
 
 if TYPE_CHECKING:
@@ -189,6 +189,16 @@ def _idle(recording: Recording, spec: str | None, pattern: Pattern) -> Idle:
     if other.is_change:
         raise DataError("holds differences, not voltages of the untouched skin", where=other.source)
     return other.in_order_of(pattern).voltages
+
+
+def found_touches(labelled: Recorded) -> Reconstruction:
+    """The touches that the pipeline finds in each frame."""
+    from tomoskin.pipeline import prepare
+
+    with Bar("preparing"):
+        prepared = prepare(labelled.drawn)
+    with Bar("finding touches") as bar:
+        return reconstructed(labelled, prepared, None, bar)
 
 
 def reconstructed(

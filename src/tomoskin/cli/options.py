@@ -71,8 +71,8 @@ CalibrationsOption = Annotated[
     typer.Option(
         "--calibration",
         metavar="C.npz",
-        help="File from tomoskin calibrate, of any kind: positions, forces, depths, bends or "
-        "classes are estimated in each frame. Once for each kind.",
+        help="File from tomoskin calibrate, of any kind: positions, forces, depths or "
+        "whatever it is of are estimated in each frame. Once for each kind.",
     ),
     Reads(),
 ]

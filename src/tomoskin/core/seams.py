@@ -1,7 +1,9 @@
 """Seams: where an extra, or a package of a user's own, adds something to the core by its name.
 
 An extra is a folder of :mod:`tomoskin.extras` with a table ``extra.toml``. Each section is a seam,
-each line in it a name and ``module:attribute``, where the module is one of the extra's own. A line
+each line in it a name and ``module:attribute``, where the module is one of the extra's own; a
+table in its place has this as its ``target``, and ``about`` it a sentence that is shown without
+loading it. A line
 ``uses = ["NAME"]`` at the table's top names the extras that it cannot do without.
 
 Another package says the same by entry points of the group ``tomoskin.SEAM``. The core asks for what
@@ -49,12 +51,14 @@ USES = "uses"
 class Registered:
     """What one ``name`` stands for: an attribute of a module, such as ``"package.module:thing"``.
 
-    ``extra`` is the folder that it comes from, "" where an installed package brings it.
+    ``extra`` is the folder that it comes from, "" where an installed package brings it; ``about``
+    is what its table says of it.
     """
 
     name: str
     target: str
     extra: str = ""
+    about: str = ""
 
     def load(self) -> Any:
         """The thing itself. Raises what the import of its module raises."""
@@ -92,8 +96,12 @@ def _of_extras() -> Mapping[Seam, tuple[Registered, ...]]:
     for file in _tables():
         extra = file.parent.name
         for seam, entries in _read(file).items():
-            for name, target in entries.items():
-                found[seam].append(Registered(name, f"tomoskin.extras.{extra}.{target}", extra))
+            for name, entry in entries.items():
+                target, about = entry, ""
+                if not isinstance(entry, str):
+                    target, about = entry["target"], entry.get("about", "")
+                where = f"tomoskin.extras.{extra}.{target}"
+                found[seam].append(Registered(name, where, extra, about))
     return {seam: tuple(entries) for seam, entries in found.items()}
 
 
@@ -101,7 +109,7 @@ def _tables() -> list[Path]:
     return sorted((Path(__file__).parent.parent / "extras").glob(f"*/{TABLE}"))
 
 
-def _read(file: Path) -> dict[Seam, dict[str, str]]:
+def _read(file: Path) -> dict[Seam, dict[str, Any]]:
     """The sections of an extra's table. Raises DataError for a section that is no seam."""
     table: dict[Any, Any] = tomllib.loads(file.read_text(encoding="utf-8"))
     table.pop(USES, None)

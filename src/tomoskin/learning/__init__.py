@@ -1,4 +1,4 @@
-"""What is learnt from examples: positions, forces and depths, classes, bends, mapping."""
+"""What is learnt from examples: positions, forces and depths, mapping; and kinds of more."""
 
 from tomoskin.learning.amount.amount_model import (
     DEPTH as DEPTH,
@@ -16,31 +16,18 @@ from tomoskin.learning.amount.measurand import (
     LabelledPresses as LabelledPresses,
     Measurand as Measurand,
 )
-from tomoskin.learning.body.body_model import BodyExamples as BodyExamples, BodyModel as BodyModel
-from tomoskin.learning.body.body_reader import (
-    BODY as BODY,
-    BodyReader as BodyReader,
-    BodyReading as BodyReading,
-)
-from tomoskin.learning.classes.classifier import (
-    CLASSES as CLASSES,
-    Answers as Answers,
-    Classifier as Classifier,
-    ClassReading as ClassReading,
-)
-from tomoskin.learning.classes.examples import (
-    Codes as Codes,
-    Examples as Examples,
-    against_rest as against_rest,
-)
 from tomoskin.learning.kind import (
+    Applied as Applied,
     Calibration as Calibration,
+    Conditions as Conditions,
     Differences as Differences,
     FrameView as FrameView,
     Kind as Kind,
+    Progress as Progress,
     Reading as Reading,
     ShownReading as ShownReading,
     TouchFit as TouchFit,
+    silent as silent,
 )
 from tomoskin.learning.kinds import (
     calibration_kinds as calibration_kinds,
@@ -58,10 +45,24 @@ from tomoskin.learning.touch.calibration_health import (
     label_doubts as label_doubts,
     worse as worse,
 )
+from tomoskin.learning.touch.gaussian_process import (
+    Basis as Basis,
+    Likeness as Likeness,
+    leading as leading,
+    moments as moments,
+    nearness as nearness,
+    squared_distances as squared_distances,
+    telling as telling,
+)
 from tomoskin.learning.touch.located_touch import TOUCH as TOUCH
 from tomoskin.learning.touch.locator import Locator as Locator, detection_at as detection_at
-from tomoskin.learning.touch.presses import Presses as Presses
-from tomoskin.learning.touch.rubbing import Rubbing as Rubbing, quiet_electrodes as quiet_electrodes
-from tomoskin.learning.touch.session_alignment import SessionAlignment as SessionAlignment
+from tomoskin.learning.touch.model_fit import compared as compared
+from tomoskin.learning.touch.posterior import BoolArray as BoolArray
+from tomoskin.learning.touch.presses import (
+    Features as Features,
+    Presses as Presses,
+    frames as frames,
+    labelled_touches as labelled_touches,
+)
 from tomoskin.learning.touch.several import Several as Several
 from tomoskin.learning.touch.watch import Watch as Watch

@@ -6,8 +6,6 @@ from typing import Any
 
 from tomoskin.core import DataError, StrPath, load_arrays, registered
 from tomoskin.learning.amount.amount_model import DEPTH, FORCE
-from tomoskin.learning.body.body_reader import BODY
-from tomoskin.learning.classes.classifier import CLASSES
 from tomoskin.learning.kind import Calibration, Kind, Progress, silent
 from tomoskin.learning.touch.located_touch import TOUCH
 
@@ -20,7 +18,7 @@ def calibration_kinds() -> tuple[Kind[Any], ...]:
     :func:`tomoskin.core.registered`.
     """
     more = (one.load() for one in registered("calibrations").values())
-    return (TOUCH, FORCE, DEPTH, BODY, CLASSES, *more)
+    return (TOUCH, FORCE, DEPTH, *more)
 
 
 def load_calibration(path: StrPath, progress: Progress = silent) -> Calibration[Any]:

@@ -6,6 +6,7 @@ from tomoskin.server.access import (
     is_loopback as is_loopback,
     load_token as load_token,
 )
+from tomoskin.server.guided_flow import Estimate as Estimate, GuidedFlow as GuidedFlow
 from tomoskin.server.handlers import serve_requests as serve_requests
 from tomoskin.server.hub import Hub as Hub
 from tomoskin.server.page_connection import (
@@ -14,7 +15,15 @@ from tomoskin.server.page_connection import (
     Tasks as Tasks,
     during as during,
 )
-from tomoskin.server.requests import SetRecording as SetRecording
+from tomoskin.server.page_messages import Figures as Figures, RubbedNow as RubbedNow
+from tomoskin.server.press_flow import DotFlow as DotFlow
+from tomoskin.server.press_taker import OFTEN as OFTEN, PressTaker as PressTaker
+from tomoskin.server.requests import (
+    AskPoint as AskPoint,
+    LearnFlow as LearnFlow,
+    SetRecording as SetRecording,
+    StopLearning as StopLearning,
+)
 from tomoskin.server.server import (
     DEFAULT_PORT as DEFAULT_PORT,
     STATIC as STATIC,

@@ -17,7 +17,7 @@ from tomoskin.run import Runner, commands
 from tomoskin.sensing.segment import Region
 from tomoskin.server.folder import Folder
 from tomoskin.server.page_messages import Figures, FlowNow, Point
-from tomoskin.server.requests import DeletePress, FlowKind
+from tomoskin.server.requests import DeletePress
 
 _FILLED, _INSIDE = 0.6, 0.85
 """Parts of the way to the rim that dots stay within: those that fill the sheet, since presses all
@@ -96,7 +96,7 @@ class GuidedFlow(ABC):
         whether there is something to estimate. WireError refuses.
     """
 
-    kind: ClassVar[FlowKind]
+    kind: ClassVar[str]
     teaches: ClassVar[Kind[Any] | None] = None
 
     def __init__(self, prepared: Prepared) -> None:
@@ -184,7 +184,7 @@ class GuidedFlow(ABC):
     def now(self) -> FlowNow:
         """What a page shows of the flow."""
         estimate = self.estimate or Estimate("")
-        shown = {
+        shown: dict[str, Any] = {
             "kind": self.kind,
             "paused": self.paused,
             "thinking": self.estimating,

@@ -9,11 +9,12 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
+import msgspec
 import numpy as np
 
-from tomoskin.core import TomoskinError, WireError
+from tomoskin.core import TomoskinError, WireError, no_such, registered
 from tomoskin.learning import DEPTH, FORCE, TOUCH, Kind, load_calibration
-from tomoskin.pipeline import FrameResult, Prepared
+from tomoskin.pipeline import FrameResult
 from tomoskin.run import Runner, SetPose, SetTwin, commands, way_to_bend
 from tomoskin.server import requests
 from tomoskin.server.amount_flow import DepthFlow, ForceFlow
@@ -22,7 +23,6 @@ from tomoskin.server.hub import Hub
 from tomoskin.server.page_connection import Page
 from tomoskin.server.page_messages import Calibrations, FlowNow
 from tomoskin.server.press_flow import MappingFlow, TouchFlow
-from tomoskin.server.rub_flow import RubFlow
 from tomoskin.server.settings_handlers import SettingsHandlers
 from tomoskin.server.settings_messages import TwinBend, TwinRefused, TwinState, TwinStretch
 from tomoskin.server.source_handlers import SourceHandlers, SourceSwitch
@@ -137,9 +137,8 @@ _OF_FLOWS = (
 )
 """Requests that the flow of the moment answers."""
 
-_FLOWS: dict[requests.FlowKind, Callable[[Prepared], GuidedFlow]] = {
-    flow.kind: flow for flow in (TouchFlow, MappingFlow, ForceFlow, DepthFlow, RubFlow)
-}
+_FLOWS: tuple[type[GuidedFlow], ...] = (TouchFlow, MappingFlow, ForceFlow, DepthFlow)
+
 _LOOKS = 0.3
 """Seconds after which pages are told how far an estimate is."""
 
@@ -161,6 +160,8 @@ class GuideHandlers:
     def __init__(self, hub: Hub, note: Callable[[Kind[Any], str], None]) -> None:
         self._hub, self._note = hub, note
         self._flow: GuidedFlow | None = None
+        more = (entry.load() for entry in registered("flows").values())
+        self._flows: dict[str, type[GuidedFlow]] = {flow.kind: flow for flow in (*_FLOWS, *more)}
         self._shown_by: set[Page] = set()
         self._watching = contextlib.ExitStack()
         hub.serve(
@@ -181,7 +182,8 @@ class GuideHandlers:
         if self._flow is not None and self._flow.prepared.mesh.identity != mesh.identity:
             self._leave()
         self._pause()
-        return (self._flow.now() if self._flow else FlowNow(),)
+        now = self._flow.now() if self._flow else FlowNow()
+        return (msgspec.structs.replace(now, offered=tuple(self._flows)),)
 
     def _pause(self) -> bool:
         """Have the flow wait while no page shows it or a recording is played; True for a change."""
@@ -191,10 +193,12 @@ class GuideHandlers:
         flow.show(on=on)
         return True
 
-    def _begin(self, page: Page, kind: requests.FlowKind) -> None:
+    def _begin(self, page: Page, kind: str) -> None:
         if self._hub.runner.flow.marker.replay is not None:
             raise WireError("presses need a live source: go back to live first")
-        flow = _FLOWS[kind](self._hub.runner.prepared)
+        if kind not in self._flows:
+            raise WireError(no_such(kind, self._flows, "a guided flow"))
+        flow = self._flows[kind](self._hub.runner.prepared)
         if isinstance(flow, DepthFlow):
             flow.skin_says = lambda: self._hub.runner.flow.twin.depth
         self._leave()

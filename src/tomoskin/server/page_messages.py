@@ -17,7 +17,7 @@ from tomoskin.run import ReplayStatus
 from tomoskin.run.sinks import SinkReport
 from tomoskin.sensing.signal import ElectrodeHealth
 from tomoskin.sensing.track import Span
-from tomoskin.server.requests import FlowKind, Unit
+from tomoskin.server.requests import Unit
 
 Point = tuple[float, float]
 Flat = list[float]
@@ -339,14 +339,15 @@ class Figures(MessagePart, frozen=True, omit_defaults=True):
 
 
 class FlowNow(Message, frozen=True, tag="flow"):
-    """The guided flow; ``kind`` null: none goes on.
+    """The guided flow; ``kind`` null: none goes on. ``offered``: those that may be begun.
 
     ``paused``: no page shows it, and nothing is recorded; ``effort``: how to press the dot;
     ``labels``: what each press was; ``label``: what it is now or next; ``asked``: what was said and
     is probably meant as ``meant``; ``stage``: how far learning is.
     """
 
-    kind: FlowKind | None = None
+    offered: tuple[str, ...] = ()
+    kind: str | None = None
     paused: bool = False
     phase: Phase = "rest"
     dot: Point | None = None

@@ -35,8 +35,6 @@ Stem = Annotated[str, Meta(pattern=rf"^{STEM}\Z")]
 
 Format = Literal["touches", "csv", "npz", "mat", "h5", "parquet", "png", "gif"]
 
-FlowKind = Literal["touch", "mapping", "force", "depth", "rub"]
-
 Unit = Literal["N", "g", "kg", "mm"]
 
 Calibrated = Literal["touch", "force", "depth"]
@@ -165,9 +163,9 @@ class Connect(StrictRequest, frozen=True, tag="connect"):
 
 class BeginFlow(StrictRequest, frozen=True, tag="flow_begin"):
     """Ask for presses: where the dot is, to learn touch or to find the channel mapping; with known
-    weights or to known depths, to learn these; everywhere, to learn touch without labels."""
+    weights or to known depths, to learn these; or as another flow of those that are offered."""
 
-    kind: FlowKind
+    kind: Annotated[str, Meta(max_length=64)]
 
 
 class ShowFlow(StrictRequest, frozen=True, tag="flow_show"):

@@ -3,9 +3,9 @@
 import { type Signal, signal } from "@preact/signals";
 import { send } from "../state";
 import { nameProblem } from "./format";
-import { flow, type FlowKind } from "./model";
+import { flow } from "./model";
 
-const names: Readonly<Record<FlowKind, Signal<string>>> = {
+const names: Record<string, Signal<string>> = {
   mapping: signal("mapped"),
   touch: signal("touch"),
   rub: signal("rubbed"),
@@ -32,8 +32,8 @@ export function Leave() {
   );
 }
 
-export function Keep({ kind }: { kind: FlowKind }) {
-  const name = names[kind];
+export function Keep({ kind }: { kind: string }) {
+  const name = (names[kind] ??= signal(kind));
   const problem = nameProblem(name.value);
   return (
     <form

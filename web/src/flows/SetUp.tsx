@@ -10,7 +10,7 @@ import type { FlowNow } from "../wire";
 import { Amount } from "./Amount";
 import { InUse } from "./Calibrations";
 import { Keep, Leave } from "./Keep";
-import { askFiles, askSources, flow, type FlowKind, type Phase, sources, type Step, step, stepOf } from "./model";
+import { askFiles, askSources, flow, type Phase, sources, type Step, step, stepOf } from "./model";
 import { Rub } from "./Rub";
 
 const STEPS: readonly (readonly [Step, string])[] = [
@@ -114,7 +114,7 @@ function Board() {
 }
 
 interface Teaching {
-  readonly kind: FlowKind;
+  readonly kind: string;
   readonly text: string;
   readonly begin: string;
 }
@@ -170,7 +170,7 @@ function lead({ phase, effort, ready, paused }: FlowNow): string | undefined {
   return ready ? "Save it, or press where the dot is" : PHASES.press;
 }
 
-function Going({ kind }: { kind: FlowKind }) {
+function Going({ kind }: { kind: string }) {
   const { presses, text, thinking, figures } = flow.value;
   const taken = `${presses.length} press${presses.length === 1 ? "" : "es"} recorded`;
   const doubtful = figures.doubtful ?? [];
@@ -227,7 +227,7 @@ function Guided({ kinds }: { kinds: readonly Teaching[] }) {
   if (kind && kinds.some((each) => each.kind === kind)) return <Going kind={kind} />;
   return (
     <>
-      {kinds.map(({ kind, text, begin }) => (
+      {kinds.filter(({ kind }) => flow.value.offered.includes(kind)).map(({ kind, text, begin }) => (
         <div key={kind} class="teaches">
           <p>{text}</p>
           <button

@@ -5,11 +5,11 @@ import { opened } from "../drawers";
 import { link, now, onMessage, say, scene, send, shown, status } from "../state";
 import type { Calibrations, EventNote, Files, FlowNow, PlayedTimeline, Sources, Span } from "../wire";
 
-export type FlowKind = NonNullable<FlowNow["kind"]>;
 export type Phase = FlowNow["phase"];
 
 const NO_FLOW: FlowNow = {
   type: "flow",
+  offered: [],
   kind: null,
   paused: false,
   phase: "rest",
@@ -154,8 +154,10 @@ export type Step = "board" | "mapping" | "touch" | "force" | "depth";
 /** The step that the set-up drawer shows. */
 export const step = signal<Step>("board");
 
-/** The step that a flow belongs to. */
-export const stepOf = (kind: FlowKind): Step => (kind === "rub" ? "touch" : kind);
+const TAUGHT: readonly Step[] = ["mapping", "touch", "force", "depth"];
+
+/** The step that a flow belongs to: its own, or that of touch. */
+export const stepOf = (kind: string): Step => TAUGHT.find((step) => step === kind) ?? "touch";
 
 const going = computed(() => flow.value.kind);
 

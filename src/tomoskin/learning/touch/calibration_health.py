@@ -11,9 +11,9 @@ import numpy as np
 
 from tomoskin.core import Detection, FloatArray
 from tomoskin.learning.touch.locator import SHARED, Locator
+from tomoskin.learning.touch.model_fit import compared
 from tomoskin.learning.touch.per_channel import SURE, Envelope, evidence_of
 from tomoskin.learning.touch.presses import equally_hard
-from tomoskin.learning.touch.unlabelled import compared
 from tomoskin.model.skin import Skin
 from tomoskin.sensing.segment import Region
 
@@ -88,8 +88,7 @@ class CalibrationHealth:
             found.append(
                 f"frames fit the calibration {self.strangeness:.1f} times worse than its own "
                 "presses do: the skin, its electrodes or its gains have changed. Ellipses are "
-                "widened. Touch the skin all over and align it: tomoskin calibrate touch --onto "
-                "C.npz --unlabelled"
+                "widened. Align it by presses of today: tomoskin calibrate touch --onto C.npz"
             )
         if self.excluded:
             shown = "; ".join(self.excluded[:_SHOWN])

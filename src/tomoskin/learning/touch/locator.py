@@ -20,7 +20,6 @@ from tomoskin.learning.touch import gaussian_process as gp
 from tomoskin.learning.touch.per_channel import Envelope, likeliest_envelope, rings
 from tomoskin.learning.touch.posterior import Estimates
 from tomoskin.learning.touch.presses import Features, Presses, Strength, frames, mean_about
-from tomoskin.learning.touch.session_alignment import SessionAlignment
 from tomoskin.model.pattern import Pattern
 from tomoskin.model.skin import Skin
 from tomoskin.sensing.segment import Region
@@ -402,16 +401,6 @@ class Locator:
         )
         return self.region.metres(answer), self.region.unit**2 * wide, strangeness
 
-    def in_session(self, dv: ArrayLike, xy: ArrayLike | None = None) -> Self:
-        """Locator for another session, from its frames (n, n_meas) of one touch each.
-
-        ``xy`` (n, 2) m where a label is known, rows of NaN otherwise. Where the session is as the
-        calibration was only labels are added, and where it cannot be aligned the locator stays
-        as it was: see :class:`SessionAlignment`, which says so. Raises DataError as that does.
-        """
-        alignment = SessionAlignment.of(self, dv, xy)
-        return self.aligned(alignment) if alignment.holds else self
-
     def sliding(self, time: Sequence[float] | FloatArray, dv: ArrayLike) -> Self:
         """The same that knows by how much the sheet lags behind a finger that slides: one that did
         at each ``time`` (n,) s, in frames (n, n_meas). Raises DataError as :meth:`predict`."""
@@ -424,16 +413,6 @@ class Locator:
         About one where nothing has changed. Raises DataError as :meth:`predict`.
         """
         return self.estimates(self.features(frames(dv, self.presses.dv.shape[1])))[2]
-
-    def aligned(self, alignment: SessionAlignment, progress: Progress = silent) -> Self:
-        """Locator that has learnt from the frames of an alignment, with their labels.
-
-        Where that is not needed, the labels that were given are added to its own.
-        """
-        presses, given = alignment.presses, alignment.labelled
-        if not alignment.needed:
-            return self.updated(given.dv, given.xy) if len(given) else self
-        return self.learn(presses, self.region, self.pattern, self.skin_id, progress)
 
     def strength(self, dv: ArrayLike) -> FloatArray:
         """(n,) strength of each frame's touch.
