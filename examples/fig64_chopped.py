@@ -49,7 +49,7 @@ from fig64_face import (
 from lab import report
 from tomoskin.board.wire import Drive
 from tomoskin.core import FloatArray
-from tomoskin.learning import Classifier
+from tomoskin.extras.classes import Classifier
 from tomoskin.model.pattern import Scan
 from tomoskin.twin import ElectronicsSettings, SampleTable, ScanClock, chopped_table, sample_table
 from tomoskin.twin.circuit import Electrodes

@@ -39,8 +39,8 @@ from bodies import options_of
 from face import CONTACT, EXPRESSIONS, Bump, Face, face, movement
 from lab import report
 from tomoskin.core import ComplexArray, FloatArray
+from tomoskin.extras.classes import Classifier
 from tomoskin.imaging import LinearProblem
-from tomoskin.learning import Classifier
 from tomoskin.model.forward import ForwardModel, State
 from tomoskin.model.pattern import Pattern
 from tomoskin.model.prior import Matern

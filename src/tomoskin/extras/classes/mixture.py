@@ -18,8 +18,8 @@ from scipy.optimize import linear_sum_assignment
 from scipy.special import bdtr
 
 from tomoskin.core import DataError, FloatArray, IntArray
-from tomoskin.learning.classes.examples import Examples
-from tomoskin.learning.touch.gaussian_process import leading
+from tomoskin.extras.classes.examples import Examples
+from tomoskin.learning import leading
 
 _MOST = 20
 """Directions: eight electrodes have n(n − 3)/2 = 20 independent readings."""

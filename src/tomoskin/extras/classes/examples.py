@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tomoskin.core import DataError, FloatArray, IntArray
-from tomoskin.learning.touch.presses import frames
+from tomoskin.learning import frames
 
 _MOST_FLAGS = 10
 """All combinations are weighed, so each flag doubles the work."""
@@ -231,7 +231,7 @@ def against_rest(pressed: ArrayLike, rest: ArrayLike) -> FloatArray:
 
 
 def _filtered(level: FloatArray, gain: float) -> FloatArray:
-    from scipy.signal import lfilter  # noqa: PLC0415 - slow, and only learning needs it
+    from scipy.signal import lfilter
 
     start = (1 - gain) * level[:1]
     return np.asarray(lfilter([gain], [1, gain - 1], level, axis=0, zi=start)[0])

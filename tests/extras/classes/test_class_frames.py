@@ -12,10 +12,10 @@ from run.board import pressed, samples_of
 from run.test_replay import Recorded, noisy
 from tomoskin.cli import main
 from tomoskin.core import DataError, Frame
+from tomoskin.extras.classes import CLASSES, Classifier, ClassReading
 from tomoskin.files.imports import read_recording
 from tomoskin.files.session import SessionReader, as_recorded, replayed
 from tomoskin.files.session.session_reader import tick_rate
-from tomoskin.learning import CLASSES, Classifier, ClassReading
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Pipeline, prepare, reconstruct
 

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import stdtrit
 
 from tomoskin.core import DataError, Detection, FloatArray, IntArray
-from tomoskin.learning.classes.examples import Codes, Examples
-from tomoskin.learning.classes.mixture import (
+from tomoskin.extras.classes.examples import Codes, Examples
+from tomoskin.extras.classes.mixture import (
     Alignment,
     Mixture,
     Subspace,
@@ -21,8 +21,15 @@ from tomoskin.learning.classes.mixture import (
     session_mean,
     shows,
 )
-from tomoskin.learning.kind import Applied, Conditions, FrameView, Kind, Reading, ShownReading
-from tomoskin.learning.touch.presses import frames
+from tomoskin.learning import (
+    Applied,
+    Conditions,
+    FrameView,
+    Kind,
+    Reading,
+    ShownReading,
+    frames,
+)
 from tomoskin.model.pattern import Pattern
 
 _FOLDS = 5

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from tomoskin.core import DataError, FloatArray
-from tomoskin.learning import Classifier, Codes, Examples, against_rest
+from tomoskin.extras.classes import Classifier, Codes, Examples, against_rest
 from tomoskin.model.pattern import Pattern
 
 ROWS = 40

@@ -8,16 +8,25 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tomoskin.cli.named_files import TABLE, ForceFlag, Reads, Writes
-from tomoskin.cli.named_parts import Recorded
-from tomoskin.cli.options import RecordingArgument, ReferenceOption, SameSkinOption
-from tomoskin.cli.output import Bar, JsonFlag, tell
+from tomoskin.cli import (
+    TABLE,
+    Bar,
+    ForceFlag,
+    JsonFlag,
+    Reads,
+    Recorded,
+    RecordingArgument,
+    ReferenceOption,
+    SameSkinOption,
+    Writes,
+    tell,
+)
 from tomoskin.core import write_rows
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from tomoskin.learning import Answers
+    from tomoskin.extras.classes.classifier import Answers
     from tomoskin.sensing.signal import Recording
 
 _SHOWN = 20
@@ -44,7 +53,7 @@ def classify(
     json: JsonFlag = False,
 ) -> None:
     """Tell the class of each frame, or that it is none of those that were learnt."""
-    from tomoskin.learning import CLASSES
+    from tomoskin.extras.classes.classifier import CLASSES
 
     with Bar("learning"):
         loaded = CLASSES.read(calibration)

@@ -1,1 +1,0 @@
-"""Which class a frame belongs to, learnt from labelled examples: one of several, or flags."""
