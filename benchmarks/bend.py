@@ -12,7 +12,7 @@ from bench_rig import Rig, drawn, gap
 from report import Floats, Report, mm, percent, progress, rms, table
 from tomoskin import Skin
 from tomoskin.core import Frame
-from tomoskin.learning import BODY, BodyExamples, BodyModel, BodyReading
+from tomoskin.extras.body import BODY, BodyExamples, BodyModel, BodyReading
 from tomoskin.model.mesh import Hinge
 from tomoskin.pipeline import FrameResult, Pipeline, prepare
 from tomoskin.pipeline.finding import voltage_covariance

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from tomoskin.core import DataError
-from tomoskin.learning import BodyExamples, BodyModel, BodyReader
-from tomoskin.learning.body.body_model import Memory, plays_of
+from tomoskin.extras.body import BodyExamples, BodyModel, BodyReader
+from tomoskin.extras.body.body_model import Memory, plays_of
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import prepare
 from tomoskin.sensing.fit import SpotModel

@@ -14,8 +14,9 @@ from run.test_runner import Watch
 from tomoskin import run as room, server
 from tomoskin.cli import main
 from tomoskin.core import Frame, Mark
+from tomoskin.extras.body import BODY, BodyExamples, BodyModel, BodyReading
 from tomoskin.files.session import SessionReader, as_recorded, replayed, session_info
-from tomoskin.learning import BODY, TOUCH, BodyExamples, BodyModel, BodyReading, Locator
+from tomoskin.learning import TOUCH, Locator
 from tomoskin.pipeline import Pipeline, prepare
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES
 from tomoskin.run.recordings import PreRoll

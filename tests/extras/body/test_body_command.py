@@ -9,9 +9,9 @@ import pytest
 
 from tomoskin.cli import main
 from tomoskin.core import DataError
+from tomoskin.extras.body import BODY
 from tomoskin.files.imports import read_recording
 from tomoskin.files.session import SessionReader
-from tomoskin.learning import BODY
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Pipeline, prepare
 

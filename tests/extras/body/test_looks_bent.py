@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from tomoskin.core import Detection, Touch
+from tomoskin.extras.body.body_reader import looks_bent
 from tomoskin.files.session import SessionReader, as_recorded, replayed
-from tomoskin.learning.body.body_reader import looks_bent
 from tomoskin.model.skin import Skin
 from tomoskin.run import simulate
 from tomoskin.twin import Script

@@ -11,7 +11,7 @@ from server.bent import frames_bent
 from server.looks import look_in_both
 from server.serving import Site
 from tomoskin.board.source import open_source
-from tomoskin.learning import BODY, BodyExamples, BodyModel
+from tomoskin.extras.body import BODY, BodyExamples, BodyModel
 from tomoskin.pipeline import voltage_covariance
 from tomoskin.run import Runner
 from tomoskin.run.commands import BendRequest, SetPose

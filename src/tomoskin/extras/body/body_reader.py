@@ -10,8 +10,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from tomoskin.core import Detection, FloatArray, Touch
-from tomoskin.learning.body.body_model import TENSOR, BodyModel
-from tomoskin.learning.kind import (
+from tomoskin.extras.body.body_model import TENSOR, BodyModel
+from tomoskin.learning import (
     Applied,
     Conditions,
     FrameView,
