@@ -14,6 +14,7 @@ from report import Floats, Report, progress, table
 from tomoskin import Locator, Skin
 from tomoskin.board.source import ScanSettings
 from tomoskin.core import Frame
+from tomoskin.extras.alignment import in_session
 from tomoskin.learning import Watch
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import triangulate
@@ -136,7 +137,7 @@ LIVES: dict[str, tuple[Callable[[Locator, Worn, np.random.Generator], Locator], 
     "no labels": (lambda locator, _skin, _rng: locator, False),
     f"{LABELS} presses a month": (labelled, True),
     "rubbed each month": (
-        lambda locator, skin, rng: locator.in_session(skin(*touches(locator.region, RUBBED, rng))),
+        lambda locator, skin, rng: in_session(locator, skin(*touches(locator.region, RUBBED, rng))),
         False,
     ),
 }

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from bench_rig import INSIDE_90
 from report import Floats, Report, percent, recordings, table
 from tomoskin import Locator, Pattern, Skin
-from tomoskin.learning import SessionAlignment, Watch
+from tomoskin.extras.alignment import SessionAlignment
+from tomoskin.learning import Watch
 from tomoskin.learning.touch.gaussian_process import Process, squared_distances
 
 SKINS = {"noPattern": 2.28, "fullCB": 6.74, "parallel": 3.13, "concentric": 4.99, "radial": 3.84}
@@ -322,7 +323,7 @@ def _transferred(old: Set, new: Set, seed: int) -> tuple[float, ...]:
     none, ten = (SessionAlignment.of(locator, touched.dv, xy) for xy in (None, labels))
     known = [locator]
     for alignment in (none, ten):
-        known.append(locator.aligned(alignment) if alignment.holds else locator)
+        known.append(alignment.locator(locator) if alignment.holds else locator)
     scores = [(mean_error(one, asked), held(one, asked)) for one in known]
     return (float(none.holds), *(figure for score in scores for figure in score))
 

@@ -16,7 +16,7 @@ from report import Floats, Report, progress, recordings, table
 from sliding import LEAD, SPEED, START, Way, recorded
 from tomoskin import Locator, Skin
 from tomoskin.core import Detection, Touch
-from tomoskin.learning import Rubbing
+from tomoskin.extras.alignment import Rubbing
 from tomoskin.sensing.segment import Region
 from tomoskin.sensing.track import SlideCorrection, likeliest_lag
 

@@ -10,8 +10,9 @@ import pytest
 from learning.labelled import RADIUS, ROWS, Floats, held, presses
 from tomoskin import Locator, Pattern
 from tomoskin.core import DataError
-from tomoskin.learning import TOUCH, SessionAlignment
-from tomoskin.learning.touch.session_alignment import CHANCE, distance, matched
+from tomoskin.extras.alignment import SessionAlignment, in_session
+from tomoskin.extras.alignment.session_alignment import CHANCE, distance, matched
+from tomoskin.learning import TOUCH
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +33,7 @@ def error(told: Floats, xy: Floats) -> float:
 def test_gains_are_found_without_labels(locator: Locator) -> None:
     dv, _ = today(300, 5)
     asked, xy = today(200, 8)
-    aligned = locator.in_session(dv)
+    aligned = in_session(locator, dv)
     told, covariance = aligned.predict(asked)
     assert error(told, xy) < 0.09 < error(locator.predict(asked)[0], xy)
     assert held(told - xy, covariance) > 0.8
@@ -97,14 +98,14 @@ def test_what_has_changed_is_said(locator: Locator) -> None:
     assert "gains have changed" in words
     same = SessionAlignment.of(locator, presses(120, 6)[0])
     assert same.findings == ("the session agrees with the calibration",)
-    assert locator.in_session(presses(120, 6)[0]) is locator
+    assert in_session(locator, presses(120, 6)[0]) is locator
 
 
 def test_labels_of_a_session_as_before_are_added(locator: Locator) -> None:
     dv, xy = presses(60, 6)
     some = np.full(xy.shape, np.nan)
     some[:5] = xy[:5]
-    more = locator.in_session(dv, some)
+    more = in_session(locator, dv, some)
     assert len(more.presses) == len(locator.presses) + 5
     assert more.presses.spread is None
 
@@ -115,7 +116,7 @@ def test_what_is_another_skin_is_not_aligned(locator: Locator) -> None:
     alignment = SessionAlignment.of(locator, dv)
     assert not alignment.holds
     assert "cannot be aligned" in alignment.findings[-1]
-    assert locator.in_session(dv) is locator
+    assert in_session(locator, dv) is locator
 
 
 def test_touches_on_a_part_of_the_skin_are_not_spread_over_all_of_it(locator: Locator) -> None:
@@ -124,7 +125,7 @@ def test_touches_on_a_part_of_the_skin_are_not_spread_over_all_of_it(locator: Lo
     alignment = SessionAlignment.of(locator, dv[part])
     assert "touch the whole skin" in alignment.findings[-1]
     assert not alignment.holds
-    assert locator.in_session(dv[part]) is locator
+    assert in_session(locator, dv[part]) is locator
 
 
 def test_where_touches_are_in_the_same_session_is_no_change(locator: Locator) -> None:
@@ -152,7 +153,7 @@ def test_channels_that_answer_otherwise_are_matched_though_frames_fit() -> None:
     assert alignment.holds
     assert len(alignment.presses) == 200
     asked, xy = session(300, 8)
-    aligned = loose.aligned(alignment)
+    aligned = alignment.locator(loose)
     assert error(aligned.predict(asked)[0], xy) < error(loose.predict(asked)[0], xy)
 
 
@@ -169,7 +170,7 @@ def test_a_monotone_law_of_each_channel_is_undone() -> None:
 def test_a_file_keeps_estimated_labels(tmp_path: Path) -> None:
     dv, _ = today(80, 5)
     pattern = Pattern.adjacent(8)
-    aligned = Locator.fit(*presses(150, 0), pattern=pattern).in_session(dv)
+    aligned = in_session(Locator.fit(*presses(150, 0), pattern=pattern), dv)
     path = tmp_path / "c.npz"
     TOUCH.of(aligned, pattern).write(path)
     again = TOUCH.read(path).model
@@ -181,11 +182,11 @@ def test_a_file_keeps_estimated_labels(tmp_path: Path) -> None:
 def test_what_cannot_align_is_refused(locator: Locator) -> None:
     dv, xy = today(60, 5)
     with pytest.raises(DataError, match="at least 50 touches"):
-        locator.in_session(dv[:20])
+        in_session(locator, dv[:20])
     with pytest.raises(DataError, match="xy of shape"):
-        locator.in_session(dv, xy[:5])
+        in_session(locator, dv, xy[:5])
     with pytest.raises(DataError, match="shape"):
-        locator.in_session(dv[:, :5])
+        in_session(locator, dv[:, :5])
 
 
 @pytest.mark.data
@@ -198,6 +199,6 @@ def test_a_hydrogel_skin_of_the_same_kind_is_aligned_without_labels(data_dir: Pa
             sets.append((kept["dv"].astype(float)[order], 1e-3 * kept["xy_mm"][order]))
     (old, places), (new, xy) = sets
     known = Locator.fit(old[:300], places[:300])
-    told, covariance = known.in_session(new[:300]).predict(new[-200:])
+    told, covariance = in_session(known, new[:300]).predict(new[-200:])
     assert np.linalg.norm(told - xy[-200:], axis=1).mean() < 6e-3
     assert held(told - xy[-200:], covariance) > 0.8

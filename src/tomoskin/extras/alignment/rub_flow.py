@@ -9,15 +9,22 @@ from typing import Any
 import numpy as np
 
 from tomoskin.core import FloatArray, WireError, reach
+from tomoskin.extras.alignment.rubbing import Rubbing, quiet_electrodes
 from tomoskin.files.messages import Every
-from tomoskin.learning import TOUCH, Rubbing, quiet_electrodes
+from tomoskin.learning import TOUCH
 from tomoskin.pipeline import FrameResult, Prepared
 from tomoskin.sensing.segment import Region
-from tomoskin.server.guided_flow import Estimate
-from tomoskin.server.page_messages import Figures, RubbedNow
-from tomoskin.server.press_flow import DotFlow
-from tomoskin.server.press_taker import OFTEN, PressTaker
-from tomoskin.server.requests import AskPoint, LearnFlow, StopLearning
+from tomoskin.server import (
+    OFTEN,
+    AskPoint,
+    DotFlow,
+    Estimate,
+    Figures,
+    LearnFlow,
+    PressTaker,
+    RubbedNow,
+    StopLearning,
+)
 
 _FEWEST, _GOOD = 150, 400
 """Touches from which it can be learnt, and that are good."""

@@ -10,11 +10,8 @@ from numpy.typing import ArrayLike
 from threadpoolctl import threadpool_limits
 
 from tomoskin.core import DataError, FloatArray, IntArray
-from tomoskin.learning.kind import Progress, silent
-from tomoskin.learning.touch.locator import Locator
-from tomoskin.learning.touch.posterior import BoolArray
-from tomoskin.learning.touch.presses import Presses, labelled_touches
-from tomoskin.learning.touch.unlabelled import UnlabelledFit, from_labels, missed_labels
+from tomoskin.extras.alignment.unlabelled import UnlabelledFit, from_labels, missed_labels
+from tomoskin.learning import BoolArray, Locator, Presses, Progress, labelled_touches, silent
 from tomoskin.model.pattern import Pattern
 from tomoskin.model.skin import Skin
 from tomoskin.sensing.segment import Region

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,13 +13,21 @@ from scipy.special import entr
 from threadpoolctl import threadpool_limits
 
 from tomoskin.core import DataError, FloatArray, IntArray
-from tomoskin.learning.touch import gaussian_process as gp
-from tomoskin.learning.touch.posterior import BoolArray
-from tomoskin.learning.touch.presses import Presses, labelled_touches
-from tomoskin.learning.touch.topographic import TopographicMap, coefficients_of, whitening
-
-if TYPE_CHECKING:
-    from tomoskin.learning.touch.locator import Locator
+from tomoskin.extras.alignment.topographic import TopographicMap, coefficients_of, whitening
+from tomoskin.learning import (
+    Basis,
+    BoolArray,
+    Likeness,
+    Locator,
+    Presses,
+    Progress,
+    labelled_touches,
+    moments,
+    nearness,
+    silent,
+    squared_distances,
+    telling,
+)
 
 _FEWEST = 50
 """Frames of a session from which it can be aligned."""
@@ -183,6 +191,16 @@ class SessionAlignment:
             holds=believed if np.isnan(missed) else missed < _AGREE,
         )
 
+    def locator(self, before: Locator, progress: Progress = silent) -> Locator:
+        """``before``, that was aligned, having learnt from the frames with their labels.
+
+        Where that is not needed, the labels that were given are added to its own.
+        """
+        if not self.needed:
+            given = self.labelled
+            return before.updated(given.dv, given.xy) if len(given) else before
+        return before.learn(self.presses, before.region, before.pattern, before.skin_id, progress)
+
     @property
     def needed(self) -> bool:
         """Whether the frames fit the calibration worse than its own presses do, or their channels
@@ -215,6 +233,17 @@ class SessionAlignment:
                 "ten known positions as well, or calibrate again"
             )
         return tuple(found)
+
+
+def in_session(locator: Locator, dv: ArrayLike, xy: ArrayLike | None = None) -> Locator:
+    """The locator for another session, from its frames (n, n_meas) of one touch each.
+
+    ``xy`` (n, 2) m where a label is known, rows of NaN otherwise. Where the session is as the
+    calibration was only labels are added, and where it cannot be aligned the locator stays as it
+    was: see :class:`SessionAlignment`, which says so. Raises DataError as that does.
+    """
+    alignment = SessionAlignment.of(locator, dv, xy)
+    return alignment.locator(locator) if alignment.holds else locator
 
 
 @dataclass(frozen=True, eq=False)
@@ -314,7 +343,7 @@ class _SessionMaps:
     def of(cls, locator: Locator, grid: FloatArray) -> Self:
         """Of some of the presses; folds of them say how sharp the maps are."""
         presses = locator.presses
-        chosen = gp.telling(len(presses), _LEARNT_ON)
+        chosen = telling(len(presses), _LEARNT_ON)
         dv, positions = presses.dv[chosen], locator.region.scaled(presses.xy[chosen])
         fold = np.arange(len(dv)) % _FOLDS
         parts = []
@@ -329,7 +358,7 @@ class _SessionMaps:
 
     @classmethod
     def _plain(cls, dv: FloatArray, positions: FloatArray, grid: FloatArray) -> Self:
-        basis = gp.Basis.of(gp.Likeness(_LENGTH), grid)
+        basis = Basis.of(Likeness(_LENGTH), grid)
         features = SessionFeatures.of(dv)(dv)
         there = basis(positions)
         coefficients = coefficients_of(there, features, _RIDGE)
@@ -361,7 +390,7 @@ def _likeliest_power(parts: Sequence[tuple[TopographicMap, FloatArray, IntArray]
 
 
 def _numbers(positions: FloatArray, grid: FloatArray) -> IntArray:
-    return np.asarray(gp.squared_distances(positions, grid).argmin(axis=1))
+    return np.asarray(squared_distances(positions, grid).argmin(axis=1))
 
 
 def _correction(positions: FloatArray, known: BoolArray, labels: FloatArray) -> FloatArray:
@@ -370,15 +399,15 @@ def _correction(positions: FloatArray, known: BoolArray, labels: FloatArray) -> 
     A smooth mapping of the sheet onto itself fits the frames about as well.
     """
     at = positions[known]
-    among = gp.nearness(at, at, _SMOOTH) + _UNSURE * np.eye(len(at))
-    near = gp.nearness(positions, at, _SMOOTH)
+    among = nearness(at, at, _SMOOTH) + _UNSURE * np.eye(len(at))
+    near = nearness(positions, at, _SMOOTH)
     return np.asarray(near @ np.linalg.solve(among, labels - at))
 
 
 def _spread(weights: FloatArray, mean: FloatArray, grid: FloatArray) -> FloatArray:
     """(n, 2, 2) mean square of the grid's positions about ``mean`` (n, 2)."""
     off = weights @ grid - mean
-    about = gp.moments(weights, grid)[1] + off[:, :, None] * off[:, None]
+    about = moments(weights, grid)[1] + off[:, :, None] * off[:, None]
     return np.asarray(about + _FLOOR**2 * np.eye(2))
 
 
@@ -400,7 +429,7 @@ def prevalence(presses: FloatArray, touches: FloatArray) -> FloatArray:
 
     ``touches`` (m, 2), both in radii of the region. The sum is one.
     """
-    often, before = (gp.nearness(presses, some, _NEAR).mean(axis=1) for some in (touches, presses))
+    often, before = (nearness(presses, some, _NEAR).mean(axis=1) for some in (touches, presses))
     weight = often / before
     return np.asarray(weight / weight.sum())
 

@@ -8,13 +8,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cli.test_calibrate import rubbed_with_a_lag
-from learning.test_rubbing import touches
+from extras.alignment.rubbed import rubbed_with_a_lag
+from extras.alignment.test_rubbing import touches
 from tomoskin.core import DataError, Detection, Touch, WireError
-from tomoskin.learning import Locator, Rubbing
+from tomoskin.extras.alignment import Rubbing
+from tomoskin.extras.alignment.rub_flow import RubFlow
+from tomoskin.learning import Locator
 from tomoskin.server.guided_flow import StoppedError
 from tomoskin.server.requests import AskPoint, DeletePress, LearnFlow, StopLearning
-from tomoskin.server.rub_flow import RubFlow
 
 RATE = 0.03
 REST = 0.1

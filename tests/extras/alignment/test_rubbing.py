@@ -12,7 +12,7 @@ import pytest
 from learning.labelled import Floats, held
 from tomoskin import ForwardModel, Pattern, Skin
 from tomoskin.core import DataError
-from tomoskin.learning import Rubbing
+from tomoskin.extras.alignment import Rubbing
 
 TOUCHES = 200
 

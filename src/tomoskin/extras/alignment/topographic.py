@@ -8,7 +8,7 @@ from typing import Self
 import numpy as np
 
 from tomoskin.core import FloatArray, IntArray, reach
-from tomoskin.learning.touch.gaussian_process import Basis, Likeness, squared_distances
+from tomoskin.learning import Basis, Likeness, squared_distances
 
 _KEPT = 30.0
 """Weight of the earlier maps in those of another session: each coefficient's, as frames."""
