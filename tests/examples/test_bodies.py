@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import math
-import struct
-
 import numpy as np
 import pytest
 
+from examples.figure_made import check_figure
 from tomoskin.model.mesh import simplex_measure
 
-MODELS = [
-    *("fig62_palpation", "fig64_chopped", "fig64_face", "fit_bound", "newtons", "soft_volume"),
-]
+MODELS = ["fig62_palpation", "fit_bound", "newtons", "soft_volume"]
 
 SHORT = {
     "fig62_palpation": {"RESPONSES": (0.05, 1.0), "ELECTRODES": (16,)},
@@ -27,15 +23,7 @@ def test_the_figure_is_made_and_the_checks_hold(imported, published, name, tmp_p
     module = imported(name)
     for knob, value in SHORT.get(name, {}).items():
         monkeypatch.setattr(module, knob, value)
-    found = module.main(["--out", str(tmp_path)])
-    assert len(found) > 1
-    assert found.keys() <= published[name].values.keys()
-    assert name in SHORT or published[name].broken(found) == []
-    assert all(math.isfinite(value) for value in found.values())
-    data = (tmp_path / f"{name}.png").read_bytes()
-    width, height = struct.unpack(">II", data[16:24])
-    assert width > 400
-    assert height > 250
+    check_figure(module, published[name], tmp_path, is_whole=name not in SHORT)
 
 
 @pytest.mark.slow
@@ -80,37 +68,6 @@ def test_balls_elsewhere_are_a_failure(imported, monkeypatch, tmp_path):
 def test_what_is_missed_counts_as_infinitely_far(imported):
     example = imported("fig62_palpation")
     assert np.isinf(example.errors([], [example.between(0.0, 0.0, 8e-3)])).all()
-
-
-def test_a_face_that_moves_as_a_whole_changes_nothing(imported):
-    face, example = imported("face"), imported("fig64_face")
-    relaxed = face.face(600)
-    rest = example.model_of(relaxed).voltages
-    everywhere = [((0.0, 0.0), 1e6, (3.0, -5.0, 2.0))]
-    moved = example.model_of(relaxed.moved(everywhere))
-    assert np.abs(moved.voltages - rest).max() < 1e-6 * np.abs(rest).max()
-    smile = example.model_of(relaxed.moved(face.EXPRESSIONS["smile"])).voltages
-    assert np.abs(smile - rest).max() > 0.05 * np.abs(rest).max()
-
-
-@pytest.mark.slow
-def test_small_moves_of_electrodes_are_found(imported):
-    example = imported("fig64_face")
-    moving = example.Moving()
-    state = example.model_of(moving.face)
-    way = np.zeros((8, 3))
-    way[3] = (2e-3, 0.0, 0.0)
-    dv = np.einsum("med,ed->m", state.movement_jacobian, way) / np.abs(state.voltages)
-    found = moving(dv)
-    named = example.most_moved([found], np.linalg.norm(way, axis=1)[None])
-    assert named.all()
-    assert found[1][3, 0] > 0.5e-3
-
-
-def test_a_run_counts_with_five_of_six(imported):
-    right = np.ones((4, 6), bool)
-    right[0, 0] = right[1, :2] = False
-    assert imported("fig64_face").whole_runs(right) == 0.75
 
 
 def test_a_dent_in_the_block_keeps_its_volume(imported):
