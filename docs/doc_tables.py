@@ -7,7 +7,7 @@ twin (twin.md), the messages between board and host (protocol.md), and the board
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields, replace
 from functools import partial
 from importlib import import_module
@@ -129,7 +129,8 @@ PAGES: dict[str, Callable[[], str]] = {
 for extra in extra_names():
     own = getattr(import_module(f"tomoskin.extras.{extra}"), "SECTIONS", ())
     if own:
-        PAGES[f"extras/{extra}.md"] = partial(tables, getattr(own, "values", lambda: own)())
+        sections = own.values() if isinstance(own, Mapping) else own
+        PAGES[f"extras/{extra}.md"] = partial(tables, sections)
 
 
 def written(page: str) -> str:
