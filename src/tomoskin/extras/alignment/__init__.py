@@ -1,4 +1,4 @@
-"""Touch learnt, or aligned to another session, from touches whose positions nobody has noted."""
+"""Touch learnt, or aligned to another session, from touches at positions that are not known."""
 
 from tomoskin.extras.alignment.rubbing import (
     Rubbing as Rubbing,
