@@ -1,13 +1,13 @@
 """Write the tables of the documentation that follow from declarations: `python docs/doc_tables.py`.
 
 Each page is written by hand down to its mark. Below stand the keys of the skin file
-(skin-file.md), of a script (simulate.md) and of a robot (extras/robot.md), the numbers of the
+(skin-file.md), of a script (simulate.md) and of the files that extras read, the numbers of the
 twin (twin.md), the messages between board and host (protocol.md), and the boards (firmware.md).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import fields, replace
 from functools import partial
 from importlib import import_module
@@ -126,11 +126,9 @@ PAGES: dict[str, Callable[[], str]] = {
     "firmware.md": board_table,
 }
 
-for extra in extra_names():
-    own = getattr(import_module(f"tomoskin.extras.{extra}"), "SECTIONS", ())
-    if own:
-        sections = own.values() if isinstance(own, Mapping) else own
-        PAGES[f"extras/{extra}.md"] = partial(tables, sections)
+for extra in extra_names():  # the page of an extra goes with it
+    if own := getattr(import_module(f"tomoskin.extras.{extra}"), "SECTIONS", None):
+        PAGES[f"extras/{extra}.md"] = partial(tables, own.values())
 
 
 def written(page: str) -> str:

@@ -48,7 +48,7 @@ print(tomoskin.__path__[0])
 
 def with_users(extra: str) -> set[str]:
     """The extra, and those that say they cannot do without it."""
-    gone, before = {extra}, set()
+    gone, before = {extra}, set[str]()
     while gone != before:
         before = set(gone)
         for name in extra_names():
@@ -125,7 +125,10 @@ def test_without_an_extra_a_page_is_served(extra: str | None, tmp_path: Path) ->
         text=True,
     ) as program:
         try:
-            address = re.search(r'"address": *"([^"]+)"', program.stdout.readline())[1]
+            assert program.stdout is not None
+            found = re.search(r'"address": *"([^"]+)"', program.stdout.readline())
+            assert found is not None
+            address = found[1]
             with urllib.request.urlopen(address) as answer:
                 assert b"<title>tomoskin" in answer.read()
         finally:

@@ -154,7 +154,7 @@ class Population(PressesSection):
         return Probe(face, float(position[0]), float(position[1]), float(force), float(angle))
 
 
-SECTIONS = (PressesSection,)
+SECTIONS = {PressesSection.section: PressesSection}
 """Sections of a script that are its own."""
 
 COMMON_PRESSES = Population(
