@@ -17,7 +17,7 @@ from tomoskin.learning import Differences, FrameView
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Mesh, laid_on, triangulate
 from tomoskin.model.pattern import Scan
-from tomoskin.model.skin import Skin
+from tomoskin.model.skin import ReadoutSettings, Skin
 from tomoskin.pipeline import Prepared, prepare
 from tomoskin.pipeline.finding import Finder, finder_of
 from tomoskin.pipeline.frame_subspace import JUMP
@@ -56,19 +56,44 @@ class Finger:
         return self.x, self.y, self.radius, self.fall
 
 
+class Converter:
+    """What a board makes of the resistances between a sheet's electrodes: counts with noise."""
+
+    def __init__(self, scan: Scan, readout: ReadoutSettings, random: np.random.Generator) -> None:
+        self._scan, self._readout, self._random = scan, readout, random
+        self.levels = 1 << readout.adc_bits
+
+    def codes(self, resistance: Floats, current: float) -> Floats:
+        """(..., n_samples) what the converter would say without noise and steps; ``resistance``
+        (..., n, n) Ω."""
+        drive, electrode = self._scan.drives[self._scan.sample_drive], self._scan.sample_electrode
+        source, sink = drive.T
+        seen = resistance[..., electrode, :] - resistance[..., sink, :]
+        rows, r = np.arange(len(drive)), self._readout
+        volts = current * (seen[..., rows, source] - seen[..., rows, sink])
+        return np.asarray((r.gain * volts + r.offset) / r.reference_voltage * self.levels)
+
+    def __call__(self, codes: Floats) -> NDArray[np.uint16]:
+        """(n_samples,) conversions of 10 bits or so, each with its own noise, summed."""
+        times = self._readout.oversampling
+        noisy = codes + FIGURES.noise * self._random.standard_normal((times, len(codes)))
+        counts: NDArray[np.uint16] = np.clip(np.floor(noisy), 0, self.levels - 1).sum(axis=0)
+        return counts.astype(np.uint16)
+
+
 class Plant:
     """A sheet that is ``uneven`` by that standard deviation of log σ, on a mesh of its own."""
 
     def __init__(self, skin: Skin, mesh: Mesh, uneven: float, seed: int) -> None:
         self._random = np.random.default_rng(seed)
-        self._readout, self._levels = skin.readout, 1 << skin.readout.adc_bits
         self.scan = Scan.of(skin.pattern())
+        self._converter = Converter(self.scan, skin.readout, self._random)
         self.volts = Readout.of(self.scan, skin.readout)
         middles = mesh.points[mesh.cells].mean(axis=1)
-        sigma = skin.conductivity * np.exp(uneven * _field(middles, self._random))
+        sigma = skin.conductivity * np.exp(uneven * uneven_field(middles, self._random))
         model = ForwardModel(mesh, skin.pattern(), skin.contact_impedance, skin.current)
-        largest = float(self._codes(model.at(sigma).transfer_resistance, skin.current).max())
-        self._current = skin.current * min(1.0, RANGE * self._levels / largest)
+        codes = self._converter.codes(model.at(sigma).transfer_resistance, skin.current)
+        self._current = skin.current * min(1.0, RANGE * self._converter.levels / float(codes.max()))
         model = ForwardModel(mesh, skin.pattern(), skin.contact_impedance, self._current)
         self.state = model.at(sigma)
         self._points = np.einsum("qk,ckd->cqd", _inner_points(), mesh.points[mesh.cells])
@@ -76,8 +101,9 @@ class Plant:
     def frames(self, presses: Sequence[Finger], count: int = 1) -> Floats:
         """(count, n_meas) V as the read-out gives them."""
         resistance = self.state.local.transfer_resistances_of([self._pressed(presses)])[0]
-        codes = self._codes(resistance, self._current)
-        return np.array([self.volts(self._frame(codes)).values for _ in range(count)])
+        codes = self._converter.codes(resistance, self._current)
+        frames = (Frame(0, 0, 0.0, 1, 0, 0, self._converter(codes)) for _ in range(count))
+        return np.array([self.volts(frame).values for frame in frames])
 
     def scan_of(
         self, begin: Sequence[Finger], middle: Sequence[Finger], end: Sequence[Finger]
@@ -87,10 +113,11 @@ class Plant:
         found = self.state.local.transfer_resistances_of(
             [self._pressed(presses) for presses in (begin, middle, end)]
         )
-        codes = np.array([self._codes(resistance, self._current) for resistance in found])
+        codes = np.array([self._converter.codes(each, self._current) for each in found])
         part = self.scan.sample_drive / len(self.scan.drives)
         weights = ((2 * part - 1) * (part - 1), 4 * part * (1 - part), part * (2 * part - 1))
-        return self._frame(np.einsum("ks,ks->s", weights, codes))
+        counts = self._converter(np.einsum("ks,ks->s", weights, codes))
+        return Frame(0, 0, 0.0, 1, 0, 0, counts)
 
     def least(self, presses: Sequence[Finger], noise: Whitener) -> Floats:
         """(k,) m: root mean square error of each place that no unbiased estimate goes below.
@@ -124,29 +151,13 @@ class Plant:
         cells = np.flatnonzero(left != 1)
         return cells, self.state.conductivity[cells] * left[cells]
 
-    def _codes(self, resistance: Floats, current: float) -> Floats:
-        """(n_samples,) what the converter would say without noise and steps."""
-        drive, electrode = self.scan.drives[self.scan.sample_drive], self.scan.sample_electrode
-        source, sink = drive.T
-        seen = resistance[electrode] - resistance[sink]
-        rows, r = np.arange(len(drive)), self._readout
-        volts = current * (seen[rows, source] - seen[rows, sink])
-        return np.asarray((r.gain * volts + r.offset) / r.reference_voltage * self._levels)
-
-    def _frame(self, codes: Floats) -> Frame:
-        """Conversions of 10 bits or so, each with its own noise, summed."""
-        times = self._readout.oversampling
-        noisy = codes + FIGURES.noise * self._random.standard_normal((times, len(codes)))
-        counts = np.clip(np.floor(noisy), 0, self._levels - 1).sum(axis=0)
-        return Frame(0, 0, 0.0, 1, 0, 0, counts.astype(np.uint16))
-
 
 def _moved(finger: Finger, column: int, step: float) -> Finger:
     name = ("x", "y", "radius", "fall")[column]
     return replace(finger, **{name: finger.parameters[column] + step})
 
 
-def _field(points: Floats, random: np.random.Generator) -> Floats:
+def uneven_field(points: Floats, random: np.random.Generator) -> Floats:
     """(n,) of unit mean square: a smooth field, and a part that differs from cell to cell."""
     low, high = np.log(LENGTHS).tolist()
     length = np.exp(random.uniform(low, high, WAVES))
