@@ -5,13 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
 from bench_rig import scan_time, stage
-from deform_plant import Affine, Ball, Law, Percolating, Pose, Sheet, strain_of
+from deform_plant import HEIGHT, Affine, Ball, Law, Percolating, Pose, Sheet, strain_of
 from report import Floats
+from tomoskin import Skin
 from tomoskin.core import Frame
+from tomoskin.pipeline import Prepared, prepare
 from touch_lab import Converter
 
 REST, RAMP, HELD, PRESSED, AFTER = 3.0, (1.0, 2.0), 3.0, 2.5, 3.0
@@ -28,6 +31,15 @@ PRESS_KEPT, LOOSE = 0.03, 3.0
 NODES = (np.cos(np.pi * np.arange(4, -1, -1) / 4) + 1) / 2
 """Parts of a deformation that are solved; between them a polynomial is exact to 1e-5 of a change,
 to 5e-3 where electrodes slide over the mesh's nodes."""
+
+
+STATED = {"material": {"gauge": 2, "gauge_across": 2}, "surface": {"layer": f"{1e3 * HEIGHT:g} mm"}}
+"""What a skin file says of :class:`Affine`, and of what bends."""
+
+
+@cache
+def _stated(electrodes: int) -> Prepared:
+    return prepare(Skin.load(f"textile-disc-{electrodes}").altered(STATED))
 
 
 @dataclass(frozen=True)
@@ -48,6 +60,13 @@ class Run:
     """Whether the electrodes stay where they are while the sheet slides under them."""
 
     loosened: int | None = None
+    begins_bent: bool = False
+    """Whether the reference is taken while it is bent."""
+
+    @property
+    def prepared(self) -> Prepared:
+        """Where the law is one that a user can know, the skin file says it."""
+        return _stated(self.electrodes) if self.law == "affine" else stage(self.electrodes)
 
     @property
     def gauges(self) -> Law:
@@ -62,6 +81,8 @@ class Course:
     """When what happens, s, and how far: parts with their ends, by name."""
 
     ends: dict[str, float]
+    first: float
+    """Part of the deformation at the beginning."""
 
     @classmethod
     def of(cls, run: Run, random: np.random.Generator) -> Course:
@@ -69,6 +90,8 @@ class Course:
         down, up = random.uniform(*RAMP, 2)
         if not run.poses:
             lengths = {"rest": REST, "pressed" if run.balls else "held": PRESSED}
+        elif run.begins_bent:
+            lengths = {"rest": REST, "straightening": up, "after": AFTER}
         elif not run.balls:
             lengths = {"rest": REST, "bending": down, "held": HELD}
         elif run.early:
@@ -77,7 +100,8 @@ class Course:
         else:
             lengths = {"rest": REST, "bending": down, "held": HELD, "pressed": PRESSED}
             lengths |= {"lifted": 1.5, "straightening": up, "after": AFTER}
-        return cls(dict(zip(lengths, np.cumsum(list(lengths.values())).tolist(), strict=True)))
+        ends = np.cumsum(list(lengths.values())).tolist()
+        return cls(dict(zip(lengths, ends, strict=True)), float(run.begins_bent))
 
     def begin(self, *names: str) -> float:
         """Of the first part whose name begins with one of ``names``; never where there is none."""
@@ -100,12 +124,12 @@ class Course:
 
     def bent(self, t: Floats) -> Floats:
         """(n,) part of the deformation that is imposed, smoothly in and out."""
-        down, up = self.begin("bending"), self.begin("straightening")
-        at = dict(self.ends)
-        arrived = at.get("bending", at.get("bending pressed", 0.0))
-        return _eased((t - down) / max(arrived - down, 1e-3)) - _eased(
-            (t - up) / max(at.get("straightening", 0.0) - up, 1e-3)
-        )
+        return self.first + self._passed("bending", t) - self._passed("straightening", t)
+
+    def _passed(self, name: str, t: Floats) -> Floats:
+        begin = self.begin(name)
+        end = next((end for part, end in self.ends.items() if part.startswith(name)), math.inf)
+        return _eased((t - begin) / (end - begin)) if end < math.inf else np.zeros(len(t))
 
     def pressed(self, t: Floats) -> Floats:
         """(n,) part of the presses' response; a little stays for a while."""
@@ -137,7 +161,7 @@ class Bench:
     """The codes of a run's frames, by a polynomial between solved states."""
 
     def __init__(self, run: Run) -> None:
-        prepared = stage(run.electrodes)
+        prepared = run.prepared
         random = np.random.default_rng([run.seed, run.electrodes, 1])
         self.prepared, self.run, self.course = prepared, run, Course.of(run, random)
         self._law, self._kept = run.gauges, float(random.uniform(*KEPT))
@@ -149,18 +173,19 @@ class Bench:
         beyond = np.clip(1 - YIELD * size.max() / np.maximum(size, 1e-12), 0.0, None)
         self._stays = self._kept * beyond * self._strain
 
-    def frames(self) -> Iterator[tuple[str, Frame]]:
-        """Each with the part of the course in which it is."""
+    def frames(self) -> Iterator[tuple[str, float, Frame]]:
+        """Each with the part of the course in which it is, and what the sheet follows by then."""
         skin, scan = self.prepared.skin, self.prepared.scan
         interval, rate = scan_time(self.prepared), skin.readout.tick_rate
         n = int(max(self.course.ends.values()) / interval)
         begin = np.arange(n) * interval
         middle = (np.arange(len(scan.drives)) + 0.5) / len(scan.drives) * interval
         codes = self._codes((begin[:, None] + middle).ravel(), n)
-        for k, (t, one) in enumerate(zip(begin.tolist(), codes, strict=True)):
-            end = t + interval
-            counts = self._converter(one)
-            yield self.course.part(t, end), Frame(k, round(t * rate), end, 1, 0, 0, counts)
+        follows, _ = _followed(self.course, begin + interval / 2)
+        for k, (t, part, one) in enumerate(zip(begin, follows, codes, strict=True)):
+            end = float(t) + interval
+            frame = Frame(k, round(t * rate), end, 1, 0, 0, self._converter(one))
+            yield self.course.part(float(t), end), float(part), frame
 
     def _codes(self, t: Floats, n: int) -> Floats:
         """(n, n_samples) of drives at ``t``, frame after frame."""
@@ -170,7 +195,7 @@ class Bench:
         weights = _lagrange(part, nodes)
         rest = self._solved(nodes)
         total = np.einsum("tk,ks->ts", weights, rest)
-        if self.run.poses and self.run.balls:
+        if "straightening" in self.course.ends:
             kept = self._solved(nodes, kept=1.0) - rest
             total += stays[:, None] * np.einsum("tk,ks->ts", weights, kept)
         if self.run.balls:
