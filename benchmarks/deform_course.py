@@ -10,7 +10,7 @@ from functools import cache
 import numpy as np
 
 from bench_rig import scan_time, stage
-from deform_plant import HEIGHT, Affine, Ball, Law, Percolating, Pose, Sheet, strain_of
+from deform_plant import HEIGHT, Affine, Ball, Fold, Law, Percolating, Pose, Sheet, strain_of
 from report import Floats
 from tomoskin import Skin
 from tomoskin.core import Frame
@@ -222,12 +222,11 @@ class Bench:
 
     def _slid(self) -> Floats:
         """(n,) rad by which electrodes that stay are further along the rim of the sheet."""
-        skin = self.prepared.skin
-        rim, gone = skin.electrode_centres, np.zeros(skin.n_electrodes)
-        if self.run.slides:
-            for pose in self.run.poses:
-                moved = pose.shift(rim)
-                gone -= (rim[:, 0] * moved[:, 1] - rim[:, 1] * moved[:, 0]) / (rim**2).sum(axis=1)
+        x, y = self.prepared.skin.electrode_centres.T
+        gone = np.zeros(len(x))
+        for pose in (p for p in self.run.poses if self.run.slides and isinstance(p, Fold)):
+            moved = pose.shift(np.column_stack([x, y]))
+            gone -= (x * moved[:, 1] - y * moved[:, 0]) / (x**2 + y**2)
         return gone
 
     def _worse(self) -> Floats:

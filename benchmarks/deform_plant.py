@@ -79,11 +79,6 @@ class Wrap:
         size = HEIGHT / self.radius * 2.0 ** -((2 * across) ** 8)
         return _directed(0 * size, size, self.axis)
 
-    def shift(self, points: Floats) -> Floats:
-        """See :class:`Fold`."""
-        right = _right(self.axis)
-        return np.asarray(HEIGHT / self.radius * (points @ right)[:, None] * right)
-
 
 @dataclass(frozen=True)
 class Stretch:
@@ -97,10 +92,6 @@ class Stretch:
         """See :class:`Fold`."""
         one = np.ones(len(points))
         return _directed(self.along * one, self.across * one, self.axis)
-
-    def shift(self, points: Floats) -> Floats:
-        """See :class:`Fold`."""
-        return np.asarray(np.einsum("nij,nj->ni", self.strain(points), points))
 
 
 Pose = Fold | Wrap | Stretch

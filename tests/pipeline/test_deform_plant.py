@@ -12,6 +12,8 @@ import pytest
 
 from tomoskin import Skin
 from tomoskin.model.forward import ForwardModel
+from tomoskin.model.mesh import Hinge, Plane
+from tomoskin.twin import Bent
 
 BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
 
@@ -96,3 +98,23 @@ def test_laws_have_the_gauges_of_their_strain(plant: Any) -> None:
     assert gauge(law, small, 0.0) == pytest.approx(1 + 1.3 * 3.0, rel=1e-4)
     assert gauge(law, 0.0, small) == pytest.approx(-1 + 1.3 * 1.0, rel=1e-4)
     assert -np.log(law(np.array(0.05), np.array(0.0))) > 1.05 * 0.05 * 4.9
+
+
+def test_a_fold_lies_where_a_hinge_of_these_numbers_does(plant: Any) -> None:
+    hinge = Hinge(math.radians(20), 0.05, axis=0.4, at=0.03)
+    points = np.random.default_rng(1).uniform(-0.06, 0.06, (200, 2))
+    xx, yy, xy = Bent(hinge).strain(points, Plane(), plant.HEIGHT).T
+    known = np.stack([[xx, xy], [xy, yy]]).transpose(2, 0, 1)
+    fold = plant.Fold(math.radians(20), 0.4, 0.03, 0.05)
+    np.testing.assert_allclose(fold.strain(points), known, atol=5e-4)
+    assert 20 < np.count_nonzero(known[:, 0, 0] > 1e-4) < 180
+
+
+def test_what_slides_is_what_the_strain_adds_up_to(plant: Any) -> None:
+    fold = plant.Fold(0.5, 0.4, 0.02, 0.05, "bell")
+    right, step = np.array([math.sin(0.4), -math.cos(0.4)]), 1e-3
+    at = np.linspace(-0.05, 0.08, 14)[:, None] * right
+    slope = (fold.shift(at + step * right) - fold.shift(at - step * right)) @ right / 2 / step
+    across = np.einsum("nij,i,j->n", fold.strain(at), right, right)
+    np.testing.assert_allclose(slope, across, atol=0.02 * np.abs(across).max())
+    np.testing.assert_allclose(fold.shift(0.02 * right[None]), 0.0, atol=2e-5)
