@@ -70,13 +70,14 @@ def _reports(
     draws: Mapping[str, int], flat: int, others: int, seeds: Sequence[int]
 ) -> Iterator[Report]:
     bent = [shown for run in _bent(draws, seeds) for shown in followed(run)]
+    sheets, (thin, wide) = sum(draws.values()) * len(LAWS) * len(seeds), (1e3 * w for w in WIDTHS)
     notes = (
-        f"{sum(draws.values()) * len(LAWS) * len(seeds)} sheets of each skin, seeds {seeds}; folds "
-        f"of {ANGLES[0]} to {ANGLES[1]}° over {1e3 * WIDTHS[0]:.0f} to {1e3 * WIDTHS[1]:.0f} mm, "
-        f"{', '.join(PROFILES)}, a third of them hollow; stretches of {100 * STRAINS[0]:.0f} to "
-        f"{100 * STRAINS[1]:.0f} %; cylinders of {1e3 * RADII[0]:.0f} to {1e3 * RADII[1]:.0f} mm",
+        f"{sheets} sheets of each skin, seeds {seeds}; uneven by 3 to 15 %; stretches of 1 to 5 %; "
+        "cylinders of 60 to 240 mm",
+        f"folds of {ANGLES[0]} to {ANGLES[1]}° over {thin:.0f} to {wide:.0f} mm, narrower at one "
+        f"end, a third hollow: {', '.join(PROFILES)}; sliding: electrodes stay as they are",
         f"bent in {RAMP[0]:g} to {RAMP[1]:g} s, held for {HELD:g} s, pressed, straightened, "
-        f"{AFTER:g} s after; a quarter pressed before too; sliding: electrodes stay as they are",
+        f"{AFTER:g} s after; a quarter pressed before too",
         "affine: dimensions alone, which the skin file says; percolating: gauge 3 to 8, not said",
     )
     yield table("nobody presses: frames with a touch", _grouped(bent, _untouched), *notes)
@@ -144,9 +145,9 @@ def _fold(random: np.random.Generator) -> Fold:
     """A third of them hollow."""
     angle = float(random.choice([1, 1, -1]) * np.radians(random.uniform(*ANGLES)))
     axis, offset = random.uniform(0, np.pi), random.uniform(-OFFSETS, OFFSETS)
-    width, shrunk = random.uniform(*WIDTHS), random.uniform(0, 0.25)
+    width, shrunk, taper = random.uniform((WIDTHS[0], 0.0, -0.25), (WIDTHS[1], 0.25, 0.25)).tolist()
     profile = str(random.choice(list(PROFILES)))
-    return Fold(angle, float(axis), float(offset), float(width), profile, float(shrunk))
+    return Fold(angle, float(axis), float(offset), width, profile, shrunk, taper)
 
 
 def _through(fold: Fold, electrode: int, electrodes: int) -> Fold:

@@ -20,8 +20,8 @@ HEIGHT = 3e-3
 RADIUS, RIM, STEP = 0.1, 192, 4.5e-3
 """Of the disc, m; nodes at its rim; m between those inside."""
 
-UNEVEN = 0.03
-"""Standard deviation of log σ of a sheet at rest."""
+UNEVEN, CONTACTS = (0.03, 0.15), 0.1
+"""Standard deviations of log σ of a sheet at rest, one drawn for each, and of its contacts'."""
 
 _TWOFOLD = 1.3
 """Exponent of conduction of a plane network above its threshold (Stauffer & Aharony, Introduction
@@ -39,7 +39,8 @@ PROFILES: dict[str, Callable[[Floats], Floats]] = {
 @dataclass(frozen=True)
 class Fold:
     """Bent by ``angle`` rad along a line of direction ``axis`` rad, ``offset`` m to its right;
-    ``width`` m at half of the curvature. Along the line it shrinks by the part ``poisson``."""
+    ``width`` m at half of the curvature, which grows along the line by the part ``taper`` from the
+    middle to the rim. Along the line the sheet shrinks by the part ``poisson``."""
 
     angle: float
     axis: float
@@ -47,11 +48,14 @@ class Fold:
     width: float
     profile: str = "hinge"
     poisson: float = 0.0
+    taper: float = 0.0
 
     def strain(self, points: Floats) -> Floats:
         """(n, 2, 2) of the sheet at ``points`` (n, 2) m."""
-        across = (points @ _right(self.axis) - self.offset) / self.width
-        size = HEIGHT * self.angle / self.width * PROFILES[self.profile](across)
+        along = points @ [np.cos(self.axis), np.sin(self.axis)] / RADIUS
+        width = self.width * (1 + self.taper * along)
+        across = (points @ _right(self.axis) - self.offset) / width
+        size = HEIGHT * self.angle / width * PROFILES[self.profile](across)
         return _directed(-self.poisson * size, size, self.axis)
 
     def shift(self, points: Floats) -> Floats:
@@ -194,11 +198,11 @@ class Sheet:
         inner = np.array([[4, 1, 1], [1, 4, 1], [1, 1, 4]]) / 6
         self.inner = np.einsum("qk,ckd->cqd", inner, corners)
         field = uneven_field(corners.mean(axis=1), random)
-        self.sigma = skin.conductivity * np.exp(UNEVEN * field)
+        self.sigma = skin.conductivity * np.exp(random.uniform(*UNEVEN) * field)
         x, y = skin.electrode_centres.T
         self.middles = np.arctan2(y, x)
         self.half = skin.arcs[0].width(skin.outline) / 2 / RADIUS
-        self.contact = skin.contact_impedance * np.exp(0.1 * random.standard_normal(len(x)))
+        self.contact = skin.contact_impedance * np.exp(CONTACTS * random.standard_normal(len(x)))
 
     def conductance(self, law: Law, strain: Floats, left: Floats) -> Floats:
         """(n_cells, 2, 2) S of the cells, of strain (n_cells, 3, 2, 2) and ``left`` (n_cells, 3) of

@@ -22,17 +22,14 @@ BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
 def plant(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.syspath_prepend(str(BENCHMARKS))
     module = importlib.import_module("deform_plant")
-    monkeypatch.setattr(module, "UNEVEN", 0.0)
+    monkeypatch.setattr(module, "UNEVEN", (0.0, 0.0))
+    monkeypatch.setattr(module, "CONTACTS", 0.0)
     return module
 
 
 @pytest.fixture
 def even(plant: Any) -> Any:
-    """An even sheet whose contacts are those of the skin."""
-    skin = Skin.load("textile-disc-16")
-    sheet = plant.Sheet(skin, 1)
-    sheet.contact = skin.contact_impedance.copy()
-    return sheet
+    return plant.Sheet(Skin.load("textile-disc-16"), 1)
 
 
 def resistance(sheet: Any, law: Any, strain: np.ndarray, **where: Any) -> np.ndarray:
