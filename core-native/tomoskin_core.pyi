@@ -127,6 +127,25 @@ class Patches:
             or the system is singular.
         """
 
+    def scaled(
+        self,
+        starts: NDArray[np.int64],
+        cells: NDArray[np.int64],
+        height: NDArray[np.float64],
+        depths: NDArray[np.float64],
+        threads: int | None = None,
+    ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """What touches take away (t, k, w, w), each in k ``depths``, and nodes to be kept first.
+
+        Touch t changes log σ of ``cells[starts[t]:starts[t + 1]]`` by ``height`` times the depth,
+        of a real state; at most 7 depths.
+
+        Raises
+        ------
+        ValueError
+            As :meth:`change`.
+        """
+
 def transposed_product(
     indptr: NDArray[np.int32],
     indices: NDArray[np.int32],

@@ -7,7 +7,7 @@
 use pulp::bytemuck::fill_zeroes;
 use pulp::{Simd, WithSimd};
 
-use crate::dense::Matrix;
+use crate::dense::{Matrix, Target, add_product};
 use crate::instructions::narrow;
 use crate::linear::solve;
 use crate::scalar::{Scalar, c64};
@@ -139,17 +139,30 @@ pub struct Changed<'a, T> {
     pub lost: &'a mut [T],
 }
 
-/// Memory that touches share, one after the other.
+/// A touch that is tried in several depths.
+#[derive(Clone, Copy, Debug)]
+pub struct Shape<'a> {
+    /// The cells.
+    pub cells: &'a [i64],
+    /// What changes of the logarithm of each one's conductivity, in a depth of one.
+    pub height: &'a [f64],
+    /// The depths, fewer than the workspace has lanes.
+    pub depths: &'a [f64],
+}
+
+/// Memory that touches share, one after the other: matrices of `L` conductivities side by side, the
+/// first of which is as it was.
 #[derive(Debug)]
-pub struct Workspace<T> {
+pub struct Workspace<T, const L: usize = 2> {
     seen: Vec<bool>,
     place: Vec<u32>,
-    patch: Patch<T>,
+    patch: Patch<T, L>,
+    lanes: Vec<[T; L]>,
 }
 
 /// A touched patch, its nodes numbered as they were found.
 #[derive(Debug)]
-struct Patch<T> {
+struct Patch<T, const L: usize> {
     nodes: Vec<u32>,
     touched: Vec<u32>,
     rim: Vec<u32>,
@@ -160,12 +173,12 @@ struct Patch<T> {
     graph: Vec<u64>,
     degree: Vec<u32>,
     /// Matrix before and after, row-major; of use is the lower triangle only.
-    matrix: Vec<[T; 2]>,
+    matrix: Vec<[T; L]>,
     list: Vec<u32>,
-    column: Vec<[T; 2]>,
+    column: Vec<[T; L]>,
 }
 
-impl<T: Scalar> Workspace<T> {
+impl<T: Scalar, const L: usize> Workspace<T, L> {
     /// Memory for touches of these cells.
     #[must_use]
     pub fn new(cells: &Cells) -> Self {
@@ -184,50 +197,38 @@ impl<T: Scalar> Workspace<T> {
                 list: Vec::new(),
                 column: Vec::new(),
             },
+            lanes: Vec::new(),
         }
     }
 
-    /// Computes what one touch changes.
-    ///
-    /// # Errors
-    /// See [`Refusal`].
-    pub fn update<B: Lift<T>>(
-        &mut self,
-        cells: &Cells,
-        base: &Base<B>,
-        touch: Touch<'_, T>,
-        out: Changed<'_, T>,
-    ) -> Result<(), Refusal> {
-        for (to, from) in out.grounded.iter_mut().zip(&base.grounded) {
-            *to = from.lift();
-        }
-        out.lost.fill(T::ZERO);
-        self.check(cells.len(), touch)?;
-        self.number(cells, touch.cells);
-        let rim = &self.patch.rim;
+    /// The nodes of the numbered patch's rim, whose columns are there; none where no two are.
+    fn rim<B>(&self, base: &Base<B>) -> Result<Vec<u32>, Refusal> {
         let node = |&local: &u32| self.patch.nodes[local as usize];
-        let nodes: Vec<u32> = rim.iter().map(node).collect();
+        let mut nodes: Vec<u32> = self.patch.rim.iter().map(node).collect();
         let absent = |&node: &u32| base.columns[node as usize].is_none();
         let missing: Vec<u32> = nodes.iter().copied().filter(absent).collect();
         if !missing.is_empty() {
             return Err(Refusal::Missing(missing));
         }
         if nodes.len() < 2 {
-            return Ok(());
+            nodes.clear();
         }
-        self.patch.assemble(cells, base, touch);
+        Ok(nodes)
+    }
+
+    /// Eliminates the nodes inside the numbered patch, whose cells have these lanes.
+    fn condense(&mut self, cells: &Cells, index: &[i64]) -> Result<(), Refusal> {
+        self.patch.assemble(cells, index, &self.lanes);
         let condense = Condense {
             patch: &mut self.patch,
         };
-        narrow(condense)
-            .ok_or(Refusal::Singular)
-            .map(|()| woodbury(&self.patch, &nodes, base, out))
+        narrow(condense).ok_or(Refusal::Singular)
     }
 
-    fn check(&mut self, n_cells: usize, touch: Touch<'_, T>) -> Result<(), Refusal> {
-        let positive = touch.conductivity.iter().all(|value| value.conducts());
+    /// Refuses cells that are not there or stand twice, or numbers that are `wrong`.
+    fn check(&mut self, n_cells: usize, index: &[i64], wrong: bool) -> Result<(), Refusal> {
         let mut marked = 0;
-        for &cell in touch.cells {
+        for &cell in index {
             let cell = usize::try_from(cell).unwrap_or(usize::MAX);
             if cell >= n_cells || self.seen[cell] {
                 break;
@@ -235,10 +236,10 @@ impl<T: Scalar> Workspace<T> {
             self.seen[cell] = true;
             marked += 1;
         }
-        for &cell in &touch.cells[..marked] {
+        for &cell in &index[..marked] {
             self.seen[cell as usize] = false;
         }
-        if positive && marked == touch.cells.len() && marked == touch.conductivity.len() {
+        if !wrong && marked == index.len() {
             return Ok(());
         }
         Err(Refusal::Impossible)
@@ -275,32 +276,138 @@ impl<T: Scalar> Workspace<T> {
     }
 }
 
-impl<T: Scalar> Patch<T> {
+impl<T: Scalar> Workspace<T> {
+    /// Computes what one touch changes.
+    ///
+    /// # Errors
+    /// See [`Refusal`].
+    pub fn update<B: Lift<T>>(
+        &mut self,
+        cells: &Cells,
+        base: &Base<B>,
+        touch: Touch<'_, T>,
+        out: Changed<'_, T>,
+    ) -> Result<(), Refusal> {
+        for (to, from) in out.grounded.iter_mut().zip(&base.grounded) {
+            *to = from.lift();
+        }
+        out.lost.fill(T::ZERO);
+        let positive = touch.conductivity.iter().all(|value| value.conducts());
+        let fits = touch.cells.len() == touch.conductivity.len();
+        self.check(cells.len(), touch.cells, !(positive && fits))?;
+        self.number(cells, touch.cells);
+        let nodes = self.rim(base)?;
+        if nodes.is_empty() {
+            return Ok(());
+        }
+        let touched = touch.cells.iter().zip(touch.conductivity);
+        self.lanes.clear();
+        self.lanes.extend(
+            touched.map(|(&cell, &after)| [base.conductivity[cell as usize].lift(), after]),
+        );
+        self.condense(cells, touch.cells)?;
+        woodbury(&self.patch, &nodes, base, out);
+        Ok(())
+    }
+}
+
+impl<const L: usize> Workspace<f64, L> {
+    /// Computes what a touch takes away in each of its depths, `width` by `width` numbers each.
+    ///
+    /// # Errors
+    /// See [`Refusal`].
+    pub fn scaled(
+        &mut self,
+        cells: &Cells,
+        base: &Base<f64>,
+        shape: Shape<'_>,
+        out: &mut [f64],
+    ) -> Result<(), Refusal> {
+        out.fill(0.0);
+        let finite = shape.height.iter().all(|value| value.is_finite());
+        let fits = shape.cells.len() == shape.height.len() && shape.depths.len() < L;
+        self.check(cells.len(), shape.cells, !(finite && fits))?;
+        self.number(cells, shape.cells);
+        let nodes = self.rim(base)?;
+        if nodes.is_empty() {
+            return Ok(());
+        }
+        self.lanes.clear();
+        for (&cell, &height) in shape.cells.iter().zip(shape.height) {
+            let mut lanes = [base.conductivity[cell as usize]; L];
+            for (lane, &depth) in lanes[1..].iter_mut().zip(shape.depths) {
+                *lane *= (depth * height).exp();
+            }
+            self.lanes.push(lanes);
+        }
+        self.condense(cells, shape.cells)?;
+        let rim = Rim::new(&nodes, base);
+        let places = out.chunks_exact_mut(base.width * base.width);
+        for (lane, out) in (1..=shape.depths.len()).zip(places) {
+            let (change, _) = self.patch.change(lane);
+            rim.lessen(&change, out);
+        }
+        Ok(())
+    }
+}
+
+/// The base system as the rim of a patch sees it, against its first node.
+struct Rim {
+    between: Matrix<f64>,
+    fields: Matrix<f64>,
+}
+
+impl Rim {
+    fn new(nodes: &[u32], base: &Base<f64>) -> Self {
+        let width = base.width;
+        let field = |row: usize, k: usize| base.fields[nodes[row] as usize * width + k];
+        Self {
+            between: between(nodes, base),
+            fields: Matrix::from_fn(nodes.len() - 1, width, |row, k| {
+                field(row + 1, k) - field(0, k)
+            }),
+        }
+    }
+
+    /// Writes Uᵀ (I + A C)⁻¹ A U of a `change` A.
+    fn lessen(&self, change: &Matrix<f64>, out: &mut [f64]) {
+        let (m, width) = (self.fields.height, self.fields.width());
+        let mut system = Matrix::from_fn(m, m, |i, j| if i == j { 1.0 } else { 0.0 });
+        system.add(1.0, self.between.view(), change.view(), m);
+        let mut current = Matrix::zeros(m, width);
+        current.add(1.0, change.view(), self.fields.view(), m);
+        solve(&system, &mut current);
+        let target = Target::full(out, width);
+        let fields = self.fields.view().transposed();
+        add_product(target, 1.0, fields, current.view(), [width, width, m]);
+    }
+}
+
+impl<T: Scalar, const L: usize> Patch<T, L> {
     fn words(&self) -> usize {
         self.nodes.len().div_ceil(64)
     }
 
-    /// Fills matrix and graph from the cells.
-    fn assemble<B: Lift<T>>(&mut self, cells: &Cells, base: &Base<B>, touch: Touch<'_, T>) {
+    /// Fills matrix and graph from cells, each with the conductivities of its lanes.
+    fn assemble(&mut self, cells: &Cells, index: &[i64], lanes: &[[T; L]]) {
         let (n, words, k) = (self.nodes.len(), self.words(), cells.per_cell);
         let long_enough = self.matrix.len().max(n * n);
-        self.matrix.resize(long_enough, [T::ZERO; 2]);
+        self.matrix.resize(long_enough, [T::ZERO; L]);
         for (i, row) in self.matrix.chunks_exact_mut(n).take(n).enumerate() {
-            fill_zeroes(&mut row[..=i]);
+            fill_zeroes(row[..=i].as_flattened_mut());
         }
         self.graph.clear();
         self.graph.resize(n * words, 0);
-        let touched = touch.cells.iter().zip(touch.conductivity);
-        for ((&cell, &after), corners) in touched.zip(self.corners.chunks_exact(k)) {
-            let before: T = base.conductivity[cell as usize].lift();
+        for ((&cell, lanes), corners) in index.iter().zip(lanes).zip(self.corners.chunks_exact(k)) {
             let unit = &cells.matrices[cell as usize * k * k..][..k * k];
             for (&i, row) in corners.iter().zip(unit.chunks_exact(k)) {
                 for (&j, &value) in corners.iter().zip(row) {
                     self.graph[i as usize * words + j as usize / 64] |= 1 << (j % 64);
                     if j <= i {
-                        let [first, second] = &mut self.matrix[i as usize * n + j as usize];
-                        *first += before * value;
-                        *second += after * value;
+                        let sums = &mut self.matrix[i as usize * n + j as usize];
+                        for (sum, &lane) in sums.iter_mut().zip(lanes) {
+                            *sum += lane * value;
+                        }
                     }
                 }
             }
@@ -348,30 +455,35 @@ impl<T: Scalar> Patch<T> {
     #[inline(always)]
     fn subtract(&mut self, node: usize) -> Option<()> {
         let n = self.nodes.len();
-        let [first, second] = self.matrix[node * n + node];
-        let scale = [T::ONE / first.pivot()?, T::ONE / second.pivot()?];
+        let mut scale = self.matrix[node * n + node];
+        for pivot in &mut scale {
+            *pivot = T::ONE / pivot.pivot()?;
+        }
         self.column.clear();
         for &other in &self.list {
             let (low, high) = (node.min(other as usize), node.max(other as usize));
-            let [a, b] = self.matrix[high * n + low];
-            self.column.push([a * scale[0], b * scale[1]]);
+            let mut values = self.matrix[high * n + low];
+            for (value, &scale) in values.iter_mut().zip(&scale) {
+                *value = *value * scale;
+            }
+            self.column.push(values);
         }
-        for (at, (&i, &by)) in self.list.iter().zip(&self.column).enumerate() {
+        for (at, (&i, by)) in self.list.iter().zip(&self.column).enumerate() {
             let row = &mut self.matrix[i as usize * n..][..n];
             for (&j, value) in self.list[..=at].iter().zip(&self.column) {
-                let [first, second] = &mut row[j as usize];
-                *first -= by[0] * value[0];
-                *second -= by[1] * value[1];
+                for ((entry, &by), &value) in row[j as usize].iter_mut().zip(by).zip(value) {
+                    *entry -= by * value;
+                }
             }
         }
         Some(())
     }
 }
 
-impl<T: Scalar> Patch<T> {
-    /// The change of the system on the rim without its first node, and the current that leaks
-    /// from each of the others.
-    fn change(&self) -> (Matrix<T>, Vec<T>) {
+impl<T: Scalar, const L: usize> Patch<T, L> {
+    /// The change of the system on the rim without its first node, in a lane, and the current that
+    /// leaks from each of the others.
+    fn change(&self, lane: usize) -> (Matrix<T>, Vec<T>) {
         let (n, m) = (self.nodes.len(), self.rim.len() - 1);
         let mut change = Matrix::zeros(m, m);
         let mut leak = vec![T::ZERO; m + 1];
@@ -379,8 +491,8 @@ impl<T: Scalar> Patch<T> {
             // The rim's numbers ascend, so that this is the lower triangle.
             let row = &self.matrix[row as usize * n..][..n];
             for (j, &column) in self.rim[..=i].iter().enumerate() {
-                let [before, after] = row[column as usize];
-                let value = after - before;
+                let lanes = row[column as usize];
+                let value = lanes[lane] - lanes[0];
                 leak[i] += value;
                 if j < i {
                     leak[j] += value;
@@ -396,11 +508,11 @@ impl<T: Scalar> Patch<T> {
     }
 }
 
-struct Condense<'a, T> {
-    patch: &'a mut Patch<T>,
+struct Condense<'a, T, const L: usize> {
+    patch: &'a mut Patch<T, L>,
 }
 
-impl<T: Scalar> WithSimd for Condense<'_, T> {
+impl<T: Scalar, const L: usize> WithSimd for Condense<'_, T, L> {
     type Output = Option<()>;
 
     /// Eliminates all nodes inside; nothing where a pivot is not positive.
@@ -424,13 +536,13 @@ impl<T: Scalar> WithSimd for Condense<'_, T> {
 /// Rounding shows in what the solve leaves over, and in the current that leaks from a rim at one
 /// potential, where none should flow.
 fn woodbury<T: Scalar, B: Lift<T>>(
-    patch: &Patch<T>,
+    patch: &Patch<T, 2>,
     nodes: &[u32],
     base: &Base<B>,
     out: Changed<'_, T>,
 ) {
     let (m, width) = (nodes.len() - 1, base.width);
-    let (change, leak) = patch.change();
+    let (change, leak) = patch.change(1);
     let between = between(nodes, base);
     let field = |row: usize, k: usize| -> T { base.fields[nodes[row] as usize * width + k].lift() };
     let fields = Matrix::from_fn(m, width, |row, k| field(row + 1, k) - field(0, k));

@@ -2,11 +2,13 @@
 
 use std::sync::{Mutex, PoisonError, RwLock};
 
-use numpy::{Element, Ix1, Ix2, Ix3, PyArray1, PyArray3, PyArrayMethods, PyUntypedArrayMethods};
+use numpy::{
+    Element, Ix1, Ix2, Ix3, PyArray1, PyArray3, PyArray4, PyArrayMethods, PyUntypedArrayMethods,
+};
 use pyo3::prelude::*;
 
 use crate::arrays::{Any, array, contiguous, invalid, is_complex, same};
-use crate::patch::{Base, Cells, Changed, Lift, Refusal, Touch, Workspace};
+use crate::patch::{Base, Cells, Changed, Lift, Refusal, Shape, Touch, Workspace};
 use crate::scalar::{Scalar, c64};
 use crate::threads::{self, Shared, split};
 
@@ -103,6 +105,93 @@ impl Patches {
             (Number::Complex(_), false) => Err(invalid("conductivity: expected complex128")),
         }
     }
+
+    #[pyo3(signature = (starts, cells, height, depths, threads=None))]
+    fn scaled<'py>(
+        &self,
+        starts: &Any<'py>,
+        cells: &Any<'py>,
+        height: &Any<'py>,
+        depths: &Any<'py>,
+        threads: Option<usize>,
+    ) -> PyResult<(Any<'py>, Bound<'py, PyArray1<i64>>)> {
+        let Number::Real(base) = &self.base else {
+            return Err(invalid("expected a real state"));
+        };
+        let depths = array::<f64, Ix1>("depths", depths)?;
+        let depths = contiguous("depths", &depths)?;
+        let (shapes, threads) = ((starts, cells, height), threads::count(threads));
+        match depths.len() {
+            0 | 1 => scaled::<2>(&self.cells, base, shapes, &depths, threads),
+            2 | 3 => scaled::<4>(&self.cells, base, shapes, &depths, threads),
+            4..8 => scaled::<8>(&self.cells, base, shapes, &depths, threads),
+            _ => Err(invalid("depths: expected at most 7")),
+        }
+    }
+}
+
+/// Changes by touches, one after the other, in several depths, with `L` conductivities abreast.
+fn scaled<'py, const L: usize>(
+    mesh: &Cells,
+    base: &RwLock<Base<f64>>,
+    (starts, cells, height): (&Any<'py>, &Any<'py>, &Any<'py>),
+    depths: &[f64],
+    threads: usize,
+) -> PyResult<(Any<'py>, Bound<'py, PyArray1<i64>>)> {
+    let py = starts.py();
+    let starts = array::<i64, Ix1>("starts", starts)?;
+    let cells = array::<i64, Ix1>("cells", cells)?;
+    let height = array::<f64, Ix1>("height", height)?;
+    let (starts, cells) = (contiguous("starts", &starts)?, contiguous("cells", &cells)?);
+    let height = contiguous("height", &height)?;
+    check_starts(&starts, cells.len())?;
+    same("length of height", cells.len(), height.len())?;
+
+    let count = starts.len() - 1;
+    let width = base.read().unwrap_or_else(PoisonError::into_inner).width;
+    let less = PyArray4::<f64>::zeros(py, [count, depths.len(), width, width], false);
+    let result = {
+        let mut less = less.readwrite();
+        let out = Shared::new(less.as_slice_mut()?);
+        let size = depths.len() * width * width;
+        let work = |touches, refused: &Mutex<Refused>| {
+            let base = base.read().unwrap_or_else(PoisonError::into_inner);
+            let mut workspace = Workspace::<f64, L>::new(mesh);
+            for number in touches {
+                let within = starts[number] as usize..starts[number + 1] as usize;
+                let shape = Shape {
+                    cells: &cells[within.clone()],
+                    height: &height[within],
+                    depths,
+                };
+                // SAFETY: each touch has a place of its own.
+                let out = unsafe { out.part(number * size..(number + 1) * size) };
+                if let Err(refusal) = workspace.scaled(mesh, &base, shape, out) {
+                    refused
+                        .lock()
+                        .unwrap_or_else(PoisonError::into_inner)
+                        .note(number, refusal);
+                }
+            }
+        };
+        py.detach(|| {
+            let refused = Mutex::default();
+            split(count, GRAIN, threads, |touches| work(touches, &refused));
+            refused.into_inner().unwrap_or_else(PoisonError::into_inner)
+        })
+    };
+    Ok((less.into_any(), result.missing(py)?))
+}
+
+fn check_starts(starts: &[i64], n_cells: usize) -> PyResult<()> {
+    let ends = (starts.first(), starts.last());
+    let ascending = starts.windows(2).all(|ends| ends[0] <= ends[1]);
+    if !ascending || ends != (Some(&0), Some(&(n_cells as i64))) {
+        return Err(invalid(
+            "starts: expected ascending entries from 0 to the number of cells",
+        ));
+    }
+    Ok(())
 }
 
 fn base<T: Scalar + Element>(
@@ -165,13 +254,7 @@ fn change<'py, B: Lift<T>, T: Scalar + Element>(
     let conductivity = array::<T, Ix1>("conductivity", conductivity)?;
     let (starts, cells) = (contiguous("starts", &starts)?, contiguous("cells", &cells)?);
     let conductivity = contiguous("conductivity", &conductivity)?;
-    let ends = (starts.first(), starts.last());
-    let ascending = starts.windows(2).all(|ends| ends[0] <= ends[1]);
-    if !ascending || ends != (Some(&0), Some(&(cells.len() as i64))) {
-        return Err(invalid(
-            "starts: expected ascending entries from 0 to the number of cells",
-        ));
-    }
+    check_starts(&starts, cells.len())?;
     same("length of conductivity", cells.len(), conductivity.len())?;
 
     let count = starts.len() - 1;
@@ -216,14 +299,7 @@ fn change<'py, B: Lift<T>, T: Scalar + Element>(
             refused.into_inner().unwrap_or_else(PoisonError::into_inner)
         })
     };
-    if let Some((number, why)) = result.first {
-        return Err(invalid(format!("touch {number}: {why}")));
-    }
-    let mut missing = result.missing;
-    missing.sort_unstable();
-    missing.dedup();
-    let missing = PyArray1::from_vec(py, missing);
-    Ok((grounded.into_any(), lost.into_any(), missing))
+    Ok((grounded.into_any(), lost.into_any(), result.missing(py)?))
 }
 
 fn taken<T>(spare: &Mutex<Vec<T>>) -> Option<T> {
@@ -238,6 +314,17 @@ struct Refused {
 }
 
 impl Refused {
+    /// Nodes that are needed first; what went wrong as an error.
+    fn missing(self, py: Python<'_>) -> PyResult<Bound<'_, PyArray1<i64>>> {
+        if let Some((number, why)) = self.first {
+            return Err(invalid(format!("touch {number}: {why}")));
+        }
+        let mut missing = self.missing;
+        missing.sort_unstable();
+        missing.dedup();
+        Ok(PyArray1::from_vec(py, missing))
+    }
+
     fn note(&mut self, number: usize, refusal: Refusal) {
         let why = match refusal {
             Refusal::Missing(nodes) => {

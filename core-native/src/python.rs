@@ -260,7 +260,7 @@ fn keep_freed_memory() {
 
 /// Number of what `tomoskin_core.pyi` says: raised with each change of it, so that tomoskin does
 /// not call an engine that was built for other arguments.
-const INTERFACE: u32 = 7;
+const INTERFACE: u32 = 8;
 
 #[pymodule]
 fn tomoskin_core(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -1,5 +1,6 @@
 """The complete electrode model: from conductivity to voltages and their derivatives."""
 
+from tomoskin.model.forward.batch import TouchBatch as TouchBatch
 from tomoskin.model.forward.differentiable import (
     jax_voltages as jax_voltages,
     torch_voltages as torch_voltages,

@@ -26,7 +26,7 @@ from tomoskin.model.pattern import Pattern
 VARIABLE = "TOMOSKIN_ENGINE"
 """Environment variable that asks for one engine: scipy or native."""
 
-INTERFACE = 7
+INTERFACE = 8
 """The interface of tomoskin_core that is called here and in ``touch``; raised with its own."""
 
 

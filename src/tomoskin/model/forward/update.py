@@ -120,19 +120,7 @@ class LocalUpdate:
 
     @cached_property
     def _patches(self) -> Patches:
-        element, basis = self._model.assembly.element, self._base.basis
-        held = np.zeros(element.n_nodes, dtype=bool)
-        for facets in element.facets:
-            held[facets] = True
-        base = BaseState(
-            cells=element.cells,
-            local=np.einsum("nqid,nqjd->nij", element.gradients, element.gradients),
-            held=held,
-            conductivity=self._conductivity.astype(basis.dtype),
-            fields=basis[: element.n_nodes],
-            grounded=basis[element.n_nodes :],
-        )
-        return self._model.engine.patches(base)
+        return self._model.engine.patches(base_state(self._base))
 
     def _size(self, n_columns: int) -> int:
         return n_columns * self._model.assembly.n_points * self._base.basis.itemsize
@@ -147,3 +135,19 @@ class LocalUpdate:
         columns = self._base.factor.columns(missing)
         self._patches.keep(missing, columns[: self._model.assembly.n_points])
         self._stored[missing] = True
+
+
+def base_state(solution: Solution) -> BaseState:
+    """What touches change of it; it has a scalar conductivity."""
+    element, basis = solution.model.assembly.element, solution.basis
+    held = np.zeros(element.n_nodes, dtype=bool)
+    for facets in element.facets:
+        held[facets] = True
+    return BaseState(
+        cells=element.cells,
+        local=np.einsum("nqid,nqjd->nij", element.gradients, element.gradients),
+        held=held,
+        conductivity=solution.conductivity.astype(basis.dtype),
+        fields=basis[: element.n_nodes],
+        grounded=basis[element.n_nodes :],
+    )

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from tomoskin.core import FloatArray, IntArray
 from tomoskin.sensing.fit.problem import Matched, WhitenedTable
@@ -92,7 +93,7 @@ def _positions(response: Response, prior: SpotPrior) -> FloatArray:
     """(n, 2) m of a hexagonal grid of positions near the cells."""
     inside, step = response.spots.mesh.centroids, _SPACING * prior.radius
     grid = hexagonal_grid(inside, step)
-    apart = np.linalg.norm(grid[:, None] - inside, axis=2).min(axis=1)
+    apart, _ = cKDTree(inside).query(grid)
     return np.asarray(grid[apart < step / 2])
 
 

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, vstack
 from scipy.spatial import cKDTree
 
-from tomoskin.core import Arrays, FloatArray, IntArray, finished, reach
+from tomoskin.core import Arrays, FloatArray, IntArray, finished
 from tomoskin.model.forward import State
 from tomoskin.sensing.fit import spot
 from tomoskin.sensing.fit.spot_fit import SpotPrior
@@ -191,14 +191,20 @@ class Certificate:
     moved: float = 0.0
 
     @classmethod
-    def of(cls, response: spot.Response, table: ResponseTable, prior: SpotPrior) -> Self:
-        """By solving the exact model for some spots, alone and in pairs."""
-        random = np.random.default_rng(_SEED)
-        spots = drawn_spots(random, response, prior, table.sign, _SPOTS)
-        alone = _exact(response, spots[:, None])
+    def of(
+        cls,
+        response: spot.Response,
+        table: ResponseTable,
+        prior: SpotPrior,
+        transfers: FloatArray,
+        of_pairs: FloatArray,
+    ) -> Self:
+        """By what the exact model says of :func:`trial_spots`: (n, q) and (m, q) Ω, each alone and
+        in pairs, see :meth:`~tomoskin.sensing.fit.spot.Response.transfers`."""
+        spots, pairs = trial_spots(response, prior, table.sign)
+        alone = transfers @ response.by_transfer
         parts = _norms(alone - table.expanded(spots)[:, 0] @ table.basis) / _norms(alone)
-        pairs = _pairs(random, spots, _APART * prior.radius)
-        beyond = _exact(response, spots[pairs]) - alone[pairs].sum(axis=1)
+        beyond = of_pairs @ response.by_transfer - alone[pairs].sum(axis=1)
         interaction = finished(Interaction.making(response))
         said = np.array([interaction.change(spots[pair]) for pair in pairs])
         pair = float(np.quantile(_norms(beyond - said) / _norms(said), _HELD))
@@ -344,6 +350,15 @@ class Reduced:
         )
 
 
+def trial_spots(
+    response: spot.Response, prior: SpotPrior, sign: str
+) -> tuple[FloatArray, IntArray]:
+    """(n, 4) spots at random on which a certificate rests, and (m, 2) numbers of pairs of them."""
+    random = np.random.default_rng(_SEED)
+    spots = drawn_spots(random, response, prior, sign, _SPOTS)
+    return spots, _pairs(random, spots, _APART * prior.radius)
+
+
 def drawn_spots(
     random: np.random.Generator, response: spot.Response, prior: SpotPrior, sign: str, count: int
 ) -> FloatArray:
@@ -366,15 +381,6 @@ def _pairs(random: np.random.Generator, spots: FloatArray, apart: float) -> IntA
     pairs = random.integers(len(spots), size=(4 * _PAIRS, 2))
     away = np.linalg.norm(spots[pairs[:, 0], :2] - spots[pairs[:, 1], :2], axis=1)
     return np.asarray(pairs[away > apart][:_PAIRS])
-
-
-def _exact(response: spot.Response, sets: FloatArray) -> FloatArray:
-    """(n, n_meas) V by sets of spots (n, k, 4)."""
-    changes = []
-    for spots in sets:
-        reach()
-        changes.append(response.changes([spots])[0])
-    return np.array(changes)
 
 
 def _norms(rows: FloatArray) -> FloatArray:

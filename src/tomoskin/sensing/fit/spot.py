@@ -9,11 +9,11 @@ from functools import cache, cached_property
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.sparse import csr_array
-from scipy.spatial import cKDTree
 
 from tomoskin.core import FloatArray, IntArray, ModelError, reach
-from tomoskin.model.forward import State
+from tomoskin.model.forward import State, TouchBatch
 from tomoskin.model.mesh import Mesh
 
 X, Y, LOG_RADIUS, CONTENT = range(4)
@@ -26,6 +26,16 @@ _SCALES = 6.0
 
 _SPLIT = 2
 """Each side of a cell is cut into so many, for the mean of a profile over the cell."""
+
+_PAIRS, _CELLS = 200_000, 20_000
+"""Pairs of a spot and a cell, and cells of spots, that are looked at together: they stay near the
+processor."""
+
+_TINY = 1e-30
+"""m², below any distance squared."""
+
+_MANY = 24
+"""From so many sets of spots on it is worth while to have the inverse of the sheet's matrix."""
 
 _FEW = 300
 """Up to so many cells a local update is faster than a new solve (1,500 cells, native engine)."""
@@ -72,7 +82,10 @@ class Profile(NamedTuple):
 
     def at(self, square: FloatArray) -> FloatArray:
         """Height at squared distances from the centre, in squared reaches: 1 there, 0 from 1 on."""
-        return self.shapes(square)[0]
+        size = 1.0 / (1.0 + self.part * (self.height - 1.0))
+        rest = np.maximum(1.0 - self.narrow * square, 0.0)
+        tail, bell = _tail_height(square), self.height * rest * rest * rest
+        return np.asarray(size * tail + self.part * (size * (bell - tail)))
 
     def shapes(self, square: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """:meth:`at`, its derivative by its argument, and the whole way from tail to bell."""
@@ -89,11 +102,23 @@ class Profile(NamedTuple):
         return steep * rest, -3.0 * self.narrow * steep
 
 
+def _tail_height(square: FloatArray) -> FloatArray:
+    """The spot with a tail, as :func:`_tail` has it."""
+    inside = np.minimum(square, 1.0)
+    scales = _SCALES * np.sqrt(inside)
+    fading, more = np.exp(-scales), 1.0 + scales
+    taper = 1.0 - inside * inside * inside
+    fading *= taper
+    more *= fading
+    more *= taper
+    return np.asarray(more)
+
+
 def _tail(square: FloatArray) -> tuple[FloatArray, FloatArray]:
     """The spot with a tail, drawn to 0 smoothly at its end; and its derivative."""
     inside = np.minimum(square, 1.0)
     scales = _SCALES * np.sqrt(inside)
-    fading, third, more = np.exp(-scales), inside**3, 1.0 + scales
+    fading, third, more = np.exp(-scales), inside * inside * inside, 1.0 + scales
     taper = 1.0 - third
     fading *= taper
     height = more * fading
@@ -200,29 +225,34 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class Footprints:
-    """Many spots of one radius and depth 1, one after the other.
+    """Many spots of depth 1, one after the other.
 
     Attributes
     ----------
+    places, radius
+        (n, 2) m and (n,) m of them.
     starts
         (n + 1,) spot k has ``cells[starts[k]:starts[k + 1]]``.
     cells
-        (c,) those that it may reach.
+        (c,) those that it reaches.
     height
         (c,) change of log σ.
-    directed, reshaped
-        (2, c) and (c,), see :class:`Part`.
     """
 
-    starts: IntArray
-    cells: IntArray
+    places: FloatArray
+    radius: FloatArray
+    starts: NDArray[np.int32]
+    cells: NDArray[np.int32]
     height: FloatArray
-    directed: FloatArray
-    reshaped: FloatArray
 
     def sums(self, part: FloatArray, n_cells: int) -> csr_array:
         """(n, n_cells): each spot's sum over the cells, of which each has its ``part`` (c,)."""
         return csr_array((part, self.cells, self.starts), (len(self.starts) - 1, n_cells))
+
+    @property
+    def owner(self) -> IntArray:
+        """(c,) which spot each cell is of."""
+        return np.repeat(np.arange(len(self.radius)), np.diff(self.starts))
 
 
 class Spots:
@@ -246,6 +276,7 @@ class Spots:
         corners = mesh.points[mesh.cells]
         self.mesh, self.profile = mesh, profile
         self._points = np.einsum("qk,ckd->cqd", _sub_centroids(_SPLIT), corners)
+        self._by_axis = np.ascontiguousarray(self._points.transpose(2, 1, 0))
         self._centroids = np.ascontiguousarray(mesh.centroids.T)
         self._margin = np.linalg.norm(corners - mesh.centroids[:, None], axis=2).max(axis=1)
 
@@ -284,19 +315,49 @@ class Spots:
         slopes, directed = np.stack([*towards, wider, more]), _along(-square * fall, offset)
         return Part(cells, depth * mean, slopes, directed, depth * way.mean(axis=1))
 
-    def footprints(self, points: FloatArray, radius: float) -> Footprints:
-        """Of spots at ``points`` (n, 2) m, of ``radius`` m."""
+    def footprints(self, places: FloatArray, radius: FloatArray | float) -> Footprints:
+        """Of spots at ``places`` (n, 2) m, of ``radius`` m, or (n,) m."""
+        radius = np.broadcast_to(np.asarray(radius, np.float64), places.shape[:1])
         reach = self.profile.reach * radius
-        near = cKDTree(self.mesh.centroids).query_ball_point(
-            points, reach + self._margin.max(), return_sorted=True
-        )
-        starts = np.cumsum([0, *map(len, near)])
-        cells = np.concatenate([np.zeros(0), *near]).astype(np.int64)
-        offset = self._points[cells] - np.repeat(points, np.diff(starts), axis=0)[:, None]
-        square = np.einsum("cqd,cqd->cq", offset, offset) / reach**2
-        height, fall, way = self.profile.shapes(square)
-        directed = _along(-square * fall, offset)
-        return Footprints(starts, cells, height.mean(axis=1), directed, way.mean(axis=1))
+        owners, numbers, heights = [], [], []
+        x, y = self._centroids
+        for some in np.array_split(np.arange(len(places)), 1 + len(places) * len(x) // _PAIRS):
+            square = (x - places[some, :1]) ** 2 + (y - places[some, 1:]) ** 2
+            own, cells = np.nonzero(square < (reach[some, None] + self._margin) ** 2)
+            own += some[:1].sum()
+            x_off, y_off = self._offsets(places, own, cells)
+            square = (x_off * x_off + y_off * y_off) / reach[own] ** 2
+            height = self.profile.at(square).mean(axis=0)
+            reached = np.flatnonzero(height)
+            owners.append(own[reached])
+            numbers.append(cells[reached].astype(np.int32))
+            heights.append(height[reached])
+        count = np.bincount(np.concatenate(owners), minlength=len(places))
+        starts = np.concatenate([[0], np.cumsum(count)]).astype(np.int32)
+        return Footprints(places, radius, starts, np.concatenate(numbers), np.concatenate(heights))
+
+    def flanks(self, feet: Footprints) -> tuple[FloatArray, FloatArray]:
+        """(2, c) and (c,): what direction and shape of spots change; see :class:`Part`."""
+        directed, reshaped = np.empty((2, len(feet.cells))), np.empty(len(feet.cells))
+        owner, reach = feet.owner, self.profile.reach * feet.radius
+        for some in np.array_split(np.arange(len(owner)), 1 + len(owner) // _CELLS):
+            own = owner[some]
+            x, y = self._offsets(feet.places, own, feet.cells[some])
+            away = x * x + y * y
+            square = away / reach[own] ** 2
+            _, fall, way = self.profile.shapes(square)
+            weight = -square * fall / np.maximum(away, _TINY)
+            directed[0, some] = (weight * (x * x - away / 2)).mean(axis=0)
+            directed[1, some] = (weight * x * y).mean(axis=0)
+            reshaped[some] = way.mean(axis=0)
+        return directed, reshaped
+
+    def _offsets(
+        self, places: FloatArray, own: IntArray, cells: IntArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """(q, c) m, x and y: points of cells (c,), each from its ``own`` (c,) of ``places``."""
+        x, y = self._by_axis
+        return x[:, cells] - places[own, 0], y[:, cells] - places[own, 1]
 
     def _squares(self, spot: FloatArray, cells: IntArray) -> tuple[FloatArray, FloatArray]:
         """(c, q) squared distances in reaches of the points of cells, and (c, q, 2) offsets, m."""
@@ -337,6 +398,8 @@ class Response:
 
         By the local update of the forward model, or by a new solve where many cells change.
         """
+        if len(sets) >= _MANY:
+            return self.transfers(sets, TouchBatch(self.state)) @ self.by_transfer
         touched = [self.spots.change(spots) for spots in sets]
         sigma = self.state.conductivity
         pressed = [(cells, sigma[cells] * np.exp(change)) for cells, change in touched]
@@ -356,6 +419,31 @@ class Response:
             conductivity[cells] = sigma
             out[k] = self.state.model.at(conductivity).voltages
         return out
+
+    def transfers(self, sets: Sequence[FloatArray], batch: TouchBatch) -> FloatArray:
+        """(b, q) Ω: what each of some sets of spots (k, 4) changes between electrodes.
+
+        The entries of a symmetric matrix without the last electrode, its upper triangle by rows.
+        """
+        every = np.concatenate(sets)
+        feet = self.spots.footprints(every[:, [X, Y]], np.exp(every[:, LOG_RADIUS]))
+        n_cells = len(self.state.conductivity)
+        heights = feet.sums(feet.height * depth_of(every)[feet.owner], n_cells)
+        owner = np.repeat(np.arange(len(sets)), [len(spots) for spots in sets])
+        ones = np.ones(len(every))
+        joined = csr_array((ones, (owner, np.arange(len(every))))) @ heights
+        touches = joined.indptr, joined.indices, joined.data
+        return upper(batch.change(touches, np.ones(1))[:, 0])
+
+    @cached_property
+    def by_transfer(self) -> FloatArray:
+        """(q, n_meas) V/Ω: what the rows read of such entries."""
+        model = self.state.model
+        read, driven = model.readers, model.drive_currents[model.pattern.drive_index]
+        rows, columns = np.triu_indices(read.shape[1] - 1)
+        both = read[:, rows] * driven[:, columns] + read[:, columns] * driven[:, rows]
+        both[:, rows == columns] /= 2
+        return np.ascontiguousarray(both.T)
 
     @cached_property
     def by_cell(self) -> FloatArray:
@@ -393,6 +481,12 @@ class Response:
         return pressed.voltages - self.reference, slopes, nuisances
 
 
+def upper(matrices: FloatArray) -> FloatArray:
+    """(…, q) entries of the upper triangle of matrices (…, n, n), by rows."""
+    rows, columns = np.triu_indices(matrices.shape[-1])
+    return np.asarray(matrices[..., rows, columns])
+
+
 def _answers(pressed: State, part: Part) -> FloatArray:
     """(6, n_meas) V: −∫ ∇u · ∂σ ∇w for a spot's four columns, its direction, and its shape."""
     field = pressed.gradient[:, :, part.cells]
@@ -408,7 +502,7 @@ def _answers(pressed: State, part: Part) -> FloatArray:
 
 def _along(weight: FloatArray, offset: FloatArray) -> FloatArray:
     """(2, c) mean of weight (c, q) times xx and xy of r̂r̂ᵀ − 1/2, for offsets (c, q, 2)."""
-    away = np.maximum(np.einsum("cqd,cqd->cq", offset, offset), 1e-30)
+    away = np.maximum(np.einsum("cqd,cqd->cq", offset, offset), _TINY)
     x, y = offset[..., 0], offset[..., 1]
     xx, xy = weight * (x * x / away - 0.5), weight * x * y / away
     return np.stack([xx.mean(axis=1), xy.mean(axis=1)])
