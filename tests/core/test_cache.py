@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import subprocess
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from threading import Event
 
 import numpy as np
 import pytest
 
-from tomoskin.core import Arrays, archive, kept
+from tomoskin.core import Arrays, archive, kept, watch_stages
 
 
 class Counted:
@@ -79,6 +85,79 @@ def test_a_folder_that_cannot_be_costs_time_only(
     for _ in range(2):
         np.testing.assert_array_equal(kept("a", make)["values"], np.arange(3.0))
     assert make.times == 2
+
+
+def test_a_full_disk_costs_time_only(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_args: object, **_named: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    make = Counted()
+    monkeypatch.setattr(archive.np, "savez", full)
+    for _ in range(2):
+        np.testing.assert_array_equal(kept("a", make)["values"], np.arange(3.0))
+    assert make.times == 2
+    assert not list(folder.iterdir())
+
+
+def test_of_two_that_need_the_same_one_makes_it_and_one_waits(folder: Path) -> None:
+    begun, go_on = Event(), Event()
+
+    def make() -> Arrays:
+        begun.set()
+        go_on.wait(60)
+        return {"values": np.arange(3.0)}
+
+    second = Counted()
+    with ThreadPoolExecutor(2) as pool:
+        first = pool.submit(kept, "a", make)
+        assert begun.wait(60)
+        other = pool.submit(kept, "a", second)
+        time.sleep(3 * archive._POLL)
+        assert not other.done()
+        go_on.set()
+        np.testing.assert_array_equal(first.result()["values"], other.result()["values"])
+    assert second.times == 0
+    assert [path.name for path in folder.iterdir()] == ["a.npz"]
+
+
+def test_one_that_was_killed_while_it_made_it_holds_nobody_up(folder: Path) -> None:
+    words = "import os; from tomoskin.core import kept; kept('a', lambda: os.kill(os.getpid(), 9))"
+    killed = subprocess.run([sys.executable, "-c", words], check=False)
+    assert killed.returncode == -9
+    assert (folder / "a.lock").is_file()
+    make = Counted()
+    kept("a", make)
+    assert make.times == 1
+    assert [path.name for path in folder.iterdir()] == ["a.npz"]
+
+
+def test_who_waits_too_long_makes_it_too(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(archive, "_WAIT", 0.0)
+    inner = Counted()
+
+    def make() -> Arrays:
+        return kept("a", inner)  # held by this very call
+
+    kept("a", make)
+    assert inner.times == 1
+    assert (folder / "a.npz").is_file()
+
+
+def test_who_waits_may_be_stopped(folder: Path) -> None:
+    class StoppedError(Exception):
+        pass
+
+    def stop(_stage: str) -> None:
+        raise StoppedError
+
+    def make() -> Arrays:
+        with watch_stages(stop):
+            return kept("a", make)
+
+    assert not folder.exists()
+    with pytest.raises(StoppedError):
+        kept("a", make)
+    assert not list(folder.iterdir())
 
 
 def test_off_keeps_nothing(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,13 +6,14 @@ from __future__ import annotations
 import io
 import math
 import os
+import time
 import tokenize
 import zipfile
 import zlib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,13 @@ from platformdirs import user_cache_path
 
 from tomoskin.core.errors import EMPTY, DataError, TomoskinError
 from tomoskin.core.records import FloatArray, IntArray
+from tomoskin.core.stages import reach
 from tomoskin.core.user_files import StrPath, check_fits, open_input, written
+
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None  # type: ignore[assignment]
 
 _UNREADABLE = (
     ValueError,
@@ -219,28 +226,80 @@ MOST_BYTES = 1 << 29
 """Beyond it the files that were not used for longest go."""
 
 
+_WAIT, _POLL = 600.0, 0.1
+"""Seconds at most until another program has made what is wanted here too, and between two looks."""
+
+
 def kept(name: str, make: Callable[[], Arrays]) -> Arrays:
     """What ``make`` returns: from the file ``name``, which holds it since it was first made.
 
     ``name`` says all that the result depends on, as a hash does. A disk that cannot be read or
-    written costs time, and nothing else. Arrays lie in memory as those of the file do: sums over
-    other strides round otherwise, and a replay of the first run would differ in the last bits.
+    written costs time, and nothing else. While another program or thread makes the same, this one
+    waits for its file. Arrays lie in memory as those of the file do: sums over other strides round
+    otherwise, and a replay of the first run would differ in the last bits.
     """
     folder = cache_folder()
     if folder is None:
         return _dense(make())
     path = folder / f"{name}.npz"
+    arrays = _read(path)
+    if arrays is not None:
+        return arrays
+    with _alone(path):
+        arrays = _read(path)  # another may have made it meanwhile
+        if arrays is not None:
+            return arrays
+        arrays = _dense(make())
+        with suppress(DataError, OSError):
+            with written(path, overwrite=True) as part, part.open("wb") as file:
+                np.savez(file, allow_pickle=False, **arrays)
+            _discard_oldest(folder)
+    return arrays
+
+
+def _read(path: Path) -> dict[str, NDArray[Any]] | None:
+    """The arrays of a file; None where it is not there or torn."""
     with suppress(DataError, OSError):
         arrays = dict(load_arrays(path))
         path.touch()  # used last
         return arrays
-    arrays = _dense(make())
-    with suppress(DataError, OSError):
-        folder.mkdir(parents=True, exist_ok=True)
-        with written(path, overwrite=True) as part, part.open("wb") as file:
-            np.savez(file, allow_pickle=False, **arrays)
-        _discard_oldest(folder)
-    return arrays
+    return None
+
+
+@contextmanager
+def _alone(path: Path) -> Iterator[None]:
+    """While the block lasts, no other program is in one for that ``path``, where the disk can say
+    so; a lock is the system's, and goes with the program that holds it."""
+    lock = path.with_suffix(".lock")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        file = lock.open("wb")
+    except OSError:
+        yield
+        return
+    with file:
+        until = time.monotonic() + _WAIT
+        while not _locked(file) and time.monotonic() < until:
+            reach()  # who waits may be stopped
+            time.sleep(_POLL)
+        try:
+            yield
+        finally:
+            with suppress(OSError):
+                lock.unlink()
+
+
+def _locked(file: BinaryIO) -> bool:
+    """Whether the file is locked by us, or cannot be locked at all."""
+    if fcntl is None:
+        return True
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:  # not on this disk
+        return True
+    return True
 
 
 def _dense(arrays: Arrays) -> dict[str, NDArray[Any]]:
