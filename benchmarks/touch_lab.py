@@ -243,7 +243,7 @@ class TwinLab:
         mean, none = self.reference.mean[:, None], np.zeros((len(dv), 0))
         excluded = np.zeros(len(dv), bool)
         differences = Differences(dv, mean, dv, none, JUMP * mean, dv, none, dv, excluded)
-        return FrameView(0.0, self.image(dv), self.floor, differences)
+        return FrameView(0.0, self.image(dv), lambda: self.floor, differences)
 
     def found(self, presses: Sequence[Press]) -> tuple[Sequence[Detection], Sequence[Detection]]:
         """Touches by fit and by image, from a cold start."""
@@ -324,7 +324,7 @@ class PlantLab:
         differences = Differences(
             dv, blind, change, self._unknown, jumps, change, blind, change, self.lost
         )
-        return FrameView(0.0, self._image.operator(dv), self._floor, differences)
+        return FrameView(0.0, self._image.operator(dv), lambda: self._floor, differences)
 
 
 def drawn_fingers(random: np.random.Generator, skin: Skin, count: int) -> tuple[Finger, ...]:

@@ -122,7 +122,7 @@ class FrameView:
     time
         s.
     image, image_noise
-        The image, and its noise where that is known.
+        The image; and what computes its noise, where that is known.
     differences
         What it was made of.
     others
@@ -132,7 +132,7 @@ class FrameView:
 
     time: float
     image: Image
-    image_noise: ImageNoise | None
+    image_noise: Callable[[], ImageNoise | None]
     differences: Differences
     others: FloatArray | None = None
 

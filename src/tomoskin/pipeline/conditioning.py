@@ -158,6 +158,11 @@ class BaselineDifferences:
         """The nuisance subspace of late."""
         return self._nuisance(self._health).nuisance
 
+    def expected(self) -> tuple[FloatArray, FloatArray]:
+        """Nuisance directions and jumps of the next frame, if all stays as it is."""
+        subspace = self._nuisance(self._health)
+        return subspace.unknown, subspace.jumps
+
     def condition(self, measured: Voltages) -> Conditioned:
         """Make difference data of one frame of voltages."""
         values, baseline, unknown = measured.values, self._baseline, measured.excluded
@@ -275,6 +280,9 @@ class GivenDifferences:
     def mean(self) -> FloatArray:
         """The voltages (n_meas,) of the model, in V."""
         return self.prepared.operator.reference
+
+    def expected(self) -> None:
+        """Nuisance directions of the next frame are not known before it."""
 
     def subspace(self) -> None:
         """The nuisance subspace: given differences have none."""

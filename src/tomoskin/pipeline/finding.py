@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Self
 
 import numpy as np
@@ -42,11 +43,14 @@ class RegionFinder:
         """What goes on with another operator or noise."""
         del reference
         yield from ()
-        return RegionFinder(prepared)
+        return lambda: RegionFinder(prepared)
+
+    def foresee(self, nuisance: FloatArray, jumps: FloatArray) -> None:
+        """Nothing is made for these."""
 
     def push(self, view: FrameView) -> list[Detection]:
         """Detections of a frame, strongest first."""
-        return self._segmenter(view.image, view.image_noise)
+        return self._segmenter(view.image, view.image_noise())
 
     def learn(self, *, touched: bool) -> bool:
         """Nothing is learnt of the newest frame, and what touches have left shows in images."""
@@ -108,14 +112,22 @@ class FitFinder:
         if prepared.spots is None or prepared.spots is self.model:
             gain = _gain(self.model, prepared, reference)
             noise = yield from _noise(prepared, reference, gain)
-            yield from self.spots.renewing(noise, gain)
-            self.volts = _voltage_ratio(self.model, reference)
-            return self
+            adopt = yield from self.spots.renewing(noise, gain)
+            return partial(self._renewed, adopt, _voltage_ratio(self.model, reference))
         other = yield from FitFinder.making(
             prepared.spots, prepared, reference, self._pace, self._interval
         )
-        yield from other.spots.preparing(self.spots)
-        return other
+        go_on = yield from other.spots.preparing(self.spots)
+        return partial(other._renewed, go_on, other.volts)
+
+    def _renewed(self, adopt: Callable[[], None], volts: float) -> FitFinder:
+        adopt()
+        self.volts = volts
+        return self
+
+    def foresee(self, nuisance: FloatArray, jumps: FloatArray) -> None:
+        """Make what the first frame is seen by, which takes half a second for 32 electrodes."""
+        self.spots.foresee(nuisance, jumps)
 
     def push(self, view: FrameView) -> list[Detection]:
         """Detections of a frame, strongest first."""
@@ -150,8 +162,9 @@ class FitFinder:
 Finder = RegionFinder | FitFinder
 """What finds the touches of one frame after the other."""
 
-FinderSteps = Generator[None, None, Finder]
-"""Pieces of work, each of a millisecond or less, that lead to a finder."""
+FinderSteps = Generator[None, None, Callable[[], Finder]]
+"""Pieces of work, each of a millisecond or less where measurements are few, that lead to what makes
+the finder of the next frame. They change nothing that frames read meanwhile."""
 
 
 def _jump_text(part: float) -> str:

@@ -3,15 +3,28 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from tomoskin.core import Detection, FloatArray, Image, ModelError, Touch, Voltages, reach, show
+from tomoskin.core import (
+    Detection,
+    FloatArray,
+    Image,
+    ModelError,
+    Touch,
+    Voltages,
+    finished,
+    reach,
+    show,
+)
 from tomoskin.learning import Differences, FrameView, Reading, calibration_kinds
 from tomoskin.model.pattern import Scan
 from tomoskin.pipeline import finding
+from tomoskin.pipeline.aside import Aside, frames_aside
 from tomoskin.pipeline.conditioning import (
     MOST_NUISANCE,
     BaselineDifferences,
@@ -23,7 +36,7 @@ from tomoskin.pipeline.drives import DriveResult, DriveWatch
 from tomoskin.pipeline.frame_result import FrameResult
 from tomoskin.pipeline.imaging import Filtered, SingleFrame
 from tomoskin.pipeline.prepare import Prepared
-from tomoskin.pipeline.rest import BodySheets, Rest, tune, tuned_sheet
+from tomoskin.pipeline.rest import BodySheets, Rest, Steps, tune, tuned_sheet
 from tomoskin.sensing.fit import LIVE, Pace
 from tomoskin.sensing.signal import Reference
 from tomoskin.sensing.track import SlideCorrection, Tracker
@@ -104,8 +117,13 @@ class Following:
         if not interval > 0:
             interval = setting.interval
         self._steps = max(1, int(interval / _STEP)) if interval > 0 else 1
+        alone = setting.alone or reference is None
+        self._patience = 0 if alone else frames_aside(prepared.pattern.n_meas, interval)
+        self._aside: Aside[Callable[[], None]] | None = None
         known = rest is None or not finding.located_alone(prepared, rest.agreement)
         self._finder = finding.finder_of(prepared, reference, setting.pace, interval, fitted=known)
+        if (seen := conditioning.expected()) is not None:
+            self._finder.foresee(*seen)
         self._renewal: finding.FinderSteps | None = None
         self._is_outdated = False
         fitted = isinstance(self._finder, finding.FitFinder)
@@ -264,42 +282,63 @@ class Following:
         self._is_outdated |= learnt.image or learnt.touches
 
     def _prepare_anew(self) -> None:
-        """As many steps as the time between two frames allows, while there is something to do."""
+        """As many steps as the time between two frames allows, while there is something to do; all
+        of them in a thread where one would take too long."""
+        if self._patience:
+            self._prepare_aside()
+            return
         for _ in range(self._steps):
             if self._tuning is None and self._renewal is None and not self._is_outdated:
                 return
-            self._tune()
+            if self._tuning is not None and self._renewal is None:
+                reach("tuning")
+                self._take_tuned(_first(self._tuning))
             self._refind()
+
+    def _prepare_aside(self) -> None:
+        """Begin what is to be done, or take what has been done, at the frame that is to have it."""
+        if self._aside is None:
+            if self._tuning is not None:
+                self._aside = Aside(partial(_tuned, self._tuning, self._take_tuned), self._patience)
+            elif self._is_outdated:
+                work = partial(_renewed, self._renewing(), self._take_finder)
+                self._aside = Aside(work, self._patience)
+        elif self._aside.is_due():
+            done, self._aside = self._aside, None
+            reach("new noise")
+            done.result()()
 
     def _refind(self) -> None:
         """One step towards a finder of what is known now; what there is serves meanwhile."""
         if self._renewal is None:
             if not self._is_outdated:
                 return
-            conditioning, self._is_outdated = self.conditioning, False
-            reference = conditioning.reference
-            if reference is not None and self._sheets is not None:
-                reference = self._sheets.shifted(reference)
-            self._renewal = self._finder.renewing(conditioning.prepared, reference)
+            self._renewal = self._renewing()
         reach("new noise")
         try:
             next(self._renewal)
         except StopIteration as end:
-            self._finder, self._renewal = end.value, None
-            if isinstance(self._finder, finding.FitFinder):
-                for applied in self._applied.values():
-                    applied.renew(self._finder.model.response, self._finder.volts)
+            self._renewal = None
+            self._take_finder(end.value)
 
-    def _tune(self) -> None:
-        """One step towards what the reference says; what there is serves meanwhile."""
-        if self._tuning is None or self._renewal is not None:
-            return
-        reach("tuning")
-        try:
-            better = next(self._tuning)
-        except StopIteration:
+    def _renewing(self) -> finding.FinderSteps:
+        conditioning, self._is_outdated = self.conditioning, False
+        reference = conditioning.reference
+        if reference is not None and self._sheets is not None:
+            reference = self._sheets.shifted(reference)
+        return self._finder.renewing(conditioning.prepared, reference)
+
+    def _take_finder(self, adopt: Callable[[], finding.Finder]) -> None:
+        self._finder = adopt()
+        if isinstance(self._finder, finding.FitFinder):
+            for applied in self._applied.values():
+                applied.renew(self._finder.model.response, self._finder.volts)
+
+    def _take_tuned(self, step: tuple[Prepared | None, bool]) -> None:
+        """Go on with what the reference has told so far; what there was served meanwhile."""
+        better, ended = step
+        if ended:
             self._tuning = None
-            return
         if better is not None:
             images = better.operator is not self.prepared.operator
             self.prepared, self._is_outdated = better, True
@@ -359,3 +398,28 @@ def _imaging(
         return SingleFrame(prepared, reference, subspace)
     interval = np.nan if rest is None else rest.interval
     return Filtered(prepared, prepared.modes, reference, interval, subspace)
+
+
+def _first(tuning: Steps) -> tuple[Prepared | None, bool]:
+    """One step of a tuning: the skin where it is prepared better from now on; whether it ended."""
+    try:
+        return next(tuning), False
+    except StopIteration:
+        return None, True
+
+
+def _tuned(
+    tuning: Steps, take: Callable[[tuple[Prepared | None, bool]], None]
+) -> Callable[[], None]:
+    """Steps up to the next that prepares the skin better; then how it is to be taken."""
+    step = _first(tuning)
+    while step == (None, False):
+        step = _first(tuning)
+    return partial(take, step)
+
+
+def _renewed(
+    renewal: finding.FinderSteps, take: Callable[[Callable[[], finding.Finder]], None]
+) -> Callable[[], None]:
+    """All steps towards a finder; then how it is to be taken."""
+    return partial(take, finished(renewal))

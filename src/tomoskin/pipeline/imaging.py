@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property, partial
 
 import numpy as np
 
@@ -14,8 +15,11 @@ from tomoskin.sensing.fit import SpotPrior
 from tomoskin.sensing.segment import ImageNoise
 from tomoskin.sensing.signal import NuisanceSubspace, Reference
 
-ImageAndNoise = tuple[Image, ImageNoise | None]
-"""An image, and its noise floor where the noise is known."""
+NoiseOfImage = Callable[[], ImageNoise | None]
+"""Computes the noise floor of an image when somebody asks; None where the noise is not known."""
+
+ImageAndNoise = tuple[Image, NoiseOfImage]
+"""An image, and its noise floor."""
 
 _SETTLED = 3.0
 """Time constants after which the filter's noise is the one of all time."""
@@ -34,14 +38,17 @@ class SingleFrame:
         subspace: NuisanceSubspace | None = None,
     ) -> None:
         self._operator = prepared.operator
-        self._noise = None if reference is None else prepared.image_noise(reference, subspace)
+        self._noise: NoiseOfImage = lambda: None
+        if reference is not None:
+            self.renew(prepared, reference, subspace)
 
     def renew(
         self, prepared: Prepared, reference: Reference, subspace: NuisanceSubspace | None
     ) -> None:
         """Another operator or noise, or other directions of the data that say nothing."""
         self._operator = prepared.operator
-        self._noise = prepared.image_noise(reference, subspace)
+        # regions of the image ask for it, fitted touches never
+        self._noise = cache(partial(prepared.image_noise, reference, subspace))
 
     def push(self, dv: FloatArray, time: float) -> ImageAndNoise:
         """Image of ``dv`` (n_meas,), measured at ``time`` s. Raises DataError for other data."""
@@ -97,7 +104,7 @@ class Filtered:
             last = None
         if last is None or time - last.time > _GAP * self._interval:
             self._settled = time + _SETTLED * self._temporal.time_constant
-        return self._temporal.push(dv, time), self._image_noise(time)
+        return self._temporal.push(dv, time), partial(self._image_noise, time)
 
     def _image_noise(self, time: float) -> ImageNoise | None:
         """The filter's own; until that holds, no less than that of a single frame."""

@@ -15,7 +15,8 @@ from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.pattern import Pattern
 from tomoskin.sensing.fit import Response, Spots, spots_of
-from tomoskin.sensing.fit.spot import PLAIN, USUAL, Profile, depth_of
+from tomoskin.sensing.fit.profile import PLAIN, USUAL, Profile
+from tomoskin.sensing.fit.spot import depth_of
 
 
 def test_content_is_what_the_cells_hold() -> None:

@@ -11,7 +11,8 @@ from scipy.spatial import cKDTree
 
 from tomoskin.core import FloatArray, IntArray
 from tomoskin.sensing.fit.problem import Matched, WhitenedTable
-from tomoskin.sensing.fit.spot import CONTENT, FILLING, LOG_RADIUS, Footprints, Response, spots_of
+from tomoskin.sensing.fit.profile import FILLING
+from tomoskin.sensing.fit.spot import CONTENT, LOG_RADIUS, Footprints, Response, spots_of
 from tomoskin.sensing.fit.spot_fit import SpotPrior
 from tomoskin.sensing.segment import hexagonal_grid
 

@@ -28,6 +28,7 @@ from scipy.spatial import cKDTree
 from tomoskin.core import Arrays, FloatArray, IntArray, finished
 from tomoskin.model.forward import State
 from tomoskin.sensing.fit import spot
+from tomoskin.sensing.fit.profile import FILLING, Profile
 from tomoskin.sensing.fit.spot_fit import SpotPrior
 from tomoskin.sensing.fit.table import ResponseTable
 
@@ -58,7 +59,7 @@ class Interaction:
     """
 
     state: State
-    profile: spot.Profile
+    profile: Profile
     centres: FloatArray
     spread: float
     fields: NDArray[np.float32]
@@ -110,7 +111,7 @@ class Interaction:
         square = np.exp(2 * spots[:, spot.LOG_RADIUS]) + self.spread
         away = self.centres - spots[:, None, :2]
         far = np.einsum("kpd,kpd->kp", away, away) / (self.profile.reach**2 * square[:, None])
-        return self.profile.at(far) * (spots[:, spot.CONTENT] / (spot.FILLING * square))[:, None]
+        return self.profile.at(far) * (spots[:, spot.CONTENT] / (FILLING * square))[:, None]
 
 
 def _patches(centroids: FloatArray, volumes: FloatArray) -> tuple[IntArray, FloatArray, FloatArray]:
@@ -372,7 +373,7 @@ def drawn_spots(
     if sign != "increase":
         depth *= -1.0 if sign == "decrease" else random.choice([-1.0, 1.0], count)
     spots[:, spot.LOG_RADIUS] = log_radius
-    spots[:, spot.CONTENT] = spot.FILLING * np.exp(2 * log_radius) * depth
+    spots[:, spot.CONTENT] = FILLING * np.exp(2 * log_radius) * depth
     return spots
 
 

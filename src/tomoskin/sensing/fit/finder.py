@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from dataclasses import replace
 from functools import partial
 from operator import is_
@@ -96,18 +96,29 @@ class SpotFinder:
         self._wander = 0.0
         self._newest_slow: tuple[tuple[FloatArray, ...], FloatArray] | None = None
 
-    def renewing(self, noise: FloatArray, gain: float = 1.0) -> Generator[None, None, None]:
-        """Go on with other noise, or another gain, at the end of some pieces of work."""
-        yield from self._sight.renewing(noise, gain, self.watch.excess)
+    def renewing(
+        self, noise: FloatArray, gain: float = 1.0
+    ) -> Generator[None, None, Callable[[], None]]:
+        """Pieces of work towards other noise, or another gain; what they return goes on with it."""
+        return (yield from self._sight.renewing(noise, gain, self.watch.excess))
 
-    def preparing(self, other: SpotFinder) -> Generator[None, None, None]:
-        """Make ready for frames as those of an ``other`` finder of the same skin, and go on where
-        that is: with its touches, and what stayed behind others."""
-        yield from self._sight.following(other._sight, self.watch.excess)
+    def preparing(self, other: SpotFinder) -> Generator[None, None, Callable[[], None]]:
+        """Make ready for frames as those of an ``other`` finder of the same skin; what is returned
+        goes on where that is: with its touches, and what stayed behind others."""
+        adopt = yield from self._sight.following(other._sight, self.watch.excess)
+        return partial(self._go_on, other, adopt)
+
+    def _go_on(self, other: SpotFinder, adopt: Callable[[], None]) -> None:
+        adopt()
         self._before, self._expected = other._before, other._expected
         self._residual, self._jump = other._residual, other._jump
         self.view = replace(self.view, residual=self._residual)
         self.watch.go_on(other.watch)
+
+    def foresee(self, nuisance: FloatArray, jumps: FloatArray) -> None:
+        """Make ready for frames with these; see :meth:`push`."""
+        self._sight.look(nuisance, jumps)
+        self._sight.of(self.watch.excess)
 
     @property
     def jump(self) -> float | None:

@@ -21,7 +21,8 @@ from scipy.spatial import cKDTree
 from tomoskin.core import Arrays, FloatArray, IntArray, kept, reach
 from tomoskin.model.forward import TouchBatch
 from tomoskin.sensing.fit.certificate import trial_spots
-from tomoskin.sensing.fit.spot import PLAIN, Footprints, Response, Spots, upper
+from tomoskin.sensing.fit.profile import PLAIN
+from tomoskin.sensing.fit.spot import Footprints, Response, Spots, upper
 from tomoskin.sensing.fit.spot_fit import SpotPrior
 from tomoskin.sensing.fit.table import PADDING, PositionGrid
 

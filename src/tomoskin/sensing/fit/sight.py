@@ -6,9 +6,9 @@ from __future__ import annotations
 import math
 from bisect import bisect_left
 from collections import OrderedDict
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from operator import is_
 from typing import NamedTuple, Self
 
@@ -23,7 +23,7 @@ from tomoskin.sensing.fit.expectation import ResidualResponse
 from tomoskin.sensing.fit.hypotheses import Jumps
 from tomoskin.sensing.fit.noise import Whitener
 from tomoskin.sensing.fit.problem import Matched, WhitenedTable
-from tomoskin.sensing.fit.spot import FILLING
+from tomoskin.sensing.fit.profile import FILLING
 from tomoskin.sensing.fit.spot_model import SpotModel
 from tomoskin.sensing.fit.unexplained import FrameWatch
 
@@ -85,21 +85,25 @@ class Sight:
 
     def renewing(
         self, noise: FloatArray, gain: float, excess: Excess
-    ) -> Generator[None, None, None]:
-        """Go on with other noise, or another gain, at the end of some pieces of work."""
+    ) -> Generator[None, None, Callable[[], None]]:
+        """Pieces of work towards other noise, or another gain; what they return goes on with it."""
         scale = self._model.scale * gain
         noise = noise / scale[:, None] / scale
         scaled = self._scaled(scale)
         made = yield from self._making(noise, scaled, excess)
-        self.scale, self._noise = scale, noise
-        self._kept = OrderedDict({_key(scaled, excess): made})
+        kept = OrderedDict({_key(scaled, excess): made})
+        return partial(self._adopt, scale, noise, kept)
 
-    def following(self, other: Sight, excess: Excess) -> Generator[None, None, None]:
-        """Make ready for frames as those of an ``other``, in pieces of work."""
+    def following(self, other: Sight, excess: Excess) -> Generator[None, None, Callable[[], None]]:
+        """The same, towards frames as those of an ``other``; see :meth:`renewing`."""
         self._nuisance, self._jumps = other._nuisance, other._jumps
         scaled = self._scaled(self.scale)
         made = yield from self._making(self._noise, scaled, excess)
-        self._kept = OrderedDict({_key(scaled, excess): made})
+        kept = OrderedDict({_key(scaled, excess): made})
+        return partial(self._adopt, self.scale, self._noise, kept)
+
+    def _adopt(self, scale: FloatArray, noise: FloatArray, kept: OrderedDict[bytes, Seen]) -> None:
+        self.scale, self._noise, self._kept = scale, noise, kept
 
     def of(self, excess: Excess) -> Seen:
         """How the newest frame is seen: as the one before, where nothing has changed."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from tomoskin.core import FloatArray
 from tomoskin.model.mesh import Mesh
-from tomoskin.sensing.fit import spot
+from tomoskin.sensing.fit import profile, spot
 from tomoskin.sensing.fit.expectation import Expectation, Known
 
 _RADIUS = 0.11
@@ -77,11 +77,13 @@ class SpotPrior:
         """
         area = float(mesh.volumes.sum())
         if layer is not None:
-            return cls(area, spot.USUAL, _ON_LAYER, _DEPTH * spot.FILLING * spot.USUAL**2, *_SURER)
+            return cls(
+                area, profile.USUAL, _ON_LAYER, _DEPTH * profile.FILLING * profile.USUAL**2, *_SURER
+            )
         scaled = _RADIUS * math.sqrt(area)
         radius = math.sqrt(scaled * _FINGER)
         spread = math.hypot(_SPREAD, math.log(scaled / _FINGER) / 2)
-        return cls(area, radius, spread, _DEPTH * spot.FILLING * radius**2)
+        return cls(area, radius, spread, _DEPTH * profile.FILLING * radius**2)
 
     def widest(self, spots: FloatArray) -> float:
         """Deviations of the prior by which the widest of spots (k, 4) is wide."""
@@ -120,7 +122,7 @@ class SpotPrior:
         kept = spots.copy()
         kept[:, spot.LOG_RADIUS] = np.clip(kept[:, spot.LOG_RADIUS], *self.log_radii)
         low, high = self.depths(sign)
-        filling = spot.FILLING * np.exp(2 * kept[:, spot.LOG_RADIUS])
+        filling = profile.FILLING * np.exp(2 * kept[:, spot.LOG_RADIUS])
         kept[:, spot.CONTENT] = np.clip(kept[:, spot.CONTENT], low * filling, high * filling)
         return kept
 

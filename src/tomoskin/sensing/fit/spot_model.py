@@ -18,8 +18,9 @@ from tomoskin.sensing.fit.certificate import Reduced
 from tomoskin.sensing.fit.expectation import Known, newcomers
 from tomoskin.sensing.fit.policy import DetectionPolicy
 from tomoskin.sensing.fit.problem import RIDGE, Answer, Limits, Matched, Problem, Solver
+from tomoskin.sensing.fit.profile import FILLING, Profile
 from tomoskin.sensing.fit.solver import NumpySolver, SheetDomain
-from tomoskin.sensing.fit.spot import CONTENT, FILLING, Footprints, Profile, Response
+from tomoskin.sensing.fit.spot import CONTENT, Footprints, Response
 from tomoskin.sensing.fit.spot_fit import Deficit, Fit, SpotPrior
 from tomoskin.sensing.fit.table import ResponseTable
 from tomoskin.sensing.fit.tabulate import Tabulation, kept_tabulation

@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import FloatArray, IntArray, finished
-from tomoskin.sensing.fit.spot import FILLING, LOG_RADIUS, X, Y, depth_of
+from tomoskin.sensing.fit.profile import FILLING
+from tomoskin.sensing.fit.spot import LOG_RADIUS, X, Y, depth_of
 
 PADDING = 2
 """Grid points beyond the sheet on each side: splines need one, the filter another."""
