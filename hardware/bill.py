@@ -21,7 +21,8 @@ COLUMNS = [
     "Manufacturer",
     "MPN",
     "Mouser",
-    "Second source",
+    "Second distributor",
+    "Alternative",
     "State",
     "Quantity",
     "EUR each",
@@ -36,10 +37,12 @@ class BillError(Exception):
 
 @dataclass(frozen=True)
 class Bought:
-    """What is known of a part: a second distributor's number (or nothing), its life cycle's state,
-    and euros for one when parts for 1, 10 and 100 boards are bought."""
+    """What is known of a part: a second distributor's number and another part that fits, each where
+    there is one, its life cycle's state, and euros for one when parts for 1, 10 and 100 boards are
+    bought."""
 
     second: str
+    other: str
     state: str
     each: tuple[float, float, float]
 
@@ -48,7 +51,8 @@ def known() -> dict[str, Bought]:
     """What is known of each part, by its number."""
     table = tomllib.loads(PARTS.read_text(encoding="utf-8"))["part"]
     return {
-        name: Bought(row["second"], row["state"], tuple(row["each"])) for name, row in table.items()
+        name: Bought(row["second"], row.get("other", ""), row["state"], tuple(row["each"]))
+        for name, row in table.items()
     }
 
 
@@ -87,6 +91,6 @@ def bill(parts: Mapping[str, Part]) -> str:
         first, names = group[0], ",".join(part.reference for part in group)
         fields = [first.fields[field] for field in ("Manufacturer", "MPN", "Mouser")]
         one = about[number]
-        tail = (one.second, one.state, len(group), *one.each)
+        tail = (one.second, one.other, one.state, len(group), *one.each)
         rows.writerow([first.value, names, first.footprint, *fields, *tail])
     return text.getvalue()

@@ -60,6 +60,13 @@ def settling_of_tree(step: float = 1 / GAIN, gap: float = 40e-9) -> float:
     return said["settled"][0] - 20e-6
 
 
+def open_sink(minus: float, limit: float = 1000.0) -> Figures:
+    """V at the converter's pin, and A through the resistor of ``limit`` ohm before it, where an
+    electrode at 2.5 V is read against one at ``minus`` V: a sink makes no contact."""
+    said = run("pico_open_sink", plus=2.5, minus=minus, gain=GAIN, limit=limit)
+    return {name: value[0] for name, value in said.items()}
+
+
 def noise(signal: float = 1 / GAIN, converter: float = CONVERTER_NOISE) -> Figures:
     """Of a conversion, at the amplifier's input: amplifier and current, V; all, V; all in ohm."""
     pin = run("pico_noise", gain=GAIN, signal=signal)["pin"][0]

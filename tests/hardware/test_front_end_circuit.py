@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 
 import pytest
@@ -101,6 +102,38 @@ def test_current_and_gain() -> None:
     assert 1 / sum(1 / one for one in ohms) == pytest.approx(front_end.SENSE)
     (gain,) = between("R", net("U6", 2), net("U6", 3))
     assert 1 + 49.4e3 / gain == pytest.approx(front_end.GAIN, rel=0.005)
+
+
+def spread(*parts: tuple[float, float], offset: float = 0.0) -> tuple[float, float]:
+    """Least and most of a product of values with relative tolerances, and an offset in V."""
+    nominal = math.prod(value for value, _ in parts)
+    least = nominal * math.prod(1 - tolerance for _, tolerance in parts) - offset
+    most = nominal * math.prod(1 + tolerance for _, tolerance in parts) + offset
+    return least, most
+
+
+OFFSET = 4.5e-3
+"""V, of a TLV2371 at most."""
+
+
+def test_the_page_refuses_no_good_board() -> None:
+    """Limits of the first power-up against the tolerances of the parts."""
+    text = (ROOT.parent / "docs" / "pico.md").read_text(encoding="utf-8")
+    low, high = spread((1.225, 1e-3), offset=OFFSET)
+    assert f"{math.floor(1e3 * low) / 1e3} to {math.ceil(1e3 * high) / 1e3} V below" in text
+    assert max(high / 1.225 - 1, 1 - low / 1.225) + 1e-3 < 6e-3  # with R1: "within 0.5 %"
+    supply = spread((3.3, 2e-3))
+    drop = 10 * (3.3 / 20e3 + 0.3e-3)  # of R13: the divider, and U7
+    assert supply[0] - drop > 3.28
+    assert supply[1] < 3.31
+    middle = (supply[0] - drop) * 0.495 - OFFSET, supply[1] * 0.505 + OFFSET
+    assert 1.62 < middle[0] < middle[1] < 1.68
+    bus = spread((0.05, 6e-3), (22 + 0.03, 1e-2))
+    assert 1.07 < bus[0] < bus[1] < 1.13
+    least_charge, most_charge = 0.4e-3 * 50, 1.1e-3 * 120  # of U6 and what it drives, through U11
+    assert 0 < least_charge < most_charge < 0.15
+    for words in ("3.28 to 3.31 V", "1.62 to 1.68 V", "1.07 to 1.13 V", "0 to 0.15 V less"):
+        assert words in text
 
 
 def test_the_converter_divides_by_a_reference_of_its_own() -> None:
