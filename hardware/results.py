@@ -25,8 +25,8 @@ GAIN = 35
 AMPERES = 0.1
 DEAD_TIME = "5u"
 """The host's default."""
-SINK_LINE = {"against": "0", "middle": "0"}
-NEIGHBOUR = {"against": "v(on)>2.5?(v(new)>2.5?v(e8):v(e7)):0", "middle": "2.5"}
+SINK_LINE = {"against": "0", "middle": "0", "tap": "0"}
+NEIGHBOUR = {"against": "v(on)>2.5?(v(new)>2.5?v(e8):v(e7)):0", "middle": "2.5", "tap": "3.3k"}
 AMPLIFIER = {"source": SINK_LINE, "mended": NEIGHBOUR}
 """What the amplifiers read against: the sink's line; the electrode before the sink."""
 _LOADS = (0.5, 1, 5, 10, 20, 50, 80, 90, 95, *range(100, 116), 200, 500, 1000, 2000)
@@ -69,7 +69,7 @@ def switching(variant: str, **change: object) -> Figures:
 
 def clipping(variant: str, contact: float, amperes: float) -> Figures:
     """A difference of two channels behind contacts: what it is and what is read, V; the pins, V."""
-    against = dict(AMPLIFIER[variant])
+    against = {key: value for key, value in AMPLIFIER[variant].items() if key != "tap"}
     against["against"] = {"source": "0", "mended": "v(e7)"}[variant]
     ring = 0.1 / amperes
     values = {"amps": amperes, "contact": contact, "ring": ring, "gain": GAIN} | against
@@ -95,9 +95,15 @@ def shared(step: float = 1 / GAIN) -> Figures:
     return {"settling": said["settled"][0] - 20e-6, "last": said["last"][0]}
 
 
+def fed(channels: int, lifted: float = 10.8) -> float:
+    """A that all taps feed into U41's 5 V where a sink makes no contact: ``lifted`` V."""
+    return channels * run("taps", lifted=lifted)["each"][0]
+
+
 def measured() -> Figures:
     """The figures of the file, rounded to what means something."""
-    rest, step = compliance("mended"), switching("mended")
+    rest = compliance("mended")
+    step = switching("mended", **SINK_LINE)  # as the twin and the built-in skins have it
     pin = noise(1 / GAIN)["pin"]
     total = math.hypot(CONVERTER_NOISE, pin / LSB)
     high = clipping("source", 20, AMPERES)["pin"]

@@ -6,7 +6,7 @@ import pytest
 
 import parasitics
 import results
-from spice import DeckError, run
+from spice import DECKS, DeckError, run
 from tomoskin.board.source import ScanSettings
 from tomoskin.model.skin import Skin
 
@@ -82,9 +82,9 @@ def test_noise_is_the_converters():
 
 
 def test_noise_is_that_on_paper():
-    """12 nV of amplifier and 4.07 of each 1 kohm before it, through one pole: docs/hardware.md."""
+    """12 nV of amplifier and 4.07 for each 1 kohm of the two 3.3 before it: docs/hardware.md."""
     quiet = results.noise(0)
-    density = math.sqrt(12**2 + 2 * 4.07**2) * 1e-9
+    density = math.sqrt(12**2 + 2 * 3.3 * 4.07**2) * 1e-9
     paper = results.GAIN * density * math.sqrt(math.pi / 2 * quiet["bandwidth"])
     assert quiet["pin"] == pytest.approx(paper, rel=0.1)
 
@@ -102,8 +102,10 @@ ARDUINO, LIFTED = "100", "1g"
 """ohm: what an Arduino without power draws from 5 V, about; a board that was lifted off it."""
 
 
-def rails(variant, channels, usb, pull="1", mega=ARDUINO):
-    said = run("rails", variant=variant, channels=channels, usb=usb, pull=pull, mega=mega)
+def rails(variant, channels, usb, pull="1", mega=ARDUINO, *, jack="12"):
+    """Figures of the rails; ``jack`` V, which come or, at 0, do not."""
+    values = {"usb": usb, "pull": pull, "mega": mega, "jack": jack}
+    said = run("rails", variant=variant, channels=channels, **values)
     return {name: value[0] for name, value in said.items()}
 
 
@@ -128,6 +130,43 @@ def test_with_5_v_the_rails_are_as_without_the_switch(channels):
     assert ours["twelve"] == pytest.approx(wrong["twelve"], abs=0.01)
     assert ours["negative"] == pytest.approx(wrong["negative"], abs=0.01)
     assert -5 < ours["negative"] < -4.16  # as the first power-up asks
+
+
+@pytest.mark.parametrize("channels", [8, 16])
+def test_with_usb_alone_a_diode_holds_12_v_near_ground(channels):
+    """The amplifiers draw +12V down: what else holds it are body diodes, at -0.6 V and below."""
+    ours = rails("mended", channels, ON, jack="0")
+    assert -0.35 < ours["below"] <= ours["twelve"] < 0
+    assert -5 < ours["negative"] < -4.4
+    assert ours["five"] == pytest.approx(5, abs=0.02)
+    text = (DECKS / "rails.cir").read_text(encoding="utf-8")
+    bare = text.replace("FLOOR_@variant@", "FLOOR_bare")
+    assert bare != text
+    with_body_diodes = rails_of(bare, channels)
+    assert with_body_diodes < -0.5
+
+
+def rails_of(deck, channels):
+    """The lowest +12V of a deck's text, with our switch and USB alone."""
+    file = DECKS / "rails_without_diode.cir"
+    file.write_text(deck, encoding="utf-8")
+    try:
+        values = {"usb": ON, "pull": "1", "mega": ARDUINO, "jack": "0"}
+        return run(file.stem, variant="mended", channels=channels, **values)["below"][0]
+    finally:
+        file.unlink()
+
+
+@pytest.mark.parametrize(("channels", "most"), [(8, 15e-3), (16, 30e-3)])
+def test_an_open_sink_feeds_u41_less_than_its_pin_may_carry(channels, most):
+    """50 mA; with the 1 kohm that were there before it was 80 with 16 channels."""
+    assert 0.5 * most < results.fed(channels) < most
+
+
+@pytest.mark.parametrize("contact", [0.05, 20])
+def test_16_amplifiers_on_one_line_settle_in_time(contact):
+    for cut in ("1m", "1g"):
+        assert results.switching("mended", contact=contact, cut=cut)["settling"] < 120e-6
 
 
 @pytest.mark.parametrize(("high", "low"), [(BROKEN, SOUND), (SOUND, BROKEN)])

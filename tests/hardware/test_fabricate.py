@@ -17,6 +17,7 @@ MEGA_LEFT = 11.0
 """Millimetres by which the Mega's left edge is left of the board's: its USB socket stays free."""
 
 MEGA = ["board-8", "board-16"]
+PAGES = (MEGA_PAGE := "hardware.md", "pico.md")
 WIDEST = {"current": 0.6, "supply": 0.4, "signal": 0.2}
 _SEGMENT = re.compile(
     r"\(segment\s+\(start [^)]*\)\s+\(end [^)]*\)\s+"
@@ -107,6 +108,27 @@ def test_the_zip_holds_what_a_factory_asks_for(board):
     assert placed <= set(circuit.parts)
     chips = {name for name in circuit.parts if name[0] == "U"}
     assert chips - {"U1"} <= placed  # the Pico itself is soldered by hand
+
+
+def test_the_pages_have_the_positions_and_sizes_of_the_files():
+    """What a factory asks for first."""
+    pages = {name: (ROOT.parent / "docs" / name).read_text(encoding="utf-8") for name in PAGES}
+    counts, widths = {}, {}
+    for board in fabricate.BOARDS:
+        with zipfile.ZipFile(ROOT / f"{board}.zip") as archive:
+            counts[board] = len(archive.read(f"{board}-positions.csv").decode().splitlines()) - 1
+        layout = (fabricate.KICAD / f"{board}.kicad_pcb").read_text(encoding="utf-8")
+        edge = re.findall(
+            r"\(gr_\w+\s+((?:(?!\(layer).)*)\(layer \"Edge.Cuts\"\)", layout, re.DOTALL
+        )
+        xs = [float(x) for text in edge for x in re.findall(r"\((?:start|end|mid) (\S+) ", text)]
+        widths[board] = round(max(xs) - min(xs), 1)
+    assert (
+        f"{counts['board-8']} positions of the front ({counts['board-16']} with" in pages[MEGA_PAGE]
+    )
+    assert f"{widths['board-8']} × 99.5 mm ({widths['board-16']} × 99.5 mm" in pages[MEGA_PAGE]
+    assert f"{counts['pico-16']} positions" in pages["pico.md"]
+    assert f"{widths['pico-16']:g} × 50 mm" in pages["pico.md"]
 
 
 @pytest.mark.parametrize("board", fabricate.BOARDS)

@@ -70,6 +70,17 @@ def test_12_v_come_only_with_5_v(circuit):
     assert [net["D2", pin] for pin in "132"] == ["-5V", "-5V", "GND"]
 
 
+def test_12_v_without_their_supply_stay_near_ground(circuit):
+    """The amplifiers draw +12V down where USB alone is there: D3 from ground, one diode of it."""
+    assert [circuit.net_of["D3", pin] for pin in "123"] == ["GND", "+12V", "+12V"]
+    assert circuit.parts["D3"].value == "BAT54S"
+
+
+def test_a_tap_is_behind_what_limits_u41(circuit):
+    taps = {circuit.parts[f"R{n}06"].value for n in range(1, circuit.channels + 1)}
+    assert taps == {"3.3k"}
+
+
 def test_an_amplifier_reads_against_the_electrode_before_the_sink(circuit):
     inputs = [9, 8, 7, 6, 5, 4, 3, 2, 23, 22, 21, 20, 19, 18, 17, 16]
     for sink in range(16):

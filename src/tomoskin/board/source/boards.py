@@ -101,6 +101,7 @@ class BoardRecord(_Record, frozen=True, kw_only=True):
     gain: float
     reference: float
     usb_reference: bool = False
+    against: Literal["neighbour", "jumper", ""] = ""
     converter: Converter
     electronics: BoardFigures
     chop: Chop = Chop()
