@@ -45,6 +45,7 @@ static struct identity identity; /* what of it may be used */
 #define REMEMBERED UINT32_C(0x746F6D6F)
 static NOINIT uint8_t reset_flags, serial_before;
 static NOINIT uint32_t memory;
+static NOINIT struct losses losses; /* opening a port resets the board, and must not forget them */
 static bool remembers;
 static volatile uint16_t ticks_high;
 static volatile bool awake;
@@ -93,6 +94,9 @@ static void read_identity(void) {
 void hal_init(void) {
     read_identity();
     remembers = memory == REMEMBERED;
+    if (!remembers) {
+        losses = (struct losses){0u, 0u};
+    }
     memory = REMEMBERED;
     ADDRESS_PORT = 0u;
     ADDRESS_DDR = ADDRESS_MASK;
@@ -142,7 +146,7 @@ uint8_t hal_reset_cause(void) {
     return (reset_flags & _BV(EXTRF)) != 0u ? RESET_EXTERNAL : RESET_UNKNOWN;
 }
 
-const struct hal_board hal_board = {
+static const struct hal_board this_board = {
     .name = "Arduino Mega 2560",
     .most_chop_hz = 1000u,
     .half_ns = 40000u,
@@ -150,6 +154,7 @@ const struct hal_board hal_board = {
     .conversion_ns = 4000u,
     .clock_ns = 1000u * CLOCKS_PER_CONVERSION / 16u, /* 16 MHz */
 };
+const struct hal_board *hal_board = &this_board;
 
 void hal_unique_id(uint8_t *id) {
     (void)memcpy(id, identity.unique_id, sizeof identity.unique_id);
@@ -160,11 +165,16 @@ uint32_t hal_current(void) {
 }
 
 static inline __attribute__((always_inline)) void take_byte(void) {
+    bool overrun = (UCSR0A & _BV(DOR0)) != 0u; /* nobody looked for three bytes; read before UDR0 */
     uint8_t byte = UDR0;
     uint8_t next = (uint8_t)((receive_end + 1u) % RECEIVE_SIZE);
-    if (next != receive_first) {
+    bool full = next == receive_first;
+    if (!full) {
         received[receive_end] = byte;
         receive_end = next;
+    }
+    if (overrun || full) {
+        losses.bytes++;
     }
     awake = true;
 }
@@ -173,6 +183,10 @@ void hal_listen(void) {
     while ((UCSR0A & _BV(RXC0)) != 0u) {
         take_byte();
     }
+}
+
+bool hal_against_neighbour(void) {
+    return false; /* a jumper chooses, which nobody here can see: the host asks the skin file */
 }
 
 void hal_switches_disable(void) {
@@ -259,6 +273,11 @@ void hal_adc_start(uint8_t channel) {
 
 void hal_adc_cancel(void) {
     ADCSRA = _BV(ADIF); /* off: a conversion under way is dropped */
+}
+
+/* Of conversions it loses none: the next one begins in the interrupt of the one before. */
+struct losses hal_losses(void) {
+    return losses;
 }
 
 int16_t hal_uart_get(void) {

@@ -34,10 +34,11 @@
 #define SCANS_CYCLES (CLOCK / 5u) /* after the last drive it no longer scans */
 #define BREAK_CYCLES 1600u        /* between two drives; without any a host waits for an answer */
 #define BOOTLOADER_CYCLES CLOCK /* a second, as on a Mega 2560 */
+#define OVERRUN_CYCLES 480ull   /* three bytes at 1 MBd: two that the processor holds, and the one behind them */
 
 /* Places in data space. */
-enum { PORT_A = 0x22, DDR_C = 0x27, PORT_C = 0x28, MCU_SR = 0x54, SP_L = 0x5D, SP_H = 0x5E, ADC_L = 0x78, ADC_H = 0x79, ADC_SRB = 0x7B, ADC_MUX = 0x7C, UCSR_0B = 0xC1 };
-enum { SOURCE_0 = 1, SOURCE_8 = 2, SINK_0 = 4, SINK_8 = 8, LATCH = 16, MUX5 = 8, WDRF = 8, RXEN_TXEN = 0x18 };
+enum { PORT_A = 0x22, DDR_C = 0x27, PORT_C = 0x28, MCU_SR = 0x54, SP_L = 0x5D, SP_H = 0x5E, ADC_L = 0x78, ADC_H = 0x79, ADC_SRB = 0x7B, ADC_MUX = 0x7C, UCSR_0A = 0xC0, UCSR_0B = 0xC1, UDR_0 = 0xC6 };
+enum { SOURCE_0 = 1, SOURCE_8 = 2, SINK_0 = 4, SINK_8 = 8, LATCH = 16, MUX5 = 8, WDRF = 8, RXEN_TXEN = 0x18, RXC = 0x80, DOR = 8 };
 
 static avr_t *avr;
 static const struct skin_memory *skin;
@@ -156,6 +157,33 @@ static uint8_t read_code(struct avr_t *machine, avr_io_addr_t at, void *unused) 
     (void)unused;
     machine->data[at] = (uint8_t)(at == ADC_L ? code & 0xFF : code >> 8);
     return machine->data[at];
+}
+
+/* simavr's line holds as many bytes as it likes; the processor's holds two beside the one that comes.
+   Where nobody has looked for longer than that, the rest is lost, and a flag says so until the next
+   byte is read. */
+static struct {
+    avr_io_read_t read;
+    void *param;
+} status, data;
+static bool overrun;
+
+static uint8_t read_status(struct avr_t *machine, avr_io_addr_t at, void *unused) {
+    (void)unused;
+    uint8_t value = status.read(machine, at, status.param);
+    bool deaf = heard != 0 && machine->cycle - heard > OVERRUN_CYCLES;
+    overrun = overrun || (deaf && (value & RXC) != 0);
+    return overrun ? value | DOR : value;
+}
+
+static uint8_t read_data(struct avr_t *machine, avr_io_addr_t at, void *unused) {
+    (void)unused;
+    uint8_t value = data.read(machine, at, data.param);
+    if (overrun && (status.read(machine, UCSR_0A, status.param) & RXC) != 0) {
+        value = data.read(machine, at, data.param); /* the byte between has gone */
+    }
+    overrun = false;
+    return value;
 }
 
 static void on_output(struct avr_irq_t *irq, uint32_t value, void *unused) {
@@ -358,6 +386,12 @@ static void build_board(const char *path) {
                             on_conversion, NULL);
     avr->io[ADC_L - 32].r.c = read_code;
     avr->io[ADC_H - 32].r.c = read_code;
+    status.read = avr->io[UCSR_0A - 32].r.c;
+    status.param = avr->io[UCSR_0A - 32].r.param;
+    data.read = avr->io[UDR_0 - 32].r.c;
+    data.param = avr->io[UDR_0 - 32].r.param;
+    avr->io[UCSR_0A - 32].r.c = read_status;
+    avr->io[UDR_0 - 32].r.c = read_data;
     uint32_t flags = 0;
     (void)avr_ioctl(avr, AVR_IOCTL_UART_SET_FLAGS('0'), &flags);
     line_input = avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_INPUT);
@@ -385,6 +419,9 @@ static void run(void) {
         give_up("the firmware has crashed");
     }
     if (watch == NULL) {
+        if (listening || looks_at_line(at)) {
+            heard = avr->cycle;
+        }
         return;
     }
     uint16_t stack = (uint16_t)(avr->data[SP_L] | avr->data[SP_H] << 8);

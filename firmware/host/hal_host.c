@@ -106,7 +106,7 @@ uint8_t hal_reset_cause(void) {
     return RESET_POWER;
 }
 
-const struct hal_board hal_board = {
+static const struct hal_board this_board = {
     .name = "Linux process",
     .most_chop_hz = 5000u,
     .half_ns = 1000u,
@@ -114,6 +114,7 @@ const struct hal_board hal_board = {
     .conversion_ns = 0u,
     .clock_ns = 813u, /* 13 clocks at 16 MHz */
 };
+const struct hal_board *hal_board = &this_board;
 
 void hal_unique_id(uint8_t *id) {
     (void)memcpy(id, "host\0\0\0\0", 8);
@@ -121,6 +122,10 @@ void hal_unique_id(uint8_t *id) {
 
 uint32_t hal_current(void) {
     return current_ua;
+}
+
+bool hal_against_neighbour(void) {
+    return false;
 }
 
 void hal_switches_disable(void) {
@@ -186,6 +191,11 @@ void hal_adc_start(uint8_t channel) {
 
 void hal_adc_cancel(void) {
     adc_due = NEVER;
+}
+
+struct losses hal_losses(void) {
+    struct losses none = {0u, 0u}; /* its clock waits, and so does its line */
+    return none;
 }
 
 int16_t hal_uart_get(void) {

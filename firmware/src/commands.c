@@ -43,7 +43,7 @@ uint32_t commands_take_baud(void) {
 }
 
 static bool is_command(uint8_t type) {
-    return type >= MSG_GET_INFO && type <= MSG_SET_ORDER;
+    return type >= MSG_GET_INFO && type <= MSG_GET_LOSSES;
 }
 
 static bool right_length(uint8_t type, uint8_t size) {
@@ -170,6 +170,10 @@ static bool answer(const uint8_t *payload, uint8_t reset_cause) {
     }
     if (type == MSG_GET_BOARD) {
         link_say_board(request);
+        return true;
+    }
+    if (type == MSG_GET_LOSSES) {
+        link_say_losses(request);
         return true;
     }
     if (type != MSG_GET_SCAN && type != MSG_GET_PATTERN && type != MSG_GET_MODE) {

@@ -149,8 +149,8 @@ struct verdict config_set_mode(const uint8_t *payload) {
     if (chopped ? frequency < LEAST_CHOP_HZ : frequency != 0u) {
         return bad(FIELD_SET_MODE_FREQUENCY);
     }
-    if (frequency > hal_board.most_chop_hz) {
-        return verdict(RESULT_CHOP_TOO_FAST, hal_board.most_chop_hz);
+    if (frequency > hal_board->most_chop_hz) {
+        return verdict(RESULT_CHOP_TOO_FAST, hal_board->most_chop_hz);
     }
     if (chopped ? periods == 0u || config.oversampling % (2u * periods) != 0u : periods != 0u) {
         return bad(FIELD_SET_MODE_PERIODS);
@@ -183,12 +183,46 @@ static uint8_t channels_of(const struct drive *drive) {
 
 /* Hz: of the fastest alternating drive in which `channels` can be read in half a period. */
 static uint16_t chop_limit(uint8_t channels) {
-    uint32_t conversion = hal_board.conversion_ns + (uint32_t)hal_board.clock_ns * config.prescaler;
-    uint32_t half = hal_board.half_ns + UINT32_C(1000) * config.dead_time +
+    uint32_t conversion = hal_board->conversion_ns + (uint32_t)hal_board->clock_ns * config.prescaler;
+    uint32_t half = hal_board->half_ns + UINT32_C(1000) * config.dead_time +
                     UINT32_C(1000) * US_PER_TICK * config_ticks(config.settling) +
-                    channels * (hal_board.sample_ns + config_conversions() * conversion);
+                    channels * (hal_board->sample_ns + config_conversions() * conversion);
     uint32_t limit = UINT32_C(500000000) / half;
-    return limit < hal_board.most_chop_hz ? (uint16_t)limit : hal_board.most_chop_hz;
+    return limit < hal_board->most_chop_hz ? (uint16_t)limit : hal_board->most_chop_hz;
+}
+
+/* Whether the electrode before the sink, the last one before the first, is the source: a board that
+   reads against it cannot read this drive. */
+static bool drives_reference(uint8_t source, uint8_t sink, uint8_t electrodes) {
+    return source == (sink == 0u ? electrodes : sink) - 1u;
+}
+
+/* How many electrodes the skin has, by the highest channel of its drives. */
+static uint8_t electrodes_of(void) {
+    uint8_t most = 0u;
+    for (uint16_t number = 0u; number < config.n_drives; number++) {
+        const struct drive *drive = &config.drives[number];
+        most = drive->source > most ? drive->source : most;
+        most = drive->sink > most ? drive->sink : most;
+        while (most + 1u < CHANNELS && drive->mask >> (most + 1u) != 0u) {
+            most++;
+        }
+    }
+    return (uint8_t)(most + 1u);
+}
+
+/* The first drive that this board cannot read, or the number of drives. */
+static uint16_t unreadable_drive(bool chopped) {
+    uint16_t number = 0u;
+    uint8_t electrodes = electrodes_of();
+    for (; hal_against_neighbour() && number < config.n_drives; number++) {
+        const struct drive *drive = &config.drives[number];
+        if (drives_reference(drive->source, drive->sink, electrodes) ||
+            (chopped && drives_reference(drive->sink, drive->source, electrodes))) {
+            return number;
+        }
+    }
+    return config.n_drives;
 }
 
 struct verdict config_check_start(uint16_t identity) {
@@ -208,6 +242,10 @@ struct verdict config_check_start(uint16_t identity) {
     }
     if (values > MOST_SAMPLES) {
         return verdict(RESULT_TOO_MANY_SAMPLES, chopped ? MOST_SAMPLES / 2u : MOST_SAMPLES);
+    }
+    uint16_t unreadable = unreadable_drive(chopped);
+    if (unreadable != config.n_drives) {
+        return verdict(RESULT_DRIVEN_REFERENCE, unreadable);
     }
     if (chopped && config.frequency > chop_limit(most)) {
         return verdict(RESULT_CHOP_TOO_FAST, chop_limit(most));

@@ -26,13 +26,17 @@ struct hal_board {
     uint16_t conversion_ns;
     uint16_t clock_ns;
 };
-extern const struct hal_board hal_board;
+extern const struct hal_board *hal_board; /* after hal_init */
 
 /* (eight bytes) tells one board from another; and the setting of its current limiter in uA, or
    CURRENT_DAMAGED where its memory holds something that nobody has written. */
 #define CURRENT_DAMAGED UINT32_MAX
 void hal_unique_id(uint8_t *id);
 uint32_t hal_current(void);
+
+/* Whether what is read is against the electrode before the sink, not against the sink's line, for all
+   that the firmware knows. */
+bool hal_against_neighbour(void);
 
 /* Switches. Only switches.c may call these. Address and latch do not connect anything. */
 void hal_switches_disable(void);
@@ -56,6 +60,14 @@ void hal_adc_prepare(uint8_t prescaler, uint8_t conversions);
 uint16_t hal_adc_ticks(void);
 void hal_adc_start(uint8_t channel);
 void hal_adc_cancel(void);
+
+/* What was lost since power came up, modulo 2^16: conversions, since an interrupt came after the
+   converter's memory was full; bytes from the host, since nobody took them in time. Under lock. */
+struct losses {
+    uint16_t conversions;
+    uint16_t bytes;
+};
+struct losses hal_losses(void);
 
 /* Serial line. get: -1 when there is nothing. send: the bytes are read as they go, and may be
    changed when `busy` has become false; only then the next. sent: they have left the machine. */

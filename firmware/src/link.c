@@ -113,20 +113,31 @@ void link_say_mode(uint8_t request) {
     small_size = SIZE_MODE;
 }
 
+void link_say_losses(uint8_t request) {
+    hal_lock();
+    struct losses losses = hal_losses();
+    hal_unlock();
+    small[0] = MSG_LOSSES;
+    small[AT_LOSSES_REQUEST] = request;
+    put_u16(small + AT_LOSSES_CONVERSIONS, losses.conversions);
+    put_u16(small + AT_LOSSES_BYTES, losses.bytes);
+    small_size = SIZE_LOSSES;
+}
+
 void link_say_board(uint8_t request) {
     small[0] = MSG_BOARD;
     small[AT_BOARD_REQUEST] = request;
-    const char *letter = hal_board.name;
+    const char *letter = hal_board->name;
     for (uint8_t at = AT_BOARD_NAME; at < AT_BOARD_MIN_CHOP; at++) {
         small[at] = (uint8_t)*letter;
         letter += *letter != '\0';
     }
     put_u16(small + AT_BOARD_MIN_CHOP, LEAST_CHOP_HZ);
-    put_u16(small + AT_BOARD_MAX_CHOP, hal_board.most_chop_hz);
-    put_u16(small + AT_BOARD_HALF, hal_board.half_ns);
-    put_u16(small + AT_BOARD_SAMPLE, hal_board.sample_ns);
-    put_u16(small + AT_BOARD_CONVERSION, hal_board.conversion_ns);
-    put_u16(small + AT_BOARD_CLOCK, hal_board.clock_ns);
+    put_u16(small + AT_BOARD_MAX_CHOP, hal_board->most_chop_hz);
+    put_u16(small + AT_BOARD_HALF, hal_board->half_ns);
+    put_u16(small + AT_BOARD_SAMPLE, hal_board->sample_ns);
+    put_u16(small + AT_BOARD_CONVERSION, hal_board->conversion_ns);
+    put_u16(small + AT_BOARD_CLOCK, hal_board->clock_ns);
     small_size = SIZE_BOARD;
 }
 

@@ -15,6 +15,7 @@ void link_say_ack(uint8_t request, uint8_t command, uint8_t result, uint16_t det
 void link_say_scan(uint8_t request);
 void link_say_mode(uint8_t request);
 void link_say_board(uint8_t request);
+void link_say_losses(uint8_t request);
 void link_say_pattern(uint8_t request, uint16_t first); /* `first` is one of the drives */
 void link_say_fault(uint32_t ticks_high, uint32_t ticks, uint8_t code, uint16_t detail);
 

@@ -7,8 +7,8 @@
 #include <stdint.h>
 
 #define PROTOCOL_MAJOR 1u
-#define PROTOCOL_MINOR 3u
-#define PROTOCOL_HASH UINT32_C(0xFFDB1F25)
+#define PROTOCOL_MINOR 4u
+#define PROTOCOL_HASH UINT32_C(0x2CE45792)
 #define MOST_TO_DEVICE 62u
 #define MOST_FROM_DEVICE 4096u
 
@@ -140,6 +140,15 @@
 #define FIELD_MODE_MODE 2u
 #define FIELD_MODE_FREQUENCY 3u
 #define FIELD_MODE_PERIODS 4u
+
+#define MSG_LOSSES 0x09u
+#define SIZE_LOSSES 6u
+#define AT_LOSSES_REQUEST 1u
+#define AT_LOSSES_CONVERSIONS 2u
+#define AT_LOSSES_BYTES 4u
+#define FIELD_LOSSES_REQUEST 0u
+#define FIELD_LOSSES_CONVERSIONS 1u
+#define FIELD_LOSSES_BYTES 2u
 
 #define MSG_FRAME 0x10u
 #define SIZE_FRAME 18u
@@ -375,6 +384,11 @@
 #define FIELD_SET_ORDER_ORDER 2u
 #define FIELD_SET_ORDER_DRIVES 3u
 
+#define MSG_GET_LOSSES 0x91u
+#define SIZE_GET_LOSSES 2u
+#define AT_GET_LOSSES_REQUEST 1u
+#define FIELD_GET_LOSSES_REQUEST 0u
+
 #define AT_DRIVE_SOURCE 0u
 #define AT_DRIVE_SINK 1u
 #define AT_DRIVE_MASK 2u
@@ -395,6 +409,7 @@
 #define RESULT_CURRENT_TOO_HIGH 11u
 #define RESULT_CHOP_TOO_FAST 12u
 #define RESULT_NOT_SINGLY 13u
+#define RESULT_DRIVEN_REFERENCE 14u
 
 /* Why the board went to its safe state by itself. */
 #define FAULT_HOST_SILENT 1u
@@ -425,5 +440,7 @@
 /* Bits of a frame's flags. */
 #define FLAG_FIRST 1u
 #define FLAG_DROPPED 2u
+#define FLAG_LATE 4u
+#define FLAG_DEAF 8u
 
 #endif

@@ -44,6 +44,8 @@ static struct {
     uint16_t drops;
     bool dropped; /* something of the turn before */
     bool broken;  /* something of this turn is dropped */
+    struct losses told; /* those that a frame's flags have said, or are about to say */
+    uint8_t noticed;        /* flags of losses that the next frame says */
 } scan;
 
 /* What the host has asked for; the scan takes it up at the end of a drive. */
@@ -139,7 +141,23 @@ static void begin_message(void) {
     scan.at = frame->buffer + FRAMING_BEFORE + (scan.singly ? SIZE_DRIVE_SAMPLES : SIZE_FRAME);
 }
 
+/* What the machine has lost since it was last asked, as flags. */
+static void notice_losses(void) {
+    struct losses now = hal_losses();
+    if (now.conversions != scan.told.conversions) {
+        scan.noticed = (uint8_t)(scan.noticed | FLAG_LATE);
+    }
+    if (now.bytes != scan.told.bytes) {
+        scan.noticed = (uint8_t)(scan.noticed | FLAG_DEAF);
+    }
+    scan.told = now;
+}
+
+/* The drives of a turn that are sent one by one all say the same: what the turn before has lost. */
 static void begin_turn(void) {
+    if (scan.singly) {
+        notice_losses();
+    }
     scan.order = order.identity;
     order.changed = false;
     scan.place = 0u;
@@ -179,6 +197,9 @@ static void begin_drive(void) {
 static void end_message(void) {
     struct frame *frame = &slots[filling];
     end_samples();
+    if (!scan.singly) {
+        notice_losses();
+    }
     if (waiting == n_slots - 1u) {
         scan.broken = true;
         return;
@@ -187,7 +208,7 @@ static void end_message(void) {
     frame->drops = scan.drops;
     frame->size = (uint16_t)(scan.at - (frame->buffer + FRAMING_BEFORE));
     frame->flags = (uint8_t)((scan.sequence == 0u ? FLAG_FIRST : 0u) |
-                             (scan.dropped ? FLAG_DROPPED : 0u));
+                             (scan.dropped ? FLAG_DROPPED : 0u) | scan.noticed);
     waiting++;
     filling = after(filling);
     hal_wake();
@@ -197,6 +218,9 @@ static void end_turn(void) {
     scan.dropped = scan.broken;
     if (scan.broken && scan.drops != UINT16_MAX) {
         scan.drops++;
+    }
+    if (!scan.broken) {
+        scan.noticed = 0u;
     }
     scan.broken = false;
     scan.sequence++;
@@ -333,6 +357,7 @@ void scan_start(void) {
     scan.dropped = scan.broken = false;
     scan.packed = config_packed();
     scan.group = 0u;
+    scan.noticed = 0u;
     scan.settling_ticks = config_ticks(config.settling);
     scan.directions = config_directions();
     scan.on_ticks = on_ticks();
@@ -341,6 +366,7 @@ void scan_start(void) {
     demodulator_clear();
     hal_adc_prepare(config.prescaler, config_conversions());
     hal_lock();
+    scan.told = hal_losses();
     begin_turn();
     begin_message();
     begin_drive();

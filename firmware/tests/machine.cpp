@@ -141,12 +141,14 @@ void Machine::note(Move move, int a, int b) {
 
 extern "C" {
 
-const struct hal_board hal_board = {"machine", 5000, 4000, 1000, 0, 813};
+static const struct hal_board this_board = {"machine", 5000, 4000, 1000, 0, 813};
+const struct hal_board *hal_board = &this_board;
 void hal_init(void) {}
 uint8_t hal_reset_cause(void) { return machine.reset_cause; }
 void hal_unique_id(uint8_t *id) { std::fill(id, id + 8, uint8_t{7}); }
 void hal_listen(void) {}
 uint32_t hal_current(void) { return machine.current; }
+bool hal_against_neighbour(void) { return machine.against_neighbour; }
 
 void hal_switches_disable(void) {
     machine.note(Machine::Move::kDisable);
@@ -223,6 +225,7 @@ void hal_adc_start(uint8_t channel) {
     }
 }
 void hal_adc_cancel(void) { machine.adc_ns = UINT64_MAX; }
+struct losses hal_losses(void) { return machine.lost; }
 
 int16_t hal_uart_get(void) {
     if (machine.line.empty()) {

@@ -44,6 +44,8 @@ struct Machine {
     bool timer_works = true;
     bool converter_works = true;
     bool plugged_in = true;
+    losses lost{0, 0};
+    bool against_neighbour = false;
 
     int source = -1, sink = -1;  // connected now
 

@@ -31,6 +31,94 @@ TEST_F(Board, FramesHoldWhatTheDrivesRead) {
     expect_frames(frames);
 }
 
+TEST_F(Board, FramesSayWhatWasLostMeanwhile) {
+    scan();
+    machine.run_us(100'000);
+    machine.lost.conversions++;
+    machine.run_us(50'000);
+    machine.lost.bytes += 3;
+    machine.run_us(50'000);
+    unsigned late = 0, deaf = 0;
+    auto frames = of(MSG_FRAME, machine.heard());
+    for (const Bytes &frame : frames) {
+        late += (frame[AT_FRAME_FLAGS] & FLAG_LATE) != 0;
+        deaf += (frame[AT_FRAME_FLAGS] & FLAG_DEAF) != 0;
+    }
+    EXPECT_GT(frames.size(), 10u);
+    EXPECT_EQ(late, 1u);
+    EXPECT_EQ(deaf, 1u);
+    EXPECT_EQ(frames.back()[AT_FRAME_FLAGS], 0u);
+}
+
+TEST_F(Board, ALossIsSaidByTheFrameItHappenedIn) {
+    scan();
+    machine.run_us(100'000);
+    size_t before = of(MSG_FRAME, machine.heard()).size();
+    machine.lost.conversions++;  // while the next one is scanned
+    machine.run_us(100'000);
+    auto frames = of(MSG_FRAME, machine.heard());
+    ASSERT_GT(before, 1u);
+    ASSERT_GT(frames.size(), 2u);
+    EXPECT_EQ(frames[0][AT_FRAME_FLAGS], FLAG_LATE);
+    EXPECT_EQ(frames[1][AT_FRAME_FLAGS], 0u);
+}
+
+TEST_F(Board, WhatADroppedFrameWouldHaveSaidTheNextOneSays) {
+    scan();
+    machine.run_us(100'000);
+    machine.room = 0;  // the line stands still: frames are dropped
+    machine.run_us(100'000);
+    machine.lost.conversions++;
+    machine.run_us(100'000);
+    machine.room = 2000;
+    (void)machine.heard();
+    machine.run_us(100'000);
+    bool said = false;
+    for (const Bytes &frame : of(MSG_FRAME, machine.heard())) {
+        said = said || (frame[AT_FRAME_FLAGS] & FLAG_LATE) != 0;
+    }
+    EXPECT_TRUE(said);
+}
+
+TEST_F(Board, SaysItsLossesWhenAsked) {
+    machine.lost = {0x1234, 0x5678};
+    machine.say({MSG_GET_LOSSES, 9});
+    machine.run_us(200);
+    auto said = of(MSG_LOSSES, machine.heard());
+    ASSERT_EQ(said.size(), 1u);
+    ASSERT_EQ(said[0].size(), SIZE_LOSSES);
+    EXPECT_EQ(said[0][AT_LOSSES_REQUEST], 9u);
+    EXPECT_EQ(u16_at(said[0], AT_LOSSES_CONVERSIONS), 0x1234u);
+    EXPECT_EQ(u16_at(said[0], AT_LOSSES_BYTES), 0x5678u);
+}
+
+TEST_F(Board, WhatWasLostBeforeStartIsNoFlag) {
+    machine.lost = {7, 9};
+    scan();
+    machine.run_us(50'000);
+    auto frames = of(MSG_FRAME, machine.heard());
+    EXPECT_GT(frames.size(), 2u);
+    expect_frames(frames);
+}
+
+TEST_F(Board, ADriveWhoseReferenceWouldBeTheSourceIsRefused) {
+    drives = {{1, 0, 0x00FC}, {3, 4, 0x00C3}, {7, 0, 0x003C}};
+    set_up();
+    EXPECT_EQ(start(), RESULT_OK);  // against the sink's line any pair can be read
+    EXPECT_EQ(ask({MSG_STOP}), RESULT_OK);
+    machine.against_neighbour = true;
+    EXPECT_EQ(start(), RESULT_DRIVEN_REFERENCE);
+    EXPECT_EQ(detail, 1u);
+    drives[1] = {2, 4, 0x00C3};
+    set_up();
+    EXPECT_EQ(start(), RESULT_DRIVEN_REFERENCE);  // of 8 electrodes the last one is before the first
+    EXPECT_EQ(detail, 2u);
+    drives[2] = {6, 0, 0x003C};
+    drives[0].mask |= 0x0080;
+    set_up();
+    EXPECT_EQ(start(), RESULT_OK);
+}
+
 TEST_F(Board, AnyTableOfDrives) {
     drives = {{3, 0, 0x0001}, {15, 7, 0xFFFF}, {0, 15, 0x8000}, {1, 2, 0}};
     oversampling = 64;

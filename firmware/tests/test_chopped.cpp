@@ -68,6 +68,20 @@ TEST_F(Chopped, FramesHoldDifferencesAndSums) {
     }
 }
 
+TEST_F(Chopped, ADriveThatWouldDriveItsReferenceWhenTurnedIsRefused) {
+    machine.against_neighbour = true;
+    set_up();
+    EXPECT_EQ(start(), RESULT_OK);  // in one direction neighbours can be read
+    EXPECT_EQ(ask({MSG_STOP}), RESULT_OK);
+    ASSERT_EQ(set_mode(DRIVE_MODE_CHOPPED, frequency, periods), RESULT_OK);
+    EXPECT_EQ(start(), RESULT_DRIVEN_REFERENCE);
+    EXPECT_EQ(detail, 0u);
+    for (uint8_t k = 0; k < kElectrodes; k++) {
+        drives[k].source = static_cast<uint8_t>((k + 2) % kElectrodes);  // one is between them
+    }
+    scan_chopped();
+}
+
 TEST_F(Chopped, TheLargestSumsFit) {
     oversampling = 64;
     frequency = 15;

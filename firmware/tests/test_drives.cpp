@@ -2,6 +2,7 @@
 #include "fixture.h"
 
 #include <map>
+#include <set>
 
 namespace {
 
@@ -52,6 +53,27 @@ class Singly : public Board {
         EXPECT_EQ(at, m.size());
     }
 };
+
+TEST_F(Singly, ALossIsSaidByAllDrivesOfTheTurnAfter) {
+    scan_singly();
+    machine.run_us(50'000);
+    uint32_t last = u32_at(of(MSG_DRIVE_SAMPLES, machine.heard()).back(), AT_FRAME_SEQUENCE);
+    machine.lost.conversions++;
+    machine.run_us(100'000);
+    std::map<uint32_t, std::set<unsigned>> flags;
+    for (const Bytes &m : of(MSG_DRIVE_SAMPLES, machine.heard())) {
+        flags[u32_at(m, AT_FRAME_SEQUENCE)].insert(m[AT_FRAME_FLAGS]);
+    }
+    unsigned late = 0;
+    for (const auto &[sequence, said] : flags) {
+        EXPECT_EQ(said.size(), 1u) << "turn " << sequence;
+        if (said.count(FLAG_LATE) != 0) {
+            late++;
+            EXPECT_LE(sequence, last + 2);
+        }
+    }
+    EXPECT_EQ(late, 1u);
+}
 
 TEST_F(Singly, AFullTurnIsTheFrameToTheBit) {
     scan();

@@ -7,10 +7,12 @@ import sys
 import pytest
 
 from tomoskin import __version__
+from tomoskin.board.wire import GetLosses, Losses
 from tomoskin.cli import app as commands, main
 from tomoskin.core import SinkError
 from tomoskin.run.sinks import sink_names
 from tomoskin.server import check_page
+from tomoskin.twin.held_scanning import HeldScanning
 
 
 def test_doctor(tomoskin):
@@ -42,6 +44,31 @@ def test_a_sink_without_its_package_is_not_ok_and_no_fault(tomoskin, monkeypatch
     lines = [line for line in out.splitlines() if "needs the package" in line]
     assert len(lines) == len(sink_names())
     assert all(line.startswith("-     sink ") for line in lines)
+
+
+@pytest.mark.parametrize(("lost", "ok"), [((0, 0), True), ((3, 0), False), ((0, 2), False)])
+def test_doctor_asks_a_board_what_it_has_lost(tomoskin, monkeypatch, lost, ok):
+    answer = HeldScanning.answer
+    monkeypatch.setattr(
+        HeldScanning,
+        "answer",
+        lambda self, command: (
+            Losses(command.request, *lost)
+            if isinstance(command, GetLosses)
+            else answer(self, command)
+        ),
+    )
+    _, out, _ = tomoskin("doctor", "--json", "--source", "twin")
+    (found,) = [one for one in json.loads(out)["findings"] if one["name"] == "board"]
+    assert found["ok"] is ok
+    assert f"late {lost[0]} times" in found["text"]
+    assert f"lost {lost[1]} times" in found["text"]
+
+
+def test_doctor_says_that_no_board_answers(tomoskin):
+    code, out, _ = tomoskin("doctor", "--source", "serial:/dev/none")
+    assert code == 1
+    assert "FAIL  board" in out
 
 
 def test_doctor_for_people(tomoskin):

@@ -131,6 +131,31 @@ MUTANTS = {
         "chopped && config.frequency > chop_limit(most)",
         "chopped && config.frequency > 2u * chop_limit(most)",
     ),
+    "late samples that are not said": (
+        "scan.c",
+        "        scan.noticed = (uint8_t)(scan.noticed | FLAG_LATE);\n",
+        "",
+    ),
+    "lost bytes that are not said": (
+        "scan.c",
+        "        scan.noticed = (uint8_t)(scan.noticed | FLAG_DEAF);\n",
+        "",
+    ),
+    "a loss forgotten with a dropped frame": (
+        "scan.c",
+        "    if (!scan.broken) {\n        scan.noticed = 0u;",
+        "    if (true) {\n        scan.noticed = 0u;",
+    ),
+    "a driven reference let through": (
+        "config.c",
+        "if (drives_reference(drive->source, drive->sink, electrodes) ||",
+        "if ((drive->source > 9u && drives_reference(drive->source, drive->sink, electrodes)) ||",
+    ),
+    "a reference driven in the other direction": (
+        "config.c",
+        "(chopped && drives_reference(drive->sink, drive->source, electrodes))",
+        "(chopped && drive->sink > 9u && drives_reference(drive->sink, drive->source, electrodes))",
+    ),
     "a mode that outlives its scan": ("config.c", "    config.mode = DRIVE_MODE_DIRECT;\n", ""),
 }
 

@@ -96,13 +96,13 @@ class Board:
     def close(self):
         self.closed = True
 
-    def send(self, samples, *, drops=0, skip=0):
+    def send(self, samples, *, drops=0, skip=0, flags=0):
         """One frame, after leaving ``skip`` out."""
         for _ in range(skip):
             next(self._sequence)
         number = next(self._sequence)
         ticks = number * self.tick
-        frame = Frame(number, ticks, 0.0, self._configuration, 0, drops, samples.astype("<u2"))
+        frame = Frame(number, ticks, 0.0, self._configuration, flags, drops, samples.astype("<u2"))
         self.raw(encode(frame))
 
     def raw(self, data):

@@ -12,7 +12,7 @@ import pytest
 
 from run.board import Board
 from tomoskin.board.source import Timing
-from tomoskin.board.wire import Ping, Start, Stop
+from tomoskin.board.wire import FrameFlag, Ping, Start, Stop
 from tomoskin.core import DataError, SourceError
 from tomoskin.files.session import RawRead, session_info
 from tomoskin.model.skin import Skin
@@ -211,11 +211,13 @@ def test_losses_are_counted(prepared, idle):
     board.raw(b"\x03abc\x00not a message\x00")
     board.send(idle)
     board.send(idle, skip=3, drops=2)
+    board.send(idle, drops=2, flags=int(FrameFlag.LATE | FrameFlag.DEAF))
     until(lambda: runner.status().gaps == 3)
-    until(lambda: runner.newest and runner.newest.result.sequence == 4)
+    until(lambda: runner.newest and runner.newest.result.sequence == 5)
     status = runner.status()
     runner.stop()
     assert status.corrupt == 2
+    assert (status.late, status.deaf) == (1, 1)
     assert status.dropped == 2
     assert any("3 frames lost" in event.text for event in runner.events.since(0)[1])
 

@@ -26,6 +26,8 @@ def make_status(**changes):
         "dropped": 1,
         "corrupt": 2,
         "gaps": 3,
+        "late": 4,
+        "deaf": 5,
         "p50": 0.0005,
         "p99": 0.001,
         "reference": ReferenceState(20, 20, 5.0, 1e-4),

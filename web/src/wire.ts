@@ -71,6 +71,8 @@ export interface RunState {
   readonly dropped: number;
   readonly corrupt: number;
   readonly gaps: number;
+  readonly late: number;
+  readonly deaf: number;
   readonly p50_ms: number | null;
   readonly p99_ms: number | null;
   readonly stages: readonly StageNow[];

@@ -127,8 +127,15 @@ export function facts(status: RunState | null): Fact[] {
     value: String(status.left_out),
     title: "Measurements that the image does without",
   };
+  const troubled = {
+    id: "troubled",
+    name: "troubled",
+    value: String(status.late + status.deaf),
+    title: `Frames with trouble on the board: ${status.late} with samples read late, ${status.deaf} in which it lost bytes from the host`,
+  };
   return [
     ...(status.left_out > 0 ? [excluded] : []),
+    ...(status.late + status.deaf > 0 ? [troubled] : []),
     { id: "fps", name: "frames/s", value: fixed(status.fps, 0), title: "Frames decoded per second" },
     {
       id: "dropped",

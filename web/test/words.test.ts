@@ -14,6 +14,8 @@ const status: RunState = {
   dropped: 1,
   corrupt: 2,
   gaps: 3,
+  late: 0,
+  deaf: 0,
   p50_ms: 0.3,
   p99_ms: 0.8,
   stages: [],
@@ -115,6 +117,9 @@ it("adds up what was lost and says what it was", () => {
   const lost = facts(status).find(({ id }) => id === "dropped");
   expect(lost).toMatchObject({ value: "6", title: "Frames lost: 1 dropped, 2 corrupt, 3 gaps" });
   expect(facts(null)).toEqual([]);
+  expect(facts(status).some(({ id }) => id === "troubled")).toBe(false);
+  const troubled = facts({ ...status, late: 2, deaf: 1 }).find(({ id }) => id === "troubled");
+  expect(troubled).toMatchObject({ value: "3", title: expect.stringContaining("2 with samples read late, 1 in which") });
 });
 
 it("says alpha and what chose it", () => {

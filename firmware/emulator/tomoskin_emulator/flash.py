@@ -11,8 +11,15 @@ import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
-from tomoskin.board.source import BOARDS_SINCE, BoardRecord, Exchange, SerialTransport, Transport
-from tomoskin.board.wire import BoardLimits, GetBoard, GetInfo, Info
+from tomoskin.board.source import (
+    BOARDS_SINCE,
+    LOSSES_SINCE,
+    BoardRecord,
+    Exchange,
+    SerialTransport,
+    Transport,
+)
+from tomoskin.board.wire import BoardLimits, GetBoard, GetInfo, GetLosses, Info, Losses
 from tomoskin.core import SourceError, StrPath
 from tomoskin_emulator.board_process import BoardIdentity
 from tomoskin_emulator.program import FLASH, PAGE, firmware_image, pack_uf2, run_tool
@@ -178,6 +185,19 @@ def ask_info(transport: Transport) -> Info:
             hint="is it the board's port? tomoskin firmware flash comes first",
         )
     return info
+
+
+def ask_losses(transport: Transport) -> Losses | None:
+    """What a board has lost since its power came up; None where its firmware does not count.
+
+    Raises
+    ------
+    SourceError
+        Where no firmware answers.
+    """
+    if ask_info(transport).minor < LOSSES_SINCE:
+        return None
+    return Exchange(transport).ask(GetLosses(0), Losses)
 
 
 def _ask_name(transport: Transport, info: Info) -> str:

@@ -7,7 +7,9 @@ import sys
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
-from typing import TypeVar
+from typing import Annotated, TypeVar
+
+import typer
 
 from tomoskin import __version__
 from tomoskin.cli.output import JsonFlag, concluded
@@ -17,9 +19,19 @@ from tomoskin.run import CheckFinding
 _T = TypeVar("_T")
 
 
-def doctor(json: JsonFlag = False) -> None:
+SourceOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="SOURCE",
+        help="Such as serial:PORT. Asks this board too what it has lost since its power came up.",
+    ),
+]
+
+
+def doctor(json: JsonFlag = False, source: SourceOption = None) -> None:
     """Say what was found, and exit with 1 where something is not as needed."""
-    findings = (finding for look in _LOOKS for finding in look())
+    looks = _LOOKS if source is None else (*_LOOKS, partial(_board, source))
+    findings = (finding for look in looks for finding in look())
     raise concluded(findings, json=json, version=__version__)
 
 
@@ -76,6 +88,32 @@ def _port() -> Iterator[CheckFinding]:
         yield CheckFinding("port", True, str(error))
     else:
         yield CheckFinding("port", True, f"{DEFAULT_PORT} is free")
+
+
+def _board(source: str) -> Iterator[CheckFinding]:
+    """What the board behind ``source`` has lost; its electrodes get no current."""
+    from tomoskin.board.source import open_source
+    from tomoskin.model.skin import Skin
+    from tomoskin.twin.emulator import ask_losses
+
+    try:
+        transport = open_source(source, Skin.load("textile-disc-8"))
+        try:
+            lost = ask_losses(transport)
+        finally:
+            transport.close()
+    except TomoskinError as error:
+        yield CheckFinding("board", False, str(error))
+        return
+    if lost is None:
+        text = "its firmware does not count what it loses: tomoskin firmware flash"
+        yield CheckFinding("board", True, text)
+        return
+    text = (
+        f"since its power came up, samples were late {lost.conversions} times, and bytes from a "
+        f"host were lost {lost.bytes} times"
+    )
+    yield CheckFinding("board", not (lost.conversions or lost.bytes), text)
 
 
 def _tried(name: str, look: Callable[[], _T], say: Callable[[_T], str]) -> CheckFinding:

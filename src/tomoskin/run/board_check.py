@@ -20,7 +20,7 @@ _NOISE = 2.0
 """Counts a conversion; the decks give 0.7, and rounding adds 0.3."""
 
 _EARLY, _LATE = 120e-6, 2e-3
-"""Settling times that must give the same readings, s; the decks need up to 84 µs."""
+"""Settling times that must give the same readings, s; the decks need up to 116 µs."""
 
 _UNSETTLED = 2.0
 """Counts between the two."""

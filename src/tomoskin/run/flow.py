@@ -211,6 +211,8 @@ class Flow:
             dropped=_dropped(self),
             corrupt=losses.corrupt,
             gaps=losses.gaps,
+            late=losses.late,
+            deaf=losses.deaf,
             p50=p50,
             p99=p99,
             stages=self.latency.stages(),
@@ -326,6 +328,8 @@ def _board(flow: Flow) -> dict[str, object]:
         "dropped": _dropped(flow),
         "corrupt": losses.corrupt,
         "missing": losses.gaps,
+        "late": losses.late,
+        "deaf": losses.deaf,
         "electrodes": (health.text if health else None) or "good",
     }
 

@@ -102,7 +102,7 @@ _CALM = 100
 PERIOD = 1.0
 """s in which the same event is said once."""
 
-COUNTED = frozenset({"fault", "refused"})
+COUNTED = frozenset({"fault", "refused", "late", "deaf"})
 """Kinds of events that a sick board causes in masses; all others are said each time."""
 
 PAUSED = "it is paused: touches follow when it is resumed"
@@ -115,12 +115,15 @@ class Losses(NamedTuple):
     """Counts of what did not arrive.
 
     ``dropped`` frames that the device or this host left out, ``corrupt`` messages damaged on
-    the line, ``gaps`` frames missing in the sequence.
+    the line, ``gaps`` frames missing in the sequence; ``late``, ``deaf`` frames in which the board
+    read samples late, or lost bytes of this host.
     """
 
     dropped: int = 0
     corrupt: int = 0
     gaps: int = 0
+    late: int = 0
+    deaf: int = 0
 
 
 class Backlog:
@@ -214,7 +217,14 @@ class Intake:
         link = self._link
         if link is None:
             return self._earlier
-        now = self._drops + link.frames.foreign, link.counters.corrupt, link.frames.lost
+        frames = link.frames
+        now = (
+            self._drops + frames.foreign,
+            link.counters.corrupt,
+            frames.lost,
+            frames.late,
+            frames.deaf,
+        )
         return Losses(*map(add, self._earlier, now))
 
     def take(self, link: Link, items: Sequence[Received], now: float) -> int:

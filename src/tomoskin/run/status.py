@@ -231,6 +231,8 @@ class Status:
         Messages that were damaged on the way.
     gaps
         Frames that are missing in the sequence.
+    late, deaf
+        Frames whose samples the board read late; frames in which it lost bytes of this host.
     p50, p99
         Latency from a frame's last byte to its touches over the last frames, s; NaN at first.
     stages
@@ -273,6 +275,8 @@ class Status:
     dropped: int
     corrupt: int
     gaps: int
+    late: int
+    deaf: int
     p50: float
     p99: float
     reference: ReferenceState
@@ -306,4 +310,8 @@ class Status:
             f"{self.source}: {self.fps:.0f} frames/s, {self.dropped} dropped, "
             f"p99 {1e3 * self.p99:.1f} ms, drift {100 * drift:.1f} %"
         )
+        if self.late:
+            text += f", {self.late} with late samples"
+        if self.deaf:
+            text += f", {self.deaf} in which the board lost bytes"
         return ", ".join([text, *(reading.text for reading in self.readings.values())])

@@ -168,6 +168,8 @@ class RunState(Message, frozen=True, tag="state"):
     dropped: int
     corrupt: int
     gaps: int
+    late: int
+    deaf: int
     p50_ms: float | None
     p99_ms: float | None
     stages: list[StageNow]

@@ -12,7 +12,9 @@ from tomoskin.twin.scanning import LIMITS
 Verdict = tuple[wire.Result, int]
 """Result and detail of an ACK."""
 
-Question = wire.GetInfo | wire.GetBoard | wire.GetScan | wire.GetPattern | wire.GetMode
+Question = (
+    wire.GetInfo | wire.GetBoard | wire.GetLosses | wire.GetScan | wire.GetPattern | wire.GetMode
+)
 """What a host may ask at any time."""
 
 Setting = wire.SetScan | wire.SetPattern | wire.SetFormat | wire.SetMode
@@ -189,12 +191,18 @@ class HeldScanning:
                     self.mode = command if command.mode is wire.DriveMode.CHOPPED else None
         return verdict
 
+    def _own(self, command: wire.GetInfo | wire.GetBoard | wire.GetLosses) -> wire.Message:
+        if isinstance(command, wire.GetLosses):
+            return wire.Losses(command.request, 0, 0)
+        if isinstance(command, wire.GetInfo):
+            return self._board.info(command.request)
+        return replace(self._board.limits, request=command.request)
+
     def answer(self, command: Question) -> wire.Message:
         """What the board is, or what is held, for a host that reads it back."""
         scan, request = self.scan, command.request
-        if isinstance(command, wire.GetInfo | wire.GetBoard):
-            limits = replace(self._board.limits, request=request)
-            return limits if isinstance(command, wire.GetBoard) else self._board.info(request)
+        if isinstance(command, wire.GetInfo | wire.GetBoard | wire.GetLosses):
+            return self._own(command)
         if scan is None:
             return wire.Ack(
                 request, wire.type_byte(type(command)), wire.Result.WRONG_CONFIGURATION, 0

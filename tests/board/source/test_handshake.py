@@ -153,8 +153,8 @@ def test_answers_to_other_requests_are_not_taken(clock):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"major": 0}, "the board speaks 0.3: the board's firmware is older"),
-        ({"major": 2}, "the board speaks 2.3: this tomoskin is older"),
+        ({"major": 0}, "the board speaks 0.4: the board's firmware is older"),
+        ({"major": 2}, "the board speaks 2.4: this tomoskin is older"),
         ({"minor": 7, "schema_hash": 1}, "the board speaks 1.7: this tomoskin is older"),
         ({"schema_hash": 0xABC}, "different schemas .board 00000abc"),
         ({"minor": 0, "schema_hash": 0xABC}, "both speak protocol 1.0, .* .board 00000abc"),

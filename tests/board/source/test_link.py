@@ -1,5 +1,7 @@
 """Frames and what goes wrong with them, once the board scans."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -19,7 +21,7 @@ from board.source.boards import (
 )
 from tomoskin.board.source import Transport
 from tomoskin.board.source.command_queue import FrameCounters
-from tomoskin.board.wire import Fault, FaultCode, encode
+from tomoskin.board.wire import Fault, FaultCode, FrameFlag, encode
 from tomoskin.core import SourceError
 
 
@@ -74,6 +76,15 @@ def test_gaps_are_events_with_the_number_lost(link, board):
         ("lost", "1 frame lost before frame 8"),
     ]
     assert link.frames == FrameCounters(passed=5, lost=4)
+
+
+def test_what_a_board_says_that_it_lost_is_counted_and_an_event(link, board):
+    flags = (0, FrameFlag.LATE, FrameFlag.DEAF, FrameFlag.LATE | FrameFlag.DEAF)
+    board.say(*(replace(frame_of(link, n), flags=int(flag)) for n, flag in enumerate(flags)))
+    items = drain(link, board)
+    assert [e.kind for e in events(items)] == ["late", "deaf", "late", "deaf"]
+    assert len(frames(items)) == 4
+    assert link.frames == FrameCounters(passed=4, late=2, deaf=2)
 
 
 def test_a_corrupt_frame_is_a_gap(link, board):

@@ -2,6 +2,7 @@
 
 from tomoskin.board.source.agreement import (
     BOARDS_SINCE as BOARDS_SINCE,
+    LOSSES_SINCE as LOSSES_SINCE,
     current_damaged as current_damaged,
 )
 from tomoskin.board.source.boards import (

@@ -7,10 +7,12 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from tomoskin.board.source.settings import Configuration, Timing
-from tomoskin.board.wire import Command, Ping, SetBaud, encode
+from tomoskin.board.wire import Command, FrameFlag, Ping, SetBaud, encode
 from tomoskin.core import DriveSamples, Event, Frame, SourceError
 
 _MODULUS = 2**32
+_LATE = "the board read some samples later than planned, since an interrupt came late"
+_DEAF = "the board has lost bytes that this computer sent"
 _ANY = -1
 """The expected number of a frame that may have any."""
 
@@ -22,12 +24,15 @@ class FrameCounters:
     ``passed`` on; ``lost`` by their sequence numbers; ``foreign``: another configuration or a
     wrong number of samples; ``stale``: behind the sequence, or before START was answered. Drives
     that come singly count as foreign or stale in the same way; a turn that lacks one is lost.
+    ``late``, ``deaf``: frames that say that the board read late, or lost bytes of this host.
     """
 
     passed: int = 0
     lost: int = 0
     foreign: int = 0
     stale: int = 0
+    late: int = 0
+    deaf: int = 0
 
 
 class SequenceFilter:
@@ -62,7 +67,7 @@ class SequenceFilter:
             self.counters.stale += 1
             return []
         self.counters.passed += 1
-        return [*self._go_on(frame, gap), frame]
+        return [*self._go_on(frame, gap), *self._losses(frame), frame]
 
     def reach(self, drive: DriveSamples) -> list[Event]:
         """A turn begins with ``drive``, which is still to make its frame; what is missing."""
@@ -90,6 +95,17 @@ class SequenceFilter:
         """How many turns are missing before this one; half the modulus or more: it is old."""
         assert self._expected is not None
         return 0 if self._expected == _ANY else (item.sequence - self._expected) % _MODULUS
+
+    def _losses(self, frame: Frame) -> list[Event]:
+        """What the board says in ``frame`` that it has lost."""
+        events = []
+        if frame.flags & FrameFlag.LATE:
+            self.counters.late += 1
+            events.append(Event(frame.host_time, "late", _LATE))
+        if frame.flags & FrameFlag.DEAF:
+            self.counters.deaf += 1
+            events.append(Event(frame.host_time, "deaf", _DEAF))
+        return events
 
     def _go_on(self, item: Frame | DriveSamples, lost: int) -> list[Event]:
         self._expected = (item.sequence + 1) % _MODULUS

@@ -35,6 +35,7 @@ class Result(IntEnum):
     CURRENT_TOO_HIGH = 11
     CHOP_TOO_FAST = 12
     NOT_SINGLY = 13
+    DRIVEN_REFERENCE = 14
 
 class FaultCode(IntEnum):
     """Why the board went to its safe state by itself."""
@@ -75,6 +76,8 @@ class FrameFlag(IntFlag):
 
     FIRST = 1
     DROPPED = 2
+    LATE = 4
+    DEAF = 8
 
 @dataclass(frozen=True, slots=True)
 class Drive:
@@ -174,6 +177,14 @@ class HeldMode:
     mode: DriveMode
     frequency: int
     periods: int
+
+@dataclass(frozen=True, slots=True)
+class Losses:
+    """Answer to GET_LOSSES: what the board has lost since power came up, modulo 65,536."""
+
+    request: int
+    conversions: int
+    bytes: int
 
 @dataclass(frozen=True, slots=True)
 class GetInfo:
@@ -294,6 +305,12 @@ class SetOrder:
     order: int
     drives: bytes
 
+@dataclass(frozen=True, slots=True)
+class GetLosses:
+    """Ask for LOSSES."""
+
+    request: int
+
 Command = (
     GetInfo
     | Ping
@@ -311,8 +328,9 @@ Command = (
     | SetMode
     | GetMode
     | SetOrder
+    | GetLosses
 )
 
-_Report = Hello | Info | Ack | Fault | HeldScan | HeldPattern | BoardLimits | HeldMode
+_Report = Hello | Info | Ack | Fault | HeldScan | HeldPattern | BoardLimits | HeldMode | Losses
 
 Message = Command | _Report | Frame | DriveSamples

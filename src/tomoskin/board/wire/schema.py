@@ -127,5 +127,5 @@ SCHEMA = Schema.read(
 )
 """The schema that this host was made with."""
 
-OLDER = {(1, 0): 0x8B6ABBBD, (1, 1): 0xF17AB758, (1, 2): 0x6B98E2FE}
+OLDER = {(1, 0): 0x8B6ABBBD, (1, 1): 0xF17AB758, (1, 2): 0x6B98E2FE, (1, 3): 0xFFDB1F25}
 """Hashes of the published versions, by major and minor, that this host speaks besides its own."""
