@@ -163,7 +163,8 @@ def run_chopped() -> Iterator[Report]:
     yield table(
         f"{CHOPPED_FRAMES} frames of both boards' real firmware",
         (_chopped(*case, CHOPPED_FRAMES) for case in cases),
-        f"adjacent, {OVERSAMPLING} conversions of 10 bits or {OVERSAMPLING // 4} of 12; "
+        "adjacent (skip:2 where a Pico drives alternately), "
+        f"{OVERSAMPLING} conversions of 10 bits or {OVERSAMPLING // 4} of 12; "
         "settling 200 us (Mega) and 84 us (Pico), dead time 5 us; frames/s by the board's "
         "own clock",
         "noise: standard deviation of a row, of which the converter has 0.7 LSB of 10 "
@@ -192,7 +193,9 @@ def _rows(
     board: str, frequency: int, own: Floats, noise: float, count: int
 ) -> tuple[Floats, float, int]:
     """(count, n_meas) V of an emulated board, its frames/s, and the periods of a drive."""
-    scan, bits = Scan.of(Pattern.adjacent(len(own))), BOARDS[board].adc_bits
+    turned = frequency and BOARDS[board].against == "neighbour"  # it cannot read neighbours then
+    scan = Scan.of(Pattern.skip(len(own), 2 if turned else 0))
+    bits = BOARDS[board].adc_bits
     finer = 1 << bits - 10
     settings = ScanSettings(
         OVERSAMPLING // finer, SETTLING[board], CURRENT, bits, chop_frequency=frequency

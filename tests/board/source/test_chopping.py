@@ -13,13 +13,14 @@ from board.source.boards import (
     SETTINGS,
     ManualClock,
     ScriptedBoard,
+    events,
     frames,
     linked,
     poll_until,
     twin_transport,
 )
-from tomoskin.board.source import Link, ScanSettings, choose_periods, chop_limit
-from tomoskin.board.wire import OLDER, BoardLimits, DriveMode, GetInfo, HeldMode, SetMode
+from tomoskin.board.source import BOARDS, Link, ScanSettings, choose_periods, chop_limit
+from tomoskin.board.wire import OLDER, BoardLimits, DriveMode, GetBoard, GetInfo, HeldMode, SetMode
 from tomoskin.core import SourceError, VirtualClock
 from tomoskin.files.session import SessionReader, SessionWriter, read_session
 from tomoskin.model.skin import Skin
@@ -90,6 +91,48 @@ def test_an_older_board_is_set_up_in_its_own_words_or_refused(clock, minor):
     assert link.session.board is None
     with pytest.raises(SourceError, match=rf"from protocol 1.2 on; this one speaks 1.{minor}"):
         linked(board(), clock, chop_frequency=500).connect()
+
+
+NEIGHBOUR, JUMPER = (
+    replace(BOARD.limits, name=BOARDS[name].text.encode().ljust(24, b"\0"))
+    for name in ("pico", "mega")
+)
+
+
+def named(clock, limits):
+    """A board that calls itself as ``limits`` says."""
+    board = ScriptedBoard(clock)
+    answer = board.answer
+    board.answer = lambda command: (
+        [replace(limits, request=command.request)]
+        if isinstance(command, GetBoard)
+        else answer(command)
+    )
+    return board
+
+
+def test_neighbours_are_not_driven_alternately_where_one_of_them_is_read_against(clock):
+    board = named(clock, NEIGHBOUR)
+    with pytest.raises(SourceError) as refused:
+        linked(board, clock, chop_frequency=500).connect()
+    assert "8 drives, 8 cannot be read alternately" in str(refused.value)
+    assert "skip:1" in str(refused.value)
+    assert "Start" not in board.names
+    linked(named(clock, NEIGHBOUR), clock).connect()  # in one direction they can be read
+
+
+def test_where_a_jumper_chooses_it_is_said(clock):
+    def said(**changes):
+        link = linked(named(clock, JUMPER), clock, chop_frequency=500, **changes)
+        items = []
+        while not link.running:
+            items += link.poll(0.3)
+        return [event.text for event in events(items) if event.kind == "driven-reference"]
+
+    assert said() == []
+    (text,) = said(against_neighbour=True)
+    assert "J41 at 1-2" in text
+    assert "skip:1" in text
 
 
 def test_a_chopped_scan_has_an_identity_of_its_own_whatever_the_board_chooses(clock):

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from firmware.boards import SCAN, Talk
+from firmware.boards import Talk
 from firmware.emulator.test_mutants import mutated as mutated_elf
 from firmware.emulator.test_pico import mutated as mutated_image
 from firmware.emulator.watch import CLOCK, Watch
@@ -37,6 +37,7 @@ from tomoskin.board.wire import (
     encode,
 )
 from tomoskin.core import Frame, SourceError
+from tomoskin.model.pattern import Pattern, Scan
 from tomoskin_emulator.board_process import (
     BoardProcess,
     BoardPrograms,
@@ -44,8 +45,11 @@ from tomoskin_emulator.board_process import (
     OwnVoltages,
     SkinMemory,
 )
+from tomoskin_emulator.program import PicoPrograms
 
 CURRENT, N = 0.1, 8
+SCAN = Scan.of(Pattern.skip(N, 2))
+"""A Pico refuses neighbours, one of which it reads against in one of the directions."""
 POTENTIALS = np.array([3, -7, 0, 12, -20, 5, 9, -4]) * 1e-3
 """V that each electrode has by itself."""
 OFFSET = 0.4
@@ -289,6 +293,24 @@ def test_a_host_that_talks_without_end_does_not_lengthen_a_drive(board: Powered)
     assert board.look().longest_on <= 0.5 / frequency + board.kind.lateness
 
 
+def test_a_pico_refuses_neighbours(pico: BoardPrograms, tmp_path: Path) -> None:
+    kind, neighbours = KINDS["pico"], Scan.of(Pattern.adjacent(N))
+    with powered(pico, kind, tmp_path) as board:
+        port = board.process.port
+        with (
+            Link(SerialTransport(port), neighbours, kind.settings) as link,
+            pytest.raises(SourceError, match="8 cannot be read alternately"),
+        ):
+            link.connect()
+        talk = Talk(SerialTransport(port))
+        set_up(talk, SetMode(4, 5, DriveMode.CHOPPED, kind.settings.chop_frequency, 2))
+        pair = Drive(1, 0, 0xFC)
+        assert ask(talk, SetPattern(5, 5, 3, (pair,))).result is Result.OK
+        refused = ask(talk, Start(6, 5))
+        assert (refused.result, refused.detail) == (Result.DRIVEN_REFERENCE, 3)
+        talk.transport.close()
+
+
 MUTANTS = {
     "a current that never turns": ("src/scan.c", "(scan.direction & 1u) != 0u", "false"),
     "directions exchanged": ("src/scan.c", "channel, reversed(), sum", "channel, !reversed(), sum"),
@@ -305,6 +327,7 @@ MUTANTS = {
     ),
     "no break": ("src/switches.c", "    hal_switches_disable();\n", ""),
 }
+LETS_NEIGHBOURS_THROUGH = ("pico/hal_pico.c", "    return true; /* U5", "    return false; /* U5")
 
 
 @pytest.mark.slow
@@ -321,3 +344,10 @@ def test_a_mutant_is_noticed(
         programs = type(whole)(mutated_elf([change], tmp_path), whole.emulator)
     with pytest.raises(AssertionError), powered(programs, KINDS[kind], tmp_path) as board:
         examine(board)
+
+
+@pytest.mark.slow
+def test_a_pico_that_lets_neighbours_through_is_noticed(pico: PicoPrograms, tmp_path: Path) -> None:
+    planted = mutated_image(pico, tmp_path, LETS_NEIGHBOURS_THROUGH)
+    with pytest.raises(AssertionError):
+        test_a_pico_refuses_neighbours(planted, tmp_path)

@@ -6,8 +6,10 @@ from collections.abc import Sequence
 from dataclasses import fields, replace
 from typing import Protocol, runtime_checkable
 
+import numpy as np
+
 from tomoskin.board import wire
-from tomoskin.board.source.boards import BOARDS, DEFAULT_BOARD
+from tomoskin.board.source.boards import BOARDS, DEFAULT_BOARD, BoardRecord
 from tomoskin.board.source.clock import TICK_RATES
 from tomoskin.board.source.settings import ScanSettings
 from tomoskin.core import SourceError, WireError
@@ -150,6 +152,46 @@ def fit_board(info: wire.Info, scan: Scan, asked: ScanSettings, where: str) -> S
         )
     singly = settings.singly and info.minor >= DRIVES_SINCE and len(scan.drives) <= _MOST_SINGLY
     return replace(settings, singly=singly)
+
+
+LOSSES_SINCE = 4
+"""The minor version in which boards say what they have lost."""
+
+
+def unreadable_drives(scan: Scan, *, alternating: bool) -> list[int]:
+    """Drives whose source is the electrode before their sink, which some boards read against.
+
+    Of an alternating drive both directions count. Before the first electrode comes the last one.
+    """
+    source, sink = scan.drives.T
+    n = 1 + int(max(scan.drives.max(), scan.sample_electrode.max()))
+    driven = source == (sink - 1) % n
+    if alternating:
+        driven |= sink == (source - 1) % n
+    return [int(number) for number in np.flatnonzero(driven)]
+
+
+def check_reference(record: BoardRecord | None, scan: Scan, asked: ScanSettings, where: str) -> str:
+    """Whether the board can read all drives; a sentence where that depends on its jumper.
+
+    SourceError says that it cannot, and which patterns it can.
+    """
+    known = record is not None and record.against
+    if not known or (known == "jumper" and not asked.against_neighbour):
+        return ""
+    drives = unreadable_drives(scan, alternating=asked.chop_frequency > 0)
+    if not drives:
+        return ""
+    source, sink = scan.drives[drives[0]] + 1
+    how = " alternately" if asked.chop_frequency else ""
+    text = (
+        f"of {len(scan.drives)} drives, {len(drives)} cannot be read{how}: the amplifier reads "
+        f"against the electrode before the sink, which is driven (E{source} to E{sink} the first)"
+    )
+    patterns = 'set [drive] pattern = "skip:1", or one that skips more'
+    if known == "neighbour":
+        raise SourceError(text, where=where, hint=patterns)
+    return f"with jumper J41 at 1-2, {text}: {patterns}, or put J41 and J42 at 2-3"
 
 
 def _check_size(info: wire.Info, scan: Scan, asked: ScanSettings, where: str) -> None:

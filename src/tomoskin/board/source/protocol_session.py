@@ -9,7 +9,14 @@ from enum import Enum, auto
 import numpy as np
 
 from tomoskin.board import wire
-from tomoskin.board.source.agreement import BOARDS_SINCE, check_held, check_version, fit_board
+from tomoskin.board.source.agreement import (
+    BOARDS_SINCE,
+    check_held,
+    check_reference,
+    check_version,
+    fit_board,
+)
+from tomoskin.board.source.boards import board_named
 from tomoskin.board.source.command_queue import CommandQueue, SequenceFilter
 from tomoskin.board.source.settings import Configuration, ScanSettings, Timing, choose_periods
 from tomoskin.core import DriveSamples, Event, Frame, SourceError
@@ -101,10 +108,8 @@ class ProtocolSession:
                 return self._hello(message, now)
             case wire.Info():
                 self._info(message, now)
-            case wire.BoardLimits():
-                self._limits(message, now)
-            case wire.HeldScan() | wire.HeldPattern() | wire.HeldMode():
-                return self._held(message, now)
+            case wire.BoardLimits() | wire.HeldScan() | wire.HeldPattern() | wire.HeldMode():
+                return self._told(message, now)
             case wire.Ack():
                 return self._ack(message, now)
             case wire.Fault():
@@ -216,18 +221,29 @@ class ProtocolSession:
                 self.commands.add((wire.GetBoard(0),))
             self._answered(now)
 
-    def _limits(self, board: wire.BoardLimits, now: float) -> None:
+    def _told(
+        self,
+        message: wire.BoardLimits | wire.HeldScan | wire.HeldPattern | wire.HeldMode,
+        now: float,
+    ) -> list[Received]:
+        if isinstance(message, wire.BoardLimits):
+            return self._limits(message, now)
+        return self._held(message, now)
+
+    def _limits(self, board: wire.BoardLimits, now: float) -> list[Received]:
         pending = self.commands.pending
         asked = isinstance(pending, wire.GetBoard) and board.request == pending.request
         if not asked or self._met is None:
-            return
+            return []
         info, fitted = self._met
+        doubt = check_reference(board_named(board.text), self._scan, fitted, self._where)
         channels = int(np.bincount(self._scan.sample_drive).max())
         periods = choose_periods(board, fitted, channels, info.tick_rate, self._where)
         self.info, self.board = info, board
         self.configuration = self.configuration.on_board(fitted, board, periods)
         self.commands.add(self.configuration.commands(info.minor))
         self._answered(now)
+        return [Event(now, "driven-reference", doubt)] if doubt else []
 
     def _held(
         self, held: wire.HeldScan | wire.HeldPattern | wire.HeldMode, now: float

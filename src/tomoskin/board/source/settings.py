@@ -41,6 +41,9 @@ class ScanSettings:
         Converter clock divider; 64 is 250 kHz at 16 MHz.
     chop_frequency
         Of an alternating drive, Hz; 0: the drive is direct.
+    against_neighbour
+        Whether the skin file has an offset, so the amplifiers read against the electrode before the
+        sink, where a jumper of the board chooses.
     singly
         Whether each drive is sent when it has been read, where the board can; else whole scans.
     """
@@ -52,6 +55,7 @@ class ScanSettings:
     dead_time: float = 5e-6
     prescaler: int = 64
     chop_frequency: int = 0
+    against_neighbour: bool = False
     singly: bool = False
 
     def __post_init__(self) -> None:
@@ -102,6 +106,7 @@ class ScanSettings:
             current_limit=skin.current,
             adc_bits=skin.readout.adc_bits,
             chop_frequency=round(skin.chop_frequency),
+            against_neighbour=skin.readout.offset > 0,
         )
 
 
