@@ -19,6 +19,11 @@
 /* Of the module itself: high keeps its regulator from bursts, since the converter divides by 3.3 V. */
 #define REGULATOR_PIN 23u
 
+/* SPI 0, to the front end's ADS7042. */
+#define SPI_FROM_PIN 20u
+#define SPI_SELECT_PIN 21u
+#define SPI_CLOCK_PIN 22u
+
 #define AMPLIFIER_PIN 26u
 #define AMPLIFIER_INPUT 0u /* of the converter */
 

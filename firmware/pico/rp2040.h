@@ -38,6 +38,7 @@
 #define RESETS_RESET 0x4000C000u
 #define RESETS_DONE 0x4000C008u
 #define RESET_ADC (1u << 0)
+#define RESET_SPI0 (1u << 16)
 #define RESET_DMA (1u << 2)
 #define RESET_IO_BANK0 (1u << 5)
 #define RESET_PADS_BANK0 (1u << 8)
@@ -75,6 +76,7 @@
 #define CLK_SYS_AUX 1u
 #define CLK_USB_CTRL 0x40008054u
 #define CLK_ADC_CTRL 0x40008060u
+#define CLK_PERI_CTRL 0x40008048u
 #define CLK_ENABLE (1u << 11)
 
 /* Pins. */
@@ -82,6 +84,8 @@
 #define GPIO_SIO 5u
 #define PAD(pin) (0x4001C004u + 4u * (pin))
 #define PAD_OUTPUT 0x56u /* as after reset: 4 mA, pull-down */
+#define GPIO_SPI 1u
+#define PAD_PULLED_UP 0x5Au /* an input that reads ones where nothing drives it */
 #define PAD_ANALOGUE 0x80u /* neither output, input nor pull */
 #define SIO_OUT 0xD0000010u
 #define SIO_OUT_SET 0xD0000014u
@@ -115,7 +119,9 @@
 #define FCS_ENABLE (1u << 0)
 #define FCS_DREQ (1u << 3)
 #define FCS_EMPTY (1u << 8)
+#define FCS_OVER (1u << 11)
 #define FCS_FLAGS (3u << 10)
+#define FCS_LEVEL(value) ((value) >> 16 & 15u)
 #define FCS_THRESHOLD_1 (1u << 24)
 
 /* DMA: channel 0. */
@@ -132,6 +138,30 @@
 #define DMA_SIZE_16 (1u << 2)
 #define DMA_INCREMENT_WRITE (1u << 5)
 #define DMA_FROM_ADC (36u << 15)
+#define DMA_FROM_SPI (17u << 15)
+
+/* DMA: channel 1, which chains to itself: to no other. */
+#define DMA1_READ 0x50000040u
+#define DMA1_WRITE 0x50000044u
+#define DMA1_COUNT 0x50000048u
+#define DMA1_CTRL_TRIG 0x5000004Cu
+#define DMA1_CTRL 0x50000050u
+#define DMA1_ALONE (1u << 11)
+
+/* SPI 0. */
+#define SPI_CR0 0x4003C000u
+#define SPI_CR1 0x4003C004u
+#define SPI_DR 0x4003C008u
+#define SPI_SR 0x4003C00Cu
+#define SPI_PRESCALE 0x4003C010u
+#define SPI_RAW 0x4003C018u
+#define SPI_CLEAR 0x4003C020u
+#define SPI_DMA 0x4003C024u
+#define SPI_16_BITS 0xFu /* clock low at rest, bits taken when it rises; selects anew for each word */
+#define SPI_ENABLE (1u << 1)
+#define SPI_RECEIVED (1u << 2)
+#define SPI_OVERRUN (1u << 0)
+#define SPI_DMA_RECEIVE (1u << 0)
 
 /* USB: registers, and the memory that it shares with the processor. */
 #define USB_ADDR 0x50110000u

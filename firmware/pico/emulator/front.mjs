@@ -15,11 +15,14 @@ const NONE = -1;
 const LEAST_DEAD_NS = 1000;
 const MULTIPLEXER_NS = 1500;
 const CONVERSION_NS = 2000;
+const WORD_NS = 1320; // of 16 bits at 12.5 MHz, and the selection before
+const NOTHING = 0xffff; // what a pin reads that is pulled up
 const DMA_CHANNEL = 0;
 
 export class Front {
-  /** `skin` gives codes; `watch` takes what is seen; `complain` a sentence. */
-  constructor(skin, watch, complain) {
+  /** `skin` gives codes; `watch` takes what is seen; `complain` a sentence; `external`: there is an ADS7042. */
+  constructor(skin, watch, complain, external) {
+    this.external = external;
     this.skin = skin;
     this.watch = watch;
     this.complain = complain;
@@ -45,10 +48,20 @@ export class Front {
       chip.gpio[READ_SHIFT + bit].addListener(() => this.#onRead());
     }
     const done = chip.clock.createAlarm(() => chip.adc.completeADCRead(this.code, false));
-    this.#follow(chip.adc.fifo, chip.dma.channels[DMA_CHANNEL]);
+    const dma = chip.dma.channels[DMA_CHANNEL];
+    this.#follow(this.external ? chip.spi[0].rxFIFO : chip.adc.fifo, dma);
     chip.adc.onADCRead = (input) => {
-      this.code = this.#convert(input);
+      if (this.external) {
+        this.code = 0; // it only sets the pace
+      } else {
+        this.code = this.#convert(input);
+      }
       done.schedule(CONVERSION_NS);
+    };
+    const sent = chip.clock.createAlarm(() => chip.spi[0].completeTransmit(this.word));
+    chip.spi[0].onTransmit = () => {
+      this.word = this.external ? this.#convert(AMPLIFIER) << 2 : NOTHING;
+      sent.schedule(WORD_NS);
     };
   }
 

@@ -1,7 +1,7 @@
-// node main.mjs [-s SKIN_MEMORY] [-e SETTINGS] [-w WATCH] [-f] [-d] -p LINE IMAGE: the firmware, a UF2,
+// node main.mjs [-s SKIN_MEMORY] [-e SETTINGS] [-w WATCH] [-f] [-d] [-a] -p LINE IMAGE: the firmware, a UF2,
 // on a simulated RP2040. LINE: descriptor of the master side of a pty, the serial port. What the switches
 // must never do is said on stderr. -e: a file that the flash's last sector begins with. -f: while
-// it scans, as fast as it goes and not in real time. -d: end when stdin does. On stdin: unplug, plug, stall, flow.
+// it scans, as fast as it goes and not in real time. -a: an ADS7042 is on SPI. -d: end when stdin does. On stdin: unplug, plug, stall, flow.
 import { readFileSync, readSync, writeSync } from 'node:fs';
 import { parseArgs } from 'node:util';
 
@@ -26,6 +26,7 @@ const { values: options, positionals } = parseArgs({
     settings: { type: 'string', short: 'e' },
     watch: { type: 'string', short: 'w' },
     fast: { type: 'boolean', short: 'f' },
+    external: { type: 'boolean', short: 'a' },
     dependent: { type: 'boolean', short: 'd' },
   },
 });
@@ -51,7 +52,7 @@ let board;
 let rebooting = false;
 const now = () => past + board.nanos;
 const complain = (what) => process.stderr.write(`${Math.round(now())} ns: ${what}\n`);
-const front = new Front(skin, watch, complain);
+const front = new Front(skin, watch, complain, options.external ?? false);
 let host;
 let out = Buffer.alloc(0);
 

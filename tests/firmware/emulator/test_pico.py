@@ -85,6 +85,34 @@ def test_scans_in_order_at_its_rate_and_samples_on_time(
     assert seen["resets"] == 0
 
 
+FASTER_THAN = {8: 380, 32: 55}
+"""Frames/s with the front end's converter, which drops three conversions."""
+
+
+@pytest.mark.parametrize("electrodes", [8, 32])
+def test_the_converter_of_the_front_end_is_read_where_it_answers(
+    pico: PicoPrograms, tmp_path: Path, electrodes: int
+) -> None:
+    scan = Scan.of(Pattern.adjacent(electrodes))
+    with powered(pico, tmp_path, "-f", "-a") as board, board.link(scan, SETTINGS) as link:
+        link.connect()
+        limits = link.session.board
+        frames = frames_of(link, 20)
+        board.until(lambda seen: seen["drives"] >= 20 * electrodes)
+        seen = board.watch()
+        assert link.frames.lost == link.frames.late == link.counters.corrupt == 0
+    assert limits is not None
+    assert limits.sample == 8000
+    for frame in frames:
+        assert frame.samples.tolist() == star(scan, 4)
+    periods = np.diff([frame.ticks for frame in frames]) / 250e3
+    assert 1 / np.median(periods) > FASTER_THAN[electrodes]
+    assert seen["instants"] > scan.n_samples * 4
+    assert seen["unsettled"] > 4
+    assert seen["jitter"] < MOST_JITTER
+    assert seen["shortestOff"] >= 1e9 * DEAD
+
+
 Change = tuple[str, str, str]
 MUTANTS: dict[str, Change] = {
     "source and sink swapped": (
