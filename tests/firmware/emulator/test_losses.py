@@ -39,14 +39,26 @@ LATE: Change = late("hal_delay_us(12u);")
 SILENT_PICO: dict[str, Change] = {
     "an overflow that is not read": (
         "pico/converter.c",
-        "} else if (came_late()) {",
-        "} else if (false && came_late()) {",
+        "too_many = (state & FCS_OVER) != 0u || FCS_LEVEL(state) > MOST_WAITING;",
+        "too_many = (state & FCS_OVER) != 0u && false;",
     ),
     "an overflow that is not counted": ("pico/converter.c", "        late++;\n", ""),
     "one that no frame says": (
         "src/scan.c",
         "        scan.noticed = (uint8_t)(scan.noticed | FLAG_LATE);\n",
         "",
+    ),
+}
+SILENT_FRONT_END: dict[str, Change] = {
+    "words of the channel before": (
+        "pico/converter.c",
+        "too_many = waited > MOST_WAITING;",
+        "too_many = false;\n        waited = 0u;",
+    ),
+    "no time for the multiplexer": (
+        "pico/converter.c",
+        "#define DROPPED_OF_FRONT_END 3u",
+        "#define DROPPED_OF_FRONT_END 0u",
     ),
 }
 DEAF: Change = (
@@ -121,8 +133,8 @@ def examine(talk: Talk, flag: FrameFlag, count: Callable[[Losses], int], right: 
     assert count(lost) > 0
 
 
-def examine_pico(programs: PicoPrograms, folder: Path) -> None:
-    with powered(programs, folder, "-f") as board:
+def examine_pico(programs: PicoPrograms, folder: Path, *options: str) -> None:
+    with powered(programs, folder, "-f", *options) as board:
         talk = Talk(SerialTransport(board.board.port))
         examine(talk, FrameFlag.LATE, lambda lost: lost.conversions, star(SCAN, 1))
         talk.transport.close()
@@ -139,8 +151,11 @@ def examine_mega(programs: Programs, elf: Path, folder: Path) -> None:
         board.said()
 
 
-def test_a_pico_that_is_late_says_so_and_reads_right(pico: PicoPrograms, tmp_path: Path) -> None:
-    examine_pico(mutated_image(pico, tmp_path, LATE), tmp_path)
+@pytest.mark.parametrize("options", [(), ("-a",)], ids=["own", "front end"])
+def test_a_pico_that_is_late_says_so_and_reads_right(
+    options: tuple[str, ...], pico: PicoPrograms, tmp_path: Path
+) -> None:
+    examine_pico(mutated_image(pico, tmp_path, LATE), tmp_path, *options)
 
 
 @pytest.mark.slow
@@ -149,6 +164,16 @@ def test_a_pico_that_hides_it_is_noticed(name: str, pico: PicoPrograms, tmp_path
     planted = mutated_image(pico, tmp_path, LATE, SILENT_PICO[name])
     with pytest.raises(AssertionError):
         examine_pico(planted, tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SILENT_FRONT_END)
+def test_a_front_end_that_is_read_wrongly_is_noticed(
+    name: str, pico: PicoPrograms, tmp_path: Path
+) -> None:
+    planted = mutated_image(pico, tmp_path, LATE, SILENT_FRONT_END[name])
+    with pytest.raises(AssertionError):
+        examine_pico(planted, tmp_path, "-a")
 
 
 @pytest.mark.parametrize("changes", [(DEAF,), (SMALL, UNREAD)], ids=["overrun", "ring"])

@@ -186,7 +186,7 @@ LATE = late("for (volatile uint8_t wait = 0u; wait < 6u; wait++) {\n        }")
 """By half a microsecond; beside the main loop's lock, the multiplexer still has its time."""
 LATER = late("hal_delay_us(1u);")
 """So late that the next conversion has ended."""
-DRAINS: Change = ("pico/converter.c", "if (!runs()) {", "if (!runs() || true) {")
+DRAINS: Change = ("pico/converter.c", "if (runs()) {", "if (runs() && false) {")
 LONGEST_ON = 5e-3
 """s that a drive is on here, with its guard's slack; what a reset ends has been on for longer."""
 STAYS_ON: Change = (
