@@ -1,7 +1,6 @@
 """The board's real firmware on a simulated processor, before the twin's sheet."""
 
 from tomoskin_emulator.flash import (
-    ask_losses as ask_losses,
     check_current as check_current,
     read_identity as read_identity,
     say_board as say_board,

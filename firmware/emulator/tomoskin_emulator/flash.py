@@ -13,13 +13,13 @@ from pathlib import Path
 
 from tomoskin.board.source import (
     BOARDS_SINCE,
-    LOSSES_SINCE,
     BoardRecord,
     Exchange,
     SerialTransport,
     Transport,
+    ask_info,
 )
-from tomoskin.board.wire import BoardLimits, GetBoard, GetInfo, GetLosses, Info, Losses
+from tomoskin.board.wire import BoardLimits, GetBoard, Info
 from tomoskin.core import SourceError, StrPath
 from tomoskin_emulator.board_process import BoardIdentity
 from tomoskin_emulator.program import FLASH, PAGE, firmware_image, pack_uf2, run_tool
@@ -95,7 +95,6 @@ _REFERENCE = 1.225
 
 _LONGEST = 60.0
 _HINT = "is it the board's port, and does nothing else use it?"
-_AGAIN, _TRIES = 0.5, 10
 
 
 def sense_resistor(current: float) -> float:
@@ -173,31 +172,6 @@ def read_identity(port: str) -> BoardIdentity:
         return BoardIdentity.of(info, _ask_name(transport, info))
     finally:
         transport.close()
-
-
-def ask_info(transport: Transport) -> Info:
-    """What a firmware says of itself, asked until it answers; SourceError where none does."""
-    info = Exchange(transport).ask(GetInfo(0), Info, patience=_AGAIN, tries=_TRIES)
-    if info is None:
-        raise SourceError(
-            f"no firmware has answered for {_AGAIN * _TRIES:.0f} s",
-            where=transport.name,
-            hint="is it the board's port? tomoskin firmware flash comes first",
-        )
-    return info
-
-
-def ask_losses(transport: Transport) -> Losses | None:
-    """What a board has lost since its power came up; None where its firmware does not count.
-
-    Raises
-    ------
-    SourceError
-        Where no firmware answers.
-    """
-    if ask_info(transport).minor < LOSSES_SINCE:
-        return None
-    return Exchange(transport).ask(GetLosses(0), Losses)
 
 
 def _ask_name(transport: Transport, info: Info) -> str:

@@ -92,9 +92,8 @@ def _port() -> Iterator[CheckFinding]:
 
 def _board(source: str) -> Iterator[CheckFinding]:
     """What the board behind ``source`` has lost; its electrodes get no current."""
-    from tomoskin.board.source import open_source
+    from tomoskin.board.source import ask_losses, open_source
     from tomoskin.model.skin import Skin
-    from tomoskin.twin.emulator import ask_losses
 
     try:
         transport = open_source(source, Skin.load("textile-disc-8"))

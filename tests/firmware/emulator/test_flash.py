@@ -11,12 +11,11 @@ from firmware.boards import SCAN, SETTINGS, built, running
 from firmware.conftest import need
 from firmware.emulator.bootloader import Mega
 from firmware.emulator.test_emulator import frames_of
-from tomoskin.board.source import Link, SerialTransport
+from tomoskin.board.source import Link, SerialTransport, ask_info
 from tomoskin.cli import main
 from tomoskin.core import SourceError
 from tomoskin_emulator import program
 from tomoskin_emulator.board_process import BoardIdentity
-from tomoskin_emulator.flash import ask_info
 
 
 @pytest.fixture

@@ -12,6 +12,9 @@ from pathlib import Path
 import pytest
 
 from firmware.boards import SCAN, Process, Talk, star_counts
+from firmware.emulator.pico import powered, star
+from firmware.emulator.test_mutants import mutated as mutated_elf
+from firmware.emulator.test_pico import late, mutated as mutated_image
 from tomoskin.board.source import SerialTransport
 from tomoskin.board.wire import (
     Ack,
@@ -27,10 +30,7 @@ from tomoskin.board.wire import (
     Start,
 )
 from tomoskin.core import Frame
-from tomoskin.twin.emulator.program import PicoPrograms, Programs
-from twin.emulator.pico import powered, star
-from twin.emulator.test_mutants import mutated as mutated_elf
-from twin.emulator.test_pico import late, mutated as mutated_image
+from tomoskin_emulator.program import PicoPrograms, Programs
 
 Change = tuple[str, str, str]
 PATIENCE, FRAMES = 20.0, 60

@@ -21,6 +21,7 @@ from tomoskin.board.source.clock import (
 )
 from tomoskin.board.source.link import Link as Link
 from tomoskin.board.source.protocol_session import Received as Received
+from tomoskin.board.source.questions import ask_info as ask_info, ask_losses as ask_losses
 from tomoskin.board.source.serial import (
     SerialTransport as SerialTransport,
     list_ports as list_ports,
