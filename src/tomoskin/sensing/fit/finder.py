@@ -14,6 +14,7 @@ from tomoskin.core import Detection, FloatArray, reach, show
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.skin import Skin
 from tomoskin.sensing.fit import policy as decisions
+from tomoskin.sensing.fit.deforming import Deforming, FrameData, Searched
 from tomoskin.sensing.fit.expectation import Expectation, ResidualResponse
 from tomoskin.sensing.fit.hypotheses import (
     CommonModeJump,
@@ -29,6 +30,7 @@ from tomoskin.sensing.fit.sight import CellDiscs, DriveView, Sight
 from tomoskin.sensing.fit.spot import CONTENT, LOG_RADIUS, N_PARAMETERS
 from tomoskin.sensing.fit.spot_fit import Deficit
 from tomoskin.sensing.fit.spot_model import SpotModel
+from tomoskin.sensing.fit.strain_state import StrainState
 from tomoskin.sensing.fit.unexplained import FrameWatch
 
 _GROWS = 0.5
@@ -90,8 +92,9 @@ class SpotFinder:
         pattern = model.response.state.model.pattern
         self.watch = FrameWatch(pattern, self._policy)
         self._sight = Sight(model, self.watch.channels, noise, gain)
+        self.deforming = Deforming(model.strained)
         self.view = DriveView(
-            model, skin, CellDiscs.of(mesh), self._sight, self.watch, self._residual
+            model, skin, CellDiscs.of(mesh), self._sight, self.watch, self._residual, self.deforming
         )
         self._wander = 0.0
         self._newest_slow: tuple[tuple[FloatArray, ...], FloatArray] | None = None
@@ -112,6 +115,7 @@ class SpotFinder:
         adopt()
         self._before, self._expected = other._before, other._expected
         self._residual, self._jump = other._residual, other._jump
+        self.deforming.go_on(other.deforming)
         self.view = replace(self.view, residual=self._residual)
         self.watch.go_on(other.watch)
 
@@ -141,14 +145,18 @@ class SpotFinder:
         """
         self._sight.look(nuisance, np.zeros((len(dv), 0)) if jumps is None else jumps)
         self._wander = wander
-        data = self._data = self.view.change(dv)
+        data = self._residual.without(dv / self._sight.scale)
         self.watch.begin(data, self._sight.of(self.watch.excess).gauge)
-        (detected, rival), jump, matched = self._searched(data)
+        found = self.deforming.decided(self._frame(data), partial(self._searched, data))
+        detected, _, _, matched, _, state = found
         solver = self._model.solver
         times = self.watch.unexplained(solver, detected.fit, matched)
         if times > 1.0:  # it may be no touch in as much noise
-            (detected, rival), jump, matched = self._searched(data, times)
-        self._rival, self._jump = rival, jump
+            found = self._searched(data, state, times)
+            detected, matched = found.detected, found.matched
+        self.deforming.take(found)
+        self._data = data - self.deforming.moved
+        self._rival, self._jump = found.rival, found.jump
         self.watch.end(solver, detected.fit, matched, times)
         self._unrest = self._motion(detected.fit.spots)
         self._before, self._deficit = detected.fit.spots, detected.fit.deficit
@@ -171,15 +179,21 @@ class SpotFinder:
         whole = self._change @ self._model.solver.table.basis
         return np.asarray(whole - self._model.changes(self._shown))
 
+    def _frame(self, data: FloatArray) -> FrameData:
+        """A frame beside the touches of the last one."""
+        return FrameData(data, self._sight.of(self.watch.excess).table, self._model, self._before)
+
     def _searched(
-        self, data: FloatArray, times: float = 1.0
-    ) -> tuple[Explained, CommonModeJump, Matched]:
-        """Touches of ``data`` (n_meas,) in so many times the noise that is known; and whether the
-        common mode has jumped."""
+        self, data: FloatArray, state: StrainState | None, times: float = 1.0
+    ) -> Searched:
+        """What explains ``data`` (n_meas,) where the sheet is deformed as ``state`` says, in so
+        many times the noise that is known: touches, and whether the common mode has jumped."""
         sight = self._sight.of(self.watch.excess)
         seen, matched, _, jumps = sight if times == 1.0 else sight.louder(times)
-        whitened, rest = seen.whitened(data)
-        left = self._residual.directions(seen.matrix)
+        whitened, rest = seen.whitened(data if state is None else data - state.moved)
+        left = self._slow(self._residual.directions(seen.matrix), jumps)
+        if state is not None:
+            left = np.vstack([state.rows @ seen.matrix.T, left])
         problem = Problem(
             response=self._model.response,
             reduced=self._model.reduced,
@@ -190,11 +204,12 @@ class SpotFinder:
             grows=self._unrest * _GROWS,
             data=whitened,
             rest=rest,
-            left=self._slow(left, jumps),
+            left=left,
             expected=self._expected,
         )
         explain = partial(self._explained, matched)
-        return *self._jump.decided(problem, jumps, self._policy, explain), matched
+        (detected, rival), jump = self._jump.decided(problem, jumps, self._policy, explain)
+        return Searched(detected, rival, jump, matched, problem, state)
 
     def _slow(self, left: FloatArray, jumps: Jumps) -> FloatArray:
         """(k, c) what stays from frame to frame and is no touch: residual responses, and how far

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from tomoskin.core import Detection, FloatArray, IntArray, finished
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.skin import Skin
+from tomoskin.sensing.fit.deforming import Deforming
 from tomoskin.sensing.fit.excess import Channels, Excess, Gauge
 from tomoskin.sensing.fit.expectation import ResidualResponse
 from tomoskin.sensing.fit.hypotheses import Jumps
@@ -184,6 +185,8 @@ class DriveView:
         Of the images.
     sight, watch, residual
         How the newest frame was seen, what touches do not explain, and what they left behind.
+    deforming
+        How the sheet is deformed.
     """
 
     model: SpotModel
@@ -192,6 +195,7 @@ class DriveView:
     sight: Sight
     watch: FrameWatch
     residual: ResidualResponse
+    deforming: Deforming
 
     @property
     def key(self) -> NoiseKey:
@@ -208,8 +212,10 @@ class DriveView:
         return noise, jumps @ jumps.T + left.T @ left
 
     def change(self, dv: FloatArray) -> FloatArray:
-        """(n_meas,) V of the model, of difference data less what touches have left behind."""
-        return self.residual.without(dv / self.sight.scale)
+        """(n_meas,) V of the model, of difference data less what touches have left behind, and less
+        what a deformation of the sheet does."""
+        data = self.residual.without(dv / self.sight.scale)
+        return np.asarray(data - self.deforming.moved)
 
     def spot(self, detection: Detection) -> FloatArray:
         """(4,) of a touch that is shown."""

@@ -22,6 +22,7 @@ from tomoskin.sensing.fit.profile import FILLING, Profile
 from tomoskin.sensing.fit.solver import NumpySolver, SheetDomain
 from tomoskin.sensing.fit.spot import CONTENT, Footprints, Response
 from tomoskin.sensing.fit.spot_fit import Deficit, Fit, SpotPrior
+from tomoskin.sensing.fit.strained_sheet import StrainedSheet
 from tomoskin.sensing.fit.table import ResponseTable
 from tomoskin.sensing.fit.tabulate import Tabulation, kept_tabulation
 from tomoskin.sensing.fit.uneven_sheet import fields_of, fitting_sheet
@@ -166,6 +167,11 @@ class SpotModel:
         return Candidates.of(self.response, self.prior)
 
     @cached_property
+    def strained(self) -> StrainedSheet:
+        """The sheet with smooth strains all over."""
+        return StrainedSheet(self.response)
+
+    @cached_property
     def _feet(self) -> tuple[Footprints, ...]:
         """Of the candidates, for uneven sheets."""
         return footprints_of(self.response, self.prior)
@@ -196,6 +202,7 @@ class SpotModel:
         """Do what takes seconds the first time, and half a second later on, before frames come."""
         _ = self.tabulation.lattices, self.candidates, self._feet, self.solver, self.reduced
         _ = fields_of(self.response.spots.mesh)
+        self.strained.warm_up()
 
     def changes(self, spots: FloatArray) -> FloatArray:
         """(k, n_meas) V that each of ``spots`` (k, 4) alone adds to the reference, by the table."""
@@ -229,7 +236,10 @@ class SpotModel:
         reduced = yield from Reduced.making(response, certificate, self.prior)
         yield
         solver = made._solver_of(table)
-        vars(made).update(candidates=candidates, reduced=reduced, solver=solver)
+        strained = self.strained.adapted(response)
+        vars(made).update(
+            candidates=candidates, reduced=reduced, solver=solver, strained=strained
+        )
         table.__dict__["typical"] = yield from table.typifying()
         return made
 

@@ -1,0 +1,248 @@
+"""A deformation of the sheet and touches on it compete for each frame.
+
+A frame is explained by touches alone, by a deformation, or by both; the likeliest explanation
+counts (evidence: MacKay 2003, chapter 28). A deformation goes on from frame to frame, as touches
+do. Where a frame is as the last one, only that is fitted; otherwise it is asked whether the sheet
+deforms, or deforms otherwise.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from tomoskin.core import FloatArray, reach
+from tomoskin.sensing.fit import policy as decisions
+from tomoskin.sensing.fit.hypotheses import CommonModeJump, Rival
+from tomoskin.sensing.fit.problem import Matched, Problem, WhitenedTable
+from tomoskin.sensing.fit.selection import SpotDetections
+from tomoskin.sensing.fit.spot import CONTENT, N_PARAMETERS
+from tomoskin.sensing.fit.spot_model import SpotModel
+from tomoskin.sensing.fit.strain import Strain
+from tomoskin.sensing.fit.strain_state import Explained, StrainState, likeliest, starts
+from tomoskin.sensing.fit.strained_sheet import StrainedSheet
+
+_BEGINS, _MOVES, _CHANGES = 6.0, 2.0, 4.0
+"""Logarithms of the odds against a deformation's beginning in a frame, its moving, and its being
+another one than was told."""
+
+_LEAVES = 30.0
+"""Squares beyond noise that an explanation leaves, from which others are asked for."""
+
+_NEAR = 0.25
+"""Part of what a frame shows that a table of folds may leave more than touches do, for the exact
+model to be asked."""
+
+_FAINT = 4.0
+"""Squared deviations by which a deformation must show, or it is over."""
+
+_QUIET = 5
+"""Frames in which it does not show, after which it is over."""
+
+_PLACE, _SWELLS = 5e-3, 0.2
+"""How far a touch may move from one frame to the next along each axis, m, and by what its radius's
+logarithm may grow, beside a deformation that begins."""
+
+_STARTS = 2
+"""Folds that are looked at, the best of the table."""
+
+
+class Searched(NamedTuple):
+    """What explains a frame where the sheet is so."""
+
+    detected: SpotDetections
+    rival: Rival | None
+    jump: CommonModeJump
+    matched: Matched
+    problem: Problem
+    state: StrainState | None
+
+    @property
+    def evidence(self) -> float:
+        """Its logarithm, but for what all explanations have in common."""
+        return self.problem.evidence(self.detected.fit)
+
+
+Search = Callable[[StrainState | None], Searched]
+"""The touches of a frame on a sheet that is so."""
+
+
+@dataclass(frozen=True, eq=False)
+class FrameData:
+    """A frame, and how it is seen.
+
+    Attributes
+    ----------
+    data
+        (n_meas,) V.
+    seen
+        The table that its touches are fitted by.
+    model
+        Of touches.
+    before
+        (k, 4) touches of the last frame.
+    """
+
+    data: FloatArray
+    seen: WhitenedTable
+    model: SpotModel
+    before: FloatArray
+
+    @property
+    def count(self) -> int:
+        """How many touches there were."""
+        return len(self.before)
+
+    @cached_property
+    def _expanded(self) -> FloatArray:
+        """(k, m, n_meas) V: what each touch of the last frame did, and its slopes."""
+        solver = self.model.solver
+        return np.asarray(solver.expanded(self.before) @ solver.table.basis)
+
+    @cached_property
+    def untouched(self) -> FloatArray:
+        """(n_meas,) V without what the touches of the last frame did."""
+        return np.asarray(self.data - self._expanded[:, 0].sum(axis=0))
+
+    @cached_property
+    def others(self) -> FloatArray:
+        """(q, r) what these may do otherwise in this frame, whitened, a deviation each."""
+        prior = self.model.prior
+        size = [_PLACE, _PLACE, _SWELLS, prior.content, prior.directed, prior.reshaped]
+        rows = np.array(size)[:, None] * self._expanded[:, 1:]
+        return np.asarray(rows.reshape(-1, len(self.data)) @ self.seen.full.T)
+
+
+class Deforming:
+    """How the sheet is deformed, frame after frame.
+
+    Parameters
+    ----------
+    sheet
+        At rest.
+
+    Attributes
+    ----------
+    state
+        What is known of its strain; None where it is at rest.
+    """
+
+    def __init__(self, sheet: StrainedSheet) -> None:
+        self.sheet = sheet
+        self.state: StrainState | None = None
+        self._moves, self._quiet, self._asked, self._vain = False, 0, 0.0, 0
+
+    def decided(self, frame: FrameData, search: Search) -> Searched:
+        """What explains a frame: touches, a deformation, or both."""
+        reach("deformation")
+        now = self.state and self.state.after(moves=False)
+        if self._moves and self.state is not None:
+            quick = self._moved(frame, search, self.state)
+            if quick is not None:
+                return quick
+        first = search(now)
+        if not self._asks(first, frame):
+            self._moves = False
+            return first
+        best, others = first, self._others(frame, first)
+        score = first.evidence - _beginning(first, frame)
+        for found, odds in others[:2]:
+            other = search(found.state)
+            own = other.evidence - odds - _beginning(other, frame)
+            if own > score:
+                best, score = other, own
+        self._moves = best is not first and best.state is not None
+        self._vain = self._vain + 1 if best is first else 0
+        return best
+
+    def _moved(self, frame: FrameData, search: Search, state: StrainState) -> Searched | None:
+        """The explanation by a deformation that moves on, where that is enough."""
+        found = self._fitted(frame, state.after(moves=True))
+        moved = search(found.state)
+        return None if self._asks(moved, frame, quick=True) else moved
+
+    def _asks(self, found: Searched, frame: FrameData, *, quick: bool = False) -> bool:
+        """Whether other explanations than one are asked for: touches begin, or much is left."""
+        fit = found.detected.fit
+        left = fit.beyond
+        if len(fit.spots) > frame.count:
+            return True
+        if left < max(_LEAVES, fit.degrees):
+            self._vain = 0
+            return False
+        return quick or decisions.looks_again(self._vain) or left > 2.0 * self._asked
+
+    def _fitted(self, frame: FrameData, begin: StrainState) -> Explained:
+        return likeliest(begin, frame.untouched, frame.seen.full, frame.others)
+
+    def _others(self, frame: FrameData, first: Searched) -> list[tuple[Explained, float]]:
+        """Deformations that may explain a frame, the likeliest first; and the odds against."""
+        self._asked = first.detected.fit.beyond
+        found: list[tuple[Explained, float]] = []
+        size = 0.0
+        if self.state is not None:
+            found.append((self._fitted(frame, self.state.after(moves=True)), _MOVES))
+            size = self.state.size
+        odds = _BEGINS if self.state is None else _CHANGES
+        for strain in self._starts(frame):
+            begin = StrainState.about(self.sheet, strain, size)
+            found.append((self._fitted(frame, begin), odds))
+        found.sort(key=lambda one: one[1] - one[0].evidence)
+        return found
+
+    def _starts(self, frame: FrameData) -> list[Strain]:
+        folds = starts(self.sheet, frame.untouched, frame.seen.full, frame.others, _STARTS)
+        return [*folds, Strain.none("stretch")]
+
+    @property
+    def moved(self) -> FloatArray | float:
+        """(n_meas,) V that the deformation has moved the voltages by."""
+        return 0.0 if self.state is None else self.state.moved
+
+    def go_on(self, other: Deforming) -> None:
+        """Go on where an ``other`` is, on another sheet."""
+        state = other.state
+        if state is not None:
+            self.state = state if other.sheet is self.sheet else state.on(self.sheet)
+
+    def take(self, found: Searched) -> None:
+        """Take what a frame was explained with."""
+        state, fit = found.state, found.detected.fit
+        if state is None:
+            self.state = None
+            return
+        d = len(state.mean)
+        rows, rest = fit.unknown[:d], fit.unknown[d:]
+        others = np.vstack([rest, _free(found)])
+        state = state.told(fit.residual, rows, others)
+        state = state.linear_again(found.problem.seen.matrix)
+        shown = found.problem.seen.matrix @ state.moved
+        self._quiet = self._quiet + 1 if shown @ shown < _FAINT else 0
+        over = self._quiet >= _QUIET and not len(fit.spots)
+        self.state = None if over else state
+
+
+def _free(found: Searched) -> FloatArray:
+    """(4k, c) what the numbers of the touches may be, by what is expected of them, each deviation.
+
+    The content of a touch is not expected: the prior says how large it may be.
+    """
+    fit, prior, expected = found.detected.fit, found.problem.prior, found.problem.expected
+    rows = [np.zeros((0, len(fit.residual)))]
+    for k, number in enumerate(fit.known or (None,) * len(fit.spots)):
+        own = np.diag(1.0 / prior.weights)
+        if number is not None:
+            own[:CONTENT, :CONTENT] = np.linalg.cholesky(expected.covariances[number])
+        rows.append(own.T @ fit.slopes[N_PARAMETERS * k : N_PARAMETERS * (k + 1)])
+    return np.vstack(rows)
+
+
+def _beginning(found: Searched, frame: FrameData) -> float:
+    """Logarithm of the odds against so many touches' beginning."""
+    more = max(len(found.detected.fit.spots) - frame.count, 0)
+    return more * math.log(200)
