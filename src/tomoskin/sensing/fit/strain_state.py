@@ -123,6 +123,9 @@ class StrainState:
         information = square[:-1, :-1] + np.eye(len(rows))
         found = np.linalg.inv(information)
         mean = self.mean + self.root @ (found @ square[:-1, -1])
+        n = len(self.at.numbers)
+        held = self.sheet.prior.held(self.at.moved(mean[:n]), self.sheet.reach)
+        mean[:n] = held.numbers - self.at.numbers
         covariance = self.root @ found @ self.root.T
         return replace(self, mean=mean, covariance=(covariance + covariance.T) / 2)
 
@@ -160,7 +163,7 @@ class Explained:
 def likeliest(
     begin: StrainState, data: FloatArray, full: FloatArray, others: FloatArray
 ) -> Explained:
-    """The likeliest numbers for ``data`` (n_meas,) V, from those of ``begin`` and by its prior.
+    """What ``begin`` expects, linear about the likeliest numbers for ``data`` (n_meas,) V.
 
     ``full`` (r, n_meas) 1/V whitens; ``others`` (q, r) are directions of what else is not known, of
     touches too.
@@ -180,9 +183,8 @@ def likeliest(
         misfit = float(square[-1, -1] - square[:-1, -1] @ solved)
         log_size = float(np.linalg.slogdet(information)[1]) / 2
         found = Explained(state, -misfit / 2 - log_size - metric.log_size, misfit)
+        found = replace(found, state=replace(state, mean=expected))
         mean = expected + root @ solved
-        covariance = root @ np.linalg.inv(information) @ root.T
-        found = replace(found, state=replace(state, mean=mean, covariance=covariance))
         if best is not None and best.evidence > found.evidence - _SETTLED:
             return max(best, found, key=lambda one: one.evidence)
         best = found
