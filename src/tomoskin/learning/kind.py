@@ -321,9 +321,6 @@ class Kind(Generic[M]):
         None where it reads nothing of that sort.
     reading
         What it reads in frames that is shown; None where that is nothing.
-    lacking
-        Touches of a frame in which nothing was read, and the mesh → a sentence where they look as
-        if such a calibration were needed, else None.
     locates
         Whether its positions stand in for those of the detections.
     fits
@@ -342,7 +339,6 @@ class Kind(Generic[M]):
     check: Callable[[Calibration[M], Skin], None] | None = None
     directions: Callable[[M], FloatArray] | None = None
     reading: type[Reading] | None = None
-    lacking: Callable[[Sequence[Touch], Mesh], str | None] | None = None
     locates: bool = False
     fits: bool = False
     own_settings: bool = False

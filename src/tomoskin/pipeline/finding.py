@@ -16,6 +16,7 @@ from tomoskin.pipeline.frame_subspace import JUMP
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.sensing.fit import (
     EXHAUSTIVE,
+    Deformation,
     Pace,
     SpotFinder,
     SpotModel,
@@ -33,6 +34,8 @@ class RegionFinder:
     """Touches are regions of the image."""
 
     like_touch = rises = False
+    deformation: Deformation | None = None
+    moved: FloatArray | float = 0.0
     others: FloatArray | None = None
     problem: str | None = None
 
@@ -152,6 +155,16 @@ class FitFinder:
             return None
         found = self.spots.push(np.where(lost, 0.0, dv), np.eye(len(dv))[:, lost])
         return found[0] if found else None
+
+    @property
+    def deformation(self) -> Deformation | None:
+        """How the sheet is deformed as a whole in the newest frame; None where it is at rest."""
+        return self.spots.deforming.told
+
+    @property
+    def moved(self) -> FloatArray | float:
+        """(n_meas,) of difference data that this has moved them by."""
+        return self.spots.moved
 
     @property
     def others(self) -> FloatArray:

@@ -137,6 +137,7 @@ class Following:
         self._sheets: BodySheets | None = None
         poses = [applied.poses for applied in self._applied.values() if len(applied.poses)]
         plain = prepared.operator.difference == "plain"
+        self._taught = bool(poses)
         if poses and reference and prepared.spots and fitted and plain:
             self._sheets = BodySheets(prepared.spots, reference, poses[0])
         self._interval = interval if interval > 0 else prepared.longest_scan
@@ -355,7 +356,8 @@ class Following:
         readings: dict[str, Any],
     ) -> FrameResult:
         shows = conditioned.differences is not None
-        doubt = self._doubt(touches, readings)
+        deformed = None if self._taught or not shows else self._finder.deformation
+        doubt = self._doubt(readings) or (deformed and deformed.text)
         return FrameResult(
             sequence=measured.sequence,
             host_time=measured.host_time,
@@ -372,21 +374,16 @@ class Following:
             readings=readings,
             calibrated=self._calibrated,
             unexplained=doubt or conditioned.problem or (shows and self._finder.problem) or None,
+            deformation=deformed,
             scanned=measured.scanned,
             scan_time=measured.scan_time,
         )
 
-    def _doubt(self, touches: tuple[Touch, ...], readings: dict[str, Any]) -> str | None:
-        """What is wrong with what was read, or looks as if more should be; in a sentence."""
-        for kind in calibration_kinds():
-            reading, doubt = readings.get(kind.name), None
-            if isinstance(reading, Reading):
-                doubt = reading.problem
-            elif reading is None and kind.lacking is not None:
-                doubt = kind.lacking(touches, self.prepared.mesh)
-            if doubt:
-                return doubt
-        return None
+    @staticmethod
+    def _doubt(readings: dict[str, Any]) -> str | None:
+        """What is wrong with what calibrations have read, in a sentence."""
+        said = (one.problem for one in readings.values() if isinstance(one, Reading))
+        return next(filter(None, said), None)
 
 
 def _imaging(

@@ -11,6 +11,7 @@ import numpy as np
 
 from tomoskin.core import FloatArray, Image, Touch, Voltages
 from tomoskin.learning import TOUCH, CalibrationHealth, Reading
+from tomoskin.sensing.fit import Deformation
 from tomoskin.sensing.signal import BaselineState, Health
 from tomoskin.sensing.track import TouchEvent
 
@@ -101,6 +102,8 @@ class FrameResult:
         What it shows that is neither touch nor noise, in a sentence, or None.
     calibrated
         Names of the kinds of calibrations in use.
+    deformation
+        How the sheet is deformed as a whole, though nothing was taught; None where it is not.
     """
 
     sequence: int
@@ -118,6 +121,7 @@ class FrameResult:
     readings: Mapping[str, Any] = field(default_factory=dict)
     unexplained: str | None = None
     calibrated: frozenset[str] = frozenset()
+    deformation: Deformation | None = None
     scanned: float = math.nan
     scan_time: float = math.nan
 

@@ -388,29 +388,6 @@ class BodyApplied(Applied):
         return reading
 
 
-_FOLD = 3
-"""Touches in a line that are doubted; a sheet that is bent by 15° or more shows as many."""
-
-_ACROSS, _ASIDE = 0.7, 0.1
-"""They go across this part of the sheet, and lie within this part of it beside their line."""
-
-
-def looks_bent(touches: Sequence[Touch], mesh: Mesh) -> str | None:
-    """A sentence where touches lie in a line across the sheet, as those of a fold do; else None."""
-    if len(touches) < _FOLD:
-        return None
-    places = np.array([(touch.detection.x, touch.detection.y) for touch in touches])
-    places -= places.mean(axis=0)
-    along, aside = np.linalg.svd(places, full_matrices=False)[2]
-    size = float(np.ptp(mesh.points[:, :2] @ along))
-    if np.ptp(places @ along) < _ACROSS * size or np.ptp(places @ aside) > _ASIDE * size:
-        return None
-    return (
-        f"{len(touches)} touches lie in a line across the sheet: if it is bent, they are its fold, "
-        "and others are misplaced; teach its motion with tomoskin calibrate body"
-    )
-
-
 def _apply(model: BodyModel, conditions: Conditions) -> Applied:
     fit = conditions.touch_fit()
     return Applied() if fit is None else BodyApplied(model, fit)
@@ -426,7 +403,6 @@ BODY = Kind(
     apply=_apply,
     directions=lambda model: model.directions,
     reading=BodyReading,
-    lacking=looks_bent,
     fits=True,
 )
 """The body's motion; its model is a :class:`BodyModel`. Title and attachment are older than the

@@ -140,6 +140,19 @@ class MaterialSection(Section, section="material"):
         Quantity("sheet resistance", "ohm/sq", 1e-4, 1e8),
         "Resistance of a square of the unloaded sheet.",
     )
+    gauge: float | None = key(
+        Number(-1000, 1000),
+        "Relative rise of resistance per mean strain in the plane, as strips are measured. With it, "
+        "deformations are told as strains.",
+        default=None,
+    )
+    gauge_across: float | None = key(
+        Number(-1000, 1000),
+        "The same for half the difference of the two principal strains: positive where a strip "
+        "conducts less along its stretch than across it.",
+        default=None,
+        needs="gauge",
+    )
 
 
 class DriveSection(Section, section="drive"):

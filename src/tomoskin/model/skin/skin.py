@@ -53,6 +53,8 @@ class Skin:
         Thickness of the soft layer under the sheet, m; None where the file does not say it.
     conductivity
         Sheet conductance of the unloaded sheet, S.
+    gauge, gauge_across
+        How its resistance rises with mean strain, and with the deviator; None where not known.
     contact_impedance
         (n,) per electrode, Ω·m.
     current
@@ -72,6 +74,8 @@ class Skin:
     surface: Surface
     layer: float | None
     conductivity: float
+    gauge: float | None
+    gauge_across: float | None
     contact_impedance: FloatArray
     current: float
     mesh_cells: int
@@ -206,6 +210,8 @@ class Skin:
             surface=body.surface,
             layer=sections.surface.layer,
             conductivity=1.0 / sections.material.sheet_resistance,
+            gauge=sections.material.gauge,
+            gauge_across=sections.material.gauge_across,
             contact_impedance=body.contact_impedance,
             current=sections.drive.current,
             mesh_cells=sections.mesh.cells,

@@ -18,6 +18,7 @@ import numpy as np
 
 from tomoskin.core import FloatArray, reach
 from tomoskin.sensing.fit import policy as decisions
+from tomoskin.sensing.fit.deformation import Deformation, StrainLaw
 from tomoskin.sensing.fit.hypotheses import CommonModeJump, Rival
 from tomoskin.sensing.fit.problem import Matched, Problem, WhitenedTable
 from tomoskin.sensing.fit.selection import SpotDetections
@@ -47,6 +48,9 @@ _QUIET = 5
 _PLACE, _SWELLS = 5e-3, 0.2
 """How far a touch may move from one frame to the next along each axis, m, and by what its radius's
 logarithm may grow, beside a deformation that begins."""
+
+_RESIDUAL = 0.15
+"""Part of the largest deformation that the sheet may keep when it is over: that is none."""
 
 _STARTS = 2
 """Folds that are looked at, the best of the table."""
@@ -125,6 +129,8 @@ class Deforming:
     ----------
     sheet
         At rest.
+    law
+        How it answers strain.
 
     Attributes
     ----------
@@ -132,8 +138,8 @@ class Deforming:
         What is known of its strain; None where it is at rest.
     """
 
-    def __init__(self, sheet: StrainedSheet) -> None:
-        self.sheet = sheet
+    def __init__(self, sheet: StrainedSheet, law: StrainLaw) -> None:
+        self.sheet, self._law = sheet, law
         self.state: StrainState | None = None
         self._moves, self._quiet, self._asked, self._vain = False, 0, 0.0, 0
 
@@ -198,6 +204,17 @@ class Deforming:
     def _starts(self, frame: FrameData) -> list[Strain]:
         folds = starts(self.sheet, frame.untouched, frame.seen.full, frame.others, _STARTS)
         return [*folds, Strain.none("stretch")]
+
+    @property
+    def told(self) -> Deformation | None:
+        """How the sheet is deformed, as it is reported; None where it is not.
+
+        What a deformation has left behind is not.
+        """
+        state = self.state
+        if state is None or state.strain.size < _RESIDUAL * state.size:
+            return None
+        return Deformation.of(state, self._law)
 
     @property
     def moved(self) -> FloatArray | float:

@@ -14,6 +14,7 @@ from tomoskin.core import Detection, FloatArray, reach, show
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.skin import Skin
 from tomoskin.sensing.fit import policy as decisions
+from tomoskin.sensing.fit.deformation import StrainLaw
 from tomoskin.sensing.fit.deforming import Deforming, FrameData, Searched
 from tomoskin.sensing.fit.expectation import Expectation, ResidualResponse
 from tomoskin.sensing.fit.hypotheses import (
@@ -92,7 +93,8 @@ class SpotFinder:
         pattern = model.response.state.model.pattern
         self.watch = FrameWatch(pattern, self._policy)
         self._sight = Sight(model, self.watch.channels, noise, gain)
-        self.deforming = Deforming(model.strained)
+        law = StrainLaw(skin.gauge, skin.gauge_across, skin.layer)
+        self.deforming = Deforming(model.strained, law)
         self.view = DriveView(
             model, skin, CellDiscs.of(mesh), self._sight, self.watch, self._residual, self.deforming
         )
@@ -123,6 +125,11 @@ class SpotFinder:
         """Make ready for frames with these; see :meth:`push`."""
         self._sight.look(nuisance, jumps)
         self._sight.of(self.watch.excess)
+
+    @property
+    def moved(self) -> FloatArray | float:
+        """(n_meas,) of difference data that a deformation of the sheet has moved them by."""
+        return self.deforming.moved * self._sight.scale if self.deforming.state else 0.0
 
     @property
     def jump(self) -> float | None:
