@@ -149,6 +149,10 @@ class BaselineDifferences:
         """(n_meas,) V of the untouched skin, as they are known now."""
         return self._baseline.mean
 
+    def volts(self, differences: FloatArray) -> FloatArray:
+        """(n_meas,) V of ``differences`` (n_meas,), in the unit of difference data."""
+        return np.asarray(differences * self._scale)
+
     @property
     def state(self) -> signal.BaselineState:
         """The values of the baseline, and how long it has been held."""
@@ -286,6 +290,10 @@ class GivenDifferences:
 
     def subspace(self) -> None:
         """The nuisance subspace: given differences have none."""
+
+    def volts(self, differences: FloatArray) -> FloatArray:
+        """(n_meas,) V of ``differences`` (n_meas,), in the unit of difference data."""
+        return np.asarray(differences * _scale(self.prepared, self.prepared.operator.reference))
 
     def condition(self, measured: Voltages) -> Conditioned:
         """Of a frame whose values are difference data already."""

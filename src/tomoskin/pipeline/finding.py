@@ -35,7 +35,7 @@ class RegionFinder:
 
     like_touch = rises = False
     deformation: Deformation | None = None
-    moved: FloatArray | float = 0.0
+    moved: FloatArray | None = None
     others: FloatArray | None = None
     problem: str | None = None
 
@@ -162,8 +162,8 @@ class FitFinder:
         return self.spots.deforming.told
 
     @property
-    def moved(self) -> FloatArray | float:
-        """(n_meas,) of difference data that this has moved them by."""
+    def moved(self) -> FloatArray | None:
+        """(n_meas,) of difference data that this has moved them by, or None."""
         return self.spots.moved
 
     @property

@@ -213,6 +213,7 @@ class Following:
             measured.time,
             touched=bool(touches) or self._finder.rises,
             noise=not (detections or self._finder.like_touch),
+            deformed=self._finder.moved,
         )
         return self._result(measured, conditioned, view.image, touches, readings)
 
@@ -272,11 +273,17 @@ class Following:
         shows = result.left_out <= MOST_NUISANCE * len(measured.values)
         return replace(result, has_image=shows, calibrated=self._calibrated)
 
-    def _learn(self, time: float, *, touched: bool, noise: bool) -> None:
+    def _learn(
+        self, time: float, *, touched: bool, noise: bool, deformed: FloatArray | None
+    ) -> None:
+        """``deformed`` (n_meas,) of difference data is what a deformation has moved: that is not
+        learnt."""
         conditioning = self.conditioning
         moved = sum((applied.moved for applied in self._applied.values()), 0.0)
         if self._sheets is not None and self._tuning is None and isinstance(moved, np.ndarray):
             self._tuning = self._sheets.steps(self.prepared, moved)
+        if deformed is not None:
+            moved = moved + conditioning.volts(deformed)
         learnt = conditioning.learn(time, moved, touched=touched, noise=noise)
         if learnt.image and (reference := conditioning.reference) is not None:
             self._imaging.renew(conditioning.prepared, reference, conditioning.subspace())

@@ -127,9 +127,12 @@ class SpotFinder:
         self._sight.of(self.watch.excess)
 
     @property
-    def moved(self) -> FloatArray | float:
-        """(n_meas,) of difference data that a deformation of the sheet has moved them by."""
-        return self.deforming.moved * self._sight.scale if self.deforming.state else 0.0
+    def moved(self) -> FloatArray | None:
+        """(n_meas,) of difference data that a deformation of the sheet has moved them by; None
+        where it is at rest, or as it is after one."""
+        if self.deforming.told is None:
+            return None
+        return np.asarray(self.deforming.moved * self._sight.scale)
 
     @property
     def jump(self) -> float | None:
