@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -113,6 +113,15 @@ class FrameData:
         """(n_meas,) V without what the touches of the last frame did."""
         return np.asarray(self.data - self._expanded[:, 0].sum(axis=0))
 
+    @property
+    def alone(self) -> FrameData:
+        """The frame as if nothing had touched in the last."""
+        return replace(self, before=self.before[:0])
+
+    def fitted(self, begin: StrainState) -> Explained:
+        """A deformation that explains the frame beside these touches; see :func:`likeliest`."""
+        return likeliest(begin, self.untouched, self.seen.full, self.others)
+
     @cached_property
     def others(self) -> FloatArray:
         """(q, r) what these may do otherwise in this frame, whitened, a deviation each."""
@@ -142,6 +151,7 @@ class Deforming:
         self.sheet, self._law = sheet, law
         self.state: StrainState | None = None
         self._moves, self._quiet, self._asked, self._vain = False, 0, 0.0, 0
+        self._age, self._count = 0, 0
 
     def decided(self, frame: FrameData, search: Search) -> Searched:
         """What explains a frame: touches, a deformation, or both."""
@@ -152,12 +162,11 @@ class Deforming:
             if quick is not None:
                 return quick
         first = search(now)
-        if not self._asks(first, frame):
+        if not self._asks(first, frame) and not self._reviews(frame):
             self._moves = False
             return first
-        best, others = first, self._others(frame, first)
-        score = first.evidence - _beginning(first, frame)
-        for found, odds in others[:2]:
+        best, score = first, first.evidence - _beginning(first, frame)
+        for found, odds in self._others(frame, first):
             other = search(found.state)
             own = other.evidence - odds - _beginning(other, frame)
             if own > score:
@@ -168,9 +177,10 @@ class Deforming:
 
     def _moved(self, frame: FrameData, search: Search, state: StrainState) -> Searched | None:
         """The explanation by a deformation that moves on, where that is enough."""
-        found = self._fitted(frame, state.after(moves=True))
+        found = frame.fitted(state.after(moves=True))
         moved = search(found.state)
-        return None if self._asks(moved, frame, quick=True) else moved
+        asks = self._asks(moved, frame, quick=True) or self._reviews(frame)
+        return None if asks else moved
 
     def _asks(self, found: Searched, frame: FrameData, *, quick: bool = False) -> bool:
         """Whether other explanations than one are asked for: touches begin, or much is left."""
@@ -183,26 +193,39 @@ class Deforming:
             return False
         return quick or decisions.looks_again(self._vain) or left > 2.0 * self._asked
 
-    def _fitted(self, frame: FrameData, begin: StrainState) -> Explained:
-        return likeliest(begin, frame.untouched, frame.seen.full, frame.others)
+    def _reviews(self, frame: FrameData) -> bool:
+        """Whether it is time to ask whether the sheet is deformed otherwise than was told: ever
+        later after that, or the number of touches, has changed."""
+        if self.state is None or frame.count != self._count:
+            self._age, self._count = 0, frame.count
+            return False
+        self._age += 1
+        return self._age > 1 and self._age.bit_count() == 1
 
     def _others(self, frame: FrameData, first: Searched) -> list[tuple[Explained, float]]:
-        """Deformations that may explain a frame, the likeliest first; and the odds against."""
+        """Deformations that may explain a frame beside the touches of the last, or without these;
+        and the odds against them."""
         self._asked = first.detected.fit.beyond
+        chosen = self._likeliest(frame)[:2]
+        if frame.count:
+            chosen += self._likeliest(frame.alone)[:1]
+        return chosen
+
+    def _likeliest(self, frame: FrameData) -> list[tuple[Explained, float]]:
+        """Deformations that may explain a frame, the likeliest first; and the odds against."""
         found: list[tuple[Explained, float]] = []
-        size = 0.0
+        size, odds = 0.0, _BEGINS
         if self.state is not None:
-            found.append((self._fitted(frame, self.state.after(moves=True)), _MOVES))
-            size = self.state.size
-        odds = _BEGINS if self.state is None else _CHANGES
+            found.append((frame.fitted(self.state.after(moves=True)), _MOVES))
+            size, odds = self.state.size, _CHANGES
         for strain in self._starts(frame):
             begin = StrainState.about(self.sheet, strain, size)
-            found.append((self._fitted(frame, begin), odds))
-        found.sort(key=lambda one: one[1] - one[0].evidence)
-        return found
+            found.append((frame.fitted(begin), odds))
+        return sorted(found, key=lambda one: one[1] - one[0].evidence)
 
     def _starts(self, frame: FrameData) -> list[Strain]:
-        folds = starts(self.sheet, frame.untouched, frame.seen.full, frame.others, _STARTS)
+        full, others = frame.seen.full, frame.others
+        folds = starts(self.sheet, frame.untouched, full, others, _STARTS)
         return [*folds, Strain.none("stretch")]
 
     @property
