@@ -16,6 +16,7 @@ from tomoskin.sensing.fit.strain import (
     Strain,
     StrainPrior,
     exponential,
+    profile,
 )
 
 _AXES, _OFFSETS, _WIDTHS = 18, 15, (0.05, 0.09, 0.16, 0.28)
@@ -140,7 +141,7 @@ class StrainedSheet:
         for k, own in enumerate(numbers):
             slopes = Strain("fold", own)
             q, _ = slopes._away(self._patches)
-            fields[:, k], turned[:, k] = np.exp(-(q**2) / 2), slopes._tensors[1]
+            fields[:, k], turned[:, k] = profile(q)[0], slopes._tensors[1]
         xx, yy, xy = (part @ fields for part in np.split(self._by_patch, 3, axis=1))
         level, deviator = xx + yy, turned[0] * xx + turned[1] * yy + turned[2] * xy
         basis = _basis(np.hstack([level, deviator]))
