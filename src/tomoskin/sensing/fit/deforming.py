@@ -9,7 +9,7 @@ deforms, or deforms otherwise.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -23,6 +23,7 @@ from tomoskin.sensing.fit.hypotheses import CommonModeJump, Rival
 from tomoskin.sensing.fit.problem import Matched, Problem, WhitenedTable
 from tomoskin.sensing.fit.selection import SpotDetections
 from tomoskin.sensing.fit.spot import CONTENT, N_PARAMETERS
+from tomoskin.sensing.fit.spot import Response
 from tomoskin.sensing.fit.spot_model import SpotModel
 from tomoskin.sensing.fit.strain import Strain
 from tomoskin.sensing.fit.strain_state import Explained, StrainState, likeliest, starts
@@ -51,6 +52,9 @@ logarithm may grow, beside a deformation that begins."""
 
 _RESIDUAL = 0.15
 """Part of the largest deformation that the sheet may keep when it is over: that is none."""
+
+_OTHER = 0.2
+"""By which part of itself a strain may differ from one that touches are fitted on."""
 
 _STARTS = 2
 """Folds that are looked at, the best of the table."""
@@ -152,6 +156,7 @@ class Deforming:
         self.state: StrainState | None = None
         self._moves, self._quiet, self._asked, self._vain = False, 0, 0.0, 0
         self._age, self._count = 0, 0
+        self._made: tuple[Strain, Response] | None = None
 
     def decided(self, frame: FrameData, search: Search) -> Searched:
         """What explains a frame: touches, a deformation, or both."""
@@ -227,6 +232,16 @@ class Deforming:
         full, others = frame.seen.full, frame.others
         folds = starts(self.sheet, frame.untouched, full, others, _STARTS)
         return [*folds, Strain.none("stretch")]
+
+    def touched(self, state: StrainState, sets: Sequence[FloatArray]) -> FloatArray:
+        """(b, n_meas) V that sets of spots (k, 4) change on the sheet as it is in a ``state``.
+
+        That sheet is made again where the strain has moved by a part of it.
+        """
+        strain, made = state.at, self._made
+        if made is None or made[0].away(strain) > _OTHER * strain.size:
+            made = self._made = strain, self.sheet.response(strain)
+        return made[1].changes(sets)
 
     @property
     def told(self) -> Deformation | None:

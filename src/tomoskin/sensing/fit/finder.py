@@ -202,11 +202,14 @@ class SpotFinder:
         seen, matched, _, jumps = sight if times == 1.0 else sight.louder(times)
         whitened, rest = seen.whitened(data if state is None else data - state.moved)
         left = self._slow(self._residual.directions(seen.matrix), jumps)
+        exact, reduced = self._model.response.changes, self._model.reduced
         if state is not None:
+            if state.shows_in_touches:
+                exact, reduced = partial(self.deforming.touched, state), None
             left = np.vstack([state.rows @ seen.matrix.T, left])
         problem = Problem(
-            response=self._model.response,
-            reduced=self._model.reduced,
+            exact=exact,
+            reduced=reduced,
             seen=seen,
             prior=self._model.prior,
             sign=self._policy.sign,

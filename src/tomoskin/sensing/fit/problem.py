@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Protocol, Self
@@ -15,7 +15,7 @@ from tomoskin.sensing.fit.certificate import Reduced
 from tomoskin.sensing.fit.expectation import Expectation, Known
 from tomoskin.sensing.fit.noise import Whitener
 from tomoskin.sensing.fit.policy import FAINTEST, USEFUL, DetectionPolicy, Pace
-from tomoskin.sensing.fit.spot import CONTENT, N_PARAMETERS, Response, bounds_of
+from tomoskin.sensing.fit.spot import CONTENT, N_PARAMETERS, bounds_of
 from tomoskin.sensing.fit.spot_fit import Deficit, Fit, SpotPrior
 from tomoskin.sensing.fit.table import ABREAST, ResponseTable
 
@@ -249,11 +249,16 @@ class Matched:
         return np.asarray(chosen)
 
 
+Exact = Callable[[Sequence[FloatArray]], FloatArray]
+"""See :meth:`Response.changes`."""
+
+
 @dataclass(frozen=True, eq=False)
 class Problem:
     """Whitened data (c,) of one frame, and what they are explained with.
 
-    ``response`` is the exact model, and ``reduced`` what stands for it where its error is small.
+    ``exact`` is the exact model: (b, n_meas) V that sets of spots change; and ``reduced`` what stands for it where its error is small;
+    None where nothing does.
     ``rest`` is the square of what the data have along no axis of theirs.
     ``sign`` is "decrease", "increase" or "both". Standard deviations of what a touch does within a
     scan: its way along each axis, ``reach`` m, and what it ``grows`` by, in parts of it.
@@ -261,8 +266,8 @@ class Problem:
     ``expected`` are the touches of the frame before where they may have gone.
     """
 
-    response: Response
-    reduced: Reduced
+    exact: Exact
+    reduced: Reduced | None
     seen: WhitenedTable
     prior: SpotPrior
     sign: str
@@ -324,6 +329,8 @@ class Problem:
     def _reduced(self, fit: Fit, allowed: float) -> Deficit | None:
         """What the table lacks of the spots of a fit, by what stands for the exact model; None
         where more may be wrong of it than so many deviations."""
+        if self.reduced is None:
+            return None
         sizes = np.sqrt(np.einsum("kc,kc->k", fit.each, fit.each))
         alone, volts = self.reduced.lacking(fit.spots, sizes)
         change = self.solver.table.basis @ volts
@@ -333,7 +340,7 @@ class Problem:
 
     def _exact(self, fit: Fit) -> Deficit:
         """The same by the exact model."""
-        exact = self.solver.table.basis @ self.response.changes([fit.spots])[0]
+        exact = self.solver.table.basis @ self.exact([fit.spots])[0]
         return Deficit(fit.spots, exact - fit.change)
 
     def evidence(self, fit: Fit) -> float:

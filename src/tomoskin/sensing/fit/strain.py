@@ -114,6 +114,14 @@ class Strain:
         """How large L is."""
         return math.hypot(*self.levels)
 
+    def away(self, other: Strain) -> float:
+        """How large the largest difference of L to an ``other`` strain is, about."""
+        if self.kind != other.kind:
+            return self.size + other.size
+        points = np.outer(np.linspace(-1.0, 1.0, 9), [1.0, 0.0]) * _PROBE
+        points = np.concatenate([points, points[:, ::-1]])
+        return float(np.abs(self.field(points) - other.field(points)).max())
+
     def moved(self, step: FloatArray) -> Strain:
         """With other numbers, by a ``step`` (d,)."""
         return Strain(self.kind, self.numbers + step)
@@ -184,6 +192,10 @@ class Strain:
         """(3,) L on the axis."""
         even, turned, _ = self._tensors
         return np.asarray(self.numbers[LEVEL] * even + self.numbers[DEVIATOR] * turned)
+
+
+_PROBE = 0.1
+"""Reach of the points in which strains are compared, m."""
 
 
 def profile(q: FloatArray) -> tuple[FloatArray, FloatArray]:

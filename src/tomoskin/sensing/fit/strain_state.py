@@ -24,6 +24,9 @@ _STEPS = 5
 _SETTLED = 0.3
 """Squared deviations that a further step must gain; and those of a move that is linear enough."""
 
+_STRAINED = 0.02
+"""Size of a strain from which touches change other voltages than at rest."""
+
 _HELD = (0.01, 0.005, 0.03, 0.002, 0.0015, 0.02)
 _MOVES = (0.12, 0.06, 0.25, 0.05, 0.03, 0.3)
 """What a deformation that stands does from frame to frame, and one that moves: deviations of axis,
@@ -80,6 +83,11 @@ class StrainState:
     def strain(self) -> Strain:
         """The most likely."""
         return self.at.moved(self.mean[: len(self.at.numbers)])
+
+    @property
+    def shows_in_touches(self) -> bool:
+        """Whether touches change other voltages on it than on the sheet at rest."""
+        return self.at.size > _STRAINED
 
     @cached_property
     def moved(self) -> FloatArray:

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from tomoskin.core import FloatArray
-from tomoskin.model.forward import State, Terminals
+from tomoskin.model.forward import ForwardModel, State, Terminals
 from tomoskin.sensing.fit.spot import Response
 from tomoskin.sensing.fit.strain import (
     LOG_WIDTH,
@@ -56,7 +56,7 @@ class StrainedSheet:
     """
 
     def __init__(self, response: Response) -> None:
-        self._state = response.state
+        self._state, self._profile = response.state, response.spots.profile
         mesh = self._state.model.mesh
         self.points = mesh.centroids
         self.breadth = math.sqrt(float(mesh.volumes.sum()))
@@ -90,6 +90,22 @@ class StrainedSheet:
     def change(self, strain: Strain) -> FloatArray:
         """(n_meas,) V that a ``strain`` adds to the sheet at rest, exactly."""
         return np.asarray(self._voltages(strain.field(self.points)) - self._at_rest)
+
+    def response(self, strain: Strain) -> Response:
+        """The sheet as it is strained, with touches on it: some milliseconds of work.
+
+        Its conductivity is a scalar again: what differs by direction is in the metric of the mesh,
+        exp(−D) for L = mean + D, D without a trace.
+        """
+        model, field = self._state.model, strain.field(self.points)
+        mean = (field[:, 0] + field[:, 1]) / 2
+        within = exponential(-(field - mean[:, None] * np.array([1.0, 1.0, 0.0])))
+        if model.mesh.metric is not None:
+            frame = np.linalg.cholesky(model.mesh.metric)
+            within = frame @ within @ frame.transpose(0, 2, 1)
+        mesh = model.mesh.with_metric(within)
+        own = ForwardModel(mesh, model.pattern, model.contact_impedance, model.current)
+        return Response(own.at(self._state.conductivity * np.exp(mean)), self._profile)
 
     def slopes(self, strain: Strain) -> FloatArray:
         """(n_meas, d) V: derivatives of the change by the numbers, as about the sheet at rest."""
