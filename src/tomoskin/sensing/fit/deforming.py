@@ -144,6 +144,9 @@ class Deforming:
         At rest.
     law
         How it answers strain.
+    policy
+        By what touches are decided on. Frames that do not follow each other are looked at each as
+        the only one, and presses alone not at all.
 
     Attributes
     ----------
@@ -151,8 +154,13 @@ class Deforming:
         What is known of its strain; None where it is at rest.
     """
 
-    def __init__(self, sheet: StrainedSheet, law: StrainLaw) -> None:
-        self.sheet, self._law = sheet, law
+    def __init__(
+        self, sheet: StrainedSheet, law: StrainLaw, policy: decisions.DetectionPolicy
+    ) -> None:
+        self.sheet, self._law, self._policy = sheet, law, policy
+        self._follows = policy.pace.speed > 0
+        self._looks = self._follows or policy.pace.joint > 0
+        self._begins = False
         self.state: StrainState | None = None
         self._moves, self._quiet, self._asked, self._vain = False, 0, 0.0, 0
         self._age, self._count = 0, 0
@@ -160,6 +168,10 @@ class Deforming:
 
     def decided(self, frame: FrameData, search: Search) -> Searched:
         """What explains a frame: touches, a deformation, or both."""
+        if not self._looks:
+            return search(None)
+        if not self._follows:
+            self.state, self._moves = None, False
         reach("deformation")
         now = self.state and self.state.after(moves=False)
         if self._moves and self.state is not None:
@@ -168,16 +180,25 @@ class Deforming:
                 return quick
         first = search(now)
         if not self._asks(first, frame) and not self._reviews(frame):
-            self._moves = False
+            self._moves = self._begins = False
             return first
         best, score = first, first.evidence - _beginning(first, frame)
+        if self.state is None:  # touches of another profile leave as much
+            score += self._policy.left_by(first.detected.fit) ** 2 / 2
         for found, odds in self._others(frame, first):
             other = search(found.state)
             own = other.evidence - odds - _beginning(other, frame)
             if own > score:
                 best, score = other, own
-        self._moves = best is not first and best.state is not None
-        self._vain = self._vain + 1 if best is first else 0
+        if best is first:
+            self._moves = self._begins = False
+            self._vain += 1
+            return best
+        self._vain = 0
+        if self.state is None and self._follows and not self._begins:
+            self._begins = True  # a touch that comes down within a scan may look so, once
+            return first
+        self._moves, self._begins = best.state is not None, False
         return best
 
     def _moved(self, frame: FrameData, search: Search, state: StrainState) -> Searched | None:

@@ -94,7 +94,7 @@ class SpotFinder:
         self.watch = FrameWatch(pattern, self._policy)
         self._sight = Sight(model, self.watch.channels, noise, gain)
         law = StrainLaw(skin.gauge, skin.gauge_across, skin.layer)
-        self.deforming = Deforming(model.strained, law)
+        self.deforming = Deforming(model.strained, law, self._policy)
         self.view = DriveView(
             model, skin, CellDiscs.of(mesh), self._sight, self.watch, self._residual, self.deforming
         )
