@@ -46,6 +46,9 @@ _FAINT = 4.0
 _QUIET = 5
 """Frames in which it does not show, after which it is over."""
 
+_BEGUN, _MOST = 2.0, 12
+"""Logarithm of the odds from which a deformation has begun, and frames in which it must."""
+
 _PLACE, _SWELLS = 5e-3, 0.2
 """How far a touch may move from one frame to the next along each axis, m, and by what its radius's
 logarithm may grow, beside a deformation that begins."""
@@ -135,6 +138,15 @@ class FrameData:
         return np.asarray(rows.reshape(-1, len(self.data)) @ self.seen.full.T)
 
 
+class Begun(NamedTuple):
+    """A deformation that may have begun, instead of touches: as the newest frame has it, the
+    logarithm of the odds for it, and frames since."""
+
+    state: StrainState | None
+    odds: float
+    frames: int
+
+
 class Deforming:
     """How the sheet is deformed, frame after frame.
 
@@ -160,7 +172,7 @@ class Deforming:
         self.sheet, self._law, self._policy = sheet, law, policy
         self._follows = policy.pace.speed > 0
         self._looks = self._follows or policy.pace.joint > 0
-        self._begins = False
+        self._rival: Begun | None = None
         self.state: StrainState | None = None
         self._moves, self._quiet, self._asked, self._vain = False, 0, 0.0, 0
         self._age, self._count = 0, 0
@@ -179,27 +191,49 @@ class Deforming:
             if quick is not None:
                 return quick
         first = search(now)
-        if not self._asks(first, frame) and not self._reviews(frame):
-            self._moves = self._begins = False
+        asks = self._rival or self._asks(first, frame) or self._reviews(frame)
+        if not asks:
+            self._moves = False
             return first
-        best, score = first, first.evidence - _beginning(first, frame)
+        score = first.evidence - _beginning(first, frame)
+        best, gain = self._best(frame, search, first, score)
+        if self.state is None and self._follows:
+            return self._begun(first, best, gain)
+        self._moves = gain > 0 and best.state is not None
+        self._vain = 0 if gain > 0 else self._vain + 1
+        return best if gain > 0 else first
+
+    def _best(
+        self, frame: FrameData, search: Search, first: Searched, score: float
+    ) -> tuple[Searched, float]:
+        """The likeliest other explanation of a frame, and the logarithm of the odds for it."""
         if self.state is None:  # touches of another profile leave as much
             score += self._policy.left_by(first.detected.fit) ** 2 / 2
+        best, most = first, -math.inf
         for found, odds in self._others(frame, first):
             other = search(found.state)
-            own = other.evidence - odds - _beginning(other, frame)
-            if own > score:
-                best, score = other, own
-        if best is first:
-            self._moves = self._begins = False
-            self._vain += 1
-            return best
-        self._vain = 0
-        if self.state is None and self._follows and not self._begins:
-            self._begins = True  # a touch that comes down within a scan may look so, once
+            own = other.evidence - odds - _beginning(other, frame) - score
+            if own > most:
+                best, most = other, own
+        return best, most
+
+    def _begun(self, first: Searched, best: Searched, gain: float) -> Searched:
+        """Whether a deformation has begun: a test over frames (Wald 1945).
+
+        One frame is not enough: a touch that comes down within a scan may look so, once.
+        """
+        odds = float(np.clip(gain, -decisions.SURE, decisions.SURE))
+        if self._rival is None:
+            self._vain = 0 if odds > 0 else self._vain + 1
+            self._rival = Begun(_told(best), odds, 1) if odds > 0 else None
             return first
-        self._moves, self._begins = best.state is not None, False
-        return best
+        odds, frames = self._rival.odds + odds, self._rival.frames + 1
+        if odds > _BEGUN:
+            self._rival, self._moves, self._vain = None, True, 0
+            return best
+        goes_on = odds > -decisions.SURE and frames < _MOST
+        self._rival = Begun(_told(best), odds, frames) if goes_on else None
+        return first
 
     def _moved(self, frame: FrameData, search: Search, state: StrainState) -> Searched | None:
         """The explanation by a deformation that moves on, where that is enough."""
@@ -241,6 +275,8 @@ class Deforming:
         """Deformations that may explain a frame, the likeliest first; and the odds against."""
         found: list[tuple[Explained, float]] = []
         size, odds = 0.0, _BEGINS
+        if self._rival is not None and self._rival.state is not None:
+            found.append((frame.fitted(self._rival.state.after(moves=True)), 0.0))
         if self.state is not None:
             found.append((frame.fitted(self.state.after(moves=True)), _MOVES))
             size, odds = self.state.size, _CHANGES
@@ -288,19 +324,25 @@ class Deforming:
 
     def take(self, found: Searched) -> None:
         """Take what a frame was explained with."""
-        state, fit = found.state, found.detected.fit
+        state, fit = _told(found), found.detected.fit
         if state is None:
             self.state = None
             return
-        d = len(state.mean)
-        rows, rest = fit.unknown[:d], fit.unknown[d:]
-        others = np.vstack([rest, _free(found)])
-        state = state.told(fit.residual, rows, others)
-        state = state.linear_again(found.problem.seen.matrix)
         shown = found.problem.seen.matrix @ state.moved
         self._quiet = self._quiet + 1 if shown @ shown < _FAINT else 0
         over = self._quiet >= _QUIET and not len(fit.spots)
         self.state = None if over else state
+
+
+def _told(found: Searched) -> StrainState | None:
+    """What a frame says of the deformation that it is explained with."""
+    state, fit = found.state, found.detected.fit
+    if state is None:
+        return None
+    d = len(state.mean)
+    others = np.vstack([fit.unknown[d:], _free(found)])
+    told = state.told(fit.residual, fit.unknown[:d], others)
+    return told.linear_again(found.problem.seen.matrix)
 
 
 def _free(found: Searched) -> FloatArray:
