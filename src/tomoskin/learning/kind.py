@@ -13,7 +13,7 @@ the file is read, which gives the same model: a file outlives the method.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from inspect import signature
 from typing import Any, ClassVar, Generic, Literal, Protocol, Self, TypeVar
@@ -32,7 +32,6 @@ from tomoskin.core import (
     ModelError,
     PatternError,
     StrPath,
-    Touch,
     electrode_table,
     load_arrays,
     located,
@@ -42,7 +41,6 @@ from tomoskin.core import (
     whole_number,
 )
 from tomoskin.learning.record_arrays import pack, unpack
-from tomoskin.model.mesh import Mesh
 from tomoskin.model.pattern import Pattern
 from tomoskin.model.skin import Skin
 from tomoskin.sensing.fit import Response

@@ -21,7 +21,7 @@ from tomoskin.core import (
     reach,
     show,
 )
-from tomoskin.learning import Differences, FrameView, Reading, calibration_kinds
+from tomoskin.learning import Differences, FrameView, Reading
 from tomoskin.model.pattern import Scan
 from tomoskin.pipeline import finding
 from tomoskin.pipeline.aside import Aside, frames_aside

@@ -104,9 +104,7 @@ def test_the_likeliest_fold_is_the_one_that_was_made(sheet: StrainedSheet, angle
     found = likeliest(StrainState.about(sheet, begin), data, full, none)
     stretch = likeliest(StrainState.about(sheet, Strain.none()), data, full, none)
     assert found.evidence > stretch.evidence + 100
-    told = found.state.told(
-        full @ (data - found.state.moved), found.state.rows @ full.T, none
-    )
+    told = found.state.told(full @ (data - found.state.moved), found.state.rows @ full.T, none)
     record = Deformation.of(told, StrainLaw())
     assert record.kind == "fold"
     assert record.axis is not None

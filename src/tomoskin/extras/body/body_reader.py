@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from tomoskin.core import Detection, FloatArray, Touch
+from tomoskin.core import Detection, FloatArray
 from tomoskin.extras.body.body_model import TENSOR, BodyModel
 from tomoskin.learning import (
     Applied,
@@ -20,7 +20,6 @@ from tomoskin.learning import (
     ShownReading,
     TouchFit,
 )
-from tomoskin.model.mesh import Mesh
 from tomoskin.sensing.fit import Response, spots_of
 from tomoskin.sensing.signal import independent
 from tomoskin.sensing.track import RESIDUAL

@@ -30,7 +30,7 @@ _WIDE = 0.25
 
 
 @dataclass(frozen=True, slots=True)
-class Estimate:
+class EstimatedNumber:
     """A number, and the ends of the interval that holds it in nine of ten cases."""
 
     value: float
@@ -96,12 +96,12 @@ class Deformation:
     """
 
     kind: Literal["fold", "stretch", "common", "unknown"]
-    amount: Estimate | None
+    amount: EstimatedNumber | None
     unit: Unit
-    axis: Estimate | None = None
-    offset: Estimate | None = None
-    width: Estimate | None = None
-    across: Estimate | None = None
+    axis: EstimatedNumber | None = None
+    offset: EstimatedNumber | None = None
+    width: EstimatedNumber | None = None
+    across: EstimatedNumber | None = None
     confused: str | None = None
 
     @classmethod
@@ -166,11 +166,11 @@ def _fold(state: StrainState, law: StrainLaw) -> Deformation:
     wide = width > _WIDE * state.sheet.breadth
     return Deformation(
         kind="fold",
-        amount=Estimate.of(level, spread),
+        amount=EstimatedNumber.of(level, spread),
         unit=unit,
-        axis=Estimate.of(angle, sd[ANGLE]),
-        offset=Estimate.of(offset, sd[OFFSET]),
-        width=Estimate(box, box * math.exp(-away), box * math.exp(away)),
+        axis=EstimatedNumber.of(angle, sd[ANGLE]),
+        offset=EstimatedNumber.of(offset, sd[OFFSET]),
+        width=EstimatedNumber(box, box * math.exp(-away), box * math.exp(away)),
         confused="a sheet wrapped round a cylinder of that axis" if wide else None,
     )
 
@@ -182,7 +182,7 @@ def _stretch(state: StrainState, law: StrainLaw) -> Deformation:
     if deviator < _CLEAR * max(sd[1], sd[2]):
         return Deformation(
             kind="common",
-            amount=Estimate.of(math.expm1(level), math.exp(level) * sd[0]),
+            amount=EstimatedNumber.of(math.expm1(level), math.exp(level) * sd[0]),
             unit="relative",
             confused="warmth, gain or supply, or a stretch that is the same in all directions",
         )
@@ -201,10 +201,10 @@ def _stretch(state: StrainState, law: StrainLaw) -> Deformation:
         unit = "relative"
     return Deformation(
         kind="stretch",
-        amount=Estimate.of(amounts[0], spread),
+        amount=EstimatedNumber.of(amounts[0], spread),
         unit="strain" if unit == "strain" else "relative",
-        axis=Estimate.of(axis, turn),
-        across=Estimate.of(amounts[1], spread),
+        axis=EstimatedNumber.of(axis, turn),
+        across=EstimatedNumber.of(amounts[1], spread),
         confused="a sheet wrapped round a cylinder across it",
     )
 

@@ -22,8 +22,7 @@ from tomoskin.sensing.fit.deformation import Deformation, StrainLaw
 from tomoskin.sensing.fit.hypotheses import CommonModeJump, Rival
 from tomoskin.sensing.fit.problem import Matched, Problem, WhitenedTable
 from tomoskin.sensing.fit.selection import SpotDetections
-from tomoskin.sensing.fit.spot import CONTENT, N_PARAMETERS
-from tomoskin.sensing.fit.spot import Response
+from tomoskin.sensing.fit.spot import CONTENT, N_PARAMETERS, Response
 from tomoskin.sensing.fit.spot_model import SpotModel
 from tomoskin.sensing.fit.strain import Strain
 from tomoskin.sensing.fit.strain_state import Explained, StrainState, likeliest, starts

@@ -237,9 +237,7 @@ class SpotModel:
         yield
         solver = made._solver_of(table)
         strained = self.strained.adapted(response)
-        vars(made).update(
-            candidates=candidates, reduced=reduced, solver=solver, strained=strained
-        )
+        vars(made).update(candidates=candidates, reduced=reduced, solver=solver, strained=strained)
         table.__dict__["typical"] = yield from table.typifying()
         return made
 

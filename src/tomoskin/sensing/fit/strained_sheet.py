@@ -170,9 +170,7 @@ class StrainedSheet:
         for axis in axes:
             across = self.points @ np.array([math.sin(axis), -math.cos(axis)])
             for offset in np.linspace(across.min(), across.max(), _OFFSETS + 2)[1:-1]:
-                out += [
-                    [axis, offset, math.log(width * self.breadth), 0, 0] for width in _WIDTHS
-                ]
+                out += [[axis, offset, math.log(width * self.breadth), 0, 0] for width in _WIDTHS]
         numbers = np.array(out)
         assert numbers.shape[1] > LOG_WIDTH
         return numbers
