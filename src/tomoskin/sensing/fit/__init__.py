@@ -1,7 +1,10 @@
 """Touches fitted to voltages by their parameters, with the exact forward model."""
 
 from tomoskin.sensing.fit.bound import position_bound as position_bound
-from tomoskin.sensing.fit.deformation import Deformation as Deformation, EstimatedNumber as EstimatedNumber
+from tomoskin.sensing.fit.deformation import (
+    Deformation as Deformation,
+    EstimatedNumber as EstimatedNumber,
+)
 from tomoskin.sensing.fit.drive_evidence import (
     DriveEvidence as DriveEvidence,
     DriveFilter as DriveFilter,

@@ -26,7 +26,7 @@ _CLEAR = 4.0
 """Deviations by which one number must differ from another for the two to be told apart."""
 
 _WIDE = 0.25
-"""Width of a fold, in parts of the sheet's breadth, from which it is as a sheet round a cylinder."""
+"""Width of a fold, in parts of the sheet's breadth, from which it is like a cylinder."""
 
 
 @dataclass(frozen=True, slots=True)

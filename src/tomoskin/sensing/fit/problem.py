@@ -257,8 +257,8 @@ Exact = Callable[[Sequence[FloatArray]], FloatArray]
 class Problem:
     """Whitened data (c,) of one frame, and what they are explained with.
 
-    ``exact`` is the exact model: (b, n_meas) V that sets of spots change; and ``reduced`` what stands for it where its error is small;
-    None where nothing does.
+    ``exact`` is the exact model: (b, n_meas) V that sets of spots change. ``reduced`` stands for it
+    where its error is small; None where nothing does.
     ``rest`` is the square of what the data have along no axis of theirs.
     ``sign`` is "decrease", "increase" or "both". Standard deviations of what a touch does within a
     scan: its way along each axis, ``reach`` m, and what it ``grows`` by, in parts of it.

@@ -5,7 +5,8 @@ across it, L = A·1 + B·(2ddᵀ − 1) to first order: A is what the mean strai
 deviator does, and how they are related is the material's. A fold bends the sheet along a line, so
 that its layer is strained across that: A and B fall off with the distance q from the line, in
 widths, as a profile does that lies half-way between a normal distribution and an even strip of the
-same second moment (Gram & Charlier: Kendall & Stuart 1977, section 6.17). An even stretch is the same all over; so is a sheet wrapped round a cylinder.
+same second moment (Gram & Charlier: Kendall & Stuart 1977, section 6.17). An even stretch is the
+same all over; so is a sheet wrapped round a cylinder.
 """
 
 from __future__ import annotations

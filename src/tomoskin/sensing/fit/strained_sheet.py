@@ -1,4 +1,4 @@
-"""What smooth strains of a whole sheet do to its voltages: exactly, and to first order by a table."""
+"""What smooth strains of a sheet do to its voltages: exactly, and to first order by a table."""
 
 from __future__ import annotations
 
