@@ -18,8 +18,11 @@ from tomoskin.sensing.fit.solver import NuisanceMetric
 from tomoskin.sensing.fit.strain import Kind, Strain
 from tomoskin.sensing.fit.strained_sheet import StrainedSheet
 
-_STEPS = 5
+_STEPS = 8
 """Of Gauss and Newton, at most, each with one exact solve."""
+
+_DAMPING = 0.03
+"""Of a step, where the whole leads to a less likely deformation (Marquardt 1963)."""
 
 _SETTLED = 0.3
 """Squared deviations that a further step must gain; and those of a move that is linear enough."""
@@ -137,6 +140,15 @@ class StrainState:
         covariance = self.root @ found @ self.root.T
         return replace(self, mean=mean, covariance=(covariance + covariance.T) / 2)
 
+    def linear_at(self, step: FloatArray) -> StrainState:
+        """Linear about a strain that is a ``step`` (d,) away; what is expected of it is left out."""
+        sheet = self.sheet
+        there = sheet.prior.held(self.at.moved(step), sheet.reach)
+        size = max(self.size, there.size)
+        directions = np.hstack([sheet.slopes(there), sheet.otherwise(there, size)])
+        change = sheet.change(there)
+        return replace(self, at=there, change=change, directions=directions, size=size)
+
     def linear_again(self, matrix: FloatArray) -> StrainState:
         """About the most likely strain, where that is far from where it is linear, by whitened
         data of ``matrix`` (c, n_meas) 1/V."""
@@ -176,48 +188,92 @@ def likeliest(
     ``full`` (r, n_meas) 1/V whitens; ``others`` (q, r) are directions of what else is not known, of
     touches too.
     """
-    prior, root = begin.mean + np.append(begin.at.numbers, np.zeros(_others(begin))), begin.root
-    metric = NuisanceMetric.of(others)
-    state, best = begin, None
+    prior = begin.mean + np.append(begin.at.numbers, np.zeros(_others(begin)))
+    linear = _Linear(prior, begin.root, data, full, NuisanceMetric.of(others))
+    best, cost = begin, linear.cost(begin)
+    damping = 0.0
     for _ in range(_STEPS):
+        state = best.linear_at(linear.step(best, damping))
+        found = linear.cost(state)
+        if found > cost:
+            damping = max(10.0 * damping, _DAMPING)
+            continue
+        gained, best, cost = cost - found, state, found
+        damping = damping / 10.0 if damping > _DAMPING else 0.0
+        if gained < _SETTLED:
+            break
+    return linear.explained(best)
+
+
+@dataclass(frozen=True, eq=False)
+class _Linear:
+    """What a frame says of a deformation, linear about one.
+
+    ``prior`` (d + k,) its numbers and what is otherwise as they are expected, ``root`` their
+    covariance's; ``data``, ``full`` and the ``metric`` of what else is not known: see
+    :func:`likeliest`.
+    """
+
+    prior: FloatArray
+    root: FloatArray
+    data: FloatArray
+    full: FloatArray
+    metric: NuisanceMetric
+
+    def _solved(self, state: StrainState) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """(d + k,) what is expected about a ``state``; (d + k + 1, d + k + 1) products of what its
+        numbers do, deviation by deviation, and of what is left; and the first ones' information."""
+        expected = self.prior - np.append(state.at.numbers, np.zeros(_others(state)))
+        residual = self.full @ (self.data - state.change - state.directions @ expected)
+        rows = self.root.T @ (self.full @ state.directions).T
+        square = self.metric.products(np.vstack([rows, residual]))
+        return expected, square, square[:-1, :-1] + np.eye(len(rows))
+
+    def step(self, state: StrainState, damping: float) -> FloatArray:
+        """(d,) from a ``state`` to the likeliest numbers, as far as it is linear (Levenberg 1944).
+
+        The larger the ``damping``, the nearer it stays, each number by what is known of it.
+        """
+        expected, square, information = self._solved(state)
+        here = np.linalg.solve(self.root, -expected)
+        held = damping * np.diag(np.diag(information))
+        onto = square[:-1, -1] + held @ here
+        moved = expected + self.root @ np.linalg.solve(information + held, onto)
+        most = _most_step(state.at.kind, state.sheet.breadth)
+        return np.clip(moved[: len(most)], -most, most)
+
+    def cost(self, state: StrainState) -> float:
+        """Squared deviations of a frame, and of the prior, where the strain is that of ``state``;
+        what is otherwise as likely as it can be."""
         n = len(state.at.numbers)
-        at = np.append(state.at.numbers, np.zeros(_others(state)))
-        expected = prior - at
-        residual = full @ (data - state.change - state.directions @ expected)
-        rows = root.T @ (full @ state.directions).T
-        square = metric.products(np.vstack([rows, residual]))
-        information = square[:-1, :-1] + np.eye(len(rows))
-        solved = np.linalg.solve(information, square[:-1, -1])
-        misfit = float(square[-1, -1] - square[:-1, -1] @ solved)
-        log_size = float(np.linalg.slogdet(information)[1]) / 2
-        found = Explained(state, -misfit / 2 - log_size - metric.log_size, misfit)
-        found = replace(found, state=replace(state, mean=expected))
-        mean = expected + root @ solved
-        if best is not None and best.evidence > found.evidence - _SETTLED:
-            return max(best, found, key=lambda one: one.evidence)
-        best = found
-        sheet = state.sheet
-        step = np.clip(mean[:n], *_most_step(state.at.kind, sheet.breadth))
-        there = sheet.prior.held(state.at.moved(step), sheet.reach)
-        size = max(state.size, there.size)
-        directions = np.hstack([sheet.slopes(there), sheet.otherwise(there, size)])
-        state = replace(
-            state, at=there, change=sheet.change(there), directions=directions, size=size
-        )
-    assert best is not None
-    return best
+        away = state.at.numbers - self.prior[:n]
+        covariance = self.root @ self.root.T
+        onto = np.linalg.solve(covariance[:n, :n], covariance[:n, n:])
+        left = covariance[n:, n:] - covariance[n:, :n] @ onto
+        rows = np.linalg.cholesky(left).T @ (self.full @ state.directions[:, n:]).T
+        otherwise = self.prior[n:] + away @ onto
+        data = self.data - state.change - state.directions[:, n:] @ otherwise
+        square = self.metric.products(np.vstack([rows, self.full @ data]))
+        information, along = square[:-1, :-1] + np.eye(len(rows)), square[:-1, -1]
+        misfit = square[-1, -1] - along @ np.linalg.solve(information, along)
+        return float(misfit + away @ np.linalg.solve(covariance[:n, :n], away))
+
+    def explained(self, state: StrainState) -> Explained:
+        """What is expected, linear about ``state``, and what speaks for it."""
+        expected, square, information = self._solved(state)
+        onto = square[:-1, -1]
+        misfit = float(square[-1, -1] - onto @ np.linalg.solve(information, onto))
+        log_size = float(np.linalg.slogdet(information)[1]) / 2 + self.metric.log_size
+        return Explained(replace(state, mean=expected), -misfit / 2 - log_size, misfit)
 
 
 def _others(state: StrainState) -> int:
     return len(state.mean) - len(state.at.numbers)
 
 
-def _most_step(kind: Kind, breadth: float) -> tuple[FloatArray, FloatArray]:
-    """Least and largest step of the numbers."""
-    if kind == "stretch":
-        return np.full(3, -0.3), np.full(3, 0.3)
-    most = np.array([0.3, 0.1 * breadth, 0.5, 0.3, 0.3])
-    return -most, most
+def _most_step(kind: Kind, breadth: float) -> FloatArray:
+    """(d,) the largest step of the numbers."""
+    return np.full(3, 0.3) if kind == "stretch" else np.array([0.3, 0.1 * breadth, 0.5, 0.2, 0.2])
 
 
 def starts(

@@ -19,7 +19,7 @@ from tomoskin.sensing.fit.strain import (
     profile,
 )
 
-_AXES, _OFFSETS, _WIDTHS = 18, 15, (0.05, 0.09, 0.16, 0.28)
+_AXES, _OFFSETS, _WIDTHS = 18, 15, (0.05, 0.08, 0.125, 0.19)
 """Folds of a table: axes, offsets along each, and widths in parts of the sheet's breadth."""
 
 _PATCHES = 400
