@@ -92,7 +92,7 @@ def test_a_full_disk_costs_time_only(folder: Path, monkeypatch: pytest.MonkeyPat
         raise OSError(errno.ENOSPC, "No space left on device")
 
     make = Counted()
-    monkeypatch.setattr(archive.np, "savez", full)
+    monkeypatch.setattr(np, "savez", full)
     for _ in range(2):
         np.testing.assert_array_equal(kept("a", make)["values"], np.arange(3.0))
     assert make.times == 2

@@ -223,7 +223,7 @@ class Spots:
         return directed, reshaped
 
     def _offsets(
-        self, places: FloatArray, own: IntArray, cells: IntArray
+        self, places: FloatArray, own: IntArray, cells: NDArray[np.integer]
     ) -> tuple[FloatArray, FloatArray]:
         """(q, c) m, x and y: points of cells (c,), each from its ``own`` (c,) of ``places``."""
         x, y = self._by_axis
