@@ -260,9 +260,7 @@ def test_with_force_a_file_is_written_over(
     tmp_path: Path,
     whole: dict[str, Path],
     case: Case,
-    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("tomoskin.cli.design._PLACES", 20)  # a map of few places is one too
     mine = tmp_path / f"mine{case.ending}"
     mine.write_bytes(b"mine")
     code, _, err = tomoskin(*case.line(whole | {"other": tmp_path / "x.csv"}, mine, "--force"))

@@ -193,7 +193,6 @@ def test_a_press_that_cannot_be_meant(old: str, new: str, where: str, what: str)
         ("format = 1\npress = [3]\n" + HEAD[11:], "[[press]] 1", "expected a section, got 3"),
         (HEAD + '[[mark]]\nat = "11 s"\ntext = "x"', "[[mark]] 1 at", "at most 10 s"),
         (HEAD + "seed = -1\n", "[script] seed", "whole number"),
-        ('format = 1\n[presses]\nsize = "9 mm"\nforce = "1 N"', "[presses]", "--presses N"),
     ],
 )
 def test_a_script_that_cannot_be_meant(text: str, where: str, what: str) -> None:

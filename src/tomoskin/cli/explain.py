@@ -34,15 +34,15 @@ def explain(
     from tomoskin.files.session import SessionReader, explain as explained
 
     with Bar("replaying"), SessionReader(session, skin) as reader:
-        found = explained(reader, frame)
-    lines = list(found.lines)
+        explanation = explained(reader, frame)
+    lines = list(explanation.lines)
     if touch is not None:
-        lines = list(found.of_touch(touch))
+        lines = list(explanation.of_touch(touch))
         if not lines:
             raise DataError(
                 f"expected a touch of frame {frame}, got {touch}: nothing was decided of it there",
                 where=str(session),
                 hint="leave --touch out to see all that the frame holds",
             )
-    steps = [{"step": step.name, "lines": step.lines} for step in found.steps]
-    tell({"frame": frame, "time_s": found.time, "steps": steps}, lines, json=json)
+    steps = [{"step": step.name, "lines": step.lines} for step in explanation.steps]
+    tell({"frame": frame, "time_s": explanation.time, "steps": steps}, lines, json=json)

@@ -27,7 +27,7 @@ def _simulated(out: Path | None, given: Given, called: str) -> list[Output]:
     assert out is not None
     others = (record.outputs(out, given, called) for record in ADDED)
     default = [Output(out, RECORDING, called)]
-    return next((found for found in others if found is not None), default)
+    return next((outputs for outputs in others if outputs is not None), default)
 
 
 def simulate(

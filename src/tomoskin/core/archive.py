@@ -13,7 +13,7 @@ import zlib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, TextIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -273,11 +273,11 @@ def _alone(path: Path) -> Iterator[None]:
     lock = path.with_suffix(".lock")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        file = lock.open("wb")
+        descriptor = os.open(lock, os.O_CREAT | os.O_RDWR)  # it holds nothing
     except OSError:
         yield
         return
-    with file:
+    with os.fdopen(descriptor) as file:
         until = time.monotonic() + _WAIT
         while not _locked(file) and time.monotonic() < until:
             reach()  # who waits may be stopped
@@ -289,7 +289,7 @@ def _alone(path: Path) -> Iterator[None]:
                 lock.unlink()
 
 
-def _locked(file: BinaryIO) -> bool:
+def _locked(file: TextIO) -> bool:
     """Whether the file is locked by us, or cannot be locked at all."""
     if fcntl is None:
         return True

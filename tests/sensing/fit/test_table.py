@@ -89,7 +89,7 @@ def problem(solver: Solver, spots: FloatArray, reach: float) -> Problem:
     along, rest = seen.whitened(volts)
     left = 0.05 * data(press(0.0, 0.06))[None] @ seen.matrix.T
     return Problem(
-        response=model().response,
+        exact=model().response.changes,
         reduced=model().reduced,
         seen=seen,
         prior=model().prior,

@@ -109,7 +109,7 @@ class ProtocolSession:
             case wire.Info():
                 self._info(message, now)
             case wire.BoardLimits() | wire.HeldScan() | wire.HeldPattern() | wire.HeldMode():
-                return self._told(message, now)
+                return self._losses(message, now)
             case wire.Ack():
                 return self._ack(message, now)
             case wire.Fault():
@@ -221,7 +221,7 @@ class ProtocolSession:
                 self.commands.add((wire.GetBoard(0),))
             self._answered(now)
 
-    def _told(
+    def _losses(
         self,
         message: wire.BoardLimits | wire.HeldScan | wire.HeldPattern | wire.HeldMode,
         now: float,

@@ -142,9 +142,8 @@ class MaterialSection(Section, section="material"):
     )
     gauge: float | None = key(
         Number(-1000, 1000),
-        "Relative rise of resistance per mean strain in the plane, as strips are measured. With "
-        "it, "
-        "deformations are told as strains.",
+        "Relative rise of resistance per mean strain in the plane, as strips are measured. It turns "
+        "deformations into strains.",
         default=None,
     )
     gauge_across: float | None = key(
