@@ -11,7 +11,8 @@ import bill
 from circuit import ROOT, Circuit
 
 DATA = tomllib.loads(Path(__file__).with_name("order_numbers.toml").read_text(encoding="utf-8"))
-PAGE = (ROOT.parent / "docs" / "hardware.md").read_text(encoding="utf-8")
+PAGES = (ROOT.parent / "docs" / name for name in ("hardware.md", "pico.md"))
+PAGE = "\n".join(page.read_text(encoding="utf-8") for page in PAGES)
 UNITS = {"p": 1.0, "n": 1e3, "u": 1e6, "k": 1e3, "R": 1.0, "K": 1e3, "M": 1e6}
 
 
