@@ -15,8 +15,9 @@ from bench_rig import INSIDE_90, distance, drawn, gap, matched, stage
 from deform_course import AFTER, HELD, RAMP, Bench, Run
 from deform_plant import PROFILES, RADIUS, Ball, Fold, Pose, Stretch, Wrap
 from report import Report, progress, table
-from tomoskin.core import Detection
-from tomoskin.pipeline import FrameResult, Pipeline
+from tomoskin.core import Detection, Touch
+from tomoskin.pipeline import Pipeline
+from tomoskin.sensing.fit import Deformation
 from touch_lab import APART
 
 SEEDS, QUICK_SEED, ELECTRODES, LAWS = (62011, 62012), 61001, (8, 16), ("affine", "percolating")
@@ -48,12 +49,14 @@ UNTOUCHED = "bending", "held", "straightening", "after"
 
 class Shown(NamedTuple):
     """One frame: of which run and part, how much of the pose the sheet follows by then (it creeps),
-    what the live pipeline made of it, and its ms."""
+    what the live pipeline says of it, and its ms."""
 
     run: Run
     part: str
     follows: float
-    result: FrameResult
+    touches: tuple[Touch, ...]
+    told: Deformation | None
+    unexplained: str | None
     ms: float
 
 
@@ -101,7 +104,8 @@ def followed(run: Run) -> list[Shown]:
         result = pipeline.push(frame)
         spent = 1e3 * (time.process_time() - begun)
         if part and result is not None and result.ready:
-            out.append(Shown(run, part, follows, result, spent))
+            said = result.touches, result.deformation, result.unexplained
+            out.append(Shown(run, part, follows, *said, spent))
     return out
 
 
@@ -208,20 +212,20 @@ def _middle(values: Sequence[float]) -> float | str:
 
 def _untouched(some: Sequence[Shown]) -> dict[str, Any]:
     def touched(*parts: str) -> str:
-        return _part([bool(one.result.touches) for one in _of(some, *parts)])
+        return _part([bool(one.touches) for one in _of(some, *parts)])
 
     named = {part: touched(part) for part in UNTOUCHED} | {"after a press": touched("lifted")}
-    beyond = [any(gap(t, (0.0, 0.0)) > RADIUS for t in one.result.touches) for one in some]
+    beyond = [any(gap(t, (0.0, 0.0)) > RADIUS for t in one.touches) for one in some]
     every = {"frames": len(_of(some, *UNTOUCHED)), "all": touched(*UNTOUCHED)}
     return every | named | {"off the sheet": _part(beyond)}
 
 
 def _told(some: Sequence[Shown]) -> dict[str, Any]:
     held = _of(some, "held")
-    errors = [_errors(one) for one in held if _is_right(one)]
+    errors = [_errors(one, one.told) for one in held if one.told and _is_right(one)]
     found: dict[str, Any] = {
         "frames": len(held),
-        "told": _part([one.result.deformation is not None for one in held]),
+        "told": _part([one.told is not None for one in held]),
         "kind right": _part([_is_right(one) for one in held]),
     }
     for name, unit, scale in (
@@ -236,18 +240,16 @@ def _told(some: Sequence[Shown]) -> dict[str, Any]:
 
 
 def _is_right(shown: Shown) -> bool:
-    told, kind = shown.result.deformation, shown.run.kind
-    if told is None:
+    if (told := shown.told) is None:
         return False
-    round_one = kind == "cylinder" and "cylinder" in (told.confused or "")
-    return told.kind in RIGHT[kind] or round_one
+    round_one = shown.run.kind == "cylinder" and "cylinder" in (told.confused or "")
+    return told.kind in RIGHT[shown.run.kind] or round_one
 
 
-def _errors(shown: Shown) -> dict[str, tuple[float, bool]]:
+def _errors(shown: Shown, told: Deformation) -> dict[str, tuple[float, bool]]:
     """Of the numbers that are told: how far each is from the truth, of the amount in parts of it,
     and whether its interval holds that."""
-    told, out = shown.result.deformation, {}
-    known = _truth(shown)
+    known, out = _truth(shown, told), {}
     if told.axis is not None:
         turns = round((told.axis.value - known["axis"]) / math.pi)
         known["axis"] += turns * math.pi
@@ -260,9 +262,9 @@ def _errors(shown: Shown) -> dict[str, tuple[float, bool]]:
     return out
 
 
-def _truth(shown: Shown) -> dict[str, float]:
+def _truth(shown: Shown, told: Deformation) -> dict[str, float]:
     """Numbers of the pose as far as they are defined, in the unit that is told."""
-    pose, told = shown.run.poses[0], shown.result.deformation
+    pose = shown.run.poses[0]
     if told.kind == "fold":
         known = {"axis": pose.axis}
         if isinstance(pose, Fold):
@@ -282,14 +284,14 @@ def _pressed(some: Sequence[Shown]) -> dict[str, Any]:
     """Presses found within half of the least distance of two; errors of touches wherever."""
     found, extra, ghosts, far, near = [], [], [], [], []
     on_it = _of(some, "pressed")
-    for run, _, _, result, _ in on_it:
-        touches = [touch.detection for touch in result.touches]
-        pairs = _pairs(run.balls, touches)
-        within = [(run.balls[b], touches[t]) for b, t, error in pairs if error < APART / 2]
+    for one in on_it:
+        balls, touches = one.run.balls, [touch.detection for touch in one.touches]
+        pairs = _pairs(balls, touches)
+        within = [(balls[b], touches[t]) for b, t, error in pairs if error < APART / 2]
         far += [error for *_, error in pairs]
         near += [distance(touch, ball.x, ball.y) < INSIDE_90 for ball, touch in within]
-        found.append(len(within) == len(run.balls))
-        extra.append(len(touches) > len(run.balls))
+        found.append(len(within) == len(balls))
+        extra.append(len(touches) > len(balls))
         ghosts.append(len(touches) > len(within))
     return {
         "frames": len(found),
@@ -298,8 +300,8 @@ def _pressed(some: Sequence[Shown]) -> dict[str, Any]:
         "in 90 % ellipse": _part(near),
         "more touches than presses": _part(extra),
         "ghosts": _part(ghosts),
-        "none while bending": _part([not s.result.touches for s in _of(some, "bending pressed")]),
-        "deformation told": _part([s.result.deformation is not None for s in on_it]),
+        "none while bending": _part([not s.touches for s in _of(some, "bending pressed")]),
+        "deformation told": _part([s.told is not None for s in on_it]),
     }
 
 
@@ -310,11 +312,11 @@ def _pairs(balls: Sequence[Ball], touches: Sequence[Detection]) -> list[tuple[in
 
 
 def _other(some: Sequence[Shown]) -> dict[str, Any]:
-    told = [one.result.deformation for one in _of(some, "held", "after")]
+    told = [one.told for one in _of(some, "held", "after")]
     kinds = Counter("nothing" if one is None else one.kind for one in told)
     named = "; ".join(f"{kind} {100 * n / len(told):.0f} %" for kind, n in kinds.most_common())
     numbers = [one is not None and one.amount is not None for one in told]
-    words = [one.result.unexplained is not None for one in _of(some, "held", "after")]
+    words = [one.unexplained is not None for one in _of(some, "held", "after")]
     mixed = {"told": named, "with a number": _part(numbers), "unexplained": _part(words)}
     return _untouched(some) | mixed
 
