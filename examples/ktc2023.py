@@ -29,13 +29,8 @@ from scipy.spatial import cKDTree
 
 from tomoskin import core
 from tomoskin.core import CHANGE, DataError, FloatArray, TomoskinError
-from tomoskin.extras.absolute import (
-    AbsoluteImaging,
-    Observation,
-    Segmented,
-    ShapeImaging,
-    homogeneous,
-)
+from tomoskin.extras import absolute
+from tomoskin.extras.absolute import AbsoluteImaging, Observation, Segmented, ShapeImaging
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Disc, ElectrodeArc, Mesh, triangulate
 from tomoskin.model.pattern import Pattern
@@ -247,7 +242,7 @@ def calibrate(readout: Readout, u_ref: FloatArray) -> tuple[ForwardModel, FloatA
         resistance = water.solve(sigma).voltages
         leak = readout.slopes(common @ resistance, u_ref - plain @ resistance, noise)
         rows = plain + leak[readout.channel, None] * common
-        found = homogeneous(model(), Observation.of(u_ref, noise, rows), "each", sigma)
+        found = absolute.homogeneous(model(), Observation.of(u_ref, noise, rows), "each", sigma)
         sigma = found.background
         water = ForwardModel(tank(), resistances(), found.contact_impedance)
     return water, leak, sigma
@@ -305,7 +300,9 @@ def linear(
     rows = readout.rows(np.zeros(readout.mpat.shape[1]))
     water = ForwardModel(tank(), resistances(), 1e-6)
     noise = 5e-4 * np.abs(u) + 1e-4 * np.abs(u).max()
-    sigma = homogeneous(water, Observation.of(u_ref, noise, rows), "fixed", SIGMA).background
+    sigma = absolute.homogeneous(
+        water, Observation.of(u_ref, noise, rows), "fixed", SIGMA
+    ).background
     imaging = AbsoluteImaging(water, Matern(RADIUS, 0.5), alpha=16.0, steps=1)
     expected = rows @ water.solve(sigma).voltages
     image = imaging(Observation.of(expected + u - u_ref, noise, rows), sigma).conductivity

@@ -62,7 +62,7 @@ def test_more_electrodes_help_and_a_deeper_press_is_placed_better() -> None:
 def test_to_be_surer_takes_a_stronger_press() -> None:
     usual = of("textile-disc-8").faintest
     assert (of("textile-disc-8", Demand(0.015, false_alarm=1e-9)).faintest > usual).all()
-    assert (of("textile-disc-8", Demand(0.015, found=0.999)).faintest > usual).all()
+    assert (of("textile-disc-8", Demand(0.015, detected=0.999)).faintest > usual).all()
     assert ((usual > 0) & (usual < 1)).all()
 
 
@@ -126,8 +126,8 @@ def test_variants_are_on_the_same_sheet() -> None:
         ({"radius": -1.0}, "radius above 0"),
         ({"depth": 1.0}, "depth between"),
         ({"false_alarm": 0.0}, "false alarm between"),
-        ({"found": 1.5}, "found between"),
-        ({"found": 0.1, "false_alarm": 0.5}, "above the probability"),
+        ({"detected": 1.5}, "found between"),
+        ({"detected": 0.1, "false_alarm": 0.5}, "above the probability"),
     ],
 )
 def test_what_cannot_be_meant_is_refused(given: dict[str, float], words: str) -> None:

@@ -80,7 +80,7 @@ def test_ctrl_c_leaves_whole_shards_and_the_same_command_goes_on(plan, whole, tm
         make_set(plan, out, in_this_process, interrupted_at(6))
     assert contents(tuple(sorted(out.iterdir()))) == whole[:2]
     made = make_set(plan, out, in_this_process, quiet)
-    assert (made.found, made.made) == (2, 1)
+    assert (made.kept, made.made) == (2, 1)
     assert contents(made.files) == whole
 
 
@@ -107,7 +107,7 @@ def test_one_file_that_was_interrupted_goes_on_too(plan, tmp_path):
         make_set(plan, out, in_this_process, interrupted_at(3))
     assert not out.exists()
     made = make_set(plan, out, in_this_process, quiet)
-    assert (made.found, made.made) == (1, 2)
+    assert (made.kept, made.made) == (1, 2)
     make_set(plan, other, in_this_process, quiet)
     assert out.read_bytes() == other.read_bytes()
     assert sorted(tmp_path.iterdir()) == [other, out]
@@ -120,14 +120,14 @@ def test_a_cluster_makes_the_same_bytes(plan, whole, tmp_path, scheduler):
     assert seen[0] == (0, 7)
     assert seen[-1] == (7, 7)
     again = make_set(plan, tmp_path / "set", on_cluster(scheduler), quiet)
-    assert (again.found, again.made) == (3, 0)
+    assert (again.kept, again.made) == (3, 0)
 
 
 def test_ctrl_c_before_a_cluster(plan, whole, tmp_path, scheduler):
     with pytest.raises(KeyboardInterrupt):
         make_set(plan, tmp_path / "set", on_cluster(scheduler), interrupted_at(1))
     made = make_set(plan, tmp_path / "set", on_cluster(scheduler), quiet)
-    assert made.found >= 1
+    assert made.kept >= 1
     assert contents(made.files) == whole
 
 

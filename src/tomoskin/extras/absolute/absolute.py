@@ -323,15 +323,15 @@ class SharpDifference:
         if self.alpha is not None:
             return self._image(data, self.alpha)
         low, high = _RANGE
-        found = self._image(data, low)
+        image = self._image(data, low)
         for _ in range(_HALVINGS):
             alpha = float(np.sqrt(low * high))
             tried = self._image(data, alpha)
             if tried.descent.steps[-1].misfit <= len(data.target):
-                low, found = alpha, tried
+                low, image = alpha, tried
             else:
                 high = alpha
-        return found
+        return image
 
     def _image(self, data: Whitened, alpha: float) -> SharpImage:
         jacobian = data.rows @ self.jacobian

@@ -50,9 +50,9 @@ def sharpened(
             given = Observation.of(changes[k], np.where(missing[k], np.inf, noise))
         else:
             given = Observation(reach @ changes[k], np.full(len(reach), noise), reach)
-        found = method(given)
-        method.alpha = found.alpha
-        shown.append(found.image)
+        sharp = method(given)
+        method.alpha = sharp.alpha
+        shown.append(sharp.image)
         advance(done, len(rows))
     in_order = tuple(shown[number] for number in np.argsort(order))
     return replace(result, shown=in_order, unit=shown[0].unit)

@@ -111,9 +111,9 @@ class Whitened:
 
 def _reduced(target: FloatArray, rows: FloatArray) -> Whitened:
     """The same sum of squares from as many values as the rows have rank."""
-    left, size, right = np.linalg.svd(rows, full_matrices=False)
+    columns, size, basis = np.linalg.svd(rows, full_matrices=False)
     rank = int(np.count_nonzero(size > _NOTHING * size[0]))
-    return Whitened(left[:, :rank].T @ target, size[:rank, None] * right[:rank])
+    return Whitened(columns[:, :rank].T @ target, size[:rank, None] * basis[:rank])
 
 
 Contacts = Literal["fixed", "one", "each"]

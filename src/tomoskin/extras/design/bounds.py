@@ -78,27 +78,31 @@ class Demand:
         Part of the conductivity that it takes.
     false_alarm
         Chance that noise alone is taken for a press at a given position in one frame.
-    found
+    detected
         Chance that a press is found in one frame.
     """
 
     radius: float | None = None
     depth: float = 0.25
     false_alarm: float = 1e-4
-    found: float = 0.95
+    detected: float = 0.95
 
     def __post_init__(self) -> None:
         """Check the ranges. Raises ModelError."""
         if self.radius is not None and not 0 < self.radius < math.inf:
             raise ModelError(f"expected a radius above 0, got {self.radius:g} m")
-        chances = (("depth", self.depth), ("false alarm", self.false_alarm), ("found", self.found))
+        chances = (
+            ("depth", self.depth),
+            ("false alarm", self.false_alarm),
+            ("found", self.detected),
+        )
         for name, value in chances:
             if not 0 < value < 1:
                 raise ModelError(f"expected a {name} between 0 and 1, got {value:g}")
         if self.ratio <= 0:
             raise ModelError(
                 "expected a probability of detection above the probability of a false alarm, "
-                f"got {self.found:g} and {self.false_alarm:g}"
+                f"got {self.detected:g} and {self.false_alarm:g}"
             )
 
     @property
@@ -107,7 +111,7 @@ class Demand:
 
         A matched filter's output is a unit normal number, shifted by that size (Kay 1998, 4.3).
         """
-        return float(ndtri(self.found) - ndtri(self.false_alarm))
+        return float(ndtri(self.detected) - ndtri(self.false_alarm))
 
     def on(self, mesh: Mesh) -> float:
         """Radius of the press on a mesh, m."""

@@ -62,8 +62,8 @@ class PressAsked:
     false_alarm: Annotated[
         float, typer.Option(help="Probability of a false alarm at a position, in a frame.")
     ] = 1e-4
-    found: Annotated[
-        float, typer.Option(help="Probability that a press is detected in a frame.")
+    detected: Annotated[
+        float, typer.Option("--found", help="Probability that a press is detected in a frame.")
     ] = 0.95
 
     def of(self, skin: Skin) -> Demand:
@@ -80,7 +80,7 @@ class PressAsked:
                 f"{1e3 * radius:.0f} mm",
                 where="--radius",
             )
-        return Demand(radius, self.depth, self.false_alarm, self.found)
+        return Demand(radius, self.depth, self.false_alarm, self.detected)
 
 
 def design(
@@ -125,7 +125,7 @@ def design(
         "skin": chosen.name,
         "press": {"radius_m": radius_m, "depth": press.depth},
         "false_alarm": press.false_alarm,
-        "found": press.found,
+        "found": press.detected,
         **own.figures(),
         "compared": rows,
     }
@@ -133,7 +133,7 @@ def design(
     if out is not None:  # last: what may fail must not cost the table
         title = (
             f"{chosen.name}: one frame, press of radius {1e3 * radius_m:.0f} mm taking "
-            f"{100 * press.depth:.0f} %; noticed: {100 * press.found:g} % found, "
+            f"{100 * press.depth:.0f} %; noticed: {100 * press.detected:g} % found, "
             f"{press.false_alarm:g} false alarms"
         )
         write_promise(out, chosen, own, title, overwrite=force)

@@ -29,10 +29,14 @@ def write_promise(
         When matplotlib is not installed, and as :func:`written` does.
     """
     figure = new_figure(path, 11.0, 4.7)
-    left, right = figure.subplots(1, 2)
+    place_axes, press_axes = figure.subplots(1, 2)
     maps = (
-        (left, _MM * bounds.rms, "least RMS error of the position (mm)"),
-        (right, 100 * bounds.faintest, "faintest press that is detected (% of the conductivity)"),
+        (place_axes, _MM * bounds.rms, "least RMS error of the position (mm)"),
+        (
+            press_axes,
+            100 * bounds.faintest,
+            "faintest press that is detected (% of the conductivity)",
+        ),
     )
     for ax, values, label in maps:
         drawn = _draw_map(ax, skin, bounds, values)

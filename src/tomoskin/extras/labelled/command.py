@@ -141,6 +141,6 @@ def _labelled(plan: SetPlan, out: Path, workers: Workers, *, overwrite: bool, js
         raise typer.Exit(1) from None
     took = time.monotonic() - begun
     files = [str(file) for file in made.files]
-    document = {"frames": n, "made": made.made, "found": made.found, "files": files}
-    before = f"; {made.found} of {plan.n_shards} parts existed already" if made.found else ""
+    document = {"frames": n, "made": made.made, "found": made.kept, "files": files}
+    before = f"; {made.kept} of {plan.n_shards} parts existed already" if made.kept else ""
     tell(document, [f"{out}: {n} labelled frames in {took:.1f} s{before}"], json=json)

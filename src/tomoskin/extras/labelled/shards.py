@@ -45,7 +45,7 @@ Workers = Callable[[SetPlan, Sequence[int]], Made]
 class SetMade:
     """What became of a set: shards that were there already, and made now; the files."""
 
-    found: int
+    kept: int
     made: int
     files: tuple[Path, ...]
 
