@@ -142,8 +142,8 @@ class MaterialSection(Section, section="material"):
     )
     gauge: float | None = key(
         Number(-1000, 1000),
-        "Relative rise of resistance per mean strain in the plane, as strips are measured. It turns "
-        "deformations into strains.",
+        "Relative rise of resistance per mean strain in the plane, as strips are measured: "
+        "deformations then are strains.",
         default=None,
     )
     gauge_across: float | None = key(

@@ -25,8 +25,8 @@ _BOX = math.sqrt(12.0)
 _CLEAR = 4.0
 """Deviations by which one number must differ from another for the two to be told apart."""
 
-_WIDE = 0.25
-"""Width of a fold, in parts of the sheet's breadth, from which it is like a cylinder."""
+_WIDE = 0.17
+"""Width of a fold, in parts of the sheet's breadth, from which it may be a cylinder's."""
 
 
 @dataclass(frozen=True, slots=True)

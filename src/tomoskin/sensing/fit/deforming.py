@@ -9,9 +9,7 @@ deforms, or deforms otherwise.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -19,13 +17,17 @@ import numpy as np
 from tomoskin.core import FloatArray, reach
 from tomoskin.sensing.fit import policy as decisions
 from tomoskin.sensing.fit.deformation import Deformation, StrainLaw
-from tomoskin.sensing.fit.hypotheses import CommonModeJump, Rival
-from tomoskin.sensing.fit.problem import Matched, Problem, WhitenedTable
-from tomoskin.sensing.fit.selection import SpotDetections
-from tomoskin.sensing.fit.spot import CONTENT, N_PARAMETERS, Response
-from tomoskin.sensing.fit.spot_model import SpotModel
+from tomoskin.sensing.fit.deformed_frame import (
+    FrameData,
+    Search,
+    Searched,
+    odds_against,
+    told_by,
+)
+from tomoskin.sensing.fit.spot import Response
 from tomoskin.sensing.fit.strain import Strain
-from tomoskin.sensing.fit.strain_state import Explained, StrainState, likeliest, starts
+from tomoskin.sensing.fit.strain_fit import Explained, starts
+from tomoskin.sensing.fit.strain_state import StrainState
 from tomoskin.sensing.fit.strained_sheet import StrainedSheet
 
 _BEGINS, _MOVES, _CHANGES = 6.0, 2.0, 4.0
@@ -34,10 +36,6 @@ another one than was told."""
 
 _LEAVES = 30.0
 """Squares beyond noise that an explanation leaves, from which others are asked for."""
-
-_NEAR = 0.25
-"""Part of what a frame shows that a table of folds may leave more than touches do, for the exact
-model to be asked."""
 
 _FAINT = 4.0
 """Squared deviations by which a deformation must show, or it is over."""
@@ -48,10 +46,6 @@ _QUIET = 5
 _BEGUN, _MOST = 2.0, 12
 """Logarithm of the odds from which a deformation has begun, and frames in which it must."""
 
-_PLACE, _SWELLS = 5e-3, 0.2
-"""How far a touch may move from one frame to the next along each axis, m, and by what its radius's
-logarithm may grow, beside a deformation that begins."""
-
 _RESIDUAL = 0.15
 """Part of the largest deformation that the sheet may keep when it is over: that is none."""
 
@@ -60,81 +54,6 @@ _OTHER = 0.2
 
 _STARTS = 2
 """Folds that are looked at, the best of the table."""
-
-
-class Searched(NamedTuple):
-    """What explains a frame where the sheet is so."""
-
-    detected: SpotDetections
-    rival: Rival | None
-    jump: CommonModeJump
-    matched: Matched
-    problem: Problem
-    state: StrainState | None
-
-    @property
-    def evidence(self) -> float:
-        """Its logarithm, but for what all explanations have in common."""
-        return self.problem.evidence(self.detected.fit)
-
-
-Search = Callable[[StrainState | None], Searched]
-"""The touches of a frame on a sheet that is so."""
-
-
-@dataclass(frozen=True, eq=False)
-class FrameData:
-    """A frame, and how it is seen.
-
-    Attributes
-    ----------
-    data
-        (n_meas,) V.
-    seen
-        The table that its touches are fitted by.
-    model
-        Of touches.
-    before
-        (k, 4) touches of the last frame.
-    """
-
-    data: FloatArray
-    seen: WhitenedTable
-    model: SpotModel
-    before: FloatArray
-
-    @property
-    def count(self) -> int:
-        """How many touches there were."""
-        return len(self.before)
-
-    @cached_property
-    def _expanded(self) -> FloatArray:
-        """(k, m, n_meas) V: what each touch of the last frame did, and its slopes."""
-        solver = self.model.solver
-        return np.asarray(solver.expanded(self.before) @ solver.table.basis)
-
-    @cached_property
-    def untouched(self) -> FloatArray:
-        """(n_meas,) V without what the touches of the last frame did."""
-        return np.asarray(self.data - self._expanded[:, 0].sum(axis=0))
-
-    @property
-    def alone(self) -> FrameData:
-        """The frame as if nothing had touched in the last."""
-        return replace(self, before=self.before[:0])
-
-    def fitted(self, begin: StrainState) -> Explained:
-        """A deformation that explains the frame beside these touches; see :func:`likeliest`."""
-        return likeliest(begin, self.untouched, self.seen.full, self.others)
-
-    @cached_property
-    def others(self) -> FloatArray:
-        """(q, r) what these may do otherwise in this frame, whitened, a deviation each."""
-        prior = self.model.prior
-        size = [_PLACE, _PLACE, _SWELLS, prior.content, prior.directed, prior.reshaped]
-        rows = np.array(size)[:, None] * self._expanded[:, 1:]
-        return np.asarray(rows.reshape(-1, len(self.data)) @ self.seen.full.T)
 
 
 class Begun(NamedTuple):
@@ -194,7 +113,7 @@ class Deforming:
         if not asks:
             self._moves = False
             return first
-        score = first.evidence - _beginning(first, frame)
+        score = first.evidence - odds_against(first, frame)
         best, gain = self._best(frame, search, first, score)
         if self.state is None and self._follows:
             return self._begun(first, best, gain)
@@ -211,7 +130,7 @@ class Deforming:
         best, most = first, -math.inf
         for found, odds in self._others(frame, first):
             other = search(found.state)
-            own = other.evidence - odds - _beginning(other, frame) - score
+            own = other.evidence - odds - odds_against(other, frame) - score
             if own > most:
                 best, most = other, own
         return best, most
@@ -224,14 +143,14 @@ class Deforming:
         odds = float(np.clip(gain, -decisions.SURE, decisions.SURE))
         if self._rival is None:
             self._vain = 0 if odds > 0 else self._vain + 1
-            self._rival = Begun(_told(best), odds, 1) if odds > 0 else None
+            self._rival = Begun(told_by(best), odds, 1) if odds > 0 else None
             return first
         odds, frames = self._rival.odds + odds, self._rival.frames + 1
         if odds > _BEGUN:
             self._rival, self._moves, self._vain = None, True, 0
             return best
         goes_on = odds > -decisions.SURE and frames < _MOST
-        self._rival = Begun(_told(best), odds, frames) if goes_on else None
+        self._rival = Begun(told_by(best), odds, frames) if goes_on else None
         return first
 
     def _moved(self, frame: FrameData, search: Search, state: StrainState) -> Searched | None:
@@ -323,7 +242,7 @@ class Deforming:
 
     def take(self, found: Searched) -> None:
         """Take what a frame was explained with."""
-        state, fit = _told(found), found.detected.fit
+        state, fit = told_by(found), found.detected.fit
         if state is None:
             self.state = None
             return
@@ -331,35 +250,3 @@ class Deforming:
         self._quiet = self._quiet + 1 if shown @ shown < _FAINT else 0
         over = self._quiet >= _QUIET and not len(fit.spots)
         self.state = None if over else state
-
-
-def _told(found: Searched) -> StrainState | None:
-    """What a frame says of the deformation that it is explained with."""
-    state, fit = found.state, found.detected.fit
-    if state is None:
-        return None
-    d = len(state.mean)
-    others = np.vstack([fit.unknown[d:], _free(found)])
-    told = state.told(fit.residual, fit.unknown[:d], others)
-    return told.linear_again(found.problem.seen.matrix)
-
-
-def _free(found: Searched) -> FloatArray:
-    """(4k, c) what the numbers of the touches may be, by what is expected of them, each deviation.
-
-    The content of a touch is not expected: the prior says how large it may be.
-    """
-    fit, prior, expected = found.detected.fit, found.problem.prior, found.problem.expected
-    rows = [np.zeros((0, len(fit.residual)))]
-    for k, number in enumerate(fit.known or (None,) * len(fit.spots)):
-        own = np.diag(1.0 / prior.weights)
-        if number is not None:
-            own[:CONTENT, :CONTENT] = np.linalg.cholesky(expected.covariances[number])
-        rows.append(own.T @ fit.slopes[N_PARAMETERS * k : N_PARAMETERS * (k + 1)])
-    return np.vstack(rows)
-
-
-def _beginning(found: Searched, frame: FrameData) -> float:
-    """Logarithm of the odds against so many touches' beginning."""
-    more = max(len(found.detected.fit.spots) - frame.count, 0)
-    return more * math.log(200)

@@ -14,8 +14,10 @@ from tomoskin.core import Detection, FloatArray, reach, show
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.skin import Skin
 from tomoskin.sensing.fit import policy as decisions
+from tomoskin.sensing.fit.certificate import Reduced
 from tomoskin.sensing.fit.deformation import StrainLaw
-from tomoskin.sensing.fit.deforming import Deforming, FrameData, Searched
+from tomoskin.sensing.fit.deformed_frame import FrameData, Searched
+from tomoskin.sensing.fit.deforming import Deforming
 from tomoskin.sensing.fit.expectation import Expectation, ResidualResponse
 from tomoskin.sensing.fit.hypotheses import (
     CommonModeJump,
@@ -202,7 +204,8 @@ class SpotFinder:
         seen, matched, _, jumps = sight if times == 1.0 else sight.louder(times)
         whitened, rest = seen.whitened(data if state is None else data - state.moved)
         left = self._slow(self._residual.directions(seen.matrix), jumps)
-        exact, reduced = self._model.response.changes, self._model.reduced
+        exact = self._model.response.changes
+        reduced: Reduced | None = self._model.reduced
         if state is not None:
             if state.shows_in_touches:
                 exact, reduced = partial(self.deforming.touched, state), None

@@ -1,4 +1,4 @@
-"""What smooth strains of a sheet do to its voltages: exactly, and to first order by a table."""
+"""What smooth strains of a whole sheet do to its voltages: exactly, and to first order."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from tomoskin.core import FloatArray
+from tomoskin.core import FloatArray, IntArray
 from tomoskin.model.forward import ForwardModel, State, Terminals
 from tomoskin.sensing.fit.spot import Response
 from tomoskin.sensing.fit.strain import (
@@ -121,7 +121,7 @@ class StrainedSheet:
         return np.asarray(self._by_patch @ fields.transpose(1, 0, 2).reshape(-1, k))
 
     @cached_property
-    def _group(self) -> tuple[FloatArray, FloatArray]:
+    def _group(self) -> tuple[IntArray, FloatArray]:
         """(n_cells,) patch of each cell, and (p, 2) middles of the patches, m."""
         step = self.breadth / math.sqrt(_PATCHES)
         place = np.floor(self.points / step).astype(int)
@@ -129,7 +129,7 @@ class StrainedSheet:
         group = group.ravel()
         size = np.bincount(group)
         middle = np.stack([np.bincount(group, x) / size for x in self.points.T], axis=1)
-        return group, middle
+        return np.asarray(group, np.int64), middle
 
     @property
     def _patches(self) -> FloatArray:
