@@ -15,8 +15,8 @@ MOST_LINES = 500
 NO_HOME_FOR_IDEAS = {"utils", "util", "helpers", "misc", "common"}
 VAGUE = {"told", "seen", "beside", "found", "left"}
 UNFINISHED = (
-    "src/tomoskin/(core|extras/alignment|files|imaging|learning/touch|model|pipeline|run|sensing|twin)/"
-    "|src/tomoskin/cli/design.py"  # --found is an option
+    "src/tomoskin/(core|extras/alignment|files|imaging|learning/touch|model|pipeline|run|sensing)/"
+    "|src/tomoskin/twin/|src/tomoskin/extras/design/command.py"  # --found is an option
 )
 """Where such names are left."""
 

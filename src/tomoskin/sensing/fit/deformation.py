@@ -125,8 +125,8 @@ class Deformation:
         if self.kind == "common":
             return f"the whole sheet conducts otherwise{self._amount}{self._but}"
         return (
-            "the sheet is deformed as no single fold or stretch explains, so no touch is shown until "
-            "it lies flat"
+            "the sheet is deformed as no single fold or stretch explains, so no touch is shown "
+            "until it lies flat"
         )
 
     @property
