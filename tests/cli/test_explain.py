@@ -14,7 +14,7 @@ def run(capsys, *words: str) -> tuple[int, str, str]:
     with pytest.raises(SystemExit) as end:
         main(["explain", *words])
     out = capsys.readouterr()
-    return end.value.code or 0, out.out, out.err
+    return int(end.value.code or 0), out.out, out.err
 
 
 def test_a_frame_is_told_in_words_and_as_json(recorded, capsys):  # noqa: F811

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tomoskin.core import Arrays, DataError
+from tomoskin.core import DataError
 from tomoskin.learning import Kind, load_calibration
 from tomoskin.model.pattern import Pattern
 
@@ -21,7 +21,7 @@ RENAMED = {"force_n": "amount"}
 """Keys that these files have for what is called so now."""
 
 
-def read_earlier(path: Path, kind: Kind[Any]) -> tuple[Arrays, Arrays]:
+def read_earlier(path: Path, kind: Kind[Any]) -> tuple[dict[str, Any], dict[str, Any]]:
     """What its model is packed as now, and what the file holds."""
     known = kind.read(path)
     assert load_calibration(path).kind is kind

@@ -34,7 +34,7 @@ _CUT = 200
 MOST_BYTES = 1 << 30
 """Of the inverse of a state's matrix: where it is larger, touches come in parts."""
 
-Batch = tuple[IntArray, IntArray, FloatArray]
+Batch = tuple[NDArray[np.integer], NDArray[np.integer], FloatArray]
 """Touches one behind the other: ``starts`` (n + 1,), and the ``cells`` (c,) and ``height`` (c,) of
 each; what is there of log σ changes by the height times a depth."""
 

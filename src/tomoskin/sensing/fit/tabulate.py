@@ -15,6 +15,7 @@ from itertools import product
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.ndimage import spline_filter1d
 
 from tomoskin.core import Arrays, FloatArray, kept, reach
@@ -175,7 +176,11 @@ def _summing(lattice: Lattice, slopes: FloatArray) -> Generator[None, None, Floa
 
 
 def _sampled(
-    response: Response, lattice: Lattice, change: FloatArray, nodes: FloatArray, basis: FloatArray
+    response: Response,
+    lattice: Lattice,
+    change: NDArray[np.floating],
+    nodes: FloatArray,
+    basis: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
     """(n, n_nodes + N_DIRECTIONS, rank) V, and :attr:`Tabulation.parts`, of the spots of a lattice.
 
@@ -203,7 +208,7 @@ def _parts(samples: FloatArray, linear: FloatArray) -> FloatArray:
     return np.where(clear[:, None], along / np.where(clear, square, 1.0)[:, None], 0.0)
 
 
-def _basis(table: FloatArray, nodes: FloatArray, reads: FloatArray) -> FloatArray:
+def _basis(table: NDArray[np.floating], nodes: FloatArray, reads: FloatArray) -> FloatArray:
     """(rank, n_meas) what all changes are made of, but for a part of ``NEGLIGIBLE``.
 
     Of changes ``table`` (n, n_nodes, q) Ω, which rows read as ``reads`` (q, n_meas) V/Ω.
