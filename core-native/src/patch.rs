@@ -464,7 +464,7 @@ impl<T: Scalar, const L: usize> Patch<T, L> {
             let (low, high) = (node.min(other as usize), node.max(other as usize));
             let mut values = self.matrix[high * n + low];
             for (value, &scale) in values.iter_mut().zip(&scale) {
-                *value = *value * scale;
+                *value *= scale;
             }
             self.column.push(values);
         }

@@ -122,9 +122,9 @@ impl Patches {
         let depths = contiguous("depths", &depths)?;
         let (shapes, threads) = ((starts, cells, height), threads::count(threads));
         match depths.len() {
-            0 | 1 => scaled::<2>(&self.cells, base, shapes, &depths, threads),
-            2 | 3 => scaled::<4>(&self.cells, base, shapes, &depths, threads),
-            4..8 => scaled::<8>(&self.cells, base, shapes, &depths, threads),
+            0 | 1 => scaled::<2>(&self.cells, base, shapes, depths, threads),
+            2 | 3 => scaled::<4>(&self.cells, base, shapes, depths, threads),
+            4..8 => scaled::<8>(&self.cells, base, shapes, depths, threads),
             _ => Err(invalid("depths: expected at most 7")),
         }
     }
@@ -144,7 +144,7 @@ fn scaled<'py, const L: usize>(
     let height = array::<f64, Ix1>("height", height)?;
     let (starts, cells) = (contiguous("starts", &starts)?, contiguous("cells", &cells)?);
     let height = contiguous("height", &height)?;
-    check_starts(&starts, cells.len())?;
+    check_starts(starts, cells.len())?;
     same("length of height", cells.len(), height.len())?;
 
     let count = starts.len() - 1;
@@ -254,7 +254,7 @@ fn change<'py, B: Lift<T>, T: Scalar + Element>(
     let conductivity = array::<T, Ix1>("conductivity", conductivity)?;
     let (starts, cells) = (contiguous("starts", &starts)?, contiguous("cells", &cells)?);
     let conductivity = contiguous("conductivity", &conductivity)?;
-    check_starts(&starts, cells.len())?;
+    check_starts(starts, cells.len())?;
     same("length of conductivity", cells.len(), conductivity.len())?;
 
     let count = starts.len() - 1;
