@@ -17,7 +17,7 @@ from tomoskin.twin import TwinSettings, TwinSkin
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 PAGES = (
-    *("bodies", "imaging", "interchange", "outputs", "simulate", "classes"),
+    *("bodies", "imaging", "interchange", "outputs", "simulate"),
     *("touch", "touch-fit", "twin", "channel-mapping"),
 )
 BLOCK = re.compile(r"^```python\n(.*?)^```", re.DOTALL | re.MULTILINE)

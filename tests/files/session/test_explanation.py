@@ -59,7 +59,7 @@ def test_it_is_the_replays_own_result(recorded, results):
 def test_the_steps_stand_in_the_order_of_the_flow(recorded, results):
     steps = [step.name for step in at(recorded, frame_with(results, "onset")).steps]
     order = ("frame", "voltages", "conditioned", "image", "hypotheses", "detections", "touches")
-    assert [name for name in steps if name in order] == list(order)
+    assert list(dict.fromkeys(name for name in steps if name in order)) == list(order)
 
 
 def test_it_says_why_a_touch_began_stayed_and_ended(recorded, results):

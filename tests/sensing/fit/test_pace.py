@@ -154,7 +154,9 @@ def test_a_frame_has_a_bounded_number_of_steps() -> None:
     exact = 1 + 2
     one = 1 + LIVE.warm + exact
     more = 2 * (1 + LIVE.glance) + 1 + LIVE.cold + exact
-    assert 0 < max(steps) <= 3 * one + (3 * LIVE.tries + 1) * more + 3
+    search = 3 * one + (3 * LIVE.tries + 1) * more + 3
+    # of the flat sheet, and beside up to three deformations that may explain it
+    assert 0 < max(steps) <= (1 + 3) * search
 
 
 def rested(ours: SpotFinder, left: FloatArray, count: int, seed: int) -> int:
