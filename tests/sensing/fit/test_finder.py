@@ -32,7 +32,9 @@ def model(sign: str = "decrease") -> SpotModel:
 
 def finder(**touch: object) -> SpotFinder:
     """One that has seen nothing yet; what it prepares is copied."""
-    return copy(_prepared(**touch))
+    own = copy(_prepared(**touch))
+    own.deforming = copy(own.deforming)
+    return own
 
 
 @cache
