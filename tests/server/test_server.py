@@ -355,7 +355,7 @@ def deaf(site):
 
 
 def test_a_page_that_does_not_read_delays_nobody_and_is_let_go(site, monkeypatch):
-    monkeypatch.setattr(page_connection, "PATIENCE", 0.3)
+    monkeypatch.setattr(page_connection, "PATIENCE", 1.0)  # of which a busy machine takes a part
     monkeypatch.setattr(page_connection, "FRAME_PERIOD", 0.001)
     with deaf(site), site.connect() as other:
         seen = []
@@ -365,7 +365,7 @@ def test_a_page_that_does_not_read_delays_nobody_and_is_let_go(site, monkeypatch
                 seen.append(decode(message)["sequence"])
             elif json.loads(message).get("kind") == "page-dropped":
                 break
-        assert len(seen) > 5  # in those 0.3 s, on a machine however busy
+        assert len(seen) > 5  # in that second, on a machine however busy
         assert seen == sorted(set(seen))
         assert site.runner.status().dropped == 0
 

@@ -63,20 +63,20 @@ class Registered:
     def load(self) -> Any:
         """The thing itself. Raises what the import of its module raises."""
         module, _, path = self.target.partition(":")
-        found: Any = import_module(module)
+        thing: Any = import_module(module)
         for part in path.split("."):
-            found = getattr(found, part)
-        return found
+            thing = getattr(thing, part)
+        return thing
 
 
 def registered(seam: Seam) -> Mapping[str, Registered]:
     """What is registered at a ``seam``, by name: extras in their order, then other packages."""
     from importlib.metadata import entry_points  # noqa: PLC0415 - loads slowly
 
-    found = {entry.name: entry for entry in _of_extras()[seam]}
+    entries = {entry.name: entry for entry in _of_extras()[seam]}
     for entry in entry_points(group=f"{PREFIX}{seam}"):
-        found.setdefault(entry.name, Registered(entry.name, entry.value))
-    return found
+        entries.setdefault(entry.name, Registered(entry.name, entry.value))
+    return entries
 
 
 def registered_one(seam: Seam, name: str) -> Registered | None:
@@ -92,7 +92,7 @@ def extra_names() -> tuple[str, ...]:
 
 @cache
 def _of_extras() -> Mapping[Seam, tuple[Registered, ...]]:
-    found: dict[Seam, list[Registered]] = {seam: [] for seam in get_args(Seam)}
+    entries_of: dict[Seam, list[Registered]] = {seam: [] for seam in get_args(Seam)}
     for file in _tables():
         extra = file.parent.name
         for seam, entries in _read(file).items():
@@ -101,8 +101,8 @@ def _of_extras() -> Mapping[Seam, tuple[Registered, ...]]:
                 if not isinstance(entry, str):
                     target, about = entry["target"], entry.get("about", "")
                 where = f"tomoskin.extras.{extra}.{target}"
-                found[seam].append(Registered(name, where, extra, about))
-    return {seam: tuple(entries) for seam, entries in found.items()}
+                entries_of[seam].append(Registered(name, where, extra, about))
+    return {seam: tuple(entries) for seam, entries in entries_of.items()}
 
 
 def _tables() -> list[Path]:

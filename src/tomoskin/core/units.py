@@ -42,15 +42,15 @@ def parse_quantity(text: str, dimension: str) -> float:
     """
     units = DIMENSIONS[dimension]
     choices = ", ".join(u or "no unit" for u in units)
-    found = _QUANTITY.match(text)
-    if not found:
+    match = _QUANTITY.match(text)
+    if not match:
         hint = ""
         if _COMMA.search(text) and _QUANTITY.match(pointed := _COMMA.sub(".", text)):
             hint = f'; with a decimal point: "{pointed.strip()}"'
         raise ValueError(
             f'expected a number with a unit of {dimension} ({choices}), got "{text}"{hint}'
         )
-    number, unit = found.groups()
+    number, unit = match.groups()
     unit = unit.replace("\N{GREEK SMALL LETTER MU}", "\N{MICRO SIGN}")
     if unit not in units:
         got = f'unit "{unit}"' if unit else "no unit"

@@ -302,16 +302,16 @@ _OF_CONTAINER = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limi
 
 def machine_memory() -> int:
     """Bytes of memory that this process can have: the machine's, its container's or its limit."""
-    found = []
+    sizes = []
     with suppress(AttributeError, ValueError, OSError):
-        found.append(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+        sizes.append(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
     for path in _OF_CONTAINER:
         with suppress(OSError, ValueError):  # "max" where there is no limit
-            found.append(int(Path(path).read_text()))
+            sizes.append(int(Path(path).read_text()))
     with suppress(ImportError):  # on Windows
         limits = import_module("resource")
-        found.append(limits.getrlimit(limits.RLIMIT_AS)[0])
-    return min((size for size in found if size > 0), default=_UNKNOWN)
+        sizes.append(limits.getrlimit(limits.RLIMIT_AS)[0])
+    return min((size for size in sizes if size > 0), default=_UNKNOWN)
 
 
 def most_bytes() -> int:

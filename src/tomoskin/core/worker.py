@@ -161,8 +161,8 @@ class Worker(Generic[C]):
         """Return when it has ended, or leave it to itself when it does not."""
         if self._thread.ident is None:
             return
-        left = (self._deadline or 0.0) + _PATIENCE - time.monotonic()
-        self._thread.join(None if math.isinf(left) else max(left, 0.0))
+        remaining = (self._deadline or 0.0) + _PATIENCE - time.monotonic()
+        self._thread.join(None if math.isinf(remaining) else max(remaining, 0.0))
         if self._thread.is_alive():
             self._tell("stuck", "does not answer, and tomoskin no longer waits for it")
 

@@ -153,8 +153,8 @@ class FitFinder:
         lost = ~np.isfinite(dv)
         if lost.all():
             return None
-        found = self.spots.push(np.where(lost, 0.0, dv), np.eye(len(dv))[:, lost])
-        return found[0] if found else None
+        detections = self.spots.push(np.where(lost, 0.0, dv), np.eye(len(dv))[:, lost])
+        return detections[0] if detections else None
 
     @property
     def deformation(self) -> Deformation | None:

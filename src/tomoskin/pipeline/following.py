@@ -122,8 +122,8 @@ class Following:
         self._aside: Aside[Callable[[], None]] | None = None
         known = rest is None or not finding.located_alone(prepared, rest.agreement)
         self._finder = finding.finder_of(prepared, reference, setting.pace, interval, fitted=known)
-        if (seen := conditioning.expected()) is not None:
-            self._finder.foresee(*seen)
+        if (expected := conditioning.expected()) is not None:
+            self._finder.foresee(*expected)
         self._renewal: finding.FinderSteps | None = None
         self._is_outdated = False
         fitted = isinstance(self._finder, finding.FitFinder)

@@ -199,9 +199,9 @@ def reconstruct(
     wanted = (recorded.frames >= start) & (recorded.frames < stop)
     with threadpool_limits(1):  # as live, so that sums keep their order
         flow = sorted(_flow(pipeline, recorded, stop, advance))
-    found = Reconstruction.of(pipeline, prepared, (one for one in flow if one.number >= start))
+    whole = Reconstruction.of(pipeline, prepared, (one for one in flow if one.number >= start))
     return replace(
-        found,
+        whole,
         rows_missing=recorded.missing[wanted].sum(axis=1),
         model_agreement=recorded.agreement,
         rows_left_out=recorded.rows_left_out,

@@ -150,10 +150,10 @@ class Prepared:
             return self
         basis = np.linalg.qr(directions)[0]
         jacobian = self.problem.jacobian
-        left = jacobian - basis @ (basis.T @ jacobian)
-        if not left.any(axis=0).all():  # nothing is left to weigh by
+        projected = jacobian - basis @ (basis.T @ jacobian)
+        if not projected.any(axis=0).all():  # nothing is left to weigh by
             return self
-        prior = self.skin.inverse.record("prior").penalty(self.mesh, left)
+        prior = self.skin.inverse.record("prior").penalty(self.mesh, projected)
         operator = replace(self.problem, prior=prior).operator(self.choice.alpha)
         return replace(self, operator=operator)
 

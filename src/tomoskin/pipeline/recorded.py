@@ -355,7 +355,7 @@ def open_electrodes(pattern: Pattern, measured: NDArray[Any], model: FloatArray)
     """
     size, expected = np.abs(measured), np.abs(model)
     rows = np.hstack([pattern.drive, pattern.measure])
-    kept, found = np.isfinite(size), list[int]()
+    kept, excluded = np.isfinite(size), list[int]()
     while kept.mean() >= _LEFT:
         scaled = expected * _size_over(size[kept], expected[kept])
         small = _SMALL * np.sqrt(np.mean(scaled[kept] ** 2))
@@ -364,8 +364,8 @@ def open_electrodes(pattern: Pattern, measured: NDArray[Any], model: FloatArray)
         part = [float(off[mine].mean()) if mine.any() else 0.0 for mine in own]
         worst = int(np.argmax(part))
         if part[worst] < _OFF:
-            return sorted(found)
-        found.append(worst)
+            return sorted(excluded)
+        excluded.append(worst)
         kept &= ~own[worst]
     return []
 

@@ -190,8 +190,8 @@ def tuned_by_rule(prepared: Prepared, rule: str, noise: FloatArray | None) -> Pr
 def with_choice(prepared: Prepared, choice: AlphaChoice) -> Prepared:
     """The skin with that alpha, which no noise changes any more."""
     spectrum = Spectrum.of(prepared.problem)
-    found = prepared.with_alpha(choice, spectrum, spectrum.operator(choice.alpha))
-    return replace(found, light_touch=None)
+    chosen = prepared.with_alpha(choice, spectrum, spectrum.operator(choice.alpha))
+    return replace(chosen, light_touch=None)
 
 
 _COMMON = 10.0

@@ -97,26 +97,26 @@ def check_board(
     if record.usb_reference and five_volts is not None:
         reference = five_volts
     scale = CountScale.of(record.gain, reference, BITS, measured=not guessed)
-    found = diagnose(
+    board = diagnose(
         np.vstack([first.mean, second.mean]),
         ring,
         np.vstack([onward.drives, back.drives]),
         current,
         scale,
     )
-    for text in found.faults:
+    for text in board.faults:
         yield CheckFinding("channels", False, text)
-    if not found.faults:
+    if not board.faults:
         text = (
-            f"{n} channels as source, sink and reading: deviations of {found.deviation:.1f} counts "
-            f"(RMS), at most {found.largest:.1f}"
+            f"{n} channels as source, sink and reading: deviations of {board.deviation:.1f} counts "
+            f"(RMS), at most {board.largest:.1f}"
         )
         yield CheckFinding("channels", True, text)
-        text = f"{found.scale * current * 1e3:.4g} mA through resistors of their nominal values"
+        text = f"{board.scale * current * 1e3:.4g} mA through resistors of their nominal values"
         text += ", if +5V is 5.00 V: --five-volts says what a meter shows there" * guessed
         yield CheckFinding("current", True, text)
-        ok = found.sink_ohms < _SINK_OHMS
-        text = f"{found.sink_ohms * 1e3:.0f} mΩ from a sink to ground"
+        ok = board.sink_ohms < _SINK_OHMS
+        text = f"{board.sink_ohms * 1e3:.0f} mΩ from a sink to ground"
         yield CheckFinding("sinks", ok, text if ok else f"{text}: solder joints, Q103, Q203, …")
     yield _noise(np.vstack([first.sd, second.sd]))
     early = _measure(transport, onward, replace(settings, settling=_EARLY), frames, _AT_ONCE)

@@ -91,9 +91,9 @@ class ScriptedPress(Scripted[PressSection]):
             first = int(np.argmin(inside))
             x, y = 1e3 * positions[first]
             corners = 1e3 * outline.polyline(outline.length / 64)
-            (left, low), (right, high) = corners.min(axis=0), corners.max(axis=0)
+            (west, low), (right, high) = corners.min(axis=0), corners.max(axis=0)
             raise ScriptError(
-                f"expected a position on the skin (x from {left:.0f} to {right:.0f} mm, y from "
+                f"expected a position on the skin (x from {west:.0f} to {right:.0f} mm, y from "
                 f"{low:.0f} to {high:.0f} mm), got ({x:.1f} mm, {y:.1f} mm), which is off the "
                 "skin",
                 where=f"{self.where} {'path' if times[first] else 'at'}",

@@ -154,7 +154,7 @@ class Rubbing:
         labelled = np.flatnonzero(np.isfinite(labels).all(axis=1))
         alone = UnlabelledFit.of(dv, skin, pattern, region, np.full(xy.shape, np.nan))
         far = _contradicting(alone, labels, labelled)
-        found = cls(
+        rubbed = cls(
             skin,
             pattern,
             Presses.checked(dv, region.metres(alone.positions), spread=_spread(alone, region)),
@@ -166,13 +166,13 @@ class Rubbing:
             tuple(chosen[far].tolist()),
         )
         if not len(labelled):
-            return found
-        if found.holds:
+            return rubbed
+        if rubbed.holds:
             fit = UnlabelledFit.of(dv, skin, pattern, region, labels)
             apart = region.unit * fit.disagreement
             presses = _presses(dv, xy, region.metres(fit.positions), _spread(fit, region))
-            return replace(found, presses=presses, disagreement=apart)
-        return found._by_labels(xy) if len(labelled) >= _ENOUGH else found
+            return replace(rubbed, presses=presses, disagreement=apart)
+        return rubbed._by_labels(xy) if len(labelled) >= _ENOUGH else rubbed
 
     def _by_labels(self, xy: FloatArray) -> Self:
         """The same from labels ``xy`` (n, 2) m alone, unless they contradict each other."""
@@ -200,28 +200,28 @@ class Rubbing:
     @property
     def findings(self) -> tuple[str, ...]:
         """What speaks against the positions and what would mend it, in words."""
-        found = []
+        notes = []
         if self.alike < _ALIKE and not self.by_labels:
-            found.append(
+            notes.append(
                 "the voltages do not change as this skin's model predicts: the pattern or the "
                 "skin may be another one, or wires may be swapped (tomoskin calibrate mapping)"
             )
         if self._unsure and not self.by_labels:
-            found.append(
+            notes.append(
                 "the touches do not say where they were: fits that assume different things differ "
                 f"by {1e3 * max(self.disagreement, self.moved):.0f} mm; label at least {_ENOUGH} "
                 "touches, or press known positions (tomoskin calibrate touch)"
             )
         if self.quiet:
             names = ", ".join(f"E{e + 1}" for e in self.quiet)
-            found.append(f"probably no touch came near {names}: rub the whole skin, out to its rim")
+            notes.append(f"probably no touch came near {names}: rub the whole skin, out to its rim")
         if self.contradicted:
             shown = ", ".join(map(str, self.contradicted[:10]))
-            found.append(
+            notes.append(
                 f"the labels of frames {shown} contradict the positions found without labels: "
                 "check the labels, and [electrodes] first and order in the skin file"
             )
-        return tuple(found)
+        return tuple(notes)
 
     @property
     def labelled(self) -> int:

@@ -169,24 +169,24 @@ class SessionAlignment:
             weight = prevalence(region.scaled(before.xy), touches)
         apart = distance(before.dv, dv, weight)
         session = _Session(locator, dv, xy, region.lattice(_PLACES))
-        found = _Found(before, touches, 0.0, 1.0, 1.0)
+        aligned = _Found(before, touches, 0.0, 1.0, 1.0)
         if not fits or apart > CHANCE:
-            found = session.found(weight if fits else None, touches)
+            aligned = session.alignment(weight if fits else None, touches)
         known = session.known
         missed = np.nan
         if known.any():
-            missed = _way(found.positions[known], region.scaled(xy[known]))
-        believed = found.moved < _MOVED and found.covered > _COVERED and found.unlike < _LIKE
+            missed = _way(aligned.positions[known], region.scaled(xy[known]))
+        believed = aligned.moved < _MOVED and aligned.covered > _COVERED and aligned.unlike < _LIKE
         return cls(
-            found.presses,
+            aligned.presses,
             Presses.of_more(dv[known], xy[known]),
             SessionFeatures.of(dv).scale / SessionFeatures.of(before.dv).scale,
-            found.moved,
-            found.noise,
-            found.covered,
+            aligned.moved,
+            aligned.noise,
+            aligned.covered,
             region.unit * missed,
             strange,
-            found.unlike,
+            aligned.unlike,
             apart,
             holds=believed if np.isnan(missed) else missed < _AGREE,
         )
@@ -212,27 +212,27 @@ class SessionAlignment:
         """What differs from the calibration, and what would mend it, in words."""
         if not self.needed:
             return ("the session agrees with the calibration",)
-        found = []
+        notes = []
         middle = float(np.median(self.gains))
         uneven = float(np.exp(np.abs(np.log(self.gains / middle)).mean()))
         if max(middle, 1 / middle) > _GAIN:
-            found.append(f"changes are {middle:.2g} times as large as in the calibration")
+            notes.append(f"changes are {middle:.2g} times as large as in the calibration")
         if uneven > _GAIN:
-            found.append(f"the channels' gains have changed by a factor of {uneven:.2g}, unevenly")
+            notes.append(f"the channels' gains have changed by a factor of {uneven:.2g}, unevenly")
         if self.noise > _NOISE:
-            found.append(
+            notes.append(
                 f"the variance that the maps do not explain is {self.noise:.2g} times as large"
             )
         if self.covered <= _COVERED:
-            found.append(f"touches cover {self.covered:.0%} of the sheet: touch the whole sheet")
-        if not found:
-            found.append("the channels' changes are distributed otherwise than in the calibration")
+            notes.append(f"touches cover {self.covered:.0%} of the sheet: touch the whole sheet")
+        if not notes:
+            notes.append("the channels' changes are distributed otherwise than in the calibration")
         if not self.holds:
-            found.append(
+            notes.append(
                 "the session cannot be aligned with the calibration: touch the whole skin, press "
                 "ten known positions as well, or calibrate again"
             )
-        return tuple(found)
+        return tuple(notes)
 
 
 def in_session(locator: Locator, dv: ArrayLike, xy: ArrayLike | None = None) -> Locator:
@@ -274,7 +274,7 @@ class _Session:
         """(n,) whether a frame has a label."""
         return np.asarray(np.isfinite(self.xy).all(axis=1))
 
-    def found(self, weight: FloatArray | None, touches: FloatArray) -> _Found:
+    def alignment(self, weight: FloatArray | None, touches: FloatArray) -> _Found:
         """Align frames by their channels' distributions, and where that does not do by a mapping.
 
         ``weight`` of the presses where the ``touches`` (n, 2) that the locator finds are believed.

@@ -118,10 +118,10 @@ def described(record: object, meaning: str = "") -> Iterator[str]:
         if hasattr(record, "why"):
             yield sentence(record)
             return
-        told = meanings(type(record))
+        meaning_of = meanings(type(record))
         for one in fields(record):
             if one.name not in _UNTOLD and not one.name.startswith("_"):
-                yield from _field(one.name, getattr(record, one.name), told.get(one.name, ""))
+                yield from _field(one.name, getattr(record, one.name), meaning_of.get(one.name, ""))
     elif isinstance(record, Mapping):
         for name, value in record.items():
             yield from _field(str(name), value, "")
@@ -157,7 +157,7 @@ def value_of(value: object) -> str:
 @cache
 def meanings(kind: type) -> Mapping[str, str]:
     """What the fields of a record are, by its docstring: units, shapes."""
-    found: dict[str, str] = {}
+    meaning_of: dict[str, str] = {}
     names, text = list[str](), list[str]()
     section = (kind.__doc__ or "").partition("Attributes\n")[2]
     for line in [*section.splitlines(), "    end"]:
@@ -165,11 +165,11 @@ def meanings(kind: type) -> Mapping[str, str]:
         if heading:
             meaning = " ".join(text)
             short = meaning if len(meaning) <= _LONG else meaning[:_LONG].rpartition(" ")[0] + " …"
-            found |= dict.fromkeys(names, short)
+            meaning_of |= dict.fromkeys(names, short)
             names, text = heading[1].split(", "), []
         elif line.startswith("        "):
             text.append(line.strip())
-    return found
+    return meaning_of
 
 
 def _field(name: str, value: object, meaning: str) -> Iterator[str]:

@@ -285,12 +285,12 @@ def _earliest_epoch(chunk: Chunk) -> float:
     return min(differences, default=math.inf)
 
 
-def _epoch(about: Mapping[str, str], told: float) -> float:
-    """The epoch as it is written, unless what the messages have ``told`` differs."""
+def _epoch(about: Mapping[str, str], stated: float) -> float:
+    """The epoch as it is written, unless what the messages have ``stated`` differs."""
     own = epoch_of(about)
-    if own is not None and (math.isinf(told) or abs(own - told) < _SAME_EPOCH):
+    if own is not None and (math.isinf(stated) or abs(own - stated) < _SAME_EPOCH):
         return own
-    return 0.0 if math.isinf(told) else told
+    return 0.0 if math.isinf(stated) else stated
 
 
 def _copy(source: Path, container: ContainerWriter, result: Repaired, advance: Advance) -> None:

@@ -370,10 +370,10 @@ def _stamp_of(
 
 def _truth_of(session: SessionReader) -> tuple[Truth, ...]:
     """As far as it can be read: frames are played without it too."""
-    found: list[Truth] = []
+    presses: list[Truth] = []
     with suppress(DataError):
-        found.extend(session.truth())
-    return tuple(sorted(found, key=lambda truth: truth.host_time))
+        presses.extend(session.truth())
+    return tuple(sorted(presses, key=lambda truth: truth.host_time))
 
 
 def _items(

@@ -83,21 +83,21 @@ class CalibrationHealth:
         return (*self._fits(), ALONE) if self.alone else self._fits()
 
     def _fits(self) -> tuple[str, ...]:
-        found = []
+        reasons = []
         if self.known and self.strangeness > STRANGE:
-            found.append(
+            reasons.append(
                 f"frames fit the calibration {self.strangeness:.1f} times worse than its own "
                 "presses do: the skin, its electrodes or its gains have changed. Ellipses are "
                 "widened. Align it by presses of today: tomoskin calibrate touch --onto C.npz"
             )
         if self.excluded:
             shown = "; ".join(self.excluded[:_SHOWN])
-            found.append(
+            reasons.append(
                 f"{len(self.excluded)} rows have jumped since the calibration and are left out: "
                 f"{shown}; presses of today mend that: tomoskin calibrate touch --onto"
             )
-        if found:
-            return tuple(found)
+        if reasons:
+            return tuple(reasons)
         if not self.known:
             return (f"touch {FEWEST} spots to see whether the calibration still fits",)
         return (
@@ -319,10 +319,10 @@ class FitCorrection:
     def of(cls, fitted: FloatArray, variance: FloatArray, positions: FloatArray) -> Self:
         """Of presses ``fitted`` at (n, 2) m, NaN where none was, with the ``variance`` (n,) m² that
         the fit says, and their labels (n, 2) m."""
-        found = np.flatnonzero(np.isfinite(fitted).all(axis=1))
-        if len(found) < max(_FEWEST_FITTED, _HALF * len(fitted)):
+        known = np.flatnonzero(np.isfinite(fitted).all(axis=1))
+        if len(known) < max(_FEWEST_FITTED, _HALF * len(fitted)):
             return cls(np.eye(2), np.zeros(2), _NOTHING)
-        fitted, positions, said = fitted[found], positions[found], float(np.median(variance[found]))
+        fitted, positions, said = fitted[known], positions[known], float(np.median(variance[known]))
         plain = np.linalg.norm(fitted - positions, axis=1)
         linear, offset, missed = _affine(fitted, positions)
         near = missed <= _ASTRAY * np.median(missed)

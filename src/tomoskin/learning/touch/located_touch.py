@@ -209,10 +209,10 @@ def _correction(locator: Locator, conditions: Conditions) -> FitCorrection | Non
     if fitted is None:
         return None
     positions, variances = np.full((len(some), 2), np.nan), np.full(len(some), np.nan)
-    for k, found in enumerate(fitted):
-        if found is not None:
-            positions[k] = found.x, found.y
-            variances[k] = (found.sd_x**2 + found.sd_y**2) / 2
+    for k, detection in enumerate(fitted):
+        if detection is not None:
+            positions[k] = detection.x, detection.y
+            variances[k] = (detection.sd_x**2 + detection.sd_y**2) / 2
     return FitCorrection.of(positions, variances, presses.xy[some])
 
 

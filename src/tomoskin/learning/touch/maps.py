@@ -73,11 +73,11 @@ class Coregion:
             rows = data.rows @ q
             ratio = data.weights[:, None] * gain
             part = ratio / (1 + ratio)
-            inside, left = part * rows, rows - part * rows
+            inside, outside = part * rows, rows - part * rows
             weighed = part / data.weights[:, None]
             back = noise @ q
             signal = _back(back, (inside / data.weights[:, None]).T @ inside, weighed.sum(axis=0))
-            noise = _back(back, left.T @ left, part.sum(axis=0)) + data.rest
+            noise = _back(back, outside.T @ outside, part.sum(axis=0)) + data.rest
             signal, noise = _shrunk(signal, m), _shrunk(noise, data.n)
             noise[np.diag_indices(k)] += _FLOOR * np.diag(noise).mean()
         gain, q = _modes(signal, noise)
@@ -171,8 +171,8 @@ class ResponseMaps:
         at = self.basis(positions) @ self.axes
         mean_of, variance_of = self._solved
         gain = self.coregion.gain
-        left = self.basis.likeness.variance * gain - (at**2) @ variance_of
-        return at @ mean_of, 1.0 + np.maximum(left, 0.0)
+        remaining = self.basis.likeness.variance * gain - (at**2) @ variance_of
+        return at @ mean_of, 1.0 + np.maximum(remaining, 0.0)
 
     def features_at(self, positions: FloatArray) -> FloatArray:
         """(n, k) features that are expected of presses at ``positions`` (n, 2)."""

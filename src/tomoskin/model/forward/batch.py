@@ -160,12 +160,12 @@ class PatchBatch:
         cuts = _cuts(len(cells) / count)
         for _ in range(cuts):
             owner = _quartered(owner, self.centroids[cells])
-        seen = self._counted(owner, nodes, count * 4**cuts)
+        valence = self._counted(owner, nodes, count * 4**cuts)
         for _ in range(cuts):
-            nodes, matrices = self._condensed(owner, nodes, matrices, seen)
-            owner = np.arange(len(seen)) // 4
-            seen = seen.reshape(len(seen) // 4, 4, -1).sum(axis=1)
-        nodes, matrices = self._condensed(owner, nodes, matrices, seen)
+            nodes, matrices = self._condensed(owner, nodes, matrices, valence)
+            owner = np.arange(len(valence)) // 4
+            valence = valence.reshape(len(valence) // 4, 4, -1).sum(axis=1)
+        nodes, matrices = self._condensed(owner, nodes, matrices, valence)
         return self._lessened(matrices, nodes)
 
     def _counted(self, owner: IntArray, nodes: IntArray, count: int) -> IntArray:
@@ -175,18 +175,18 @@ class PatchBatch:
         return np.bincount(flat, minlength=count * n).reshape(count, n)
 
     def _condensed(
-        self, owner: IntArray, nodes: IntArray, matrices: FloatArray, seen: IntArray
+        self, owner: IntArray, nodes: IntArray, matrices: FloatArray, valence: IntArray
     ) -> tuple[IntArray, FloatArray]:
         """What the rims of groups see: their nodes (g, r) and matrices (1 + k, g, r, r).
 
         Of parts (e,) whose ``nodes`` (e, v) have ``matrices`` (1 + k, e, v, v), each of an
-        ``owner``; ``seen`` (g, n_nodes): the cells of a group at each node. Rows of groups with a
-        smaller rim are filled up with its first node, and zeros.
+        ``owner``; ``valence`` (g, n_nodes): the cells of a group at each node. Rows of groups with
+        a smaller rim are filled up with its first node, and zeros.
         """
-        groups, n = seen.shape
+        groups, n = valence.shape
         present = np.zeros((groups, n), bool)
         present[owner[:, None], nodes] = True
-        inside = present & (seen == self._valence)
+        inside = present & (valence == self._valence)
         rim = present & ~inside
         own = inside.sum(axis=1)
         n_inside, n_rim = int(own.max()), int(rim.sum(axis=1).max())
@@ -276,7 +276,7 @@ def _schur(matrices: FloatArray, n_inside: int) -> FloatArray:
         factor = np.linalg.cholesky(matrices)[..., n_inside:, n_inside:]
     except np.linalg.LinAlgError as error:
         raise singular() from error
-    left = factor @ factor.swapaxes(-1, -2)
+    condensed = factor @ factor.swapaxes(-1, -2)
     rim -= n_inside
-    left[..., rim, rim] -= more
-    return np.asarray(left)
+    condensed[..., rim, rim] -= more
+    return np.asarray(condensed)

@@ -92,8 +92,8 @@ class ForwardModel(System):
                     f"{row.shape}"
                 )
         flat = [one.reshape(-1, one.shape[-1]) for one in (many, *rows)]
-        found = [product(self.at(sigma), *own) for sigma, *own in zip(*flat, strict=True)]
-        return np.array(found).reshape(*many.shape[:-1], -1)
+        products = [product(self.at(sigma), *own) for sigma, *own in zip(*flat, strict=True)]
+        return np.array(products).reshape(*many.shape[:-1], -1)
 
     def transfer_resistance(self, conductivity: ArrayLike) -> NDArray[Any]:
         """(n_electrodes, n_electrodes) Ω; see :class:`State`."""

@@ -69,15 +69,15 @@ def _candidates(
     """Cell, column and row of every pixel in the box around each cell."""
     low, high = corner.min(axis=1), corner.max(axis=1)
     slack = 1e-9 * step
-    left = np.searchsorted(x, low[:, 0] - slack)
+    first_column = np.searchsorted(x, low[:, 0] - slack)
     right = np.searchsorted(x, high[:, 0] + slack, side="right")
     top = np.searchsorted(-y, -high[:, 1] - slack)
     bottom = np.searchsorted(-y, -low[:, 1] + slack, side="right")
-    wide, tall = right - left, bottom - top
+    wide, tall = right - first_column, bottom - top
     cell = np.repeat(np.arange(len(corner)), wide * tall)
     first = np.repeat(np.cumsum(wide * tall) - wide * tall, wide * tall)
     down, across = np.divmod(np.arange(len(cell)) - first, np.maximum(wide, 1)[cell])
-    return cell, left[cell] + across, top[cell] + down
+    return cell, first_column[cell] + across, top[cell] + down
 
 
 def _inside(corner: FloatArray, cell: IntArray, position: FloatArray) -> NDArray[np.bool_]:

@@ -225,8 +225,8 @@ def _fit(
     times, drop = _line(ideal[inside], counts[inside])
     times = float(np.clip(times, *bounds))
     model = np.clip(times * ideal + np.where(ideal > 0, drop, 0.0), 0, scale.top)
-    left = (counts - model)[judged]
-    rms, largest = float(np.sqrt(np.mean(left**2))), float(np.abs(left).max())
+    residual = (counts - model)[judged]
+    rms, largest = float(np.sqrt(np.mean(residual**2))), float(np.abs(residual).max())
     return _Fit(fault.text, times, drop, rms, largest)
 
 
@@ -248,10 +248,10 @@ def _amplifiers(counts: FloatArray, nominal: BoardFault, scale: CountScale) -> I
         model = np.clip(gain * ideal + offset, 0, scale.top)
         if np.ptp(counts[:, e]) < 1:
             gain, model = 0.0, np.full(len(ideal), counts[:, e].mean())
-        left = counts[:, e] - model
+        residual = counts[:, e] - model
         n = counts.shape[1]
-        rms = float(np.sqrt((rest.deviation**2 * (n - 1) + np.mean(left**2)) / n))
-        largest = max(rest.largest, float(np.abs(left).max()))
+        rms = float(np.sqrt((rest.deviation**2 * (n - 1) + np.mean(residual**2)) / n))
+        largest = max(rest.largest, float(np.abs(residual).max()))
         text = _of_an_amplifier(e, gain, offset, float(counts[:, e].mean()) / scale.top)
         yield _Fit(text, rest.scale, rest.sink_drop, rms, largest)
 

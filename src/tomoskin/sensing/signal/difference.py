@@ -114,7 +114,7 @@ class NuisanceSubspace:
             ) from error
         return cls(basis, cho_solve(factor, carried.T, check_finite=False))
 
-    def without_free(self, seen: FloatArray, fitted: FloatArray) -> Self:
+    def without_free(self, observed: FloatArray, fitted: FloatArray) -> Self:
         """The same, and without the images in the null space of the operator's prior.
 
         Such an image, as Laplace's constant, is fitted whatever it costs, and nothing in P tells
@@ -123,14 +123,14 @@ class NuisanceSubspace:
 
         Parameters
         ----------
-        seen
+        observed
             (n_meas, k): what the free images do to the data.
         fitted
             (k, n_meas): how large the operator makes each of them.
         """
         weights = fitted - (fitted @ self.directions) @ self.weights
         return type(self)(
-            np.hstack([self.directions, seen]), np.concatenate([self.weights, weights])
+            np.hstack([self.directions, observed]), np.concatenate([self.weights, weights])
         )
 
     def __call__(self, dv: FloatArray) -> FloatArray:

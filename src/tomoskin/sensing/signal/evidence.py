@@ -228,14 +228,14 @@ class EqualReadings:
         spread = (self.weight * (counts[self.first] - mean) ** 2).sum(axis=1)
         equal = (apart < least) & (spread > least)  # two that float stand at a rail
         broken = _broken(values, reciprocity)
-        found = {}
+        stuck = {}
         for one, other in self.pairs[equal].tolist():
             electrode, read = (one, other) if broken[one] >= broken[other] else (other, one)
             if broken[electrode] > _BROKEN:
                 reason = f"it reads as E{read + 1} does under every drive, though it drives as "
                 reason += "itself: the multiplexer does not reach it"
-                found[electrode] = ElectrodeHealth(electrode, "stuck", reason)
-        return found
+                stuck[electrode] = ElectrodeHealth(electrode, "stuck", reason)
+        return stuck
 
 
 def _broken(values: FloatArray, reciprocity: Reciprocity) -> FloatArray:
