@@ -189,12 +189,12 @@ def _default(key: Key) -> str:
 def _stage(stage: str) -> str:
     title, record = _STAGES[stage]
     rows = (
-        [f"`{name}`", unit]
+        [f"`{name}`{unit and f', {unit}'}"]
         + [_shown(getattr(getattr(preset, stage), name)) for preset in PRESETS.values()]
-        + [meaning, SOURCES.get(name, _assumed(source))]
+        + [f"{meaning} {_sourced(SOURCES.get(name, source))}".strip()]
         for name, unit, meaning, source in documented(record)
     )
-    head = ["number", "unit", *PRESETS, "meaning", "source"]
+    head = ["number, unit", *PRESETS, "meaning (source)"]
     return f"### {title}: `{record.__name__}`\n\n{_table(head, rows)}"
 
 
@@ -206,9 +206,9 @@ def _line() -> str:
     return f"### Line: `LineSettings`\n\n{_table(['number', 'default', 'meaning'], rows)}"
 
 
-def _assumed(source: str) -> str:
-    """What the defaults have as ideal, the presets assume."""
-    return "assumed" if source == "ideal" else source
+def _sourced(source: str) -> str:
+    """In brackets, unless it is assumed: what the defaults have as ideal, the presets assume."""
+    return f"({source})" if source not in ("", "ideal", "assumed") else ""
 
 
 def _shown(value: object) -> str:

@@ -50,7 +50,7 @@ def _entry(name: str, text: str) -> str:
     heading = title.strip().rstrip(".")
     return f"""## {heading}
 
-![{heading}](images/gallery/{name}.webp)
+![{heading.partition(":")[0]}](images/gallery/{name}.webp)
 
 *{_capital(shown)}* (`examples/{name}.py`)
 
