@@ -227,7 +227,7 @@ def pages(every: Sequence[Claim]) -> Iterator[tuple[Path, str]]:
                 text = texts.get(page) or page.read_text(encoding="utf-8")
                 texts[page] = written(text, template, claim.values)
     yield from texts.items()
-    yield written_gallery({one.name: one.values for one in every if one.part == "gallery"})
+    yield written_gallery()
 
 
 def run(every: Sequence[Claim], part: str | None, *, accept: bool) -> Iterator[str]:

@@ -7,7 +7,7 @@ twin (twin.md), the messages between board and host (protocol.md), and the board
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import fields, replace
 from functools import partial
 from importlib import import_module
@@ -16,7 +16,7 @@ from typing import Any
 
 from tomoskin.board.source import BOARDS
 from tomoskin.board.wire import SCHEMA
-from tomoskin.board.wire.schema import FieldSpec
+from tomoskin.board.wire.schema import FieldSpec, MessageSpec
 from tomoskin.core import extra_names
 from tomoskin.model.section import Choice, Key, Section, literal
 from tomoskin.model.skin import METHODS, SECTIONS
@@ -73,12 +73,13 @@ def schema_tables() -> str:
     """The bytes of every message of the protocol, its groups, and its values."""
     parts = []
     for title, to_device in (("From the board", False), ("To the board", True)):
-        parts.append(f"## {title}\n")
-        for message in SCHEMA.messages:
-            if message.to_device == to_device:
-                parts.append(f"### {message.name} (0x{message.type:02X})\n\n{message.text}.\n")
-                head = [["0", "type", "u8", f"0x{message.type:02X}"]]
-                parts.append(_table(_BYTES, [*head, *_field_rows(message.fields, 1)]))
+        first = "Byte 0 is the type that stands in the heading"
+        then = ", byte 1 the request id; what follows them is in the tables" if to_device else ""
+        parts.append(f"## {title}\n\n{first}{then}.\n")
+        messages = [one for one in SCHEMA.messages if one.to_device == to_device]
+        for place, message in enumerate(messages):
+            parts.append(f"### {message.name} (0x{message.type:02X})\n\n{message.text}.\n")
+            parts += filter(None, [_message_table(message, messages[:place])])
     parts.append("## Groups and values\n")
     for name, struct in SCHEMA.structs.items():
         table = _table(_BYTES, _field_rows(struct.fields, 0))
@@ -108,6 +109,17 @@ def board_table() -> str:
 
 
 _BYTES = ["byte", "field", "type", "meaning"]
+
+
+def _message_table(message: MessageSpec, before: Sequence[MessageSpec]) -> str:
+    """Its fields: the last alone where all others are those of a message ``before`` it."""
+    rows = list(_field_rows(message.fields, 1))[message.to_device :]
+    layout = [(field.name, field.type_name) for field in message.fields[:-1]]
+    for other in before if len(layout) > 3 else ():
+        if [(field.name, field.type_name) for field in other.fields[:-1]] == layout:
+            last = _table(_BYTES, rows[-1:])
+            return f"All fields but the last are those of {other.name}.\n\n{last}"
+    return _table(_BYTES, rows) if rows else ""
 
 
 def _field_rows(fields: Iterable[FieldSpec], start: int) -> Iterator[list[str]]:
@@ -177,12 +189,12 @@ def _default(key: Key) -> str:
 def _stage(stage: str) -> str:
     title, record = _STAGES[stage]
     rows = (
-        [f"`{name}`", unit]
+        [f"`{name}`{unit and f', {unit}'}"]
         + [_shown(getattr(getattr(preset, stage), name)) for preset in PRESETS.values()]
-        + [meaning, SOURCES.get(name, _assumed(source))]
+        + [f"{meaning} {_sourced(SOURCES.get(name, source))}".strip()]
         for name, unit, meaning, source in documented(record)
     )
-    head = ["number", "unit", *PRESETS, "meaning", "source"]
+    head = ["number, unit", *PRESETS, "meaning (source)"]
     return f"### {title}: `{record.__name__}`\n\n{_table(head, rows)}"
 
 
@@ -194,9 +206,9 @@ def _line() -> str:
     return f"### Line: `LineSettings`\n\n{_table(['number', 'default', 'meaning'], rows)}"
 
 
-def _assumed(source: str) -> str:
-    """What the defaults have as ideal, the presets assume."""
-    return "assumed" if source == "ideal" else source
+def _sourced(source: str) -> str:
+    """In brackets, unless it is assumed: what the defaults have as ideal, the presets assume."""
+    return f"({source})" if source not in ("", "ideal", "assumed") else ""
 
 
 def _shown(value: object) -> str:

@@ -1,10 +1,9 @@
-"""The gallery's page: what stands at the head of each example, its picture and its numbers."""
+"""The gallery's page: each example's picture, and what stands below its set-up at its head."""
 
 from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Mapping
 from pathlib import Path
 
 from PIL import Image, ImageSequence
@@ -17,11 +16,6 @@ QUALITIES, OF_FILM, LARGEST = (85, 70, 55, 40), 70, 60_000
 """Of WebP: at 85 a line of a pixel stays sharp; a figure has at most so many bytes."""
 
 MARK = "<!-- made by make gallery: what follows is not written by hand -->"
-
-FEW = 7
-"""Up to so many numbers are shown unasked."""
-
-Numbers = Mapping[str, Mapping[str, float]]
 
 
 def documented() -> dict[str, str]:
@@ -41,45 +35,30 @@ def _place(file: Path) -> tuple[bool, str, int, str]:
     return numbered is None, chapter, int(number), file.name
 
 
-def written_gallery(numbers: Numbers) -> tuple[Path, str]:
+def written_gallery() -> tuple[Path, str]:
     """The page, and its text: above its mark as it stands."""
     head, mark, _ = PAGE.read_text(encoding="utf-8").partition(MARK)
-    entries = [_entry(name, text, numbers[name]) for name, text in documented().items()]
+    entries = [_entry(name, text) for name, text in documented().items()]
     return PAGE, "\n".join([f"{head}{mark}\n", *entries])
 
 
-def _entry(name: str, text: str, numbers: Mapping[str, float]) -> str:
-    """One example: what stands at its head, its figure and its numbers."""
+def _entry(name: str, text: str) -> str:
+    """One example: its figure, and what stands at its head below the set-up."""
     title, _, rest = text.replace("``", "`").partition("\n")
     parts = re.split(r"^(?:Shown|Thesis saw|Checked|Assumed): ", rest, flags=re.M)
-    body, shown, saw, checked, assumed = parts
-    rows = [f"| {key} | {value:.3g} |" for key, value in numbers.items()]
-    table = "\n".join(["| number | value |", "|---|---:|", *rows])
+    _, shown, saw, checked, assumed = map(_joined, parts)
     heading = title.strip().rstrip(".")
-    details = "<details open>" if len(rows) <= FEW else "<details>"
     return f"""## {heading}
 
-![{heading}](images/gallery/{name}.webp)
+![{heading.partition(":")[0]}](images/gallery/{name}.webp)
 
-*{_capital(_joined(shown))}*
+*{_capital(shown)}* (`examples/{name}.py`)
 
-{body.strip()}
+**The thesis saw** {saw}
 
-**The thesis saw** {_joined(saw)}
+**Checked:** {checked}
 
-**Checked:** {_joined(checked)}
-
-**Assumed:** {_joined(assumed)}
-
-{details}<summary>{len(rows)} numbers of this run</summary>
-
-{table}
-
-</details>
-
-```
-python examples/{name}.py --out figures --force
-```
+**Assumed:** {assumed}
 """
 
 

@@ -10,11 +10,10 @@ Thesis saw: one, two, three found (the third at 60 % only); a remainder after un
 Checked: as many regions as probes in every loaded stage, each within 15 mm of a probe. After
 unloading a fall of conductivity remains where the probes were. It is more than four standard
 deviations of its noise, and less than a quarter of the fall under load.
-Assumed: the places, in front of electrodes. Turned by 22.5°, between electrodes, the response is a
-sixth smaller, and 60 % gives four regions with three of the seeds 1 to 6. That 70 % misses a probe
-is so with three of these seeds (1, 4 and 6); with the others 70 % finds all three too. The thesis's
-protocol (5.2.2) says that the force was not considered, its results (5.3.4) that 400 g lay on each
-probe. What remains is the loop of the twin's knit, 12.5 % of the response, published for a knit.
+Assumed: the places, in front of electrodes. Between electrodes the response is a sixth smaller, and
+60 % gives four regions with three of the seeds 1 to 6. That 70 % misses a probe is so with seeds 1,
+4 and 6; with the others it finds all three too. What remains is the loop of the twin's knit, 12.5 %
+of the response, published for a knit.
 """
 
 from __future__ import annotations

@@ -12,10 +12,9 @@ grow with the diameter, the maximum slightly.
 Checked: the largest region lies along the axis, at least 1.7 times as long as wide, that of a press
 at most 1.5; area and maximum grow with the radius.
 Assumed: both angles, so that the maximum grows. Wrapped by the same 60°, the area grows, but the
-maximum falls (below), for strain is the foam's height over the radius; with 70° and 50° it falls
-more. So the growth of the maximum is not explained by the model: a skin that lies close to either
-shows less on the larger. Wrapped all around 70 mm the whole sheet changes evenly, and what stands
-out is no region along the cylinder. The order of the cylinders matters little (below).
+maximum falls, for strain is the foam's height over the radius; with 70° and 50° it falls more. So
+the growth of the maximum is not explained by the model. Wrapped all around 70 mm the whole sheet
+changes evenly, and no region along the cylinder stands out.
 """
 
 from __future__ import annotations

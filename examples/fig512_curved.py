@@ -17,9 +17,8 @@ there, or 3 mm more. Against the straight arm's reference the moved joint alone 
 by more than half of what a touch does; with the encoder by less than 0.3.
 Assumed: the skin is 185 mm across, not 200, since it would overlap itself on an arm of 30 mm
 radius; the thesis calls the 30 mm a circumference, which cannot be. The chair's back is a saddle of
-400 and 600 mm, and "soft" is foam of 30 mm under the skin instead of 3 (below). The gain is 15, for
-on the bent bodies 35 rails: then the noise is larger, alpha too, and NOSER's pictures lie up to
-17 mm towards the rim, on the flat skin as well.
+400 and 600 mm, and "soft" is foam of 30 mm. The gain is 15, for on the bent bodies 35 rails: so the
+noise is larger, and NOSER's pictures lie up to 17 mm towards the rim.
 """
 
 from __future__ import annotations

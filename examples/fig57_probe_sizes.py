@@ -11,7 +11,7 @@ negative one contains E4, and every row that contains E4 falls.
 Assumed: two numbers of the twin. Its foam is squeezed solid at 40 % (`lock`), which was chosen for
 this figure: without it a small probe sinks in deeper and changes more. The gauge factor is 10; 1.2
 to 2.4 are published for knits. With 2.4, and half as much across, noise hides the growth from size
-to size. So the thesis's result is not explained by numbers that are published.
+to size. So published numbers do not explain the thesis's result.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ than wide by at least 1.2 times, at the centre by less. The fit tells one touch,
 The thesis's four metrics are reported.
 Assumed: the force, 5 N, and the place at the rim, neither of which the thesis gives; a gauge factor
 of 10. With 2.4, which is published for a knit, each press is still found, but the change is a fifth
-as large (below), and at the centre the noise shifts it: by 2 to 9 mm with seeds 1 to 6.
+as large, and at the centre the noise shifts it: by 2 to 9 mm with seeds 1 to 6.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ of its noise; the picture of the square has the shape of the circles' (correlati
 RES50 within the circles' range ± 5 %). The thesis's four metrics are reported.
 Assumed: means of 40 frames (the thesis: 10), and one press before all others that is not counted,
 since the knit remembers its first load. The thesis names neither. With 10 frames, or without that
-press, the step from 15 to 18 mm is too small for its noise (below), and the check fails.
+press, the step from 15 to 18 mm is too small for its noise, and the check fails.
 """
 
 from __future__ import annotations

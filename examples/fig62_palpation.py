@@ -12,12 +12,12 @@ Thesis saw: both balls, at their places; with a threshold of 75 % their sizes ar
 Checked: two are found and no third, each within 8 mm of its place. On the same foam without balls
 nothing is found. Their depth is not asked for.
 Assumed: the response, a rise of conductivity by 100 % per compression of the foam's face, twenty
-times that of the textile preset. It was chosen so that the balls are found, and no publication of
+times that of the textile preset. It was chosen so that the balls are found; no publication of
 it is known to us. With the preset's 5 % no ball is found, with 25 % one, with 50 % both by 16
 electrodes and one by 8 (the thesis has 8 channels, the entry 16). Regions of the picture never
-show both: 75 % leaves one, and as much in plain foam, where no ball is. So the thesis's result is
-not explained by the model: its knit must answer pressure more strongly, or in another way.
-Averaged are 40 frames of 64 readings, the thesis has 10; the foam's 5 kPa are assumed too.
+show both: 75 % leaves one, and as much in plain foam, where no ball is. So the model does
+not explain the thesis's result. Averaged are 40 frames of 64
+readings, the thesis has 10; the foam's 5 kPa are assumed too.
 """
 
 from __future__ import annotations

@@ -16,8 +16,7 @@ Checked: with the alternating drive the electrodes are seen a hundred times less
 drive.
 Assumed: the double layer (10 to 40 µF/cm² are published for smooth metal; a rough 0.5 cm² has some
 ten times as much), its leak, and that the electrode's own voltage stands still within a scan. Where
-it does not, the alternating drive reads its change too. No noise of the amplifier's low frequencies
-is in it, which would favour the alternating drive further.
+it does not, the alternating drive reads its change too.
 """
 
 from __future__ import annotations

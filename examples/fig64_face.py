@@ -17,9 +17,9 @@ direct current. Of a picture with movement, the electrode that is said to have m
 of the three that did in 3 of 4 pictures at least, over all runs of a session.
 Assumed: the face, how its expressions move it, and the noise of direct current. With 2 mV most
 expressions are still recognised, with 8 mV few. But then it is not "A" and the smile that remain,
-as in the thesis (below): why those two stood out is not explained by the model. Which electrodes
-moved is read with the noise of the read-out; with 2 mV of polarisation (below) the right one is
-named little more often than by chance, which is 3 of 8.
+as in the thesis: why those two stood out is not explained by the model. Which electrodes moved is
+read with the noise of the read-out; with 2 mV of polarisation the right one is named little more
+often than by chance, which is 3 of 8.
 """
 
 from __future__ import annotations

@@ -12,11 +12,10 @@ Thesis saw: adjacent driving with a NOSER or Gaussian prior places a press to wi
 (chapter 8); no table.
 Checked: for every pattern and prior the mean ERR75 is below 20 mm, and for adjacent driving with
 NOSER below 10 mm; RES75 ≥ RES50 and 0 < shape angle ≤ 90° everywhere.
-Assumed: the three places, the probe, and presses on the twin's knit. The sweep says what each
-metric is good for. Maximum, RES50 and shape angle fall all the way as alpha grows, so they have no
-best alpha: they only reward what is sharp, noise too. ERR75 has one: 0.1, 1 and 0.3 of the chosen
-alpha with the seeds 1 to 3, and it is flat there. So ERR75 alone can choose, and alpha by the noise
-lies at the smooth end of what it chooses. The thesis names four metrics and chose by trial.
+Assumed: the three places, the probe, and presses on the twin's knit. Maximum, RES50
+and shape angle fall all the way as alpha grows, so they have no best alpha. ERR75 has one: 0.1, 1
+and 0.3 of the chosen alpha with the seeds 1 to 3, and it is flat there. The thesis names four
+metrics and chose by trial.
 """
 
 from __future__ import annotations
