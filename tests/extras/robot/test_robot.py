@@ -285,6 +285,38 @@ def test_a_joint_that_cannot_be_meant(files, old, new, said):
         Urdf.read(files / "hand.urdf")
 
 
+XMLNS = 'xmlns:xacro="http://www.ros.org/wiki/xacro"'
+PARTS = f"""<robot {XMLNS}><xacro:include filename="$(find hand)/urdf/pad.xacro"/></robot>"""
+PAD = f"""<robot {XMLNS}><xacro:macro name="pad" params="name"><link name="${{name}}"><visual>
+<geometry><mesh filename="file://$(find arm)/meshes/pad.obj"/></geometry></visual></link>
+</xacro:macro></robot>"""
+FINDS = f"""<robot name="arm" {XMLNS}><xacro:include filename="$(find arm)/urdf/parts.xacro"/>
+<link name="base"/><xacro:pad name="pad"/>
+<joint name="j" type="fixed"><parent link="base"/><child link="pad"/></joint></robot>"""
+
+
+@pytest.mark.parametrize("folder", ["arm", "arm-main"])
+def test_a_xacro_finds_packages_in_the_folders_above(tmp_path, xacro, folder):
+    """Its own by its folder's name, or by that in its package.xml; another beside it."""
+    assert xacro
+    own, other = tmp_path / folder, tmp_path / "hand"
+    for made in (own / "urdf" / "deep", own / "meshes", other / "urdf"):
+        made.mkdir(parents=True)
+    if folder != "arm":
+        (own / "package.xml").write_text("<package><name> arm </name></package>")
+    (own / "urdf" / "deep" / "arm.urdf.xacro").write_text(FINDS)
+    (own / "urdf" / "parts.xacro").write_text(PARTS)
+    (other / "urdf" / "pad.xacro").write_text(PAD)
+    (own / "meshes" / "pad.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    urdf = Urdf.read(own / "urdf" / "deep" / "arm.urdf.xacro")
+    assert set(urdf.links) == {"base", "pad"}
+    (solid,) = urdf.solids()
+    assert (len(solid.triangles), solid.problems) == (1, ())
+    (own / "urdf" / "parts.xacro").write_text(PARTS.replace("find hand", "find foot"))
+    with pytest.raises(SkinError, match=r'expected the package "foot" in a folder above, or ROS'):
+        Urdf.read(own / "urdf" / "deep" / "arm.urdf.xacro")
+
+
 @pytest.mark.parametrize("kind", ["fixed", "floating"])
 def test_what_a_type_does_not_use_is_not_read(files, kind):
     """As SolidWorks writes fixed joints; a limit or a law may be there too."""

@@ -16,7 +16,6 @@ from tomoskin.core import (
     SkinError,
     StrPath,
     meant_or_known,
-    needed,
 )
 from tomoskin.extras.robot.link_shapes import (
     MOST_TRIANGLES,
@@ -25,6 +24,7 @@ from tomoskin.extras.robot.link_shapes import (
     read_shapes,
     thinned,
 )
+from tomoskin.extras.robot.packages import expanded
 from tomoskin.extras.robot.urdf_joint import (
     STANDS,
     Followed,
@@ -92,8 +92,8 @@ class Urdf:
                 hint="remove <!ENTITY …>",
             )
         root = _parsed(text, where)
-        if "${" in text or any("xacro}" in element.tag for element in root.iter()):
-            root = _parsed(_expanded(path), where)
+        if "${" in text or "$(" in text or any("xacro}" in e.tag for e in root.iter()):
+            root = _parsed(expanded(path), where)
         if root.tag != "robot":
             raise SkinError(f"expected <robot> with its links, got <{root.tag}>", where=where)
         links = tuple(name_of(link, where) for link in root.findall("link"))
@@ -197,15 +197,6 @@ def _parsed(text: str, where: str) -> ElementTree.Element:
         return ElementTree.fromstring(text)
     except ElementTree.ParseError as error:
         raise SkinError(f"is not valid XML, so it is not a URDF: {error}", where=where) from None
-
-
-def _expanded(path: Path) -> str:
-    """The URDF that a xacro makes, with its arguments' own defaults."""
-    xacro = needed("xacro", "xacro", path, SkinError)
-    try:
-        return str(xacro.process_file(str(path)).toxml())
-    except Exception as error:  # of any kind, since the file's expressions are Python's
-        raise SkinError(f"cannot be expanded by xacro: {error}", where=str(path)) from error
 
 
 def _solid(shapes: list[LinkShape], most: int) -> LinkSolid:
