@@ -78,6 +78,20 @@ def test_eidors_structures_give_the_same(data_dir, tmp_path):
         "model": {"img": {"fwd_model": {"stimulation": stimulation}}, "vv": golden["vi"]},
         "full": {"stimulation": stimulation, "vi": full, "meas_select": golden["meas_select"]},
         "data": {"fmdl": {"stimulation": stimulation}, "vi": {"meas": golden["vi"]}},
+        "in model": {
+            "fmdl": {"stimulation": stimulation, "meas_select": golden["meas_select"]},
+            "vi": full,
+        },
+        "deeper": {
+            "imdl": {
+                "fwd_model": {
+                    "stimulation": stimulation,
+                    "meas_select": csc_matrix(golden["meas_select"] != 0),
+                }
+            },
+            "vi": {"meas": full},
+            "meas_select": 1.0,
+        },
     }
     for name, variables in cases.items():
         path = tmp_path / f"{name}.mat"
@@ -103,12 +117,28 @@ EYE = np.eye(8) - np.roll(np.eye(8), 1, axis=1)
         ({"stim": EYE, "meas": EYE, "meas_stim": np.full(8, 9)}, "drives from 1 to 8"),
         ({"stim": EYE, "meas": EYE, "meas_stim": np.ones(8)}, "expected data of 8 rows"),
         ({"x": np.ones(3)}, "got the keys x"),
-        ({"f": "text"}, "empty archive"),
+        ({"f": "text"}, r"got f \(text\)"),
+        ({"r": {"name": "x", "value": 1.0}}, r"got r \(a structure of name, value\)"),
+        ({}, "empty archive"),
     ],
 )
 def test_matlab_files_that_cannot_be_meant(tmp_path, variables, said):
     with pytest.raises(DataError, match=said):
         read_recording(matlab(tmp_path / "x.mat", **variables))
+
+
+def test_thinned_data_of_a_full_scan(tmp_path):
+    """As EIDORS has it with meas_current: all 64 rows in the model, 40 in the data."""
+    rows = [(k, j) for k in range(8) for j in range(8)]
+    select = np.array([{k, (k + 1) % 8}.isdisjoint({j, (j + 1) % 8}) for k, j in rows])
+    stimulation = [{"stim_pattern": EYE[k][:, None], "meas_pattern": EYE} for k in range(8)]
+    model = {"stimulation": stimulation, "meas_select": select[:, None]}
+    data = np.arange(80.0).reshape(40, 2)
+    got = read_recording(matlab(tmp_path / "x.mat", fmdl=model, vi=data))
+    assert np.array_equal(got.voltages, data.T)
+    assert free(got).all()
+    whole = read_recording(matlab(tmp_path / "y.mat", fmdl=model, vi=np.ones((64, 2))))
+    assert whole.voltages.shape == (2, 64)
 
 
 def test_a_damaged_matlab_file_is_refused(tmp_path):

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.io import loadmat, whosmat
 
 from damage import mutated
 from tomoskin.core import DataError
@@ -43,6 +45,23 @@ def test_it_is_read_again_as_it_was(tmp_path: Path, recording: Recording) -> Non
     for name in ("voltages", "drive", "measure", "time", "labels"):
         assert np.array_equal(getattr(got, name), getattr(recording, name)), name
     assert (got.idle, got.reference, got.board_known) == (4, None, True)
+
+
+def test_all_numbers_are_doubles(tmp_path: Path, recording: Recording) -> None:
+    """In MATLAB and Octave a double divided by an integer is an integer: means would be 0."""
+    whole = replace(
+        recording,
+        voltages=recording.voltages.astype(np.float32),
+        reference=np.arange(PATTERN.n_meas),
+        labels=np.zeros((10, 2), np.int64),
+    )
+    write_matlab(tmp_path / "x.mat", whole, 1e-3, 8)
+    kinds = {name: kind for name, _, kind in whosmat(tmp_path / "x.mat")}
+    assert set(kinds) == {"stimulation", "vi", "vh", "time_s", "idle", "xy_m", "board_known"}
+    assert {kinds.pop("stimulation"), kinds.pop("board_known")} == {"struct", "logical"}
+    assert set(kinds.values()) == {"double"}
+    stimulation = loadmat(tmp_path / "x.mat", simplify_cells=True)["stimulation"][0]
+    assert stimulation["stim_pattern"].dtype == stimulation["meas_pattern"].dtype == np.float64
 
 
 @pytest.mark.slow

@@ -75,6 +75,25 @@ def test_sciospec_files_hold_potentials(tmp_path, every):
     assert ordered.voltages.shape == (1, 208)
 
 
+@pytest.mark.parametrize("every", [range(1, 17), range(1, 33)])
+@pytest.mark.parametrize("first", [1, 10])
+def test_sciospec_files_of_older_programs(tmp_path, every, first):
+    """Without the lines that name channels: those that are driven are the electrodes."""
+    channels = range(first, first + 16) if len(every) > 16 else every
+    injections = [(c, channels[(k + 1) % 16]) for k, c in enumerate(channels)]
+    newer, older = tmp_path / "new.eit", tmp_path / "old.eit"
+    text = sciospec(channels, every, injections)
+    newer.write_text(text)
+    lines = text.splitlines()
+    older.write_text("\n".join(["11", *lines[1:11], *lines[18:]]) + "\n")
+    got, expected = read_recording(older), read_recording(newer)
+    for name in ("voltages", "drive", "measure"):
+        assert np.array_equal(getattr(got, name), getattr(expected, name))
+    older.write_text("\n".join(["12", *lines[1:11], lines[16], *lines[18:]]) + "\n")
+    if len(every) == 16:
+        assert np.array_equal(read_recording(older).voltages, expected.voltages)
+
+
 def test_sciospec_files_that_are_not_one_frame(tmp_path):
     path = tmp_path / "setup_00001.eit"
     text = sciospec(range(1, 17), range(1, 17), [(1, 2), (2, 3)])

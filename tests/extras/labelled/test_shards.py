@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import shutil
 import signal
+import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -15,6 +17,7 @@ from tomoskin.extras.labelled import (
     COMMON_PRESSES,
     Population,
     SetPlan,
+    fingerprint,
     in_processes,
     in_this_process,
     make_set,
@@ -136,6 +139,76 @@ def test_what_a_worker_of_a_cluster_cannot_do_is_said_here(scheduler, monkeypatc
     crowd = SetPlan(SKIN, CROWD, "textile", 1, 7)
     with pytest.raises(ScriptError, match="found no position 5 mm from the rim and 100 mm from"):
         list(on_cluster(scheduler)(crowd, [0]))
+
+
+OLD = """
+import sys, types
+old = types.ModuleType("tomoskin")
+old.__version__, old.__file__ = "0.0.9", __file__
+sys.modules["tomoskin"] = old
+"""
+
+
+@pytest.fixture
+def two_workers(tmp_path) -> Iterator[str]:
+    """A scheduler with a worker of ours and one of a tomoskin 0.0.9, each a process."""
+    distributed = pytest.importorskip("distributed")
+    (tmp_path / "old.py").write_text(OLD)
+    with distributed.LocalCluster(
+        n_workers=0, processes=True, dashboard_address=None, protocol="tcp", host="127.0.0.1"
+    ) as cluster:
+        command = [sys.executable, "-m", "distributed.cli.dask_worker", cluster.scheduler_address]
+        command += ["--nthreads", "1", "--host", "127.0.0.1", "--no-dashboard", "--no-nanny"]
+        workers = [
+            subprocess.Popen([*command, *more], cwd=tmp_path, stderr=subprocess.DEVNULL)
+            for more in ([], ["--preload", str(tmp_path / "old.py")])
+        ]
+        try:
+            with distributed.Client(cluster) as client:
+                client.wait_for_workers(2, timeout=60)
+            yield cluster.scheduler_address
+        finally:
+            for worker in workers:
+                worker.kill()
+                worker.wait()
+
+
+@pytest.mark.slow
+def test_workers_of_another_version_are_refused(plan, two_workers):
+    """Before any frame: a version whose numbers have other units would go unnoticed."""
+    said = "got 1 others: tcp://127.0.0.1:[0-9]+ has tomoskin 0.0.9 instead of 0.1.0, code"
+    with pytest.raises(SourceError, match=said):
+        list(on_cluster(two_workers)(plan, [0]))
+
+
+def test_other_code_of_the_same_version_is_refused(plan):
+    ours = fingerprint.fingerprint()
+    assert ours["code"] != "none"
+    theirs = ours | {"code": "0" * 12, "numpy": "none"}
+    told = fingerprint.differences(ours, theirs)
+    assert (
+        told
+        == f"numpy none instead of {ours['numpy']}, code 000000000000 instead of {ours['code']}"
+    )
+    with pytest.raises(SourceError, match="got 1 others: a has numpy none"):
+        labelled._check_workers({"a": theirs, "b": ours}, ours, "tcp://x")
+    with pytest.raises(RuntimeError, match="instead of 000000000000"):
+        fingerprint.made_alike(theirs, plan, 0)
+
+
+def test_a_fingerprint_changes_with_the_code_that_computes(tmp_path, monkeypatch):
+    import tomoskin
+
+    before = fingerprint.fingerprint()["code"]
+    root = tmp_path / "tomoskin"
+    for room in fingerprint.ROOMS:
+        shutil.copytree(Path(tomoskin.__file__).parent / room, root / room)
+    (root / "cli").mkdir()
+    monkeypatch.setattr(tomoskin, "__file__", str(root / "__init__.py"))
+    (root / "cli" / "app.py").write_text("0")
+    assert fingerprint.fingerprint()["code"] == before
+    (root / "twin" / "material.py").write_text("0")
+    assert fingerprint.fingerprint()["code"] != before
 
 
 def test_what_a_process_cannot_do_is_said_here():

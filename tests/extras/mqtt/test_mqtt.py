@@ -10,6 +10,7 @@ import socket
 import ssl
 import subprocess
 import time
+import types
 from contextlib import contextmanager
 from dataclasses import replace
 
@@ -217,6 +218,39 @@ def test_an_onset_outlasts_a_broker_that_was_away(broker, stream):
         sink.close()
         rest = [came.get(timeout=PATIENCE).payload for _ in range(3)]
     assert rest == [b"offline", b"online", b"offline"]
+
+
+class Link:
+    """A client whose link goes after some messages, which arrive."""
+
+    def __init__(self, lasts):
+        self.lasts, self.arrived = lasts, []
+
+    def publish(self, _topic, data="", *_more, **_about):
+        came = len(self.arrived) < self.lasts
+        if came:
+            self.arrived.append(data)
+        return types.SimpleNamespace(rc=0 if came else 4, is_published=lambda: came)
+
+
+@pytest.mark.parametrize("lasts", [0, 1, 3])
+def test_what_is_owed_outlasts_a_link_that_goes_while_it_is_sent_again(stream, lasts):
+    sink = make_sink("mqtt://127.0.0.1/robot/skin")
+    sink._stream, sink._client = stream, Link(0)
+    owed = [f"onset {n}".encode() for n in range(5)]
+    for data in owed:
+        with pytest.raises(SinkError):
+            sink._put("touch", data, qos=1)
+    links = Link(lasts), Link(99)
+    sink._client = links[0]
+    with pytest.raises(SinkError):
+        sink._pay()
+    sink._client = links[1]
+    sink._pay()
+    assert [*links[0].arrived, *links[1].arrived] == owed
+    sink._client = Link(99)
+    sink._pay()
+    assert sink._client.arrived == []
 
 
 def test_who_comes_later_gets_the_touches_until_they_are_old(broker, stream, monkeypatch):

@@ -8,9 +8,10 @@ import struct
 import numpy as np
 import pytest
 
-from tomoskin.core import SkinError
+from tomoskin.core import GeometryError, SkinError
 from tomoskin.extras.robot import Urdf
 from tomoskin.extras.robot.link_shapes import box, capsule, rod, thinned
+from tomoskin.model.mesh import Draped, MeshFile
 
 LINKS = """<link name="a">
   <visual><origin xyz="0 0 1"/><geometry><box size="0.2 0.4 0.6"/></geometry></visual>
@@ -148,3 +149,36 @@ def test_a_fine_mesh_is_drawn_coarsely():
     assert 250 < len(coarse) <= 1000 < len(fine)
     assert np.abs(coarse).max() == pytest.approx(1.0, abs=0.1)
     assert np.array_equal(thinned(fine, len(fine)), fine)
+
+
+CONCAVE = (
+    COLLADA.replace('count="12">0 0 0 1 0 0 1 2 0 0 2 0<', 'count="18">%s<')
+    .replace('count="4" stride', 'count="6" stride')
+    .replace("<vcount>4</vcount><p>0 1 2 3</p>", "<vcount>6</vcount><p>1 2 3 4 5 0</p>")
+    .replace('<triangles count="1">', '<triangles count="0">')
+    .replace("<p>0 1 2</p>", "<p></p>")
+    % "0 0 0 2 0 0 2 1 0 1 1 0 1 2 0 0 2 0"
+)
+POLYLIST = CONCAVE[CONCAVE.index("<polylist") : CONCAVE.index("</polylist>")] + "</polylist>"
+POLYGONS = POLYLIST.replace("polylist", "polygons").replace("<vcount>6</vcount>", "")
+
+
+@pytest.mark.filterwarnings("ignore:the matrix subclass", "ignore:string or file")  # pycollada's
+@pytest.mark.parametrize("element", [POLYLIST, POLYGONS], ids=["polylist", "polygons"])
+def test_a_polygon_of_a_collada_file_that_is_not_convex_has_its_area(tmp_path, element):
+    """An L of area 3 cm²; pycollada's own triangles have 4."""
+    pytest.importorskip("collada")
+    file = tmp_path / "l.dae"
+    file.write_text(CONCAVE.replace(POLYLIST, element))
+    read = MeshFile.read(file)
+    assert area(read.places[read.cells]) == pytest.approx(3e-4)
+    assert Draped.read(file).outline.area == pytest.approx(3e-4)
+
+
+@pytest.mark.filterwarnings("ignore:the matrix subclass")
+def test_a_polygon_with_a_hole_is_refused(tmp_path):
+    pytest.importorskip("collada")
+    hole = POLYGONS.replace("<p>1 2 3 4 5 0</p>", "<ph><p>0 1 2</p><h>3 4 5</h></ph>")
+    (tmp_path / "l.dae").write_text(CONCAVE.replace(POLYLIST, hole))
+    with pytest.raises(GeometryError, match=r"l\.dae: expected polygons without holes"):
+        MeshFile.read(tmp_path / "l.dae")

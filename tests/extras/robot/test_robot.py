@@ -285,6 +285,120 @@ def test_a_joint_that_cannot_be_meant(files, old, new, said):
         Urdf.read(files / "hand.urdf")
 
 
+XMLNS = 'xmlns:xacro="http://www.ros.org/wiki/xacro"'
+PARTS = f"""<robot {XMLNS}><xacro:include filename="$(find hand)/urdf/pad.xacro"/></robot>"""
+PAD = f"""<robot {XMLNS}><xacro:macro name="pad" params="name"><link name="${{name}}"><visual>
+<geometry><mesh filename="file://$(find arm)/meshes/pad.obj"/></geometry></visual></link>
+</xacro:macro></robot>"""
+FINDS = f"""<robot name="arm" {XMLNS}><xacro:include filename="$(find arm)/urdf/parts.xacro"/>
+<link name="base"/><xacro:pad name="pad"/>
+<joint name="j" type="fixed"><parent link="base"/><child link="pad"/></joint></robot>"""
+
+
+@pytest.mark.parametrize("folder", ["arm", "arm-main"])
+def test_a_xacro_finds_packages_in_the_folders_above(tmp_path, xacro, folder):
+    """Its own by its folder's name, or by that in its package.xml; another beside it."""
+    assert xacro
+    own, other = tmp_path / folder, tmp_path / "hand"
+    for made in (own / "urdf" / "deep", own / "meshes", other / "urdf"):
+        made.mkdir(parents=True)
+    if folder != "arm":
+        (own / "package.xml").write_text("<package><name> arm </name></package>")
+    (own / "urdf" / "deep" / "arm.urdf.xacro").write_text(FINDS)
+    (own / "urdf" / "parts.xacro").write_text(PARTS)
+    (other / "urdf" / "pad.xacro").write_text(PAD)
+    (own / "meshes" / "pad.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    urdf = Urdf.read(own / "urdf" / "deep" / "arm.urdf.xacro")
+    assert set(urdf.links) == {"base", "pad"}
+    (solid,) = urdf.solids()
+    assert (len(solid.triangles), solid.problems) == (1, ())
+    (own / "urdf" / "parts.xacro").write_text(PARTS.replace("find hand", "find foot"))
+    with pytest.raises(SkinError, match=r'expected the package "foot" in a folder above, or ROS'):
+        Urdf.read(own / "urdf" / "deep" / "arm.urdf.xacro")
+
+
+@pytest.mark.parametrize("kind", ["fixed", "floating"])
+def test_what_a_type_does_not_use_is_not_read(files, kind):
+    """As SolidWorks writes fixed joints; a limit or a law may be there too."""
+    unused = '<axis xyz="0 0 0"/><limit lower="x"/><mimic joint="nothing" multiplier="none"/>'
+    text = MOVING.replace('type="revolute"', f'type="{kind}"').replace(
+        '<axis xyz="0 0 1"/><mimic joint="turn" multiplier="-2" offset="0.5"/>', unused
+    )
+    assert unused in text
+    (files / "hand.urdf").write_text(text)
+    urdf = Urdf.read(files / "hand.urdf")
+    assert urdf.pose("c").position == pytest.approx(urdf.pose("b").position)
+
+
+CHAIN = """<robot name="m"><link name="l0"/><link name="l1"/><link name="l2"/><link name="l3"/>
+<joint name="c" type="revolute"><parent link="l2"/><child link="l3"/><axis xyz="0 0 1"/>
+  <mimic joint="b" multiplier="-1" offset="0.05"/></joint>
+<joint name="b" type="revolute"><parent link="l1"/><child link="l2"/><axis xyz="0 0 1"/>
+  <mimic joint="a" multiplier="2" offset="0.1"/></joint>
+<joint name="a" type="continuous"><parent link="l0"/><child link="l1"/><axis xyz="0 0 1"/></joint>
+</robot>"""
+
+
+def told(**positions):
+    def of(joint):
+        if joint not in positions:
+            raise SkinError(f"pose unknown: {joint} has not come")
+        return positions[joint]
+
+    return of
+
+
+def angle(pose):
+    return np.arctan2(pose.rotation[1, 0], pose.rotation[0, 0])
+
+
+def test_joints_that_mimic_joints_that_mimic_follow_the_law(files):
+    (files / "chain.urdf").write_text(CHAIN)
+    urdf = Urdf.read(files / "chain.urdf")
+    for states in ({"a": 0.3}, {"a": 0.3, "b": 0.7, "c": -0.65}, {"a": 0.3, "c": -0.62}):
+        assert angle(urdf.pose("l3", told(**states))) == pytest.approx(0.35)
+    with pytest.raises(SkinError, match="a has not come"):
+        urdf.pose("l3", told(b=0.7))
+    both = told(a=0.3, b=0.4)
+    assert angle(urdf.pose("l1", both)) == pytest.approx(0.3)
+    for link in ("l2", "l3"):
+        with pytest.raises(SkinError, match=r'"b" is reported at 0\.400.*"a", .* at 0\.700'):
+            urdf.pose(link, both)
+
+
+def test_a_joint_is_placed_by_its_own_state_where_what_it_mimics_is_not_told(files):
+    text = CHAIN.replace('<parent link="l1"/>', '<parent link="l0"/>')
+    (files / "chain.urdf").write_text(text)
+    urdf = Urdf.read(files / "chain.urdf")
+    assert angle(urdf.pose("l3", told(b=0.7))) == pytest.approx(0.7 - 0.65)
+    with pytest.raises(SkinError, match="a has not come"):
+        urdf.pose("l2", told(c=0.7))
+
+
+def test_a_ring_of_mimicking_joints_is_refused(files):
+    text = CHAIN.replace("</joint>\n</robot>", '<mimic joint="c"/></joint>\n</robot>')
+    assert text != CHAIN
+    (files / "chain.urdf").write_text(text)
+    with pytest.raises(SkinError, match="a ring of <mimic>"):
+        Urdf.read(files / "chain.urdf")
+
+
+def test_the_page_draws_a_chain_whose_states_contradict_it(files):
+    from tomoskin.extras.robot.overview import Stance
+
+    (files / "chain.urdf").write_text(CHAIN)
+    (files / "chain.toml").write_text(
+        'format = 1\n[robot]\nurdf = "chain.urdf"\n[[skin]]\nname = "palm"\n'
+        'skin = "textile-disc-8"\nlink = "l3"\n'
+    )
+    robot = Robot.load(files / "chain.toml").moved_by(lambda _: told(a=0.3, c=0.4))
+    assert angle(Stance(robot).poses(0.0)["l3"]) == pytest.approx(0.35)
+    floating = CHAIN.replace("continuous", "floating")
+    (files / "chain.urdf").write_text(floating)
+    robot = Robot.load(files / "chain.toml").moved_by(lambda _: told())
+    assert angle(Stance(robot).poses(0.0)["l3"]) == pytest.approx(0.0)
+
+
 def test_a_mesh_lies_on_its_link(files):
     urdf = Urdf.read(files / "arm.urdf")
     assert [*urdf.meshes] == ["upper"]

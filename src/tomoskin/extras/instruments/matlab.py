@@ -97,7 +97,7 @@ _REFERENCE = ("vh", "reference")
 
 def is_eidors(variables: Mapping[str, Any]) -> bool:
     """Whether there is a stimulation structure, or the same as matrices."""
-    return _stimulation(variables) is not None or set(variables) >= {"stim", "meas", "meas_stim"}
+    return _model(variables) is not None or set(variables) >= {"stim", "meas", "meas_stim"}
 
 
 def read_eidors(variables: Mapping[str, Any], source: str) -> Recording:
@@ -106,9 +106,10 @@ def read_eidors(variables: Mapping[str, Any], source: str) -> Recording:
     They stand alone or in a model (``fmdl``, ``img.fwd_model``, …). Each has the current into every
     electrode (n_el, 1) and one row of ±1 a measurement (n, n_el). Data are columns, one a frame:
     ``vi``, ``vv``, ``v``, ``data`` or ``meas`` (or a structure with ``meas``), with ``vh`` as the
-    reference; full scans are thinned by ``meas_select``. The same as plain matrices: ``stim``
-    (n_drives, n_el), ``meas`` (n_meas, n_el), ``meas_stim`` (n_meas, 1) from 1. Electrodes keep
-    their numbers: EIDORS' own circles begin at the top and count clockwise, as built-in skins do.
+    reference; full scans are thinned by ``meas_select``, of the model or beside it. The same as
+    plain matrices: ``stim`` (n_drives, n_el), ``meas`` (n_meas, n_el), ``meas_stim`` (n_meas, 1)
+    from 1. Electrodes keep their numbers: EIDORS' own circles begin at the top and count
+    clockwise, as built-in skins do.
 
     Raises
     ------
@@ -116,14 +117,17 @@ def read_eidors(variables: Mapping[str, Any], source: str) -> Recording:
         When a pattern is not one electrode against one other, there are no data, or their
         number of rows is another.
     """
-    stimulation = _stimulation(variables)
-    if stimulation is None:
+    model = _model(variables)
+    if model is None:
         drive, measure = _flat_rows(variables, source)
         names = tuple(name for name in _DATA if name != "meas")
     else:
-        drive, measure = _rows(stimulation, source)
+        drive, measure = _rows(_listed(model) or [], source)
         names = _DATA
-    select = variables.get("meas_select")
+    select = _selected(model or {}, variables, source)
+    is_full = select is not None and len(select) == len(drive)
+    if is_full and _read(variables, names, None, len(drive), source) is None:
+        drive, measure = drive[select], measure[select]  # the data are thinned already
     voltages = _read(variables, names, select, len(drive), source)
     if voltages is None:
         raise DataError(
@@ -148,19 +152,38 @@ def read_eidors(variables: Mapping[str, Any], source: str) -> Recording:
     )
 
 
-def _stimulation(variables: Any) -> list[Mapping[str, Any]] | None:
-    """The first stimulation structure in the variables or in a model among them."""
+def _model(variables: Any) -> Mapping[str, Any] | None:
+    """What holds the first stimulation structure: the variables, or a model among them."""
     if not isinstance(variables, Mapping):
         return None
+    if _listed(variables) is not None:
+        return variables
+    inner = (_model(value) for value in variables.values())
+    return next((item for item in inner if item is not None), None)
+
+
+def _listed(model: Mapping[str, Any]) -> list[Mapping[str, Any]] | None:
+    """Its stimulations; None where it has none."""
     for key in ("stimulation", "stim"):
-        names = variables.get(key)
+        names = model.get(key)
         listed = [names] if isinstance(names, Mapping) else names
         if isinstance(listed, list | np.ndarray) and len(listed):
             items = [item for item in listed if isinstance(item, Mapping)]
             if len(items) == len(listed) and all("stim_pattern" in item for item in items):
                 return items
-    inner = (_stimulation(value) for value in variables.values())
-    return next((item for item in inner if item is not None), None)
+    return None
+
+
+def _selected(
+    model: Mapping[str, Any], variables: Mapping[str, Any], source: str
+) -> NDArray[np.bool_] | None:
+    """(n,) which rows of a full scan count; None where nothing says it."""
+    for holder in (model, variables):
+        if (given := holder.get("meas_select")) is not None:
+            select = _dense(given, source).reshape(-1) != 0
+            if len(select) > 1:
+                return np.asarray(select)
+    return None
 
 
 def _rows(stimulation: list[Mapping[str, Any]], source: str) -> tuple[NDArray[Any], IntArray]:
@@ -190,7 +213,11 @@ def _flat_rows(variables: Mapping[str, Any], source: str) -> tuple[NDArray[Any],
 
 
 def _read(
-    variables: Mapping[str, Any], names: tuple[str, ...], select: Any, n_rows: int, source: str
+    variables: Mapping[str, Any],
+    names: tuple[str, ...],
+    select: NDArray[np.bool_] | None,
+    n_rows: int,
+    source: str,
 ) -> NDArray[Any] | None:
     """(n_frames, n_rows) of the first of ``names`` that has so many rows."""
     for name in names:
@@ -201,8 +228,8 @@ def _read(
             continue
         data = _dense(value, source)
         data = data.reshape(-1, 1) if data.ndim == 1 else data
-        if data.ndim == 2 and select is not None and len(data) == np.size(select) != n_rows:
-            data = data[np.flatnonzero(_dense(select, source))]
+        if data.ndim == 2 and select is not None and len(data) == len(select) != n_rows:
+            data = data[select]
         if data.ndim == 2 and len(data) == n_rows:
             return np.ascontiguousarray(data.T)
     return None
@@ -239,8 +266,24 @@ def read_matlab(path: Path, source: str) -> Recording | Arrays:
             where=source,
             hint='in MATLAB: s = struct(object); save("plain.mat", "-struct", "s", "-v7")',
         )
-    return {
+    arrays = {
         key: value
         for key, value in variables.items()
         if isinstance(value, np.ndarray) and value.dtype.kind in "biufc"
     }
+    if variables and not arrays:
+        raise DataError(
+            "expected EIDORS' stimulation with its data, or arrays of numbers, got "
+            + ", ".join(f"{name} ({_what(value)})" for name, value in sorted(variables.items())),
+            where=source,
+            hint="docs/interchange.md lists what can be read",
+        )
+    return arrays
+
+
+def _what(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return f"a structure of {', '.join(map(str, value))}" if value else "a structure"
+    if isinstance(value, list | np.ndarray):
+        return "cells or structures"
+    return "text" if isinstance(value, str) else type(value).__name__

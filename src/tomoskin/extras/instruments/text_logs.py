@@ -1,16 +1,16 @@
-"""Text logs of EIT-kit, OpenEIT, Sciospec and a serial port, line by line: whole frames are kept,
+"""Text logs of EIT-kit, OpenEIT and a serial port, line by line: whole frames are kept,
 every other line is counted and listed."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tomoskin.core import DataError, IntArray
+from tomoskin.core import DataError, FloatArray, IntArray
 from tomoskin.extras.instruments import tables
 from tomoskin.files.imports import voltages_of
 from tomoskin.sensing.signal import Recording
@@ -41,8 +41,11 @@ class Skipped:
         )
 
 
-def numbers_in(text: str, separator: str = ",") -> list[float] | None:
-    """Numbers between separators, an empty one at the end left out; None when one is none."""
+def numbers_in(text: str, separator: str | None = ",") -> list[float] | None:
+    """Numbers between separators, an empty one at the end left out; None when one is none.
+
+    ``separator`` None: spaces, of any number.
+    """
     parts = text.strip().rstrip(separator).split(separator)
     try:
         return [float(part) for part in parts]
@@ -121,6 +124,9 @@ _TWO_TERMINAL = 28
 _SCANS = {32: (8, 3), 40: (8, 1), 192: (16, 8), 208: (16, 1), 896: (32, 16), 928: (32, 1)}
 """Values of a frame → electrodes, and how far apart the driven ones are."""
 
+_CANCELS = 0.5
+"""Drives whose sum is less than this part of the sum of their sizes have no polarity in common."""
+
 
 def is_open_eit(lines: list[str]) -> bool:
     """Whether one of the first lines begins as its frames do."""
@@ -131,8 +137,9 @@ def read_open_eit(lines: Iterable[str], source: str) -> Recording:
     """OpenEIT's text logs: one frame a line, ``magnitudes : 27159.1250 , 32341.4375 , …``.
 
     The number of values tells electrodes and drive: pyEIT's scan order with the drive spread as
-    the firmware sets it, or every pair of 8 electrodes by two terminals. The instrument gives
-    sizes of impedances without signs; each measuring pair is turned so that a uniform disc
+    the firmware sets it, or every pair of 8 electrodes by two terminals. Commas or spaces separate
+    values. The instrument gives sizes of impedances without signs, its simulator voltages with
+    signs: :func:`_turned` tells them apart. Each measuring pair is turned so that a uniform disc
     reads above zero. Opposite drives come from both ends; their mean counts, as the instrument
     favours one end. Lines carry no time: frames are numbered.
 
@@ -145,29 +152,70 @@ def read_open_eit(lines: Iterable[str], source: str) -> Recording:
     """
     frames: list[list[float]] = []
     skipped = Skipped()
-    odd = ""
+    odd, comma = "", False
     for number, line in enumerate(lines, start=1):
         if not line.strip():
             continue
         word, colon, rest = line.partition(":")
-        values = numbers_in(rest) if colon and word.strip() in _WORDS else None
+        values = _values(rest) if colon and word.strip() in _WORDS else None
         if values is None:
             skipped.add(number, "no frames")
+            odd = odd or (f'"{line.strip()[:40]}" in line {number}' if colon else "")
         elif _expected(frames, len(values)):
             frames.append(values)
+            continue
         else:
             skipped.add(number, "another number of values")
             odd = odd or f"{len(values)} in line {number}"
+        comma = comma or _has_decimal_comma(rest)
     if not frames:
         counts = ", ".join(map(str, sorted({_TWO_TERMINAL, *_SCANS})))
         raise DataError(
             f"expected frames of {counts} values, got {odd or 'none'}",
             where=source,
-            hint="numbers must have a decimal point, not a comma",
+            hint="numbers must have a decimal point, not a comma" if comma else "",
         )
-    rows = rows_of(len(frames[0]))
-    recording = voltages_of(source, np.array(frames), rows, notes=skipped.notes())
-    return recording.without_repeats()
+    voltages, rows, note = _turned(np.array(frames))
+    notes = (*skipped.notes(), *filter(None, (note,)))
+    return voltages_of(source, voltages, rows, notes=notes).without_repeats()
+
+
+def _values(text: str) -> list[float] | None:
+    """Numbers between commas, or else between spaces."""
+    between_spaces = None if "," in text else numbers_in(text, None)
+    return between_spaces or numbers_in(text)
+
+
+def _has_decimal_comma(text: str) -> bool:
+    """Whether a comma stands between digits, and there is no decimal point."""
+    return "." not in text and re.search(r"\d,\d", text) is not None
+
+
+def _turned(
+    frames: FloatArray,
+) -> tuple[FloatArray, tuple[IntArray, IntArray], str]:
+    """Values (n_frames, n) as a uniform disc reads them above zero, their rows, and what was found.
+
+    A log of sizes has each of them above zero; one of voltages those of pairs that are turned
+    below. What of the two makes the sum of all values larger is taken, and of voltages the
+    polarity that does: one for all, or where this cancels most of the sum, one for each drive.
+    """
+    drive, measure = rows_of(frames.shape[1])
+    mean = np.nan_to_num(frames).mean(axis=0)
+    if (mean >= 0.0).all() or len(mean) == _TWO_TERMINAL:
+        return frames, (drive, measure), ""
+    starts = np.flatnonzero(np.append(True, (drive[1:] != drive[:-1]).any(axis=1)))
+    turns = np.where((measure == _scan(len(mean))[1]).all(axis=1), 1.0, -1.0)
+    sums = {kind: np.add.reduceat(mean * s, starts) for kind, s in (("v", turns), ("s", 1.0))}
+    is_signed = np.abs(sums["v"]).sum() >= np.abs(sums["s"]).sum()
+    sign, of_drives = (turns, sums["v"]) if is_signed else (np.ones(len(mean)), sums["s"])
+    polarity, whose = np.full(len(starts), np.sign(of_drives.sum()) or 1.0), "one"
+    if abs(of_drives.sum()) < _CANCELS * np.abs(of_drives).sum():
+        polarity, whose = np.where(of_drives < 0.0, -1.0, 1.0), "each drive's own"
+    sign = sign * np.repeat(polarity, np.diff(np.append(starts, len(mean))))
+    agree = float(np.mean(mean * sign > 0.0))
+    note = f"its values have signs, read with {whose} polarity; {agree:.0%} are those of a disc"
+    return frames * sign, (drive, measure), note
 
 
 def _expected(frames: list[list[float]], count: int) -> bool:
@@ -181,11 +229,16 @@ def rows_of(count: int) -> tuple[IntArray, IntArray]:
     if count == _TWO_TERMINAL:
         pairs = np.array(list(combinations(range(8), 2)), dtype=np.int64)
         return pairs, pairs
+    drive, measure = _scan(count)
+    return drive, tables.for_magnitudes(drive, measure, _SCANS[count][0])
+
+
+def _scan(count: int) -> tuple[IntArray, IntArray]:
+    """Drive and measure (count, 2) as pyEIT has them, not turned."""
     n, spread = _SCANS[count]
     e = np.arange(n)
     drives = np.column_stack([e, (e + spread) % n])
-    (drive, measure), _ = tables.scan_of(drives, tables.neighbours(n)[:, ::-1])
-    return drive, tables.for_magnitudes(drive, measure, n)
+    return tables.scan_of(drives, tables.neighbours(n)[:, ::-1])[0]
 
 
 _N = 16
@@ -282,83 +335,3 @@ def _row(number: int, line: str) -> _Row | None:
 def _drop(rows: list[_Row] | None, skipped: Skipped) -> None:
     if rows:
         skipped.add(rows[0].line, "parts of incomplete frames", len(rows))
-
-
-_CHANNELS = "MeasurementChannels:"
-_ALL = "MeasurementChannelsIndependentFromInjectionPattern:"
-
-
-def is_sciospec(lines: list[str]) -> bool:
-    """Whether there is such a header."""
-    return any(line.startswith(_CHANNELS) for line in lines)
-
-
-def read_sciospec(lines: Iterable[str], source: str) -> Recording:
-    """Sciospec's ``.eit`` files, one frame each: a header, then for each injection a line of its
-    two channels and a line of potentials, real and imaginary part of every channel in turn.
-
-    The first line says how many lines the header has; ``MeasurementChannels`` names the channels
-    that are on electrodes, the line after it all that are in the file. The current enters at the
-    first of an injection's channels, whose potential is the highest. Voltages are differences of
-    neighbouring channels, without those that touch the injection.
-
-    Raises
-    ------
-    DataError
-        When header or injections are not as expected, or there are several frequencies.
-    """
-    text = [line.strip() for line in lines]
-    header = int(text[0]) if text and text[0].isdigit() else 0
-    channels, all_channels = (_channels(text[:header], word, source) for word in (_CHANNELS, _ALL))
-    number = {int(channel): index for index, channel in enumerate(channels)}
-    body = [line for line in text[header:] if line]
-    drives, potentials = [], []
-    for line, values in zip(body[::2], body[1::2], strict=False):
-        pair = [number.get(int(part), -1) for part in line.split() if part.isdigit()]
-        if len(pair) != 2 or min(pair) < 0:
-            raise DataError(
-                f"expected an injection's two channels, each of MeasurementChannels, got "
-                f'"{line[:40]}"',
-                where=source,
-                hint="one frame of one frequency can be read",
-            )
-        drives.append(pair)
-        potentials.append(_potentials(values, channels, all_channels, source))
-    if not drives:
-        raise DataError("holds no injection", where=source)
-    return _of_injections(np.array(drives), np.array(potentials), source)
-
-
-def _channels(header: list[str], word: str, source: str) -> NDArray[np.int64]:
-    """Numbers of channels, from 1."""
-    for line in header:
-        if line.startswith(word):
-            numbers = numbers_in(line.removeprefix(word))
-            if numbers:
-                return np.array(numbers, dtype=np.int64)
-    raise DataError(
-        f"expected numbers of channels after {word} in the header, got none", where=source
-    )
-
-
-def _potentials(
-    line: str, channels: NDArray[np.int64], all_channels: NDArray[np.int64], source: str
-) -> NDArray[np.complex128]:
-    """(n,) V of the ``channels``, from a line of these or of all."""
-    values = numbers_in(line, "\t")
-    parts = np.array(values or (), dtype=np.float64)
-    for listed in (channels, all_channels):
-        if len(parts) == 2 * len(listed):
-            by_channel = dict(zip(listed.tolist(), parts[::2] + 1j * parts[1::2], strict=True))
-            return np.array([by_channel[channel] for channel in channels.tolist()])
-    raise DataError(
-        f"expected {2 * len(channels)} or {2 * len(all_channels)} numbers for an injection, got "
-        f"{len(parts)}",
-        where=source,
-    )
-
-
-def _of_injections(drives: IntArray, potentials: NDArray[np.complex128], source: str) -> Recording:
-    rows, kept = tables.scan_of(drives, tables.neighbours(potentials.shape[1]))
-    values = potentials - np.roll(potentials, -1, axis=1)
-    return voltages_of(source, values.reshape(1, -1)[:, kept], rows)

@@ -10,6 +10,7 @@ import zipfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -29,10 +30,13 @@ from tomoskin.core import (
     load_arrays,
     save_arrays,
 )
+from tomoskin.extras.labelled import fingerprint
 from tomoskin.extras.labelled.population import SetPlan, make_shard
 
 _PATIENCE = 10.0
 """Seconds for a scheduler to answer."""
+
+_LISTED = 3
 
 Made = Iterator[tuple[int, dict[str, Any]]]
 """Shards with their numbers, in whatever order they are finished."""
@@ -136,10 +140,15 @@ def in_processes(n: int) -> Workers:
 
 
 def on_cluster(address: str) -> Workers:
-    """Workers of a Dask cluster whose scheduler is at ``address``; they need tomoskin too."""
+    """Workers of a Dask cluster whose scheduler is at ``address``; they need this tomoskin too.
+
+    Versions, and a hash of what computes, are compared before any frame is made. Raises
+    SourceError, which names each worker that differs.
+    """
 
     def run(plan: SetPlan, shards: Sequence[int]) -> Made:
         try:
+            import cloudpickle
             from dask import distributed
         except ImportError as error:
             raise SourceError(
@@ -149,13 +158,34 @@ def on_cluster(address: str) -> Workers:
             client = distributed.Client(address, timeout=_PATIENCE)
         except (OSError, TimeoutError, ValueError) as error:
             raise SourceError(f"no scheduler answers: {error}", where=address) from error
+        cloudpickle.register_pickle_by_value(fingerprint)
         with client:
-            futures = client.map(make_shard, [plan] * len(shards), list(shards), pure=False)
+            ours = fingerprint.fingerprint()
+            _check_workers(client.run(fingerprint.fingerprint), ours, address)
+            futures = client.map(
+                partial(fingerprint.made_alike, ours),
+                [plan] * len(shards),
+                list(shards),
+                pure=False,
+            )
             number = dict(zip((future.key for future in futures), shards, strict=True))
             for future, arrays in distributed.as_completed(futures, with_results=True):
                 yield number[future.key], arrays
 
     return run
+
+
+def _check_workers(found: Mapping[str, dict[str, str]], ours: dict[str, str], address: str) -> None:
+    """Raise SourceError that names the workers on which others would compute."""
+    told = {worker: fingerprint.differences(ours, theirs) for worker, theirs in found.items()}
+    others = [f"{worker} has {said}" for worker, said in told.items() if said]
+    if others:
+        raise SourceError(
+            f"expected workers with the tomoskin of this computer, got {len(others)} others: "
+            f"{'; '.join(others[:_LISTED])}{'; …' if len(others) > _LISTED else ''}",
+            where=address,
+            hint="install the same versions there, and start the workers again",
+        )
 
 
 def processors() -> int:

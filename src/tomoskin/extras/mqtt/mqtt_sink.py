@@ -25,7 +25,8 @@ _PATIENCE = 5.0
 _KEEPALIVE = 10
 
 _EXPIRY = 3
-"""Seconds for which the broker keeps touches: what is older is not true any more."""
+"""Seconds for which the broker keeps touches: what is older is not true any more. Mosquitto 2.0
+counts whole seconds of its clock, and so keeps them for 2 to 3."""
 
 _MOST_OWED = 100
 """Messages that are sent again after the broker was away; the oldest make room."""
@@ -83,10 +84,7 @@ class MqttSink(Sink):
         client.loop_start()
         _check_answer(answers, self.name)
         self._say("online")
-        owed, self._owed = self._owed, deque(maxlen=_MOST_OWED)
-        for name, data, sent in owed:
-            if sent.rc or not sent.is_published():
-                self._put(name, data, qos=1)
+        self._pay()
 
     def publish(self, item: Item) -> None:
         """Send what is worth a message."""
@@ -98,6 +96,17 @@ class MqttSink(Sink):
             self._put("touch", encode_json(content), qos=int(content["event"] != "move"))
         if item.is_due:
             self._put("touches", encode_json(item.content()), keep=_EXPIRY)
+
+    def _pay(self) -> None:
+        """Send again what may not have come; where the link goes meanwhile, the rest stays owed."""
+        owed, self._owed = self._owed, deque(maxlen=_MOST_OWED)
+        owed = deque(item for item in owed if item[2].rc or not item[2].is_published())
+        try:
+            while owed:
+                name, data, _ = owed.popleft()
+                self._put(name, data, qos=1)
+        finally:
+            self._owed.extend(owed)
 
     def close(self) -> None:
         """Say that we are offline, and disconnect."""

@@ -13,6 +13,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from tomoskin.core import FloatArray, GeometryError, SkinError
+from tomoskin.extras.robot.packages import package_folder
 from tomoskin.model.mesh import MeshFile, Pose
 
 MOST_TRIANGLES = 20_000
@@ -95,9 +96,11 @@ def _located(path: str, urdf: Path) -> Path:
     scheme, _, rest = path.rpartition("://")
     if scheme != "package":
         return urdf.parent / rest
-    within = rest.partition("/")[2]
+    package, _, within = rest.partition("/")
     folders = urdf.absolute().parents
     tried = [folder / part for folder in folders for part in (rest, within)]
+    if (own := package_folder(package, urdf)) is not None:
+        tried.insert(0, own / within)
     return next((file for file in tried if file.is_file()), urdf.parent / within)
 
 

@@ -9,7 +9,7 @@ from typing import Any, Self, TypeVar
 
 from tomoskin.core import FloatArray, SkinError, Touch
 from tomoskin.extras.robot.self_contact import LINGERS, NearLink, OwnLinks
-from tomoskin.extras.robot.urdf import Positions
+from tomoskin.extras.robot.urdf_joint import Positions
 from tomoskin.files.messages import LinkPose, Place
 from tomoskin.model.mesh import Pose
 

@@ -130,21 +130,29 @@ class Overview(Host):
 class Stance:
     """Where the links of a ``robot`` are drawn.
 
-    A joint is where its newest state says; else where it was last, and at zero before that.
+    A joint is where its newest state says; else where it was last, and at zero before that. One
+    that mimics another follows it. Where a pose cannot be told, all is drawn as it was last.
     """
 
     def __init__(self, robot: Robot) -> None:
         self._urdf, self._joints = robot.urdf, robot.skins[0].place.joints
         self._last: dict[str, float] = {}
-        self._rest = self._urdf.poses() if self._urdf else {}
+        self._drawn = self._urdf.poses() if self._urdf else {}
+        self._follow = (
+            {j.name for j in self._urdf.joints.values() if j.mimics} if self._urdf else ()
+        )
 
     def poses(self, utc: float) -> dict[str, Pose]:
         """Of each link in the frame of the root at a time, s since 1970."""
         if self._urdf is None or self._joints is None:
-            return self._rest
-        return self._urdf.poses(partial(self._position, self._joints(utc)))
+            return self._drawn
+        with contextlib.suppress(SkinError):
+            self._drawn = self._urdf.poses(partial(self._position, self._joints(utc)))
+        return self._drawn
 
     def _position(self, positions: Callable[[str], float], joint: str) -> float:
+        if joint in self._follow:
+            raise SkinError(f'the joint "{joint}" follows another')
         with contextlib.suppress(SkinError):
             self._last[joint] = positions(joint)
         return self._last.get(joint, 0.0)

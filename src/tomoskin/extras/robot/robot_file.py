@@ -53,7 +53,7 @@ class RobotSection(Section, section="robot"):
     joints: str | None = key(
         _FILE,
         "Where positions of its joints come from: `ros2` for the topic `/joint_states`, or an MCAP "
-        "file of ROS 2 that holds it.",
+        "file of ROS 2 that holds it, perhaps with the topic: `arm.mcap:topic=/arm/states`.",
         default=None,
         needs="urdf",
     )

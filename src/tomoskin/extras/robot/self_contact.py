@@ -13,7 +13,8 @@ from scipy.spatial import ConvexHull, QhullError
 
 from tomoskin.core import FloatArray, GeometryError, SkinError
 from tomoskin.extras.robot.link_shapes import LinkShape
-from tomoskin.extras.robot.urdf import Positions, Urdf
+from tomoskin.extras.robot.urdf import Urdf
+from tomoskin.extras.robot.urdf_joint import Positions
 
 LINGERS = 0.1
 """Seconds for which a touch goes on after a link has gone: some scans tell that it has ended."""

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterable
-from dataclasses import dataclass, field
+from collections.abc import Container, Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
 from xml.etree import ElementTree
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from tomoskin.core import (
     FloatArray,
@@ -17,71 +16,28 @@ from tomoskin.core import (
     SkinError,
     StrPath,
     meant_or_known,
-    needed,
-    no_such,
 )
 from tomoskin.extras.robot.link_shapes import (
     MOST_TRIANGLES,
     LinkShape,
     name_of,
-    origin_of,
-    part_of,
     read_shapes,
     thinned,
+)
+from tomoskin.extras.robot.packages import expanded
+from tomoskin.extras.robot.urdf_joint import (
+    STANDS,
+    Followed,
+    Positions,
+    UrdfJoint,
+    check_mimics,
+    read_joint,
 )
 from tomoskin.model.mesh import Pose
 from tomoskin.model.skin import read_text
 
 _LARGEST = 20_000_000
 """A URDF has at most so many bytes."""
-
-
-_TURNS, _SLIDES, _STANDS = ("revolute", "continuous"), ("prismatic",), ("fixed", "")
-_UNTOLD = ("floating", "planar")
-"""Kinds of joints whose position is not one number, so that no joint state says it."""
-
-Positions = Callable[[str], float]
-"""The position of a joint by its name, rad or m; raises SkinError where it is not known."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class UrdfJoint:
-    """What holds the link ``child`` to the link ``parent``.
-
-    Attributes
-    ----------
-    pose
-        Of the child's frame in the parent's, at position zero.
-    kind
-        The type that the URDF says.
-    axis
-        (3,) unit vector in the child's frame, about or along which it moves.
-    mimics
-        A joint that it follows; its position is that of the joint times ``factor``, and ``offset``.
-    """
-
-    name: str
-    parent: str
-    child: str
-    pose: Pose
-    kind: str = ""
-    axis: FloatArray = field(default_factory=lambda: np.array([1.0, 0.0, 0.0]))
-    mimics: str = ""
-    factor: float = 1.0
-    offset: float = 0.0
-
-    def moved(self, positions: Positions) -> Pose:
-        """The pose of the child's frame in the parent's. Raises SkinError."""
-        if self.kind in _STANDS:
-            return self.pose
-        if self.kind in _UNTOLD:
-            raise SkinError(
-                f'pose unknown: a joint state has no position of the {self.kind} "{self.name}"'
-            )
-        way = self.factor * positions(self.mimics or self.name) + self.offset
-        if self.kind in _SLIDES:
-            return self.pose @ Pose(way * self.axis)
-        return self.pose @ Pose(rotation=Rotation.from_rotvec(way * self.axis).as_matrix())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -136,12 +92,12 @@ class Urdf:
                 hint="remove <!ENTITY …>",
             )
         root = _parsed(text, where)
-        if "${" in text or any("xacro}" in element.tag for element in root.iter()):
-            root = _parsed(_expanded(path), where)
+        if "${" in text or "$(" in text or any("xacro}" in e.tag for e in root.iter()):
+            root = _parsed(expanded(path), where)
         if root.tag != "robot":
             raise SkinError(f"expected <robot> with its links, got <{root.tag}>", where=where)
         links = tuple(name_of(link, where) for link in root.findall("link"))
-        joints = [_joint(joint, where) for joint in root.findall("joint")]
+        joints = [read_joint(joint, where) for joint in root.findall("joint")]
         shapes = tuple(read_shapes(root, path))
         urdf = cls(where, root.get("name", ""), links, {j.child: j for j in joints}, shapes)
         urdf._check(joints)
@@ -170,6 +126,8 @@ class Urdf:
     ) -> dict[str, Pose]:
         """Those of some ``links``, or of all in the order of the file, as :meth:`pose` has each."""
         poses = {self.root: Pose()}
+        if positions:
+            positions = Followed({joint.name: joint for joint in self.joints.values()}, positions)
 
         def of(link: str) -> Pose:
             if link not in poses:
@@ -182,7 +140,7 @@ class Urdf:
 
     def body(self, link: str) -> str:
         """The first link of the rigid body that ``link`` belongs to."""
-        while (joint := self.joints.get(link)) is not None and joint.kind in _STANDS:
+        while (joint := self.joints.get(link)) is not None and joint.kind in STANDS:
             link = joint.parent
         return link
 
@@ -218,11 +176,7 @@ class Urdf:
         for joint in joints:
             for end in (joint.parent, joint.child):
                 self.check_link(end, f'{self.source}: joint "{joint.name}"')
-            if joint.mimics and joint.mimics not in {other.name for other in joints}:
-                raise SkinError(
-                    f'expected a joint to mimic, got "{joint.mimics}"',
-                    where=f'{self.source}: joint "{joint.name}"',
-                )
+        check_mimics({joint.name: joint for joint in joints}, self.source)
         roots = [link for link in self.links if link not in self.joints]
         if len(roots) > 1 or not self.links:
             raise SkinError(
@@ -243,35 +197,6 @@ def _parsed(text: str, where: str) -> ElementTree.Element:
         return ElementTree.fromstring(text)
     except ElementTree.ParseError as error:
         raise SkinError(f"is not valid XML, so it is not a URDF: {error}", where=where) from None
-
-
-def _expanded(path: Path) -> str:
-    """The URDF that a xacro makes, with its arguments' own defaults."""
-    xacro = needed("xacro", "xacro", path, SkinError)
-    try:
-        return str(xacro.process_file(str(path)).toxml())
-    except Exception as error:  # of any kind, since the file's expressions are Python's
-        raise SkinError(f"cannot be expanded by xacro: {error}", where=str(path)) from error
-
-
-def _joint(element: ElementTree.Element, where: str) -> UrdfJoint:
-    name = name_of(element, where)
-    ends = [element.find(end) for end in ("parent", "child")]
-    parent, child = ("" if end is None else end.get("link", "") for end in ends)
-    where = f'{where}: joint "{name}"'
-    kind = element.get("type", "")
-    known = (*_TURNS, *_SLIDES, *_STANDS, *_UNTOLD)
-    if kind not in known:
-        raise SkinError(no_such(kind, filter(None, known), "a type"), where=where)
-    mimic, axis = element.find("mimic"), np.array(part_of(element, "axis", "xyz", "1 0 0", where))
-    if not (length := np.linalg.norm(axis)) > 0:
-        raise SkinError("expected an axis with a direction, got 0 0 0", where=where)
-    return UrdfJoint(
-        name, parent, child, origin_of(element, where), kind, axis / length,
-        "" if mimic is None else mimic.get("joint", ""),
-        part_of(element, "mimic", "multiplier", "1", where)[0],
-        part_of(element, "mimic", "offset", "0", where)[0],
-    )  # fmt: skip
 
 
 def _solid(shapes: list[LinkShape], most: int) -> LinkSolid:

@@ -11,24 +11,23 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from mcap.reader import make_reader
-
-from tomoskin.core import DataError, SinkError, SkinError, needed
+from tomoskin.core import SinkError, SkinError, needed
+from tomoskin.extras.ros2.joint_bag import JOINT_STATE, State, recorded_states, stamped
 from tomoskin.extras.ros2.ros2_sink import ros_domain, struct_of
 from tomoskin.run.sinks import options_of
 
 MAX_AGE = 0.5
 """Seconds from a joint state after which it says no more how the robot stands."""
 
-_KIND = "sensor_msgs/msg/JointState"
+_LATE = 1.0
+"""Seconds by which a message may come after a newer one; more, twice in turn: the clock was set."""
+
+_TOPIC_OF_FILE = ":topic="
 _WHERE = "joint states"
 _MOST = 4000
 """Positions that are kept of each joint of a live robot: some seconds."""
 
 _AT_ONCE = 64
-
-State = tuple[float, Any]
-"""A message, and when it was sent: s since 1970, for messages that do not say."""
 
 
 @dataclass
@@ -37,14 +36,19 @@ class _Track:
 
     times: list[float] = field(default_factory=list)
     positions: list[float] = field(default_factory=list)
+    _far: tuple[float, float] | None = None
 
     def add(self, time: float, position: float, most: int | None) -> None:
-        """A time before the last means that the clock was set: the older ones say nothing."""
-        if self.times and time < self.times[-1]:
-            self.times.clear()
-            self.positions.clear()
-        self.times.append(time)
-        self.positions.append(position)
+        """A late one goes to its place; two far before the last mean that the clock was set."""
+        if self.times and time < self.times[-1] - _LATE:
+            before, self._far = self._far, (time, position)
+            if before is None:
+                return
+            self.times, self.positions = [before[0]], [before[1]]
+        self._far = None
+        place = bisect_right(self.times, time)
+        self.times.insert(place, time)
+        self.positions.insert(place, position)
         if most and len(self.times) > most:
             del self.times[: most // 2], self.positions[: most // 2]
 
@@ -104,27 +108,29 @@ class JointStates:
         )
 
     def _add(self, sent: float, message: Any) -> None:
-        stamp = message.header.stamp
-        time = stamp.sec + 1e-9 * stamp.nanosec or sent
+        time = stamped(sent, message)
         for name, position in zip(message.name, message.position, strict=False):
             if math.isfinite(position):
                 self._tracks.setdefault(name, _Track()).add(time, position, self._most)
 
 
 def joint_states(spec: str) -> JointStates:
-    """Of ``ros2``, ``ros2:domain=N,topic=NAME``, or the path of an MCAP file of ROS 2.
+    """Of ``ros2``, ``ros2:domain=N,topic=NAME``, or the path of an MCAP file of ROS 2, perhaps with
+    the topics in it that are meant: ``arm.mcap:topic=/arm/joint_states``.
 
     Raises
     ------
     SinkError
         Where there is no such topic or domain, or CycloneDDS is not installed.
     DataError
-        When the file cannot be read, or holds no joint states.
+        When the file cannot be read, or does not say which joint states are meant.
     """
     name, _, argument = spec.partition(":")
     if name != "ros2":
-        states = iter(list(_recorded(Path(spec))))  # the first who asks takes them all
-        return JointStates(lambda: states, spec)
+        path, _, topics = spec.partition(_TOPIC_OF_FILE)
+        taken, recorded = recorded_states(Path(path), filter(None, topics.split(",")))
+        states = iter(recorded)  # the first who asks takes them all
+        return JointStates(lambda: states, f"{path}, topic {taken}")
     options = options_of(filter(None, argument.split(",")), ("domain", "topic"), _WHERE)
     topic = options.get("topic", "joint_states").removeprefix("/")
     return JointStates(_listener(ros_domain(options, _WHERE), topic), f"/{topic}", _MOST)
@@ -139,7 +145,7 @@ def _listener(domain: int, topic: str) -> Callable[[], Iterable[State]]:
     policy = dds["core"].Policy
     try:
         participant = dds["domain"].DomainParticipant(domain)
-        about = dds["topic"].Topic(participant, f"rt/{topic}", struct_of(_KIND))
+        about = dds["topic"].Topic(participant, f"rt/{topic}", struct_of(JOINT_STATE))
         qos = dds["core"].Qos(policy.Reliability.BestEffort, policy.History.KeepLast(_MOST))
         reader = dds["sub"].DataReader(participant, about, qos=qos)
     except dds["core"].DDSException as error:
@@ -152,20 +158,3 @@ def _listener(domain: int, topic: str) -> Callable[[], Iterable[State]]:
                     yield 1e-9 * message.sample_info.source_timestamp, message
 
     return take
-
-
-def _recorded(path: Path) -> Iterator[State]:
-    """All joint states of a file, whatever their topic is called."""
-    struct, some = struct_of(_KIND), False
-    try:
-        with path.open("rb") as file:
-            for schema, _, message in make_reader(file).iter_messages():
-                if schema is not None and schema.name == _KIND:
-                    some = True
-                    yield 1e-9 * message.log_time, struct.deserialize(message.data)
-    except OSError as error:
-        raise DataError(f"cannot be read: {error.strerror}", where=str(path)) from None
-    except Exception as error:  # the libraries raise many kinds for damaged bytes
-        raise DataError(f"is not a complete MCAP file: {error}", where=str(path)) from error
-    if not some:
-        raise DataError(f"expected messages of {_KIND}, got none", where=str(path))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.io import savemat
 from scipy.sparse import csc_matrix
 
@@ -36,7 +37,7 @@ def write_matlab(
         When the file would be larger than the format allows, and as :func:`written` does.
     """
     drives, order = _by_drive(recording.drive)
-    values = recording.voltages[:, order].T
+    values = _doubles(recording.voltages[:, order].T)
     if values.nbytes > _LARGEST:
         raise DataError(
             f"{values.shape[1]} frames are too many for a MATLAB v5 file (2 GiB)",
@@ -52,17 +53,22 @@ def write_matlab(
     variables: dict[str, Any] = {
         "stimulation": stimulation,
         "vi": values,
-        "time_s": recording.time[:, None],
-        "idle": recording.idle,
+        "time_s": _doubles(recording.time[:, None]),
+        "idle": float(recording.idle),  # integers divide as integers there
     }
     if recording.board_known:
         variables["board_known"] = True
     if recording.reference is not None:
-        variables["vh"] = recording.reference[order][:, None]
+        variables["vh"] = _doubles(recording.reference[order][:, None])
     if recording.labels is not None:
-        variables["xy_m"] = recording.labels
+        variables["xy_m"] = _doubles(recording.labels)
     with written(path, overwrite=overwrite) as part:
         savemat(part, variables, do_compression=True, appendmat=False)
+
+
+def _doubles(values: NDArray[Any]) -> NDArray[Any]:
+    """The same as the only numbers with which MATLAB computes as everybody expects."""
+    return values.astype(np.complex128 if np.iscomplexobj(values) else np.float64, copy=False)
 
 
 def _by_drive(drive: IntArray) -> tuple[IntArray, IntArray]:

@@ -20,6 +20,7 @@ from scipy.spatial import cKDTree
 from tomoskin.core import FloatArray, GeometryError, IntArray, located
 from tomoskin.model.mesh import triangles
 from tomoskin.model.mesh.mesh import MeshFile
+from tomoskin.model.mesh.overlap import check_overlaps
 from tomoskin.model.mesh.polygon import Polygon
 from tomoskin.model.mesh.surface import Surface, rows_of
 
@@ -234,7 +235,8 @@ class Draped(Surface):
         ------
         GeometryError
             Naming the cells: for a surface in pieces, with an edge in more than two triangles,
-            degenerate, one-sided, running through itself, closed, or with more than one rim.
+            degenerate, overlapping, one-sided, running through itself, closed, or with more than
+            one rim.
         """
         x, table = np.asarray(points, dtype=np.float64), np.asarray(cells, dtype=np.int64)
         triangles.check_cells(x, table)
@@ -242,6 +244,7 @@ class Draped(Surface):
             raise GeometryError(
                 f"expected triangles in space, got cells {table.shape} of points {x.shape}"
             )
+        check_overlaps(x, table)
         table = same_turn(table)
         triangles.check_crossings(x, table)
         return cls(x, table, _upright(x, table, flattened(x, table)))

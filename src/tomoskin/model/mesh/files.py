@@ -1,11 +1,12 @@
-"""What mesh files hold, by meshio or pycollada (extra ``mesh``): cells, points, groups of facets;
-which of these are electrodes: by name, facets or a function."""
+"""What mesh files hold, some by meshio or pycollada (extra ``mesh``): cells, points, groups of
+facets; which of these are electrodes: by name, facets or a function."""
 
 from __future__ import annotations
 
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -14,13 +15,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tomoskin.core import FloatArray, GeometryError, IntArray, check_is_file, install_hint
+from tomoskin.model.mesh.facets import triangulated
+from tomoskin.model.mesh.polygon_files import joined, read_obj, read_ply, read_stl
 from tomoskin.model.mesh.triangles import boundary_facets
 
-READERS = {
-    ".msh": "meshio.gmsh", ".vtu": "meshio.vtu", ".stl": "meshio.stl", ".obj": "meshio.obj",
-    ".ply": "meshio.ply", ".dae": "collada",
-}  # fmt: skip
-"""The module that reads each ending."""
+OWN = {".stl": read_stl, ".obj": read_obj, ".ply": read_ply}
+READERS = {".msh": "meshio.gmsh", ".vtu": "meshio.vtu", ".dae": "collada"}
+"""The module that reads each other ending."""
 
 TOO_LARGE = 10.0
 """A body that extends further than this, m, is taken for one in millimetres."""
@@ -35,11 +36,15 @@ _CORNERS = {"vertex": 1, "line": 2, "triangle": 3, "tetra": 4}
 
 
 def parsed(file: Path) -> Any:
-    """The file as meshio reads it."""
-    name = READERS.get(file.suffix.lower())
+    """The file as meshio would give it."""
+    ending = file.suffix.lower()
+    if ending in OWN:
+        return _read(OWN[ending], file)
+    name = READERS.get(ending)
     if name is None:
+        known = ", ".join((".msh", ".vtu", *OWN, ".dae"))
         raise GeometryError(
-            f'expected a file ending in {", ".join(READERS)}, got "{file.suffix}"', where=str(file)
+            f'expected a file ending in {known}, got "{file.suffix}"', where=str(file)
         )
     try:
         # the reader itself: meshio.read ends the process where a file is damaged
@@ -49,10 +54,15 @@ def parsed(file: Path) -> Any:
         raise GeometryError(
             f"{file.suffix} files need {package}", where=str(file), hint=install_hint("mesh")
         ) from error
+    return _read(partial(_scene, reader) if name == "collada" else reader.read, file)
+
+
+def _read(read: Callable[[Path], Any], file: Path) -> Any:
     _check_readable(file)
     try:
-        with np.errstate(over="ignore"):  # its test for binary STL multiplies text
-            return _scene(reader, file) if name == "collada" else reader.read(file)
+        return read(file)
+    except GeometryError as error:
+        raise GeometryError(error.message, where=str(file), hint=error.hint) from error
     except OSError as error:
         raise GeometryError(f"cannot be read: {error.strerror}", where=str(file)) from error
     except Exception as error:  # a parser meets damage in any way
@@ -64,16 +74,27 @@ def parsed(file: Path) -> Any:
 
 def _scene(collada: Any, file: Path) -> Any:
     """All triangles of a scene, in m; its upward axis is not applied, as RViz has it."""
-    meshio, common = import_module("meshio"), collada.common
-    ignored = [common.DaeUnsupportedError, common.DaeBrokenRefError]  # textures, lights
+    if b"<ph>" in file.read_bytes():
+        raise GeometryError(
+            "expected polygons without holes, got <ph>", hint="cut it into triangles"
+        )
+    ignored = [collada.common.DaeUnsupportedError, collada.common.DaeBrokenRefError]  # textures
     document = collada.Collada(str(file), ignore=ignored)
-    parts = (part for shape in document.scene.objects("geometry") for part in shape.primitives())
-    sets = (part.triangleset() if hasattr(part, "triangleset") else part for part in parts)
-    corners = [one.vertex[one.vertex_index] for one in sets if one.vertex_index.shape[1] == 3]
-    whole = np.concatenate([np.zeros((0, 3, 3)), *corners]).reshape(-1, 3)
-    points, cells = np.unique(whole, axis=0, return_inverse=True)
-    points *= document.assetInfo.unitmeter or 1.0
-    return meshio.Mesh(points, [("triangle", cells.reshape(-1, 3))])
+    parts = [part for shape in document.scene.objects("geometry") for part in shape.primitives()]
+    corners = [part.vertex[cells] for part in parts if (cells := _triangles(part)) is not None]
+    whole = np.concatenate([np.zeros((0, 3, 3)), *corners])
+    return joined(whole * (document.assetInfo.unitmeter or 1.0))
+
+
+def _triangles(part: Any) -> IntArray | None:
+    """(n, 3) of what a scene draws; None of lines. Its own triangles would cover more than a
+    polygon that is not convex."""
+    if hasattr(part, "polyindex"):
+        ends = part.polyindex.tolist()
+        polygons = (part.vertex_index[start:end].tolist() for start, end in ends)
+        return triangulated(part.vertex, polygons)
+    table = part.vertex_index
+    return np.asarray(table, np.int64) if table is not None and table.shape[1] == 3 else None
 
 
 def _check_readable(file: Path) -> None:

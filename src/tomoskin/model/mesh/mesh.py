@@ -15,6 +15,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from tomoskin.core import FloatArray, GeometryError, IntArray, PixelMap, located, numeric
 from tomoskin.model.mesh import files
+from tomoskin.model.mesh.overlap import check_overlaps
 from tomoskin.model.mesh.triangles import (
     boundary_facets,
     check_mesh,
@@ -147,7 +148,7 @@ class Mesh:
         ------
         GeometryError
             When meshio is not installed, the file cannot be read or holds no usable cells, it
-            seems to be in millimetres, a cell repeats another one, or an electrode has no facet.
+            seems to be in millimetres, cells overlap, or an electrode has no facet.
         """
         return MeshFile.read(path, scale=scale).mesh(electrodes)
 
@@ -295,7 +296,9 @@ class MeshFile:
             number = np.full(len(self.points), -1)
             number[used] = np.arange(len(used))
             tables = [files.renumbered(number, f, f"E{i}") for i, f in enumerate(facets, 1)]
-            return Mesh(self.points[used], compact.reshape(self.cells.shape), tuple(tables))
+            mesh = Mesh(self.points[used], compact.reshape(self.cells.shape), tuple(tables))
+            check_overlaps(mesh.points, mesh.cells)
+            return mesh
 
 
 def _frozen(value: object, dtype: DTypeLike, where: str) -> NDArray[Any]:

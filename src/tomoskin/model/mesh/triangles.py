@@ -129,7 +129,7 @@ def check_crossings(points: FloatArray, cells: IntArray) -> None:
 
     Neighbours may meet at what they share; two triangles in one plane are not distinguished.
     """
-    for pairs in _near(points, cells):
+    for pairs in near_cells(points, cells):
         for one, other in ((0, 1), (1, 0)):
             cut = _cuts(points, cells[pairs[:, one]], cells[pairs[:, other]])
             if cut.any():
@@ -142,7 +142,7 @@ def check_crossings(points: FloatArray, cells: IntArray) -> None:
                 )
 
 
-def _near(points: FloatArray, cells: IntArray) -> list[IntArray]:
+def near_cells(points: FloatArray, cells: IntArray) -> list[IntArray]:
     """Pairs (n, 2) of cells whose boxes overlap, in blocks."""
     corner = points[cells]
     middle = corner.mean(axis=1)
