@@ -99,3 +99,18 @@ def test_a_skin_that_saturates_its_board_is_no_good_skin(tomoskin, tmp_path):
     code, out, errors = tomoskin("design", "--skin", str(file), "--electrodes", "")
     assert (code, out) == (1, "")
     assert "a current of 0.11 mA fits" in errors
+
+
+def test_check_says_which_places_the_pattern_cannot_tell_apart(tomoskin, tmp_path):
+    rows = [(k, j) for k in range(4) for j in range(4) if j != k]
+    drive = {"pattern": None, "current": "40 mA"}
+    drive |= {"drive": [[k + 4, k] for k, _ in rows], "measure": [[j, j + 4] for _, j in rows]}
+    skin = Skin.load("textile-disc-8").altered({"drive": drive, "readout": {"gain": 15}})
+    (tmp_path / "across.toml").write_text(skin.to_toml())
+    code, out, err = tomoskin("skin", "check", tmp_path / "across.toml", "--json")
+    assert code == 0
+    said = json.loads(out)["ambiguity"]
+    assert "turned by 180° about the centre, give the same voltages" in said
+    assert 'pattern = "opposite" in [drive] separates them' in said
+    assert said in err
+    assert json.loads(tomoskin("skin", "check", "textile-disc-8", "--json")[1])["ambiguity"] is None

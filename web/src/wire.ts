@@ -21,6 +21,7 @@ export interface Scene {
   readonly truth: boolean;
   readonly probe: ProbeSizes;
   readonly version: string;
+  readonly same: SamePlaces | null;
 }
 
 /** The skin, by what its file says. */
@@ -52,6 +53,13 @@ export interface ProbeSizes {
   readonly radius_m: number;
   readonly force_n: number;
   readonly max_force_n: number;
+}
+
+/** Places that the pattern cannot tell apart. */
+export interface SamePlaces {
+  readonly text: string;
+  readonly maps: readonly (readonly number[])[];
+  readonly least_m: number;
 }
 
 /** Another scale of the same scene. */

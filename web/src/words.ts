@@ -54,7 +54,7 @@ function stateOf(status: RunState, old: boolean): readonly [word: string, remark
 }
 
 /** What someone must act on; the server's own sentence first. */
-function warningsOf(status: RunState, age: number | null): Warning[] {
+function warningsOf(scene: Scene, status: RunState, age: number | null): Warning[] {
   const { baseline, calibration, paused, problem, replay, running, sick } = status;
   const found = problem ? [warning(problem)] : [];
   if (!running && !replay?.ended && !problem) found.push(warning("No frames come from the source"));
@@ -68,6 +68,7 @@ function warningsOf(status: RunState, age: number | null): Warning[] {
   if (calibration?.broken) {
     found.push(...calibration.findings.map((text) => warning(text, "The calibration does not fit any more")));
   }
+  if (scene.same) found.push(warning(scene.same.text, "Two places look the same"));
   if (baseline?.stale) found.push(warning(`The reference is stale: ${baseline.stale}`));
   return found;
 }
@@ -103,9 +104,9 @@ export function headline(
 ): Headline {
   if (link.phase === "lost") return disconnected(link, now, age);
   if (link.phase === "connecting" || !scene || !status) return calm("Connecting");
-  if (opening !== null) return { ...calm("Opening", opening), warnings: warningsOf(status, age) };
+  if (opening !== null) return { ...calm("Opening", opening), warnings: warningsOf(scene, status, age) };
   const [word, remark] = withFlow(stateOf(status, age !== null && age > OLD), flow, !status.replay);
-  return { word, remark, warnings: warningsOf(status, age) };
+  return { word, remark, warnings: warningsOf(scene, status, age) };
 }
 
 export interface Fact {

@@ -1,4 +1,5 @@
 import { describe, expect, it } from "vitest";
+import { elsewhere } from "../src/sheet/overlay";
 import { contours, prepareTopology, toNodes } from "../src/sheet/topology";
 import { barLength, boxOf, contains, fit, outward, toPixels, toSheet } from "../src/sheet/view";
 
@@ -6,6 +7,16 @@ const SQUARE = [-1, -1, 1, -1, 1, 1, -1, 1];
 /** Two triangles of a square, the second clockwise. */
 const POINTS = [0, 0, 2, 0, 2, 2, 0, 2];
 const CELLS = [0, 1, 2, 0, 3, 2];
+
+describe("places that the pattern cannot tell apart", () => {
+  const same = { text: "", maps: [[-1, 0, 0, -1, 0.2, 0.1], [-1, 0, 0, -1, 0.2, 0.1]], least_m: 0.02 };
+
+  it("are each shown once, and not where a touch is its own image", () => {
+    expect(elsewhere({ x: 0.05, y: 0.05 }, same)).toEqual([[0.15000000000000002, 0.05]]);
+    expect(elsewhere({ x: 0.101, y: 0.05 }, same)).toEqual([]);
+    expect(elsewhere({ x: 0.05, y: 0.05 }, null)).toEqual([]);
+  });
+});
 
 describe("the view", () => {
   const view = fit(boxOf([0, 0, 0.2, 0.1]), 800, 600, { left: 100, right: 0, top: 50, bottom: 50 });

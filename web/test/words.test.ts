@@ -47,6 +47,12 @@ describe("the headline", () => {
     expect(headline({ phase: "connecting" }, null, null, 0, null).word).toBe("Connecting");
   });
 
+  it("warns of places that the pattern cannot tell apart", () => {
+    const same = { text: "a press looks the same across", maps: [[-1, 0, 0, -1, 0, 0]], least_m: 0.02 };
+    const line = headline(open, { ...scene, same }, status, 10, 0.1);
+    expect(line.warnings.map(({ text }) => text)).toEqual(["a press looks the same across"]);
+  });
+
   it("says that a recording is opened, until it is", () => {
     const line = headline(open, scene, status, 10, 0.1, null, "run.mcap");
     expect(line).toEqual({ word: "Opening", remark: "run.mcap", warnings: [] });

@@ -192,7 +192,7 @@ def image(
     if results.out is not None:
         write = WRITERS[results.out.suffix.lower()]
         write(results.out, prepared, result, display, overwrite=force)
-    _warn(given.data, result, chosen)
+    _warn(given.data, result, prepared)
     if located_alone(prepared, result.model_agreement):
         remark(f"{recording}: the calibration alone locates touches, one at a time")
     since = (result.time - first_time(given.data)).tolist()
@@ -241,7 +241,7 @@ def _lines(result: Reconstruction, spans: tuple[Span, ...], prepared: Prepared) 
     return lines
 
 
-def _warn(recorded: Recording, result: Reconstruction, skin: Skin) -> None:
+def _warn(recorded: Recording, result: Reconstruction, prepared: Prepared) -> None:
     """Say on stderr what was left out, and what looks wrong."""
     from tomoskin.files.imports import is_session
     from tomoskin.model.skin import regions_doubt
@@ -269,8 +269,11 @@ def _warn(recorded: Recording, result: Reconstruction, skin: Skin) -> None:
         )
     if (doubt := result.model_agreement.doubt(volts=is_session(source))) is not None:
         remark(f"{source}: {doubt}")
+    skin, ambiguity = prepared.skin, prepared.ambiguity
     if (doubt := regions_doubt(skin.inverse, skin.touch)) is not None:
         remark(f"{skin.source}: {doubt}")
+    if ambiguity is not None:
+        remark(f"{skin.source}: {ambiguity.text}")
 
 
 def _document(
@@ -309,6 +312,7 @@ def _document(
                 "x_m": t.detection.x,
                 "y_m": t.detection.y,
                 "peak": t.detection.peak,
+                "elsewhere_m": t.elsewhere,
                 **_amounts(t),
             }
             for f, touches in zip(result.frames.tolist(), result.touches, strict=True)

@@ -48,6 +48,7 @@ def check(file: SkinArgument, json: JsonFlag = False) -> None:
     """Check a skin file, mesh it, and compare the expected voltages with the board's limits."""
     from tomoskin.model.mesh import quality
     from tomoskin.model.skin import Skin, regions_doubt
+    from tomoskin.pipeline import ambiguity_of
     from tomoskin.sensing.signal import Headroom
 
     skin = Skin.load(file)
@@ -57,6 +58,8 @@ def check(file: SkinArgument, json: JsonFlag = False) -> None:
         raise SkinError(headroom.problem, where=skin.source)
     if (doubt := regions_doubt(skin.inverse, skin.touch)) is not None:
         remark(f"{skin.source}: {doubt}")
+    if (ambiguity := ambiguity_of(skin)) is not None:
+        remark(f"{skin.source}: {ambiguity.text}")
     figures = {
         "n_cells": mesh.n_cells,
         "n_points": mesh.n_points,
@@ -68,6 +71,7 @@ def check(file: SkinArgument, json: JsonFlag = False) -> None:
         f"{mesh.n_cells} triangles of quality {mesh.minimum:.2f} (least), {mesh.mean:.2f} (mean)"
     )
     document = {"ok": True, "mesh": figures, "headroom": headroom.figures()}
+    document["ambiguity"] = None if ambiguity is None else ambiguity.text
     tell(_summary(skin) | document, [line, f"expected: {headroom.text}"], json=json)
 
 

@@ -327,6 +327,9 @@ class Touch:
     possible
         Identities that it may have, its own among them, where it has been too close to another
         for frames to tell who is who; else empty.
+    elsewhere
+        Other places, (x, y) m, at which the same press gives the same voltages, where the skin's
+        pattern cannot tell them apart; else empty.
     provisional
         Whether single drives alone have told of it: no frame has confirmed it yet.
     """
@@ -338,6 +341,7 @@ class Touch:
     merged: tuple[int, ...] = ()
     possible: tuple[int, ...] = ()
     provisional: bool = False
+    elsewhere: tuple[tuple[float, float], ...] = ()
 
     @property
     def amounts(self) -> dict[str, Amount]:
@@ -347,7 +351,13 @@ class Touch:
 
     @property
     def said(self) -> str:
-        """Its kind for tables: "merged 1+2", "1 or 2" and "too close" say what is not certain."""
+        """Its kind for tables: "merged 1+2", "1 or 2" and "too close" say what is not certain, and
+        so does "or at 50 30 mm", a place that the pattern cannot tell from its own."""
+        places = [f"or at {1e3 * x:.0f} {1e3 * y:.0f} mm" for x, y in self.elsewhere]
+        return ", ".join([self._who, *places])
+
+    @property
+    def _who(self) -> str:
         if self.merged:
             return f"merged {'+'.join(map(str, self.merged))}"
         if self.possible:

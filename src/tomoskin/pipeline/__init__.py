@@ -22,6 +22,7 @@ from tomoskin.pipeline.offline import (
 from tomoskin.pipeline.pipeline import REFERENCE_FRAMES as REFERENCE_FRAMES, Pipeline as Pipeline
 from tomoskin.pipeline.prepare import (
     Prepared as Prepared,
+    ambiguity_of as ambiguity_of,
     colour_limit as colour_limit,
     prepare as prepare,
     with_calibrations as with_calibrations,

@@ -193,6 +193,7 @@ class Following:
         reach("tracking")
         show("detections", detections)
         touches = self._tracker.update(detections, measured.time, measured.host_time)
+        touches = tuple(map(self._everywhere, touches))
         show("touches", touches)
         show("events", self._tracker.events)
         if self._drives is not None:  # no number is given twice
@@ -238,13 +239,23 @@ class Following:
         if result is None:
             return None
         finger = self._tracker.slides.of_finger
-        return replace(result, touches=tuple(map(finger, result.touches)))
+        touches = (self._everywhere(finger(touch)) for touch in result.touches)
+        return replace(result, touches=tuple(touches))
 
     def early(self, result: FrameResult) -> FrameResult:
         """The newest ``result`` for those who were told of drives before."""
         if self._drives is None:
             return result
-        return replace(result, touches=self._drives.among(result.touches))
+        touches = tuple(map(self._everywhere, self._drives.among(result.touches)))
+        return replace(result, touches=touches)
+
+    def _everywhere(self, touch: Touch) -> Touch:
+        """With the other places that the pattern cannot tell from its own; presses that taught
+        positions have told which it is."""
+        ambiguity = self.prepared.ambiguity
+        if ambiguity is None or any(c.kind.locates for c in self.prepared.calibrations.values()):
+            return touch
+        return replace(touch, elsewhere=ambiguity.elsewhere(touch.detection.x, touch.detection.y))
 
     def _detected(self, time: float, differences: Differences) -> tuple[FrameView, list[Detection]]:
         """What a frame shows, and the touches in it."""

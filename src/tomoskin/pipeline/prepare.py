@@ -26,7 +26,7 @@ from tomoskin.learning import Calibration, Kind, load_calibration
 from tomoskin.model.forward import ForwardModel
 from tomoskin.model.mesh import Mesh
 from tomoskin.model.pattern import Pattern, Scan
-from tomoskin.model.skin import METHODS, Skin
+from tomoskin.model.skin import METHODS, Ambiguity, Skin
 from tomoskin.sensing.fit import SpotModel
 from tomoskin.sensing.segment import ImageNoise, Segmenter
 from tomoskin.sensing.signal import Headroom, NuisanceSubspace, Readout, Reference, difference_noise
@@ -122,6 +122,11 @@ class Prepared:
         """What the untouched skin asks of the board, and what that gives."""
         return Headroom.of(self.skin, self.model.at(self.skin.conductivity))
 
+    @cached_property
+    def ambiguity(self) -> Ambiguity | None:
+        """Which places the skin's pattern cannot tell apart; None where it tells all."""
+        return self.skin.ambiguity(lambda: self.problem.jacobian)
+
     @property
     def directions(self) -> FloatArray:
         """(n_meas, k) V along which what its calibrations read moves the data."""
@@ -205,6 +210,12 @@ def prepare(skin: Skin, previous: Prepared | None = None) -> Prepared:
                 calibration.check(skin)
             return _prepared(skin, _problem_after(previous, skin), previous)
         return _prepared(skin, _problem(_model(skin), skin))
+
+
+def ambiguity_of(skin: Skin) -> Ambiguity | None:
+    """Which places the pattern of ``skin`` cannot tell apart, by its model; None where it tells
+    all. Raises TomoskinError where it cannot be meshed or modelled."""
+    return skin.ambiguity(lambda: _model(skin).jacobian(skin.conductivity))
 
 
 def with_calibrations(

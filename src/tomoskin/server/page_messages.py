@@ -80,12 +80,25 @@ class ProbeSizes(MessagePart, frozen=True):
     max_force_n: float
 
 
+class SamePlaces(MessagePart, frozen=True):
+    """Places that the pattern cannot tell apart.
+
+    ``maps``: each takes x, y (m) to a·x + b·y + e, c·x + d·y + f, as [a, b, c, d, e, f]; what comes
+    to lie nearer than ``least_m`` to where it was is no other place. ``text`` says it in words.
+    """
+
+    text: str
+    maps: list[Flat]
+    least_m: float
+
+
 class Scene(Message, frozen=True, tag="scene"):
     """Everything about the skin that does not change from frame to frame.
 
     ``limit`` is the end of the fixed symmetric colour scale, in ``unit``; ``solid`` holds the
     points in space, x0, y0, z0, …, of a sheet on a surface; null: the sheet lies flat.
     ``truth``: what really presses is known, because it can be pressed or was when it was recorded.
+    ``same``: places that the pattern cannot tell apart; null: it tells all.
     """
 
     skin: SkinName
@@ -102,6 +115,7 @@ class Scene(Message, frozen=True, tag="scene"):
     truth: bool
     probe: ProbeSizes
     version: str
+    same: SamePlaces | None = None
 
 
 class Scale(Message, frozen=True, tag="scale"):

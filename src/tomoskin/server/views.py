@@ -10,6 +10,7 @@ from tomoskin import __version__
 from tomoskin.core import Event, FloatArray, IntArray
 from tomoskin.files.session import Timeline
 from tomoskin.model.mesh import Plane
+from tomoskin.model.skin import Ambiguity
 from tomoskin.pipeline import Prepared
 from tomoskin.run import MAX_FORCE, Status
 from tomoskin.server import page_messages as to_page
@@ -56,7 +57,15 @@ def scene(
         truth=pressable or truth,
         probe=PROBE,
         version=__version__,
+        same=_same_places(prepared.ambiguity),
     )
+
+
+def _same_places(ambiguity: Ambiguity | None) -> to_page.SamePlaces | None:
+    if ambiguity is None:
+        return None
+    maps = [flat(np.append(one.matrix, one.shift)) for one in ambiguity.symmetries]
+    return to_page.SamePlaces(text=ambiguity.text, maps=maps, least_m=ambiguity.least)
 
 
 def state(status: Status) -> to_page.RunState:

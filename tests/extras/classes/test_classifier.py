@@ -199,7 +199,7 @@ def test_six_points_on_another_day(data_dir: Path, old: int, new: int) -> None:
     answers = known.in_session(asked).predict(asked)
     assert hit(answers.flags, truth) > 0.85
     assert abs(answers.probability.mean() - hit(answers.flags, truth)) < 0.06
-    assert answers.rejected.mean() < 0.03
+    assert answers.rejected.mean() < 0.06
 
 
 def six_points(data_dir: Path, number: int) -> tuple[FloatArray, FloatArray]:

@@ -5,7 +5,7 @@ import type { Touch } from "../decode";
 import { fixed, inScale, millimetres, scaleFor, type Scale } from "../format";
 import { fingers } from "../screen";
 import { limit, link, scene, shown, status } from "../state";
-import { halfAxes } from "../sheet/overlay";
+import { elsewhere, halfAxes } from "../sheet/overlay";
 import { amountInWords, MEASURANDS } from "../words";
 import { next, several, showNext, shownAs } from "./amounts";
 import { ReadingsAboveTouches } from "./Readings";
@@ -25,7 +25,12 @@ function doubt(touch: Touch): string | undefined {
   return touch.several ? "may be several touches, too close to separate" : undefined;
 }
 
-const notes = (touch: Touch) => [touch.own && "by the robot itself", doubt(touch)].filter(Boolean).join(", ");
+/** Where else it may be, in words. */
+const others = (touch: Touch) =>
+  elsewhere(touch, scene.value?.same).map(([x, y]) => `or at ${millimetres(x, 0)}, ${millimetres(y, 0)} mm`);
+
+const notes = (touch: Touch) =>
+  [touch.own && "by the robot itself", doubt(touch), ...others(touch)].filter(Boolean).join(", ");
 
 function Strength({ touch, scale }: { touch: Touch; scale: Scale }) {
   const name = shownAs.value;
@@ -77,6 +82,7 @@ function Row({ touch, scale }: { touch: Touch; scale: Scale }) {
         <span class={touch.own ? "chip itself" : "chip"} title={notes(touch)}>
           {touch.id}
           {touch.several > 0 && "+"}
+          {others(touch).length > 0 && "?"}
         </span>
       </th>
       <td class="large">{millimetres(touch.x)}</td>

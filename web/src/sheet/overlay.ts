@@ -4,6 +4,7 @@ import type { Touch, Truth } from "../decode";
 import { rim } from "../faces";
 import type { Held } from "../presses";
 import type { Theme } from "../theme";
+import type { SamePlaces } from "../wire";
 import { contours, type Topology } from "./topology";
 import { toPixels, type View } from "./view";
 
@@ -156,6 +157,35 @@ function drawTouch(pen: Pen, theme: Theme, view: View, touch: Touch): void {
   haloed(pen, theme, path, theme.accent, 2, touch.provisional ? [5, 4] : []);
 }
 
+/** Other places, m, at which the pattern cannot tell the touch from its own; none twice. */
+export function elsewhere(touch: Pick<Touch, "x" | "y">, same: SamePlaces | null | undefined): Place[] {
+  const places: Place[] = [[touch.x, touch.y]];
+  for (const [a, b, c, d, e, f] of same?.maps ?? []) {
+    const place = [a * touch.x + b * touch.y + e, c * touch.x + d * touch.y + f] as const;
+    const far = places.map(([x, y]) => Math.hypot(x - place[0], y - place[1]));
+    if (Math.min(...far) > same!.least_m) places.push(place);
+  }
+  return places.slice(1);
+}
+
+/** A dashed ring where the touch may be as well, with the touch's number. */
+function drawElsewhere(pen: Pen, theme: Theme, view: View, touch: Touch, place: Place): void {
+  const [x, y] = toPixels(view, ...place);
+  const path = new Path2D();
+  path.arc(x, y, 9, 0, 2 * Math.PI);
+  haloed(pen, theme, path, theme.accent, 2, [3, 3]);
+  pen.font = `500 14px ${theme.font}`;
+  pen.textAlign = "left";
+  pen.textBaseline = "middle";
+  pen.strokeStyle = theme.halo;
+  pen.lineWidth = 4;
+  pen.lineJoin = "round";
+  const text = `or ${touch.id} here`;
+  pen.strokeText(text, x + 14, y);
+  pen.fillStyle = theme.accent;
+  pen.fillText(text, x + 14, y);
+}
+
 /** The touch's number on a disc beside its cross. */
 function drawNumber(pen: Pen, theme: Theme, view: View, touch: Touch): void {
   const [x, y] = toPixels(view, touch.x, touch.y);
@@ -269,6 +299,7 @@ export function drawMarks(
   topology: Topology,
   marks: Marks,
   maxForce: number,
+  same: SamePlaces | null = null,
 ): void {
   const density = pen.canvas.width / view.width;
   pen.setTransform(density, 0, 0, density, 0, 0);
@@ -284,6 +315,9 @@ export function drawMarks(
   for (const held of marks.held) drawHeld(pen, theme, view, held, maxForce);
   for (const touch of marks.touches) drawTouch(pen, theme, view, touch);
   for (const truth of marks.truths ?? []) drawTruth(pen, theme, view, truth);
+  for (const touch of marks.touches) {
+    for (const place of elsewhere(touch, same)) drawElsewhere(pen, theme, view, touch, place);
+  }
   for (const touch of marks.touches) drawNumber(pen, theme, view, touch);
   if (marks.cursor) drawCursor(pen, theme, view, marks.cursor);
 }

@@ -93,7 +93,7 @@ export class Painter {
       cursor: cursor.peek(),
       smoothed: smoothed.peek(),
     };
-    drawMarks(this.pen, colours, view, shape, marks, scene.peek()?.probe.max_force_n ?? 1);
+    drawMarks(this.pen, colours, view, shape, marks, scene.peek()?.probe.max_force_n ?? 1, scene.peek()?.same);
     drewNewest();
   });
 }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -114,6 +115,7 @@ def _facts(classifier: Classifier, n_frames: int) -> dict[str, Any]:
         "labelled": int(examples.part(examples.newest).labelled.sum()),
         "sessions": int(examples.session.max()) + 1,
         "right_when_left_out": classifier.right,
+        "unknown_when_not_taught": None if isnan(classifier.noticed) else classifier.noticed,
         "alignment": None if alignment is None else asdict(alignment),
     }
 
@@ -123,9 +125,14 @@ def _lines(classifier: Classifier, facts: dict[str, Any], *, is_aligned: bool) -
     kind = "classes" if facts["exclusive"] else "flags"
     lines = [
         f"{len(facts['names'])} {kind}: {', '.join(facts['names'])}",
-        f"{facts['labelled']} of {facts['frames']} frames labelled; in cross-validation, "
-        f"{100 * classifier.right:.0f} % of the labelled frames are right",
+        f"{facts['labelled']} of {facts['frames']} frames labelled; with whole repetitions left "
+        f"out, {100 * classifier.right:.0f} % of the labelled frames are right",
     ]
+    if not isnan(classifier.noticed):
+        lines.append(
+            f"one known frame in twenty is called unknown, and about "
+            f"{100 * classifier.noticed:.0f} % of the frames of a class that was not taught"
+        )
     if classifier.right < _HARDLY:
         lines.append("the labels hardly depend on the data: check that they belong to these frames")
     if is_aligned and classifier.alignment is not None:

@@ -3,15 +3,16 @@ calibration that it makes."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass, replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import stdtrit
 
 from tomoskin.core import DataError, Detection, FloatArray, IntArray
 from tomoskin.extras.classes.examples import Codes, Examples
+from tomoskin.extras.classes.held_out import HeldOut, compared, learnt, runs_of, tempered
 from tomoskin.extras.classes.mixture import (
     Alignment,
     Mixture,
@@ -32,12 +33,6 @@ from tomoskin.learning import (
 )
 from tomoskin.model.pattern import Pattern
 
-_FOLDS = 5
-_KNOWN = 0.99
-"""Part of the frames of known classes that are not called unknown."""
-
-_SHARPNESS = np.geomspace(0.05, 1.6, 16)
-_TEMPERED = np.geomspace(1e-3, 1.6, 60)
 _ENOUGH = 10
 """Unlabelled frames of a session below which it is not fitted."""
 
@@ -115,8 +110,10 @@ class Classifier:
     skin_id
         Identity of the skin, "" where it is not known.
     right
-        Part of the labelled frames of the newest session that has them all whose state is told
-        when they are left out of the learning.
+        Part of the labelled frames of the newest session that has them all whose class is right
+        when their repetition is left out of the learning.
+    noticed
+        Part of them that would be called unknown had their class not been taught; NaN for flags.
     alignment
         How the newest session was taken over; None where it has all its labels.
     rows
@@ -131,6 +128,7 @@ class Classifier:
     sharpness: float
     limit: float
     right: float
+    noticed: float = math.nan
     alignment: Alignment | None = None
     rows: IntArray | None = None
 
@@ -175,20 +173,22 @@ class Classifier:
     @classmethod
     def learn(cls, examples: Examples, skin_id: str = "") -> Self:
         """Learn from checked examples of the skin of that identity."""
-        taught = examples.taught().enough()
-        distances, strange = _left_out(taught)
-        truth = examples.codes.numbers(taught.flags[taught.newest])
+        chosen, codes = examples.to_teach, examples.codes
+        taught = examples.part(chosen).enough()
+        held_out = HeldOut.of(taught, runs_of(examples)[chosen])
         subspace = Subspace.of(examples)
         made = cls(
             examples,
             skin_id,
             subspace,
-            _mixture(subspace, taught, examples),
-            sharpness=_sharpness(distances, truth),
-            limit=_limit(strange),
-            right=float(np.mean(distances.argmin(axis=1) == truth)),
+            learnt(subspace, taught, examples, held_out.covariance(subspace)),
+            sharpness=held_out.sharpness,
+            limit=held_out.limit,
+            right=held_out.right,
+            noticed=held_out.noticed(subspace.axes.shape[1]) if codes.exclusive else math.nan,
         )
-        return made if examples.labelled[examples.newest].all() else made._settled(strange)
+        complete = examples.labelled[examples.newest].all()
+        return made if complete else made._settled(held_out.strange)
 
     def _settled(self, usual: FloatArray) -> Self:
         """Fitted to the newest session, not all of whose frames have a label."""
@@ -201,14 +201,14 @@ class Classifier:
         fitted, alignment = aligned(self.mixture, x, numbers, self._rest())
         made = self._with(fitted, newest.dv, usual)
         if alignment.holds:
-            sharpness = min(self.sharpness, _tempered(fitted.distances(x), alignment.reliability))
+            sharpness = min(self.sharpness, tempered(fitted.distances(x), alignment.reliability))
             return replace(made, sharpness=sharpness, alignment=alignment)
         before = type(self).learn(older, self.skin_id)
         return replace(before, examples=self.examples, alignment=alignment)
 
     def _with(self, mixture: Mixture, dv: FloatArray, usual: FloatArray) -> Self:
         """With a mixture fitted to frames (n, n_meas); ``usual`` (m,) strangeness of known ones."""
-        strange = _compared(self.subspace, mixture, dv)[1]
+        strange = compared(self.subspace, mixture, dv)[1]
         limit = self.limit * max(float(np.median(strange) / np.median(usual)), 1.0)
         return replace(self, mixture=mixture, limit=limit)
 
@@ -217,7 +217,7 @@ class Classifier:
         zeros = np.zeros((1, self.examples.dv.shape[1]))
         if self.examples.codes.exclusive:
             return None
-        taught = self.examples.taught()
+        taught = self.examples.part(self.examples.to_teach)
         for number in np.unique(taught.session):
             middle = session_mean(self.examples.dv[self.examples.session == number])
             group = np.zeros(int((taught.session == number).sum()), dtype=np.int64)
@@ -235,7 +235,7 @@ class Classifier:
         """
         codes = self.examples.codes
         data = frames(dv, self.examples.dv.shape[1])
-        distances, strange = _compared(self.subspace, self.mixture, data)
+        distances, strange = compared(self.subspace, self.mixture, data)
         lost = self.alignment is not None and not self.alignment.holds
         weights = posterior(distances, 0.0 if lost else self.sharpness)
         best = distances.argmin(axis=1)
@@ -278,68 +278,6 @@ class Classifier:
         return ClassReading(
             answers.label[0], float(answers.probability[0]), bool(answers.rejected[0])
         )
-
-
-def _mixture(subspace: Subspace, taught: Examples, complete: Examples) -> Mixture:
-    """Learnt from labelled frames, each session about the mean of the whole of it."""
-    x = np.empty((len(taught), subspace.axes.shape[1]))
-    for number in np.unique(taught.session):
-        middle = session_mean(complete.dv[complete.session == number])
-        chosen = taught.session == number
-        x[chosen] = subspace.whitened(taught.dv[chosen], middle) @ subspace.axes
-    group = np.unique(taught.session, return_inverse=True)[1].reshape(-1)
-    return Mixture.of(complete.codes.table, x, taught.flags, group)
-
-
-def _compared(
-    subspace: Subspace, mixture: Mixture, dv: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """(n, k) squared distances of frames to the combinations; (n,) their strangeness.
-
-    A frame is strange by how far it is from the nearest combination, inside and beside the
-    directions.
-    """
-    white = subspace.whitened(dv)
-    x = white @ subspace.axes
-    distances = mixture.distances(x)
-    inside = distances.min(axis=1) / x.shape[1]
-    return distances, inside + subspace.outside(white, x)
-
-
-def _left_out(taught: Examples) -> tuple[FloatArray, FloatArray]:
-    """Distances and strangeness of the newest session's frames, learnt from the others."""
-    asked = taught.part(taught.newest)
-    distances = np.zeros((len(asked), len(taught.codes.table)))
-    strange = np.zeros(len(asked))
-    fold = np.full(len(taught), -1)
-    fold[taught.newest] = np.arange(len(asked)) % _FOLDS
-    for number in range(min(_FOLDS, len(asked))):
-        kept, out = taught.part(fold != number), fold[taught.newest] == number
-        subspace = Subspace.of(kept)
-        mixture = _mixture(subspace, kept, kept)
-        distances[out], strange[out] = _compared(subspace, mixture, asked.dv[out])
-    return distances, strange
-
-
-def _sharpness(distances: FloatArray, truth: IntArray) -> float:
-    """Temperature of the probabilities at which left-out labels are likeliest (Guo et al. 2017)."""
-    rows = np.arange(len(truth))
-    likely = [np.log(posterior(distances, s)[rows, truth] + 1e-12).mean() for s in _SHARPNESS]
-    return float(_SHARPNESS[int(np.argmax(likely))])
-
-
-def _tempered(distances: FloatArray, reliability: float) -> float:
-    """Temperature of the probabilities at which their mean is at most ``reliability``."""
-    said = np.array([posterior(distances, s).max(axis=1).mean() for s in _TEMPERED])
-    return float(_TEMPERED[max(int((said <= reliability).sum()) - 1, 0)])
-
-
-def _limit(strange: FloatArray) -> float:
-    """Strangeness that one known frame in a hundred exceeds, from left-out ones (log-normal)."""
-    log = np.log(strange)
-    n = len(log)
-    reach = stdtrit(n - 1, _KNOWN) * np.sqrt(1 + 1 / n)
-    return float(np.exp(log.mean() + reach * log.std(ddof=1)))
 
 
 class ClassesApplied(Applied):

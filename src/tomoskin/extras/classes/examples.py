@@ -152,14 +152,15 @@ class Examples:
             self, dv=self.dv[chosen], flags=self.flags[chosen], session=self.session[chosen]
         )
 
-    def taught(self) -> Self:
-        """Labelled frames of the sessions that have all labels; of all, where there is none.
+    @property
+    def to_teach(self) -> NDArray[np.bool_]:
+        """(n,) labelled frames of the sessions that have all labels; of all, where there is none.
 
         The few labels of a session that is fitted without most of them count in that fit.
         """
         partly = np.unique(self.session[~self.labelled])
         complete = self.labelled & ~np.isin(self.session, partly)
-        return self.part(complete if complete.any() else self.labelled)
+        return np.asarray(complete if complete.any() else self.labelled)
 
     def and_then(self, other: Examples) -> Self:
         """These, then the ``other`` ones as a session of their own.

@@ -24,7 +24,7 @@ from tomoskin.learning import leading
 _MOST = 20
 """Directions: eight electrodes have n(n − 3)/2 = 20 independent readings."""
 
-_FRAMES_EACH = 4
+_FRAMES_EACH = 2
 """Frames for each direction."""
 
 _QUIETEST = 0.3
@@ -119,18 +119,27 @@ class Mixture:
     covariance: FloatArray
 
     @classmethod
-    def of(cls, table: FloatArray, x: FloatArray, flags: FloatArray, group: IntArray) -> Self:
+    def of(
+        cls,
+        table: FloatArray,
+        x: FloatArray,
+        flags: FloatArray,
+        group: IntArray,
+        covariance: FloatArray | None = None,
+    ) -> Self:
         """From labelled frames x (n, d), flags (n, f), each of a group with a mean of its own.
 
-        m is that of the last group.
+        m is that of the last group. ``covariance`` (d, d) is that of the frames' residuals without
+        one.
         """
         middle = np.stack([x[group == g].mean(axis=0) for g in range(group.max() + 1)])
         share = np.stack([flags[group == g].mean(axis=0) for g in range(group.max() + 1)])
         design = flags - share[group]
         effect = np.linalg.lstsq(design, x - middle[group], rcond=None)[0]
-        residual = x - middle[group] - design @ effect
         templates = np.vstack([middle[-1] - share[-1] @ effect, effect])
-        return cls(table, templates, shrunk(residual))
+        if covariance is None:
+            covariance = shrunk(x - middle[group] - design @ effect)
+        return cls(table, templates, covariance)
 
     @property
     def exclusive(self) -> bool:
@@ -220,14 +229,16 @@ def posterior(distances: FloatArray, sharpness: float = 1.0) -> FloatArray:
     return np.asarray(weights / weights.sum(axis=1, keepdims=True))
 
 
-def shrunk(residual: FloatArray) -> FloatArray:
-    """(d, d) covariance of residuals (n, d), drawn to a sphere (Ledoit & Wolf 2004)."""
+def shrunk(residual: FloatArray, part: float | None = None) -> FloatArray:
+    """(d, d) covariance of residuals (n, d), drawn to a sphere by a ``part``; None: by as much as
+    is best where they do not depend on each other (Ledoit & Wolf 2004)."""
     n, d = residual.shape
     raw = residual.T @ residual / n
     size = max(np.trace(raw) / d, 1e-12)
-    away = ((raw - size * np.eye(d)) ** 2).sum()
-    noise = (((residual**2).sum(axis=1) ** 2).sum() / n - (raw**2).sum()) / n
-    part = float(np.clip(noise / away, 0.01, 1.0)) if away > 0 else 1.0
+    if part is None:
+        away = ((raw - size * np.eye(d)) ** 2).sum()
+        noise = (((residual**2).sum(axis=1) ** 2).sum() / n - (raw**2).sum()) / n
+        part = float(np.clip(noise / away, 0.01, 1.0)) if away > 0 else 1.0
     return np.asarray((1 - part) * raw + part * size * np.eye(d))
 
 

@@ -111,6 +111,7 @@ def design(
     from tomoskin.extras.design.bounds import resolution_bounds
     from tomoskin.extras.design.design_map import write_promise
     from tomoskin.model.skin import Skin
+    from tomoskin.pipeline import ambiguity_of
 
     counts = _counts(electrodes)
     chosen = Skin.load(skin)
@@ -121,12 +122,14 @@ def design(
         rows = _compared(chosen, demand, counts, patterns.split(","), bar)
     radius_m = demand.on(chosen.mesh())
     say_headroom(own.headroom)
+    ambiguity = ambiguity_of(chosen)
     document = {
         "skin": chosen.name,
         "press": {"radius_m": radius_m, "depth": press.depth},
         "false_alarm": press.false_alarm,
         "found": press.detected,
         **own.figures(),
+        "ambiguity": None if ambiguity is None else ambiguity.text,
         "compared": rows,
     }
     tell(document, _lines(document), json=json)
@@ -156,6 +159,7 @@ def _compared(
 ) -> list[dict[str, Any]]:
     from tomoskin.extras.design.bounds import resolution_bounds, variants
     from tomoskin.model.pattern import Scan
+    from tomoskin.pipeline import ambiguity_of
 
     rows: list[dict[str, Any]] = []
     jobs = 1 + len(counts) * len(patterns)
@@ -169,6 +173,8 @@ def _compared(
         except TomoskinError as error:
             rows.append(row | {"fault": error.message})
             continue
+        ambiguous = ambiguity_of(variant.skin)
+        row["ambiguity"] = None if ambiguous is None else ambiguous.text
         pattern = variant.skin.pattern()
         samples = Scan.of(pattern).n_samples
         row |= {"rows": pattern.n_meas, "samples": samples} | bound.figures()
@@ -190,6 +196,8 @@ def _lines(document: dict[str, Any]) -> Iterator[str | Table]:
         f"best position, {1e3 * document['median_m']:.2g} mm in the median, "
         f"{1e3 * document['p95_m']:.2g} mm at the 95th percentile"
     )
+    if document["ambiguity"] is not None:
+        yield f"but {document['ambiguity']}"
     yield (
         f"it is detected (found {100 * document['found']:g} % of the time, "
         f"{document['false_alarm']:g} false alarms) from "
@@ -211,5 +219,5 @@ def _lines(document: dict[str, Any]) -> Iterator[str | Table]:
     if any("saturated" in row for row in document["compared"]):
         yield _SATURATES
     for row in document["compared"]:
-        if "fault" in row:
-            yield f"{row['electrodes']} electrodes, {row['pattern']}: {row['fault']}"
+        if fault := row.get("fault") or row.get("ambiguity"):
+            yield f"{row['electrodes']} electrodes, {row['pattern']}: {fault}"

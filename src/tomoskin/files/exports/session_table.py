@@ -156,7 +156,7 @@ def _touch_text(name: str, value: object) -> str:
 
 _FRAMES = ("number", "time", "host_time", "sequence", "ticks", "mark", "samples", "voltages")
 _TOUCH = np.dtype(
-    [("frame", "i8"), ("time", "f8"), ("id", "i8"), ("kind", "S32"), ("since", "f8")]
+    [("frame", "i8"), ("time", "f8"), ("id", "i8"), ("kind", "S80"), ("since", "f8")]
     + [(name, "f8") for name in ("x", "y", "sd_x", "sd_y", "area", "peak")]
     + [
         (f"{name}{part}", "S12" if part == "_state" else "f8")

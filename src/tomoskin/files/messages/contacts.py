@@ -398,12 +398,15 @@ def _when(scanned: float, host_time: float) -> float:
 
 
 def touch_row(touch: Touch) -> dict[str, Any]:
-    """One touch as plain values by name; force, N, and depth, m, only where calibrations do."""
+    """One touch as plain values by name; force, N, and depth, m, only where calibrations tell them,
+    other places only where the pattern cannot tell them apart."""
     r = touch.detection
     amounts: dict[str, Any] = {}
     for name, amount in touch.amounts.items():
         interval = amount.low, amount.high
         amounts |= {name: amount.value, f"{name}_interval": interval, f"{name}_calibrated": True}
+    if touch.elsewhere:
+        amounts["elsewhere"] = touch.elsewhere
     return amounts | {
         "id": touch.id, "kind": touch.kind, "since": touch.since,
         "x": r.x, "y": r.y, "sd_x": r.sd_x, "sd_y": r.sd_y, "area": r.area, "peak": r.peak,

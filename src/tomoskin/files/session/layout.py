@@ -152,6 +152,7 @@ def _touch_of(item: dict[str, Any]) -> Touch:
     place = item["x"], item["y"], sd_x, sd_y, item["area"], item["peak"], _NO_CELLS
     cov_xy, close, merged = (item.get(k) for k in ("cov_xy", "close", "merged"))  # format 1.0: none
     possible = tuple(item.get("possible", ()))  # none in 0.1
+    elsewhere = tuple((x, y) for x, y in item.get("elsewhere", ()))
     amounts: dict[str, Any] = {}
     for name in MEASURANDS:
         if item.get(name) is not None:
@@ -159,4 +160,5 @@ def _touch_of(item: dict[str, Any]) -> Touch:
             high = math.inf if high is None else high  # beyond what was taught
             amounts[name] = Amount(item[name], low, high)
     reading = Detection(*place, cov_xy=cov_xy or 0.0, close=bool(close), **amounts)
-    return Touch(item["id"], item["kind"], item["since"], reading, tuple(merged or ()), possible)
+    named = item["id"], item["kind"], item["since"], reading
+    return Touch(*named, tuple(merged or ()), possible, elsewhere=elsewhere)

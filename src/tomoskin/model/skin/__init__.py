@@ -21,3 +21,4 @@ from tomoskin.model.skin.processing import (
     regions_doubt as regions_doubt,
 )
 from tomoskin.model.skin.skin import Skin as Skin
+from tomoskin.model.skin.symmetry import Ambiguity as Ambiguity

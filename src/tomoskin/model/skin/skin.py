@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from os import PathLike
@@ -28,6 +28,7 @@ from tomoskin.model.skin.build import (
     flat_mesh,
 )
 from tomoskin.model.skin.find import built_in_names, skin_text
+from tomoskin.model.skin.symmetry import Ambiguity, SheetSymmetry, unseen_symmetries
 
 _BODY = ("outline", "surface", "electrodes", "material", "drive", "readout", "mesh", "twin")
 """Sections that sheet, mesh and scan rest on; the others only make images of it."""
@@ -176,6 +177,22 @@ class Skin:
     def pattern(self) -> Pattern:
         """Drive and measurement table."""
         return self._body.pattern
+
+    @cached_property
+    def unseen_symmetries(self) -> tuple[SheetSymmetry, ...]:
+        """Symmetries of sheet and electrodes that leave every row of the pattern as it is."""
+        return unseen_symmetries(self.pattern(), self.outline, self.electrode_centres)
+
+    def ambiguity(self, jacobian: Callable[[], FloatArray]) -> Ambiguity | None:
+        """Which places the pattern cannot tell apart; None where it tells all.
+
+        ``jacobian`` makes that of the pattern on :meth:`mesh`, (n_meas, n_cells): most patterns see
+        every symmetry, and then it is not asked.
+        """
+        if not self.unseen_symmetries:
+            return None
+        centres = self.electrode_centres
+        return Ambiguity.of(self.unseen_symmetries, self.outline, centres, self.mesh(), jacobian())
 
     def mesh(self) -> Mesh:
         """Mesh of the sheet in its own coordinates, with the lengths it has on its surface; made
