@@ -100,14 +100,14 @@ NOISE, LASTING = 0.002, 0.001
 
 
 def standing(
-    rate: float, seconds: float, noise: float, seed: int, path: float = 0.0
+    rate: float, seconds: float, noise: float, seed: int, way: float = 0.0
 ) -> list[Detection]:
-    """Where a finger is shown that stands at 0, then goes on along x at ``path`` m/s."""
+    """Where a finger is shown that stands at 0, and ``way`` m along x in the second half."""
     rng = np.random.default_rng(seed)
     whole, lasting = math.hypot(noise, LASTING), (LASTING**2, 0.0, LASTING**2)
     frames = []
     for number in range(round(seconds * rate)):
-        x, y = noise * rng.standard_normal(2) + (path * number / rate, 0.0)
+        x, y = noise * rng.standard_normal(2) + (way * (number >= seconds * rate / 2), 0.0)
         d = detection(float(x), float(y), sd_x=whole, sd_y=whole, snr=60.0, lasting=lasting)
         frames.append([d])
     return [touches[0].detection for touches in Run(rate)(frames).touches]
@@ -134,6 +134,28 @@ def test_noise_of_a_finger_that_stands_is_no_slide(rate: float, noise: float) ->
         shown = standing(rate, 60.0, noise, seed=seed)
         high = np.array([d.sd_x for d in shown]) > 0.007 + noise
         assert not np.any(high[2:] & high[1:-1] & high[:-2]), "a frame at a time may be in doubt"
+
+
+@pytest.mark.parametrize("rate", [10, 20, 100])
+@pytest.mark.parametrize("way", [0.004, 0.006, 0.008])
+def test_a_short_slide_that_one_frame_cannot_tell_from_noise_is_held_and_told(
+    rate: float, way: float
+) -> None:
+    """Frames that agree on where it ends tell it, and ± is wide until they do."""
+    inside, late = [], []
+    for seed in range(5, 10):
+        shown = standing(rate, 6.0, NOISE, seed=seed, way=way)[round(3 * rate) :]
+        inside += [_in_ellipse(d, way) for d in shown]
+        late.append(np.mean([d.x for d in shown[-rate:]]))
+    assert np.mean(inside) > 0.84
+    assert np.median(late) == pytest.approx(way, abs=1.2e-3), "it stands where it has come to"
+
+
+def _in_ellipse(d: Detection, x: float) -> bool:
+    """Whether the ellipse of 90 % holds (x, 0)."""
+    covariance = [[d.sd_x**2, d.cov_xy], [d.cov_xy, d.sd_y**2]]
+    off = np.array([d.x - x, d.y])
+    return bool(off @ np.linalg.solve(covariance, off) < 4.605)
 
 
 @pytest.mark.parametrize("rate", [10, 40])

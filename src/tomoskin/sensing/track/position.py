@@ -9,7 +9,7 @@ from typing import Self
 from tomoskin.core import Detection
 from tomoskin.sensing.track.motion import TrackObservation, region_radius
 from tomoskin.sensing.track.policy import RESIDUAL
-from tomoskin.sensing.track.standing import Spread, StandingFinger
+from tomoskin.sensing.track.standing import Spread, StandingFinger, mixed
 
 # Deviations are those of fits to the moving plant, seeds 1 to 3 (docs/theory/tracking.md).
 
@@ -164,9 +164,13 @@ class Position:
             self.slid * math.exp(-since / RESIDUAL.recovery),
             self.moved,
         )
+        settled = stands.settled
         if stands.has_moved(since):
             stood, slid, moved = stood or self.stands.place, _DRAG, time
             stands = StandingFinger(place)
+        elif settled is not None:
+            stood, slid = stood or self.stands.place, max(slid, min(stands.way, _DRAG))
+            stands = settled
         left = (1.0 - trust) * unseen
         now = type(self)(
             place, lasting, stands, left, detection.bias, strength, stood, slid, time, moved
@@ -187,7 +191,7 @@ class Position:
             return replace(self, stood=None if over else stood, slid=0.0 if over else self.slid)
         part = max(1.0 - _DRAG / away, 0.0)
         stood = stood._replace(x=stood.x + part * x, y=stood.y + part * y)
-        return replace(self, stood=stood, slid=_DRAG)
+        return replace(self, stood=stood, slid=max(self.slid, min(away, _DRAG)))
 
     @property
     def shown(self) -> TrackObservation:
@@ -195,17 +199,10 @@ class Position:
         frames as far as it stands, else the newest, and so where no mean is known to be surer."""
         if self.lasting is None:
             return self.place
-        stands, place = self.stands.place, self.place
-        part = 1.0 if self.time - self.moved < _SHOWS else self.stands.moved
-        x, y, apart = place.x - stands.x, place.y - stands.y, part * (1.0 - part)
-        rest = 1.0 - part
-        return TrackObservation(
-            stands.x + part * x,
-            stands.y + part * y,
-            rest * stands.xx + part * place.xx + apart * x * x,
-            rest * stands.xy + part * place.xy + apart * x * y,
-            rest * stands.yy + part * place.yy + apart * y * y,
-        )
+        if self.time - self.moved < _SHOWS:
+            return self.place
+        stands = self.stands
+        return mixed(stands.place, stands.other or self.place, stands.moved)
 
     def _chance(self, detection: Detection, unseen: float, region: float) -> float:
         """Probability that this is noise elsewhere (data association: Bar-Shalom & Tse 1975).
@@ -222,6 +219,14 @@ class Position:
         return noise / (noise + math.exp(max(-0.5 * square / spread, -700.0)))
 
     @property
+    def _dragging(self) -> float:
+        """Variance in the plane of a press that has moved: the sheet drags behind as it moves, and
+        where it stands again, by no more than it has moved."""
+        stands = self.stands
+        way = min(stands.way, _DRAG)
+        return stands.moving * _DRAG**2 + (1.0 - stands.moving) * way**2
+
+    @property
     def wavers(self) -> float:
         """Deviation in the plane of what differs from frame to frame, m."""
         shown = self.shown
@@ -231,7 +236,7 @@ class Position:
         """The ``detection`` at this position, with all that may be off."""
         x, y, *noise = self.shown
         xx, xy, yy = Spread(*noise).plus(self.lasting or _NONE)
-        drag = max(self.slid**2, self.stands.moved * _DRAG**2)
+        drag = max(self.slid**2, self.stands.moved * self._dragging)
         more = self.unseen + self.bias**2 + 0.5 * drag
         return Detection(  # of all fields: dataclasses.replace takes several times as long
             x=x,

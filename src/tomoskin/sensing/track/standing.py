@@ -43,8 +43,17 @@ _AWAY = 7e-5
 """Variance along each axis of where a finger is seen that has just moved, m²: as it begins to
 slide, the response jumps by 8 to 20 mm on the twin."""
 
-_MOVES = 0.1
+_MOVES = 0.2
 """How often a finger that stands begins to move, per second."""
+
+_AGAIN = 3.0
+"""How often a finger that has moved moves on, per second."""
+
+_SURE = 1e3
+"""Odds of having moved from which on a finger stands where it has moved to."""
+
+_STOPS = 0.2
+"""Seconds in which a finger that was seen to move has come to stand, where frames agree with it."""
 
 _ONE = 8.0
 """What one frame says at the most for having moved, log likelihood ratio: noise is not quite normal
@@ -67,10 +76,18 @@ class StandingFinger:
     it once in a stated time (Page 1954; Lorden 1971: the mean time to a false alarm is exp(h)
     frames or more, h the threshold).
 
+    Where it is if it has moved is followed as well: a mixture of having moved before, and standing
+    again, and of moving now, whose moments are kept (Blom & Bar-Shalom 1988). So a way that one
+    frame cannot tell from noise is told by several that agree on where it ends.
+
     Attributes
     ----------
     place
         The mean, and its covariance by noise alone.
+    other
+        The same, if it has moved; None before its second frame.
+    moving
+        Probability that it still moves, if it has moved.
     odds
         Of having moved against standing, as frames up to now say it.
     evidence
@@ -78,6 +95,8 @@ class StandingFinger:
     """
 
     place: TrackObservation
+    other: TrackObservation | None = None
+    moving: float = 1.0
     odds: float = 0.0
     evidence: float = 0.0
 
@@ -86,46 +105,106 @@ class StandingFinger:
         """Probability of having moved."""
         return self.odds / (1.0 + self.odds)
 
+    @property
+    def way(self) -> float:
+        """How far it has moved, if it has, m."""
+        return 0.0 if self.other is None else math.dist(self.place[:2], self.other[:2])
+
+    @property
+    def settled(self) -> Self | None:
+        """As it stands where it has moved to; None where that is not sure."""
+        if self.other is None or self.odds <= _SURE or self.moving > 0.5:
+            return None
+        return type(self)(self.other, evidence=self.evidence)
+
     def after(self, seen: TrackObservation, changed: Spread, seconds: float, trust: float) -> Self:
         """With a frame more, ``seconds`` later, that has ``seen`` it and is to be trusted so far.
 
         What a model errs by has ``changed`` by this covariance since the frame before.
         """
         share = min(seconds / _COHERENCE, 1.0)
-        noise = Spread(seen.xx, seen.xy, seen.yy)
-        before = Spread(self.place.xx, self.place.xy, self.place.yy)
-        before = before.plus(changed).widened(_WALK * seconds)
-        total = before.plus(noise)
-        if not math.isfinite(total.area):  # the noise is not known
+        grown = changed.widened(_WALK * seconds)
+        stands = _Guess.of(self.place, grown, seen)
+        if not math.isfinite(stands.total.area):  # the noise is not known
             return type(self)(seen)
-        away = total.widened(_AWAY)
-        x, y = seen.x - self.place.x, seen.y - self.place.y
-        ratio = 0.5 * (total.square(x, y) - away.square(x, y) + math.log(total.area / away.area))
-        ratio = trust * share * min(ratio, _ONE)
-        odds = min((self.odds + _MOVES * seconds) * math.exp(ratio), math.exp(2.0 * _ONE))
-        evidence = max(self.evidence + ratio, 0.0)
-        stays = trust * share / (1.0 + odds)
-        return type(self)(_updated(self.place, before, total, (x, y), stays), odds, evidence)
+        moves = _Guess.of(self.place, grown.widened(_AWAY), seen)
+        again = -math.expm1(-_AGAIN * seconds)
+        first = self.odds * again + _MOVES * seconds
+        ratio, now = moves.log_density - stands.log_density, moves.updated(trust * share)
+        before, moving = ratio, 1.0
+        if self.other is not None:
+            there = _Guess.of(self.other, grown, seen)
+            stay = (self.odds * (1.0 - again), there.log_density - stands.log_density)
+            before, part = _mean(stay, (first, ratio))
+            now = mixed(now, there.updated(trust * share), part)
+            moving = 1.0 - part * (1.0 - self.moving * math.exp(-seconds / _STOPS))
+        odds = (self.odds + _MOVES * seconds) * math.exp(trust * share * min(before, _ONE))
+        evidence = max(self.evidence + trust * share * min(ratio, _ONE), 0.0)
+        place = stands.updated(trust * share / (1.0 + odds))
+        return type(self)(place, now, moving, min(odds, math.exp(2.0 * _ONE)), evidence)
 
     def has_moved(self, seconds: float) -> bool:
-        """Whether frames ``seconds`` apart show that it no longer stands there."""
+        """Whether frames ``seconds`` apart show that it slides: it is no longer there, and one
+        need not ask where it ends."""
         return self.evidence > math.log(_HOUR / max(seconds, _COHERENCE))
 
 
-def _updated(
-    place: TrackObservation, before: Spread, total: Spread, off: tuple[float, float], part: float
-) -> TrackObservation:
-    """A Kalman filter's step with a ``part`` of its gain."""
-    (x, y), area = off, total.area
-    # gain = before · total⁻¹
-    g_xx = (before.xx * total.yy - before.xy * total.xy) / area
-    g_xy = (before.xy * total.xx - before.xx * total.xy) / area
-    g_yx = (before.xy * total.yy - before.yy * total.xy) / area
-    g_yy = (before.yy * total.xx - before.xy * total.xy) / area
+@dataclass(frozen=True, slots=True)
+class _Guess:
+    """Where a finger was held to be, what a frame has ``seen`` off it, and their covariances."""
+
+    place: TrackObservation
+    before: Spread
+    total: Spread
+    x: float
+    y: float
+
+    @classmethod
+    def of(cls, place: TrackObservation, grown: Spread, seen: TrackObservation) -> Self:
+        """What is held of a ``place`` that is less sure by so much, and what is seen off it."""
+        before = Spread(*place[2:]).plus(grown)
+        total = before.plus(Spread(*seen[2:]))
+        return cls(place, before, total, seen.x - place.x, seen.y - place.y)
+
+    @property
+    def log_density(self) -> float:
+        """Logarithm of how likely it was to be seen there, but for a constant."""
+        return -0.5 * (self.total.square(self.x, self.y) + math.log(self.total.area))
+
+    def updated(self, part: float) -> TrackObservation:
+        """A Kalman filter's step with a ``part`` of its gain."""
+        x, y, total, before, area = self.x, self.y, self.total, self.before, self.total.area
+        # gain = before · total⁻¹
+        g_xx = (before.xx * total.yy - before.xy * total.xy) / area
+        g_xy = (before.xy * total.xx - before.xx * total.xy) / area
+        g_yx = (before.xy * total.yy - before.yy * total.xy) / area
+        g_yy = (before.yy * total.xx - before.xy * total.xy) / area
+        return TrackObservation(
+            self.place.x + part * (g_xx * x + g_xy * y),
+            self.place.y + part * (g_yx * x + g_yy * y),
+            before.xx - part * (g_xx * before.xx + g_xy * before.xy),
+            before.xy - part * (g_xx * before.xy + g_xy * before.yy),
+            before.yy - part * (g_yx * before.xy + g_yy * before.yy),
+        )
+
+
+def mixed(one: TrackObservation, other: TrackObservation, part: float) -> TrackObservation:
+    """The mean of two hypotheses, the second of which has a ``part`` of the probability, and the
+    covariance of both together."""
+    x, y, rest = other.x - one.x, other.y - one.y, 1.0 - part
     return TrackObservation(
-        place.x + part * (g_xx * x + g_xy * y),
-        place.y + part * (g_yx * x + g_yy * y),
-        before.xx - part * (g_xx * before.xx + g_xy * before.xy),
-        before.xy - part * (g_xx * before.xy + g_xy * before.yy),
-        before.yy - part * (g_yx * before.xy + g_yy * before.yy),
+        one.x + part * x,
+        one.y + part * y,
+        rest * one.xx + part * other.xx + rest * part * x * x,
+        rest * one.xy + part * other.xy + rest * part * x * y,
+        rest * one.yy + part * other.yy + rest * part * y * y,
     )
+
+
+def _mean(first: tuple[float, float], second: tuple[float, float]) -> tuple[float, float]:
+    """Logarithm of the mean of two densities by (weight, logarithm), and the first one's part."""
+    (one, a), (other, b) = first, second
+    top = max(a, b)
+    mine = one * math.exp(max(a - top, -700.0))
+    both = mine + other * math.exp(max(b - top, -700.0))
+    return top + math.log(both / (one + other)), mine / both
