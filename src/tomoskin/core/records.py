@@ -267,8 +267,7 @@ class Detection:
     x, y
         Weighted centroid, m.
     sd_x, sd_y
-        Standard deviation of the centroid that the measurement noise alone causes, m;
-        NaN where the noise is not known.
+        Standard deviation of the centroid, m; NaN where the noise is not known.
     area
         Area of the region, m².
     peak
@@ -286,6 +285,10 @@ class Detection:
     bias
         Standard deviation, along each axis, of what the position is off by without any noise, m;
         0 in a touch, whose ``sd_x`` and ``sd_y`` hold it.
+    lasting
+        (xx, xy, yy) m², the part of the covariance that is the same in frame after frame, so that
+        no mean over frames takes it away: what a model errs by, and slow noise. None where that is
+        not known: then none of it may be taken away.
     force, depth
         N across the sheet, and m by which it gives way under the tip, with their intervals; None
         where no calibration tells them: uncalibrated.
@@ -303,6 +306,7 @@ class Detection:
     close: bool = False
     weak: bool = False
     bias: float = 0.0
+    lasting: tuple[float, float, float] | None = None
     force: Amount | None = None
     depth: Amount | None = None
 

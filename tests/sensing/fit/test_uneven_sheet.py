@@ -81,6 +81,15 @@ def test_rows_without_a_value_do_not_count_and_too_few_tell_nothing() -> None:
     assert finished(fitting_sheet(rest, reference, 5e-6)) is rest
 
 
+def test_a_reference_of_another_skin_leaves_the_sheet_as_it_is() -> None:
+    """No sheet comes near it, whatever its noise, and nothing fails."""
+    rest = model().response.state
+    signs = (-1.0) ** np.arange(len(rest.voltages))
+    for reference in (rest.voltages * signs, np.roll(rest.voltages, 1) * signs):
+        for deviation in (0.0, 5e-6):
+            assert finished(fitting_sheet(rest, reference, deviation)) is rest
+
+
 def test_a_press_on_an_uneven_sheet_is_nearer_to_where_it_is() -> None:
     state, plain = uneven(), model()
     fitted = finished(plain.fitting(state.voltages, 5e-6))

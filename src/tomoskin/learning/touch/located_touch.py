@@ -174,7 +174,7 @@ def _at(detection: Detection, position: FloatArray, covariance: FloatArray) -> D
     x, y = position.tolist()
     sd_x, sd_y = np.sqrt(np.diag(covariance)).tolist()
     cov_xy = float(covariance[0, 1])
-    return replace(detection, x=x, y=y, sd_x=sd_x, sd_y=sd_y, cov_xy=cov_xy, bias=0.0)
+    return replace(detection, x=x, y=y, sd_x=sd_x, sd_y=sd_y, cov_xy=cov_xy, bias=0.0, lasting=None)
 
 
 def _learn(

@@ -42,6 +42,14 @@ _GROWS = 0.5
 _REST = 0.5
 """A touch that stood still in the frame before moves, and grows, by this part of that at least."""
 
+_ERRS = 0.4
+"""Part of the rest of a covariance, as a variance, that means over many frames are off by; the
+other part counts as noise. Chosen on the twin's seeds 4801 and 4804 (docs/theory/tracking.md)."""
+
+_LASTING = 0.1
+"""Part of the variance of a frame's noise that the next frames have too: 1/20 is the reference's,
+and as much is slower than frames. Correlations over 2 s on the twin's seed 4801 have 0.05."""
+
 _SWELLS = 0.08
 """Standard deviation of the logarithm of a touch's radius from frame to frame."""
 
@@ -303,14 +311,15 @@ class SpotFinder:
         radius, ratio = math.exp(log_radius), float(detected.ratio[k])
         # a touch is told against the untouched skin
         content += self._residual.beneath(x, y, radius)
-        spread = detected.covariance[4 * k : 4 * k + 2, 4 * k : 4 * k + 2]
+        own = slice(4 * k, 4 * k + 2)
+        spread = detected.covariance[own, own] + self._rim.doubt(x, y, radius)
+        (xx, xy), (_, yy) = (_ERRS * (spread - (1 - _LASTING) * detected.noise[own, own])).tolist()
         weak = decisions.is_weak(
             self._policy, ratio, float(detected.fresh[k]), float(detected.beside[k])
         )
-        detection = self.view.shown(
-            np.array([x, y, log_radius, content]), spread + self._rim.doubt(x, y, radius), ratio
-        )
-        return replace(detection, weak=weak, close=bool(detected.close[k]))
+        detection = self.view.shown(np.array([x, y, log_radius, content]), spread, ratio)
+        close = bool(detected.close[k])
+        return replace(detection, weak=weak, close=close, lasting=(xx, xy, yy))
 
 
 def joined(detected: SpotDetections) -> SpotDetections:
@@ -347,11 +356,14 @@ def _merged(detected: SpotDetections, i: int, j: int) -> SpotDetections:
     for column, part in ((i, share[0]), (j, share[1])):
         mix[4 * i : 4 * i + 2, 4 * column : 4 * column + 2] = part * np.eye(2)
     rows = (4 * keep[:, None] + np.arange(N_PARAMETERS)).ravel()
-    covariance = (mix @ detected.covariance @ mix.T)[np.ix_(rows, rows)]
+    covariance, noise = (
+        (mix @ each @ mix.T)[np.ix_(rows, rows)] for each in (detected.covariance, detected.noise)
+    )
     ratio, fresh = detected.ratio.copy(), detected.fresh.copy()
     for each in (ratio, fresh):
         each[i] = np.hypot(*each[[i, j]])
     close, beside = detected.close.copy(), detected.beside.copy()
     close[i], beside[i] = True, min(beside[i], beside[j])
     kept = replace(fit, spots=spots[keep])
-    return SpotDetections(kept, ratio[keep], fresh[keep], covariance, close[keep], beside[keep])
+    counted = ratio[keep], fresh[keep], covariance, noise, close[keep], beside[keep]
+    return SpotDetections(kept, *counted)

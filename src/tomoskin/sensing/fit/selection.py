@@ -260,6 +260,8 @@ class SpotDetections:
         (k,) the same out of noise and residual responses: what a new touch needs.
     covariance
         (4k, 4k), noise and a wrong profile together.
+    noise
+        (4k, 4k), the part of that which differs from frame to frame.
     close
         (k,) bool: another touch so near cannot be ruled out.
     beside
@@ -270,6 +272,7 @@ class SpotDetections:
     ratio: FloatArray
     fresh: FloatArray
     covariance: FloatArray
+    noise: FloatArray
     close: NDArray[np.bool_]
     beside: FloatArray
 
@@ -278,14 +281,15 @@ def judged(selection: ForwardSelection, fit: Fit) -> SpotDetections:
     """How sure each touch of a fit is."""
     if not len(fit.spots):
         none = np.zeros(0)
-        return SpotDetections(fit, none, none, np.zeros((0, 0)), none.astype(bool), none)
+        nothing = np.zeros((0, 0))
+        return SpotDetections(fit, none, none, nothing, nothing, none.astype(bool), none)
     reach("covariances")
     problem = selection.problem
     squares, covariance = problem.solver.judged(problem, fit, _UNEVEN)
     ratio = np.sqrt(squares)
     fresh = selection.ratios(fit) if len(problem.left) else ratio
     close, beside = _close(selection, fit), selection.policy.beside(fit)
-    return SpotDetections(fit, ratio, fresh, covariance, close, beside)
+    return SpotDetections(fit, ratio, fresh, covariance, fit.noise, close, beside)
 
 
 def _close(selection: ForwardSelection, fit: Fit) -> NDArray[np.bool_]:

@@ -235,6 +235,20 @@ class Fit:
         even = np.linalg.inv(self.normal * scale[:, None] * scale)
         return np.asarray(even * scale[:, None] * scale)
 
+    @cached_property
+    def noise(self) -> FloatArray:
+        """(4k, 4k): what noise of this frame's data, and nothing else, adds to the covariance.
+
+        The least squares are P JC⁻¹ of the data, with P the covariance and C what the unknown
+        directions have beside white noise. What they may answer is the same in the next frame.
+        """
+        taken, unknown = self.slopes, self.unknown
+        if len(unknown):
+            metric = np.eye(len(unknown)) + unknown @ unknown.T
+            taken = taken - np.linalg.solve(metric, unknown @ taken.T).T @ unknown
+        moved = self.covariance @ taken
+        return np.asarray(moved @ moved.T)
+
     @property
     def beyond(self) -> float:
         """Squares of the residual beyond what noise has."""

@@ -119,6 +119,10 @@ _LEAST = 0.03
 
 _STEPS = 4
 
+_MOST_UNEVEN, _MOST_DIRECTED = 3.0, 1.0
+"""Sizes of log σ over a sheet and of an anisotropy that no sheet has: twelve and five times what is
+expected at the most."""
+
 
 @dataclass(frozen=True, eq=False)
 class _Linear:
@@ -200,7 +204,8 @@ def fitting_sheet(
     """The sheet that explains a ``reference`` (n_meas,) V of this standard deviation, V, best; a
     piece between each two yields.
 
-    ``state`` itself where nothing speaks against it. Rows that are not finite do not count,
+    ``state`` itself where nothing speaks against it, and where no sheet comes near: the reference
+    is another skin's. Rows that are not finite do not count,
     and a factor that all voltages have in common means nothing.
     """
     finite = np.flatnonzero(np.isfinite(reference))
@@ -216,7 +221,11 @@ def fitting_sheet(
         yield
         data = linear.residual + linear.by_cell @ uneven + linear.along @ anisotropy
         likeliest = yield from _likeliest(fields, linear, data)
+        if likeliest is None:
+            return state
         uneven, anisotropy = yield from linear.explained(data, *likeliest)
+        if not _is_sheet(uneven, anisotropy):
+            return state
         yield
         now = yield from _sheet(state, uneven, _DIRECTED * anisotropy)
         yield
@@ -224,12 +233,19 @@ def fitting_sheet(
     return state if even else now
 
 
+def _is_sheet(uneven: FloatArray, anisotropy: FloatArray) -> bool:
+    """Whether a change (n_cells,) of log σ and an anisotropy (2,), in deviations, may be those of a
+    sheet; where a reference is another skin's they grow from step to step."""
+    size = _DIRECTED * math.hypot(*anisotropy)
+    return bool(np.abs(uneven).max(initial=0.0) < _MOST_UNEVEN and size < _MOST_DIRECTED)
+
+
 def _likeliest(
     fields: Sequence[FloatArray], linear: _Linear, data: FloatArray
-) -> Generator[None, None, tuple[FloatArray, float]]:
+) -> Generator[None, None, tuple[FloatArray, float] | None]:
     """(n_cells, k) modes of the random field that makes ``data`` (n,) V likeliest, zero for an even
-    sheet; and how far rows are off."""
-    best = (-math.inf, fields[0][:, :0], 0.0)
+    sheet; and how far rows are off. None where none has a likelihood that is a number."""
+    best: tuple[float, FloatArray, float] | None = None
     seen = []
     for modes in fields:
         yield
@@ -248,9 +264,9 @@ def _likeliest(
             square = np.vstack([rows, own]) @ np.vstack([rows, own]).T
             for size in (0.0, *_UNEVEN):
                 log_evidence = _log_evidence(square, size) - log_size
-                if log_evidence > best[0]:
+                if log_evidence > (-math.inf if best is None else best[0]):
                     best = log_evidence, size * modes, error
-    return best[1:]
+    return None if best is None else best[1:]
 
 
 def _log_evidence(square: FloatArray, size: float) -> float:
