@@ -132,7 +132,7 @@ class Following:
         self._calibrated = frozenset(self._applied)
         if (lag := prepared.skin.touch.slide_lag) is None:
             lag = sum(applied.slide_lag for applied in self._applied.values())
-        tracker.slides = SlideCorrection(lag)
+        tracker.slides, tracker.outline = SlideCorrection(lag), prepared.skin.outline
         self._tuning = None if reference is None else tune(prepared, reference, excluded)
         self._sheets: BodySheets | None = None
         poses = [applied.poses for applied in self._applied.values() if len(applied.poses)]
@@ -237,8 +237,7 @@ class Following:
         result = self._drives.push(drive, dv, clock, self._tracker.ledger.numbered, late=late)
         if result is None:
             return None
-        finger = self._tracker.slides.of_finger
-        return replace(result, touches=tuple(map(finger, result.touches)))
+        return replace(result, touches=tuple(map(self._tracker.finger, result.touches)))
 
     def early(self, result: FrameResult) -> FrameResult:
         """The newest ``result`` for those who were told of drives before."""
