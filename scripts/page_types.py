@@ -38,7 +38,8 @@ def types() -> str:
     }
     roots = [*to_skin, *page_messages.ROBOT_MESSAGES, *sent]
     made: dict[str, str] = {}
-    for info in inspect.multi_type_info([*roots, page_messages.RobotTouches, ShownReading]):
+    others = page_messages.RobotTouches, ShownReading, page_messages.DeformationNow
+    for info in inspect.multi_type_info([*roots, *others]):
         _type(info, made)
     parts = [*made.values()]
     for name, members in unions.items():

@@ -60,6 +60,7 @@ class Case:
 CASES = {
     ("image", "out"): Case("image {presses} --skin {skin} --out {out}", ".npz"),
     ("image", "touches"): Case("image {presses} --skin {skin} --touches {out}", ".csv"),
+    ("image", "deformations"): Case("image {presses} --skin {skin} --deformations {out}", ".csv"),
     ("image", "thorough"): Case("image {presses} --skin {skin} --thorough {out}", ".csv"),
     ("locate", "touches"): Case(
         "locate {presses} --calibration {calibration} --touches {out}", ".csv"
@@ -80,6 +81,9 @@ CASES = {
     ("skin lay", "out"): Case("skin lay {surface} --electrodes {places} --out {out}", ".toml"),
     ("session export", "out"): Case("session export {session} {out}", ".csv"),
     ("session export", "touches"): Case("session export {session} {other} --touches {out}", ".csv"),
+    ("session export", "deformations"): Case(
+        "session export {session} {other} --deformations {out}", ".csv"
+    ),
     ("session import", "out"): Case("session import {presses} {out}", ".npz"),
 }
 """One for each output that may be written over with --force; extras have theirs beside their

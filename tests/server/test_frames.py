@@ -6,13 +6,17 @@ import struct
 from dataclasses import replace
 from typing import ClassVar
 
+import msgspec
 import numpy as np
 import pytest
 
+from files.session.runs import FOLD, STRETCH
 from tomoskin.core import Amount, Detection, Image, Touch
 from tomoskin.learning import CalibrationHealth, DentMap, Reading, ShownReading
 from tomoskin.pipeline import FrameResult
+from tomoskin.sensing.fit import Deformation
 from tomoskin.server.frames import encode_result
+from tomoskin.server.page_messages import DeformationNow
 from tomoskin.twin import Finger, Press, Probe
 
 HEADER = (
@@ -175,6 +179,18 @@ def test_what_calibrations_read_goes_last():
     told = found["readings"]["weather"]
     assert (told["words"], told["drawn"], told["notes"]) == ("rain", [0.5, 1.25], [])
     assert found["labels"] == [0, 0, 0, 0, 1]
+
+
+@pytest.mark.parametrize("deformation", [FOLD, STRETCH, Deformation("unknown", None, "relative")])
+def test_a_deformation_goes_with_the_readings_as_the_page_declares_it(deformation):
+    readings = {"sky": Said()}
+    found = decode(encode_result(make(5, readings=readings, deformation=deformation), [], 0.0))
+    assert list(found["readings"]) == ["weather", "deformation"]
+    told = found["readings"]["deformation"]
+    assert set(told) == set(DeformationNow.__struct_fields__)
+    shown = msgspec.convert(told, DeformationNow, strict=True)
+    assert (shown.kind, shown.text) == (deformation.kind, deformation.text)
+    assert (shown.axis is None) == (deformation.axis is None)
 
 
 def test_a_probe_of_any_face_is_told_by_its_area():

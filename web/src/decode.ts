@@ -35,9 +35,21 @@ export type Readings = Readonly<Record<string, wire.ShownReading>>;
 
 const NOTHING_READ: Readings = {};
 
-function readingsAt(buffer: ArrayBuffer, at: number): Readings {
-  if (buffer.byteLength <= at) return NOTHING_READ;
-  return JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, at))) as Readings;
+interface Read {
+  readonly readings: Readings;
+  /** How the sheet is deformed as a whole; null: as it was at rest. */
+  readonly deformation: wire.DeformationNow | null;
+}
+
+const NOTHING: Read = { readings: NOTHING_READ, deformation: null };
+
+function readAt(buffer: ArrayBuffer, at: number): Read {
+  if (buffer.byteLength <= at) return NOTHING;
+  const { deformation = null, ...readings } = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, at))) as Record<
+    string,
+    wire.ShownReading
+  > & { readonly deformation?: wire.DeformationNow };
+  return { readings, deformation };
 }
 
 /** By how much each node of the mesh has given way, and the deviation of that, in `wire.DENT_STEP`. */
@@ -46,7 +58,7 @@ export interface Dent {
   readonly deviation: Uint16Array;
 }
 
-export interface Frame {
+export interface Frame extends Read {
   readonly sequence: number;
   readonly hostTime: number;
   readonly referenceReady: boolean;
@@ -63,7 +75,6 @@ export interface Frame {
   readonly labels: Uint8Array;
   /** Null: nothing touches, the page has not asked for it, or depths are uncalibrated. */
   readonly dent: Dent | null;
-  readonly readings: Readings;
 }
 
 /** Decode one frame. Throws RangeError for bytes that are not one. */
@@ -101,6 +112,6 @@ export function decodeFrame(buffer: ArrayBuffer): Frame {
           deviation: new Uint16Array(buffer, dentAt + 2 * nDent, nDent),
         }
       : null,
-    readings: readingsAt(buffer, dentAt + 4 * nDent),
+    ...readAt(buffer, dentAt + 4 * nDent),
   };
 }

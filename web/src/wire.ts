@@ -784,6 +784,26 @@ export interface ShownReading {
   readonly notes: readonly string[];
 }
 
+/** How the sheet is deformed as a whole in a frame, as every message says it (docs/sinks.md). */
+export interface DeformationNow {
+  readonly kind: "common" | "fold" | "stretch" | "unknown";
+  readonly unit: "rad" | "relative" | "strain";
+  readonly axis: EstimatedNow | null;
+  readonly offset: EstimatedNow | null;
+  readonly width: EstimatedNow | null;
+  readonly amount: EstimatedNow | null;
+  readonly across: EstimatedNow | null;
+  readonly confused: string | null;
+  readonly text: string;
+}
+
+/** A number, and the interval that nine in ten lie in. */
+export interface EstimatedNow {
+  readonly value: number | null;
+  readonly low: number | null;
+  readonly high: number | null;
+}
+
 export type ServerMessage =
   | Scene
   | Scale

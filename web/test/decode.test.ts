@@ -56,6 +56,17 @@ describe("decodeFrame", () => {
     expect([...frame.labels]).toEqual([0, 1, 1, 0, 0]);
   });
 
+  it("reads how the sheet is deformed beside them", () => {
+    expect(decodeFrame(sample()).deformation).toBeNull();
+    const said = new TextEncoder().encode('{"bend":{"words":"bent"},"deformation":{"kind":"fold"}}');
+    const bytes = new Uint8Array(172 + said.length);
+    bytes.set(new Uint8Array(sample()));
+    bytes.set(said, 172);
+    const { readings, deformation } = decodeFrame(bytes.buffer);
+    expect(readings).toEqual({ bend: { words: "bent" } });
+    expect(deformation).toEqual({ kind: "fold" });
+  });
+
   it("reads the dent after the labels, where there is one", () => {
     expect(decodeFrame(sample()).dent).toBeNull();
     const bytes = new Uint8Array(172 + 8);

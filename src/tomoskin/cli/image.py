@@ -15,7 +15,14 @@ import typer
 from tomoskin.cli import options
 from tomoskin.cli.choices import quantity, skin_for_file, with_recorded_calibrations
 from tomoskin.cli.named_files import TABLE, Added, ForceFlag, Writes
-from tomoskin.cli.named_parts import Recorded, first_time, reconstructed, say_notes, span_lines
+from tomoskin.cli.named_parts import (
+    Recorded,
+    deformation_lines,
+    first_time,
+    reconstructed,
+    say_notes,
+    span_lines,
+)
 from tomoskin.cli.output import Bar, JsonFlag, remark, tell
 from tomoskin.core import MEASURANDS, DataError, no_such
 
@@ -132,6 +139,7 @@ class Results:
         Writes(IMAGES),
     ] = None
     touches: options.TouchesOut = None
+    deformations: options.DeformationsOut = None
     force: ForceFlag = False
     thorough: Annotated[
         Path | None,
@@ -141,6 +149,15 @@ class Results:
         ),
         Writes(TABLE),
     ] = None
+
+    def write_deformations(self, result: Reconstruction) -> None:
+        """How the sheet is deformed in each frame, where that is asked for."""
+        from tomoskin.files.exports import write_deformations
+
+        if self.deformations is not None:
+            frames, times = result.frames.tolist(), result.time.tolist()
+            rows = zip(frames, times, result.deformations, strict=True)
+            write_deformations(self.deformations, rows, overwrite=self.force)
 
 
 def image(
@@ -189,6 +206,7 @@ def image(
         if path is not None:
             rows = zip(part.frames.tolist(), part.time.tolist(), part.touches, strict=True)
             write_touches(path, rows, surface, measured=measured, overwrite=force)
+    results.write_deformations(result)
     if results.out is not None:
         write = WRITERS[results.out.suffix.lower()]
         write(results.out, prepared, result, display, overwrite=force)
@@ -198,6 +216,7 @@ def image(
     since = (result.time - first_time(given.data)).tolist()
     spans = touch_spans(zip(since, result.touches, strict=True))
     lines = _lines(result, spans, prepared)
+    lines += deformation_lines(zip(since, result.deformations, strict=True))
     if thorough is not None:
         count = sum(map(len, tables[thorough].touches))
         lines.append(f"{thorough}: each frame searched by itself, {count} touches in them all")
@@ -279,6 +298,8 @@ def _warn(recorded: Recording, result: Reconstruction, prepared: Prepared) -> No
 def _document(
     result: Reconstruction, spans: tuple[Span, ...], prepared: Prepared
 ) -> dict[str, Any]:
+    from tomoskin.files.messages import deformation_content
+
     missing = zip(result.frames.tolist(), result.rows_missing.tolist(), strict=True)
     return {
         "frames": len(result.frames),
@@ -304,6 +325,11 @@ def _document(
                 "peak": span.peak,
             }
             for span in spans
+        ],
+        "deformations": [
+            {"frame": frame, **content}
+            for frame, one in zip(result.frames.tolist(), result.deformations, strict=True)
+            if (content := deformation_content(one)) is not None
         ],
         "touches": [
             {

@@ -81,6 +81,8 @@ def _alone(given: Recorded, loaded: Calibration[Locator], *, several: bool) -> L
     """By the calibration alone: each frame is one press, or two, of a skin that may be unknown."""
     import numpy as np
 
+    from tomoskin.sensing.track import on_sheet
+
     dv = given.dv
     frames = np.flatnonzero(np.isfinite(dv[:, loaded.model.features.rows]).any(axis=1))
     if len(frames) < len(dv):
@@ -88,7 +90,9 @@ def _alone(given: Recorded, loaded: Calibration[Locator], *, several: bool) -> L
             f"{given.path}: {len(dv) - len(frames)} frames hold no finite value and were left out"
         )
     _say_health(_strangeness(loaded.model, dv[frames]))
-    return frames.tolist(), list((_several if several else _single)(loaded, dv[frames]))
+    outline = None if given.skin is None else given.skin.outline
+    located = (_several if several else _single)(loaded, dv[frames])
+    return frames.tolist(), [tuple(on_sheet(one, outline) for one in some) for some in located]
 
 
 def _strangeness(locator: Locator, dv: FloatArray) -> CalibrationHealth:

@@ -14,16 +14,18 @@ from tomoskin.cli.output import Bar, remark
 from tomoskin.core import DataError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
     from tomoskin.core import FloatArray, IntArray
+    from tomoskin.files.messages import DeformationSpan
     from tomoskin.files.session import Advance
     from tomoskin.learning import Calibration
     from tomoskin.model.pattern import Pattern
     from tomoskin.model.skin import Skin
     from tomoskin.pipeline import Idle, Prepared, Reconstruction, Setting
+    from tomoskin.sensing.fit import Deformation
     from tomoskin.sensing.signal import Recording, Reference
     from tomoskin.sensing.track import Span
 
@@ -270,6 +272,22 @@ def span_lines(spans: Sequence[Span], unit: str = "") -> Iterator[str]:
         yield f"touch {span.id:>3}  {when}  {where}  strength {span.peak:+.3g} {unit}".rstrip()
     if len(spans) > _SHOWN:
         yield f"… and {len(spans) - _SHOWN} more touches"
+
+
+def deformation_lines(frames: Iterable[tuple[float, Deformation | None]]) -> Iterator[str]:
+    """Each deformation in (time, deformation) of frames in a line: when, and what it is."""
+    from tomoskin.files.messages import deformation_spans
+
+    spans = deformation_spans(frames)
+    yield from told_deformations(spans)
+
+
+def told_deformations(spans: Sequence[DeformationSpan]) -> Iterator[str]:
+    """The first of them in a line each: when, and what it is."""
+    for span in spans[:_SHOWN]:
+        yield f"{span.begin:6.2f} to {span.end:6.2f} s  {span.deformation.text}"
+    if len(spans) > _SHOWN:
+        yield f"… and {len(spans) - _SHOWN} more deformations"
 
 
 def _range_of(recording: Recording, kind: str, number: int) -> range:

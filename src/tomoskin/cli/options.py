@@ -89,6 +89,11 @@ TouchesOut = Annotated[
     typer.Option(metavar="X.csv", help="File for the touches."),
     Writes(TABLE),
 ]
+DeformationsOut = Annotated[
+    Path | None,
+    typer.Option(metavar="X.csv", help="File for how the sheet is deformed in each frame."),
+    Writes(TABLE),
+]
 SinkOption = Annotated[
     list[str] | None,
     typer.Option(

@@ -20,8 +20,8 @@ from tomoskin.cli.named_files import (
     Writes,
     package_of,
 )
-from tomoskin.cli.named_parts import say_notes, span_lines
-from tomoskin.cli.options import TouchesOut
+from tomoskin.cli.named_parts import say_notes, span_lines, told_deformations
+from tomoskin.cli.options import DeformationsOut, TouchesOut
 from tomoskin.cli.output import Bar, JsonFlag, remark, tell
 from tomoskin.core import Output, registered
 
@@ -161,6 +161,7 @@ def export(
         Writes(EXPORTS, _exported, _package),
     ],
     touches: TouchesOut = None,
+    deformations: DeformationsOut = None,
     every: Annotated[
         float, typer.Option(min=1e-3, help="Seconds between two images, for formats with images.")
     ] = 0.1,
@@ -172,7 +173,13 @@ def export(
     force: ForceFlag = False,
 ) -> None:
     """Convert a session to tables, images or the format of another program."""
-    from tomoskin.files.exports import Export, export_formats, export_touches, omitted
+    from tomoskin.files.exports import (
+        Export,
+        export_deformations,
+        export_formats,
+        export_touches,
+        omitted,
+    )
     from tomoskin.files.session import SessionReader, skins_in
 
     form = export_formats()[out.suffix.lower()]
@@ -192,11 +199,13 @@ def export(
         form.write(job, out)
         if touches is not None:
             export_touches(job, touches)
+        if deformations is not None:
+            export_deformations(job, deformations)
         if session.torn:
             remark(f"{file}: {session.torn}")
         without = ", ".join(omitted(session, out.suffix.lower()))
     is_series = out.suffix.lower() in (".vtu", ".pvd")  # a .pvd names the files of a series
-    for path in (out.with_suffix(".pvd") if is_series else out, touches):
+    for path in (out.with_suffix(".pvd") if is_series else out, touches, deformations):
         if path is not None and path.is_file():
             but = f", without {without}" if without and path == out else ""
             typer.echo(f"{path}: {path.stat().st_size / 1e6:.1f} MB{but}")
@@ -238,6 +247,7 @@ def _lines(info: SessionInfo) -> list[tuple[str, str]]:
         ("missing", f"{info.lost} frames in {info.gaps} gaps, {info.dropped} dropped by the "
                     f"board, {info.skipped} skipped, {info.held} held"),
         *_touches(info),
+        *(("deformed", line) for line in told_deformations(info.deformations)),
     ]  # fmt: skip
     if info.presses:
         lines.append(("presses", f"{info.presses} on the twin"))

@@ -132,7 +132,7 @@ class Following:
         self._calibrated = frozenset(self._applied)
         if (lag := prepared.skin.touch.slide_lag) is None:
             lag = sum(applied.slide_lag for applied in self._applied.values())
-        tracker.slides = SlideCorrection(lag)
+        tracker.slides, tracker.outline = SlideCorrection(lag), prepared.skin.outline
         self._tuning = None if reference is None else tune(prepared, reference, excluded)
         self._sheets: BodySheets | None = None
         poses = [applied.poses for applied in self._applied.values() if len(applied.poses)]
@@ -238,7 +238,7 @@ class Following:
         result = self._drives.push(drive, dv, clock, self._tracker.ledger.numbered, late=late)
         if result is None:
             return None
-        finger = self._tracker.slides.of_finger
+        finger = self._tracker.finger
         touches = (self._everywhere(finger(touch)) for touch in result.touches)
         return replace(result, touches=tuple(touches))
 

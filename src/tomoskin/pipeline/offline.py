@@ -18,7 +18,7 @@ from tomoskin.pipeline.pipeline import Pipeline
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.pipeline.recorded import Idle, RecordedFrames, recorded_frames
 from tomoskin.pipeline.rest import tuned_by_file, tuned_by_rule
-from tomoskin.sensing.fit import EXHAUSTIVE
+from tomoskin.sensing.fit import EXHAUSTIVE, Deformation
 from tomoskin.sensing.signal import Recording
 
 Advance = Callable[[float, float], None]
@@ -64,6 +64,8 @@ class Reconstruction:
     readings
         What the skin's calibrations read, by the name of their kind: one a frame, None where too
         little was left of it.
+    deformations
+        How the sheet is deformed in each frame; None where it is not.
     problems
         What was wrong with frames, in a sentence each, and with which of them.
     """
@@ -79,6 +81,7 @@ class Reconstruction:
     choice: AlphaChoice
     rows_left_out: IntArray
     readings: Mapping[str, tuple[Any, ...]] = field(default_factory=dict)
+    deformations: tuple[Deformation | None, ...] = ()
     problems: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
     unseen: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     notes: tuple[str, ...] = ()
@@ -92,15 +95,14 @@ class Reconstruction:
         left_out: list[int] = []
         problems: dict[str, list[int]] = {}
         for number, time, result in frames:
-            kept.append(
-                (number, time, result.left_out, result.image, result.touches, result.readings)
-            )
+            contents = result.touches, result.readings, result.deformation
+            kept.append((number, time, result.left_out, result.image, *contents))
             if not result.has_image:
                 left_out.append(number)
             if result.problem is not None:
                 problems.setdefault(result.problem, []).append(number)
-        numbers, times, missing, shown, touches, readings = (
-            zip(*kept, strict=True) if kept else 6 * ((),)
+        numbers, times, missing, shown, touches, readings, deformations = (
+            zip(*kept, strict=True) if kept else 7 * ((),)
         )
         return cls(
             frames=np.array(numbers, dtype=np.int64),
@@ -114,6 +116,7 @@ class Reconstruction:
             choice=pipeline.choice,
             rows_left_out=np.zeros(0, dtype=np.int64),
             readings={k: tuple(r.get(k) for r in readings) for k in prepared.calibrations},
+            deformations=deformations,
             problems={text: tuple(some) for text, some in problems.items()},
         )
 

@@ -15,7 +15,8 @@ labels                u8 [n_cells], 0 none, k = cells of the k-th touch; padded 
 dent                  u16 [n_dent] twice: by how much each node of the mesh has given way, and the
                       deviation of that, in :data:`DENT_STEP`; n_dent is 0 where none is asked for
 readings              all bytes that follow: JSON, what the page shows of what calibrations read,
-                      by its key; none where nothing was read
+                      by its key, and how the sheet is deformed as "deformation"; none where
+                      nothing was read and it is not
 ====================  ======================================================================
 
 Flags: bit 0 the reference stands; bit 1 too many rows are unusable, there is no image;
@@ -26,10 +27,12 @@ from __future__ import annotations
 
 from collections.abc import Container, Sequence
 from enum import IntFlag
+from typing import Any
 
 import numpy as np
 
 from tomoskin.core import Touch, encode_json
+from tomoskin.files.messages import deformation_content
 from tomoskin.learning import DentMap
 from tomoskin.pipeline import FrameResult
 from tomoskin.sensing.track import amount_values
@@ -83,6 +86,9 @@ RECORDS = {
     "Truth": np.dtype([(name, "<f4") for name in ("x", "y", "force", "radius")]),
 }
 """The records of the message; ``scripts/page_types.py`` makes the page's readers of them."""
+
+DEFORMATION = "deformation"
+"""Key of how the sheet is deformed, beside those of readings."""
 
 _MOST = 255
 """Labels are bytes: more touches than that are not sent."""
@@ -170,7 +176,9 @@ def _touches(touches: Sequence[Touch], now: float, own: Container[int]) -> bytes
 
 
 def _readings(result: FrameResult) -> bytes:
-    shown = {reading.key: reading.shown for reading in result.shown_readings.values()}
+    shown: dict[str, Any] = {reading.key: reading.shown for reading in result.shown_readings.values()}
+    if result.deformation is not None:
+        shown[DEFORMATION] = deformation_content(result.deformation)
     return encode_json(shown) if shown else b""
 
 

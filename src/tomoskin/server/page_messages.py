@@ -240,6 +240,31 @@ class PlayedTimeline(Message, frozen=True, tag="timeline"):
     touches: tuple[Span, ...]
 
 
+class EstimatedNow(MessagePart, frozen=True):
+    """A number, and the interval that nine in ten lie in."""
+
+    value: float | None
+    low: float | None
+    high: float | None
+
+
+class DeformationNow(MessagePart, frozen=True):
+    """How the sheet is deformed as a whole in a frame, as every message says it (docs/sinks.md).
+
+    It goes with the frame, behind its readings.
+    """
+
+    kind: Literal["fold", "stretch", "common", "unknown"]
+    unit: Literal["rad", "strain", "relative"]
+    axis: EstimatedNow | None
+    offset: EstimatedNow | None
+    width: EstimatedNow | None
+    amount: EstimatedNow | None
+    across: EstimatedNow | None
+    confused: str | None
+    text: str
+
+
 # Files, sources, calibrations.
 
 

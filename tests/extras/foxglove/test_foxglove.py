@@ -14,12 +14,13 @@ import stat
 import struct
 import time
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from websockets.sync.client import connect
 
-from files.session.runs import TOUCH
+from files.session.runs import FOLD, TOUCH
 from run.sinks.conftest import EPOCH, EVENT, PATIENCE, begin, contacts_at, free_port, stream
 from tomoskin.core import SinkError
 from tomoskin.files.session import schema_of
@@ -91,12 +92,13 @@ def test_what_a_client_sees(served):
         topic, time, content = subscribed(sink, client)
         assert (topic, time) == ("/events", round((EPOCH + 0.5) * 1e9))
         assert content["message"] == EVENT.text
-        sink.publish(contacts_at(1.0, TOUCH, sequence=3))
+        sink.publish(replace(contacts_at(1.0, TOUCH, sequence=3), deformation=FOLD))
         found = {topic: content for topic, _, content in (client.message() for _ in "abc")}
     assert found["/touches"]["sequence"] == 3
     assert found["/touches"]["touches"][0]["x"] == TOUCH.detection.x
     assert found["/touches"]["touches"][0]["position"] == [TOUCH.detection.x, TOUCH.detection.y, 0]
     assert found["/touches"]["valid"]
+    assert found["/touches"]["deformation"]["axis"] == {"value": 0.5, "low": 0.4, "high": 0.6}
     assert found["/scene"]["entities"][0]["id"] == "touch-4"
     assert found["/image"]["column_count"] == 48
 

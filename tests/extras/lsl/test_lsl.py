@@ -21,19 +21,20 @@ MulticastPort = 16599
 RUN = """
 import json, math, time
 import pylsl
-from files.session.runs import TOUCH
+from dataclasses import replace
+from files.session.runs import FOLD, TOUCH
 from run.sinks.conftest import EVENT, begin
 from tomoskin.run.sinks import make_sink
 
 sink = make_sink("lsl:try")
 contacts_at = begin(sink)
 found = {}
-for name in ("voltages", "dv", "touches", "events"):
+for name in ("voltages", "dv", "touches", "deformation", "events"):
     (info,) = pylsl.resolve_byprop("name", f"try-{name}", timeout=20)
     found[name] = pylsl.StreamInlet(info)
     found[name].open_stream(20)
 before = time.monotonic()
-sink.publish(contacts_at(before, TOUCH))
+sink.publish(replace(contacts_at(before, TOUCH), deformation=FOLD))
 sink.publish(EVENT)
 rows = {name: inlet.pull_sample(20)[0] for name, inlet in found.items()}
 stamp = found["voltages"]
@@ -47,6 +48,7 @@ latest = pylsl.local_clock() - now
 print(json.dumps({
     "voltages": rows["voltages"], "dv": rows["dv"], "event": rows["events"],
     "touches": [None if math.isnan(v) else v for v in rows["touches"]],
+    "deformation": rows["deformation"][:6],
     "label": channel.child_value("label"), "unit": channel.child_value("unit"),
     "ahead": time_ - (before + 1.0), "between": [earliest, latest],
 }))
@@ -81,6 +83,11 @@ def test_touches_and_events(told):
     assert told["touches"][:4] == [4, 0.1, -0.2, -0.5]
     assert told["touches"][4:] == [None] * 31 + [1]  # the last says that they are valid
     assert told["event"] == ['{"kind":"connected","text":"board 01"}']
+
+
+def test_a_deformation_is_a_sample_of_numbers(told):
+    assert told["deformation"][:2] == [1, 2]  # a fold, in rad
+    assert told["deformation"][2:6] == [0.5, 0.4, 0.6, 0.02]  # its axis, then its offset
 
 
 def test_time_is_the_frames_on_lsls_clock(told):

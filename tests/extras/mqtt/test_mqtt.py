@@ -18,7 +18,7 @@ import pytest
 from paho.mqtt import client as paho
 
 from conftest import missing
-from files.session.runs import TOUCH
+from files.session.runs import FOLD, TOUCH
 from run.sinks.conftest import (
     EPOCH,
     EVENT,
@@ -126,12 +126,14 @@ def test_touches_events_and_status(broker, heard, stream):
     sink = make_sink(broker.url)
     contacts_at = begin(sink, stream)
     assert heard() == ("robot/skin/status", "online")
-    sink.publish(contacts_at(1.0, TOUCH, sequence=3))
+    sink.publish(replace(contacts_at(1.0, TOUCH, sequence=3), deformation=FOLD))
     topic, text = heard()
     assert topic == "robot/skin/touches"
     told = json.loads(text)
     assert (told["sequence"], told["touches"][0]["x"]) == (3, TOUCH.detection.x)
     assert told["touches"][0]["sd_y"] is None
+    assert (told["valid"], told["deformation"]["kind"]) == (True, "fold")
+    assert told["deformation"]["offset"] == {"value": 0.02, "low": 0.015, "high": 0.025}
     assert told["touches"][0]["position"] == [TOUCH.detection.x, TOUCH.detection.y, 0.0]
     assert (told["skin"], told["frame_id"]) == (stream.skin, "robot/skin/skin")
     assert told["utc_s"] == EPOCH + told["host_time"]
@@ -162,6 +164,22 @@ def test_beginnings_and_ends_are_sent_at_once_the_rest_now_and_then(broker, hear
     sink.publish(reporter.of(result_at(1.0, one, sequence=7)))
     sink.publish(reporter.of(result_at(1.0 + 1.01 * PERIOD, one, sequence=8)))
     assert [json.loads(heard()[1])["sequence"] for _ in range(6)] == [0, 1, 3, 5, 7, 8]
+    sink.close()
+
+
+def test_a_deformation_is_told_at_once_and_while_it_lasts(broker, heard, stream):
+    sink = make_sink(broker.url)
+    begin(sink, stream)
+    heard()
+    reporter = Reporter(stream.named(sink.naming), period=sink.period)
+    for number, told in enumerate((None, FOLD, FOLD, None, None)):
+        result = result_at(0.01 * number, sequence=number, deformation=told)
+        sink.publish(reporter.of(result))
+    sink.publish(reporter.of(result_at(0.1, sequence=5, deformation=FOLD)))
+    sink.publish(reporter.of(result_at(0.1 + 1.01 * PERIOD, sequence=6, deformation=FOLD)))
+    sent = [json.loads(heard()[1]) for _ in range(5)]
+    assert [one["sequence"] for one in sent] == [0, 1, 3, 5, 6]
+    assert [bool(one["deformation"]) for one in sent] == [False, True, False, True, True]
     sink.close()
 
 

@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 
 from cli.conftest import tomoskin
-from files.session.runs import TOUCH
+from files.session.runs import FOLD, TOUCH
 from run.sinks.conftest import (
     EPOCH,
     EVENT,
@@ -68,7 +68,7 @@ def test_a_file_holds_sheet_touches_and_series(tmp_path, whole):
     path = tmp_path / "run.rrd"
     sink = open_rerun(f"{path},namespace=left_arm")
     contacts_at = begin(sink, whole)
-    sink.publish(contacts_at(0.25, TOUCH, touch_of(5)))
+    sink.publish(replace(contacts_at(0.25, TOUCH, touch_of(5)), deformation=FOLD))
     sink.publish(EVENT)
     sink.publish(contacts_at(0.5))
     sink.close()
@@ -88,6 +88,9 @@ def test_a_file_holds_sheet_touches_and_series(tmp_path, whole):
     assert [value for _, value in found["/left_arm/latency", "scalars"]] == [[0.25], [0.0]]
     assert found["/left_arm/peak/4", "scalars"][0][1] == [TOUCH.detection.peak]
     assert found["/left_arm/peak/4", "is_recursive"][0][0] == ended  # its line ends here
+    assert found["/left_arm/deformation/offset_m", "scalars"][0][1] == [0.02]
+    assert found["/left_arm/deformation/offset_m", "is_recursive"][0][0] == ended
+    assert [value for _, value in found["/left_arm/deformation/kind", "scalars"]] == [[1], [0]]
     assert found["/left_arm/events", "text"][0][1] == ["connected: board 01"]
 
 

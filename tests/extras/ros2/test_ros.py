@@ -15,7 +15,7 @@ import pytest
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from scipy.spatial.transform import Rotation
 
-from files.session.runs import TOUCH
+from files.session.runs import FOLD, TOUCH
 from run.sinks.conftest import EPOCH, EVENT, MESH, VALUES, contacts_at, result_at, touch_of
 from tomoskin.core import Amount, Event
 from tomoskin.extras.ros2.ros_types import TYPES, encode_cdr, type_hash
@@ -254,6 +254,15 @@ def test_a_lost_source_says_so_once_and_reports_on(stream):
     assert (back["valid"]["data"], reporter.silent()) == (True, None)
 
 
+def test_a_deformation_is_in_the_text_and_in_the_report(stream):
+    bent = replace(contacts_at(0.25, TOUCH, stream=stream), deformation=FOLD)
+    values = messages_of(stream, bent)
+    told = msgspec.json.decode(values["touches"]["data"])["deformation"]
+    assert (told["kind"], told["amount"]["high"], told["text"]) == ("fold", 0.4, FOLD.text)
+    assert value_of(values, "deformation") == FOLD.text
+    assert value_of(messages_of(stream, 0.5), "deformation") == "none"
+
+
 def test_markers_replace_those_before(stream):
     shown = messages_of(stream, 0.25, TOUCH)["markers"]["markers"]
     assert [(m.get("ns"), m.get("action"), m.get("type")) for m in shown] == [
@@ -354,6 +363,7 @@ def test_texts_are_json(stream):
     assert told == {
         "host_time": 0.25, "utc_s": EPOCH + 0.25, "scan_s": None, "frame_id": "skin",
         "skin": stream.skin, "sequence": 7, "latency_s": 0.012, "valid": True, "problem": None,
+        "deformation": None,
     }  # fmt: skip
     assert found["position"] == [TOUCH.detection.x, TOUCH.detection.y, 0]
     assert (found["normal"], found["covariance"], found["force"]) == ([0, 0, 1], None, None)

@@ -9,6 +9,7 @@ from tomoskin.core import Detection, Event, Frame, Image, Mark, Touch
 from tomoskin.files.session import SessionWriter
 from tomoskin.model.pattern import Scan
 from tomoskin.model.skin import Skin
+from tomoskin.sensing.fit import Deformation, EstimatedNumber
 
 SKIN = Skin.load("textile-disc-8")
 SCAN = Scan.of(SKIN.pattern())
@@ -29,6 +30,22 @@ INFO = Info(
     current=1000,
     max_baud=1_000_000,
     unique_id=bytes(range(8)),
+)
+FOLD = Deformation(
+    kind="fold",
+    amount=EstimatedNumber(0.35, 0.3, 0.4),
+    unit="rad",
+    axis=EstimatedNumber(0.5, 0.4, 0.6),
+    offset=EstimatedNumber(0.02, 0.015, 0.025),
+    width=EstimatedNumber(0.06, 0.04, 0.09),
+)
+STRETCH = Deformation(
+    kind="stretch",
+    amount=EstimatedNumber(0.03, 0.02, 0.04),
+    unit="strain",
+    axis=EstimatedNumber(1.5, 1.4, 1.6),
+    across=EstimatedNumber(0.01, 0.0, 0.02),
+    confused="a sheet wrapped round a cylinder across it",
 )
 TOUCH = Touch(
     4, "decrease", 0.25, Detection(0.1, -0.2, 1e-3, float("nan"), 3e-4, -0.5, np.empty(0))

@@ -18,6 +18,7 @@ import {
 } from "../state";
 import { painted, percent, unresolved } from "../signals/unresolved";
 import { theme } from "../theme";
+import { twin } from "../twin/model";
 import { Target } from "../flows/Target";
 import { narrow } from "../screen";
 import { Furniture, LABELS } from "./Furniture";
@@ -100,7 +101,7 @@ export function Sheet() {
         painter.resize(width, height);
       }),
       effect(() => {
-        void [view.value, theme.value, topology.value, limit.value, smoothed.value, painted.value, showTruth.value, hand.value, cursor.value, heights.value];
+        void [view.value, theme.value, topology.value, limit.value, smoothed.value, painted.value, showTruth.value, hand.value, cursor.value, heights.value, twin.value];
         painter.request();
       }),
       () => painter.stop(),

@@ -1,14 +1,15 @@
 /** What is drawn over the image each frame: contours, touches, the twin's truth, own presses. */
 
 import type { Touch, Truth } from "../decode";
+import type { DeformationNow } from "../wire";
 import { rim } from "../faces";
 import type { Held } from "../presses";
 import type { Theme } from "../theme";
 import type { SamePlaces } from "../wire";
+import { drawDeformation, drawTrueDeformation, type TrueDeformation } from "./deformed";
+import { haloed, type Pen, type Place, within } from "./pen";
 import { contours, type Topology } from "./topology";
 import { toPixels, type View } from "./view";
-
-type Place = readonly [number, number];
 
 export interface Marks {
   readonly touches: readonly Touch[];
@@ -21,27 +22,11 @@ export interface Marks {
   /** The keyboard's place on the sheet, m. */
   readonly cursor: readonly [number, number] | null;
   readonly smoothed: boolean;
-}
-
-type Pen = CanvasRenderingContext2D;
-
-/** A line that reads on any colour: a wide halo under it. */
-function haloed(
-  pen: Pen,
-  theme: Theme,
-  path: Path2D,
-  colour: string,
-  width: number,
-  dashes: number[] = [],
-): void {
-  pen.setLineDash([]);
-  pen.strokeStyle = theme.halo;
-  pen.lineWidth = width + 2.5;
-  pen.stroke(path);
-  pen.setLineDash(dashes);
-  pen.strokeStyle = colour;
-  pen.lineWidth = width;
-  pen.stroke(path);
+  /** The rim, x0, y0, x1, y1, … m: no ellipse and no contour goes beyond it. */
+  readonly outline: readonly number[];
+  readonly deformation: DeformationNow | null;
+  /** Of the twin; null: the truth is not asked for. */
+  readonly trueDeformation: TrueDeformation | null;
 }
 
 /** Towards the neighbours, then back out a little more: evens a loop without shrinking it
@@ -148,13 +133,18 @@ function drawTouch(pen: Pen, theme: Theme, view: View, touch: Touch): void {
   path.lineTo(x + arm, y);
   path.moveTo(x, y - arm);
   path.lineTo(x, y + arm);
-  // Not drawn where the cross would hide it.
+  haloed(pen, theme, path, theme.accent, 2, dashesOf(touch));
+}
+
+const dashesOf = (touch: Touch): number[] => (touch.provisional ? [5, 4] : []);
+
+/** What holds a touch with 90 % of certainty. */
+function drawEllipse(pen: Pen, theme: Theme, view: View, touch: Touch): void {
+  const [x, y] = toPixels(view, touch.x, touch.y);
   const ring = ellipse(touch)?.map((place) => toPixels(view, ...place));
-  if (ring?.some(([px, py]) => Math.hypot(px - x, py - y) > 3)) {
-    ring.forEach(([px, py], k) => (k ? path.lineTo(px, py) : path.moveTo(px, py)));
-    path.closePath();
-  }
-  haloed(pen, theme, path, theme.accent, 2, touch.provisional ? [5, 4] : []);
+  // Not drawn where the cross would hide it.
+  if (!ring?.some(([px, py]) => Math.hypot(px - x, py - y) > 3)) return;
+  haloed(pen, theme, closed(ring), theme.accent, 2, dashesOf(touch));
 }
 
 /** Other places, m, at which the pattern cannot tell the touch from its own; none twice. */
@@ -291,6 +281,17 @@ function drawCursor(pen: Pen, theme: Theme, view: View, place: readonly [number,
   haloed(pen, theme, path, theme.ink, 1.5);
 }
 
+/** The regions that touches cover, and the ellipses that hold them. */
+function drawRegions(pen: Pen, theme: Theme, view: View, topology: Topology, marks: Marks): void {
+  if (marks.touches.length === 0) return;
+  for (const region of contours(topology, marks.labels, marks.touches.length)) {
+    for (const loop of region) {
+      haloed(pen, theme, loopPath(loop, topology, view, marks.smoothed), theme.accent, 1.5);
+    }
+  }
+  for (const touch of marks.touches) drawEllipse(pen, theme, view, touch);
+}
+
 /** Draw all marks on a cleared canvas. */
 export function drawMarks(
   pen: Pen,
@@ -304,13 +305,11 @@ export function drawMarks(
   const density = pen.canvas.width / view.width;
   pen.setTransform(density, 0, 0, density, 0, 0);
   pen.clearRect(0, 0, view.width, view.height);
-  if (marks.touches.length > 0) {
-    for (const region of contours(topology, marks.labels, marks.touches.length)) {
-      for (const loop of region) {
-        haloed(pen, theme, loopPath(loop, topology, view, marks.smoothed), theme.accent, 1.5);
-      }
-    }
-  }
+  const ground = { pen, theme, view, outline: marks.outline };
+  if (marks.deformation) drawDeformation(ground, marks.deformation);
+  if (marks.trueDeformation) drawTrueDeformation(ground, marks.trueDeformation);
+  pen.setLineDash([]);
+  within(pen, view, marks.outline, () => drawRegions(pen, theme, view, topology, marks));
   for (const trail of marks.trails) drawTrail(pen, theme, view, trail);
   for (const held of marks.held) drawHeld(pen, theme, view, held, maxForce);
   for (const touch of marks.touches) drawTouch(pen, theme, view, touch);

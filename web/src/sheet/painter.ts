@@ -4,6 +4,7 @@ import { hand, history, limit, newest, scene, showTruth, smoothed, timed, topolo
 import { drewNewest } from "../latency";
 import { AMOUNTS, painted } from "../signals/unresolved";
 import { theme } from "../theme";
+import { twin } from "../twin/model";
 import { GlPicture, openGl } from "./gl";
 import { drawMarks } from "./overlay";
 import { flatPicture, type Picture } from "./picture";
@@ -92,6 +93,9 @@ export class Painter {
       held: hand.peek().held,
       cursor: cursor.peek(),
       smoothed: smoothed.peek(),
+      outline: scene.peek()?.outline ?? [],
+      deformation: frame?.referenceReady ? frame.deformation : null,
+      trueDeformation: showTruth.peek() ? twin.peek() : null,
     };
     drawMarks(this.pen, colours, view, shape, marks, scene.peek()?.probe.max_force_n ?? 1, scene.peek()?.same);
     drewNewest();

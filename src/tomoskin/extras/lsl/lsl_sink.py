@@ -8,7 +8,15 @@ from typing import Any
 import numpy as np
 
 from tomoskin.core import MEASURANDS, Event, FloatArray, SinkError, clock_ahead, encode_json, needed
-from tomoskin.files.messages import Contacts, Item, Naming, Stream, row_labels, time_of
+from tomoskin.files.messages import (
+    Contacts,
+    Item,
+    Naming,
+    Stream,
+    deformation_state,
+    row_labels,
+    time_of,
+)
 from tomoskin.run.sinks import Sink
 
 MOST_TOUCHES = 5
@@ -20,7 +28,8 @@ _IRREGULAR = 0.0
 
 
 class LslSink(Sink):
-    """Streams ``NAME-voltages``, ``-dv``, ``-touches`` and ``-events``, on LSL's own clock."""
+    """Streams ``NAME-voltages``, ``-dv``, ``-touches``, ``-deformation`` and ``-events``, on LSL's
+    own clock."""
 
     def __init__(self, prefix: str) -> None:
         self.name = f"lsl {prefix}"
@@ -39,6 +48,8 @@ class LslSink(Sink):
         self._announce(stream, "voltages", "EIT", rows)
         self._announce(stream, "dv", "EIT", rows)
         self._announce(stream, "touches", "Touch", [*touches, ("valid", "")])
+        bent = [(name, _unit_of(name)) for name in deformation_state(None)]
+        self._announce(stream, "deformation", "Deformation", bent)
         self._announce(stream, "events", "Markers", [("event", "")])
 
     def publish(self, item: Item) -> None:
@@ -54,6 +65,8 @@ class LslSink(Sink):
                 self._push("dv", item.voltages - item.reference, item)
         if item.is_due:
             self._push("touches", touch_sample(item), item)
+            sample = np.array([*deformation_state(item.deformation).values()])
+            self._push("deformation", sample, item)
 
     def close(self) -> None:
         """Withdraw the streams that were announced."""
@@ -77,6 +90,12 @@ class LslSink(Sink):
             channel.append_child_value("unit", unit)
         info.desc().append_child_value("skin", stream.skin)
         self._outlets[name] = self._lsl.StreamOutlet(info)
+
+
+def _unit_of(column: str) -> str:
+    """The unit that the name of a column ends with."""
+    ending = column.rpartition("_")[2]
+    return ending if ending in ("m", "rad") else ""
 
 
 def open_lsl(argument: str) -> LslSink:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 from uuid import uuid4
@@ -26,6 +27,7 @@ class RerunView:
     def __init__(self, rerun: Any, recording: Any, stream: messages.Stream) -> None:
         self._rerun, self._recording, self._stream = rerun, recording, stream
         self._ids: set[int] = set()
+        self._bent: frozenset[str] = frozenset()
         if stream.corners is not None:
             corners = stream.corners.reshape(-1, 3)
             sheet = rerun.Mesh3D(
@@ -70,12 +72,25 @@ class RerunView:
             self._series(f"peak/{touch.id}", touch.detection.peak)
             for name, amount in touch.amounts.items():
                 self._series(f"{name}/{touch.id}", amount.value)
+        self._deformation(contacts)
         ids = {touch.id for touch in touches}
         for gone in self._ids - ids:  # or its line would go on for ever
             for name in ("peak", *MEASURANDS):
                 gap = self._rerun.Clear(recursive=False)
                 self._recording.log(self._path(f"{name}/{gone}"), gap)
         self._ids = ids
+
+    def _deformation(self, contacts: messages.Contacts) -> None:
+        """Its numbers as series; those that are not told any more end."""
+        state = messages.deformation_state(contacts.deformation)
+        known = {name: value for name, value in state.items() if not math.isnan(value)}
+        for name in self._bent - known.keys():
+            gap = self._rerun.Clear(recursive=False)
+            self._recording.log(self._path(f"deformation/{name}"), gap)
+        if known["kind"] or self._bent:
+            for name, value in known.items():
+                self._series(f"deformation/{name}", value)
+        self._bent = frozenset(known) if known["kind"] else frozenset()
 
     def _sheet(self, image: Image) -> None:
         share = np.clip(image.values / self._stream.limit, -1.0, 1.0)

@@ -97,6 +97,7 @@ def diagnostics(head: Value, frame: Contacts) -> Value:
         "latency_s": frame.latency,
         "touches": len(frame.touches),
         "valid": frame.valid,
+        "deformation": frame.deformation.text if frame.deformation else "none",
         "frame": frame.frame_id,
         "parent": stream.parent or _NO_PARENT,
         **(stream.board() if stream.board else {}),

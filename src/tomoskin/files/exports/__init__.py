@@ -15,9 +15,13 @@ from tomoskin.files.exports.picture import (
 )
 from tomoskin.files.exports.session_export import (
     WRITERS as WRITERS,
+    export_deformations as export_deformations,
     export_formats as export_formats,
     export_touches as export_touches,
     omitted as omitted,
 )
-from tomoskin.files.exports.session_table import write_touches as write_touches
+from tomoskin.files.exports.session_table import (
+    write_deformations as write_deformations,
+    write_touches as write_touches,
+)
 from tomoskin.files.exports.vtu import series_files as series_files, write_vtu as write_vtu

@@ -11,7 +11,13 @@ from tomoskin.core import FloatArray, StrPath, registered
 from tomoskin.files.exports.export import Export, ExportFormat
 from tomoskin.files.exports.matlab_file import write_matlab
 from tomoskin.files.exports.picture import FILMS, MOST_PANELS, rendered, write_picture
-from tomoskin.files.exports.session_table import write_csv, write_hdf5, write_parquet, write_touches
+from tomoskin.files.exports.session_table import (
+    write_csv,
+    write_deformations,
+    write_hdf5,
+    write_parquet,
+    write_touches,
+)
 from tomoskin.files.exports.vtu import write_series
 from tomoskin.files.imports import write_interchange
 from tomoskin.files.messages import Contacts
@@ -21,6 +27,7 @@ from tomoskin.files.session import (
     first_scan,
     message_counts,
     recording_of,
+    session_deformations,
     session_touches,
 )
 from tomoskin.learning import DEPTH, dent_map
@@ -96,6 +103,12 @@ def export_touches(job: Export, path: StrPath) -> None:
         own=own,
         overwrite=job.overwrite,
     )
+
+
+def export_deformations(job: Export, path: StrPath) -> None:
+    """Write a table of how the sheet is deformed; of a session without touches and images, as a
+    replay finds."""
+    write_deformations(path, session_deformations(job.session), overwrite=job.overwrite)
 
 
 WRITERS: dict[str, Callable[[Export, Path], None]] = {

@@ -14,12 +14,14 @@ from numpy.typing import NDArray
 from tomoskin.core import MEASURANDS, StrPath, needed, write_rows, written
 from tomoskin.files.exports.export import Export
 from tomoskin.files.imports import column_names
+from tomoskin.files.messages import DEFORMATION_COLUMNS, DeformedFrame, deformation_rows
 from tomoskin.files.session import (
     Block,
     SessionReader,
     all_blocks,
     idle_count,
     press_positions,
+    session_deformations,
     session_touches,
 )
 from tomoskin.model.mesh import Surface
@@ -146,6 +148,19 @@ def write_touches(
     return len(rows)
 
 
+def write_deformations(
+    path: StrPath, frames: Iterable[DeformedFrame], *, overwrite: bool = False
+) -> int:
+    """Write how the sheet is deformed in (frame, time, deformation); return the number of rows.
+
+    One row a frame that is told as deformed, in :data:`~.messages.DEFORMATION_COLUMNS`; what is not
+    known is an empty field. Raises as :func:`written` does.
+    """
+    rows = [[*map(_touch_text, DEFORMATION_COLUMNS, row)] for row in deformation_rows(frames)]
+    write_rows(path, [DEFORMATION_COLUMNS, *rows], overwrite=overwrite)
+    return len(rows)
+
+
 def _touch_text(name: str, value: object) -> str:
     if name in ("time_s", ELAPSED):
         return f"{value:.6f}"
@@ -165,9 +180,13 @@ _TOUCH = np.dtype(
     ]
 )
 
+_TEXTS = {"frame": "i8", "kind": "S8", "unit": "S8", "confused": "S128"}
+_DEFORMATION = np.dtype([(name, _TEXTS.get(name, "f8")) for name in DEFORMATION_COLUMNS])
+
 
 def write_hdf5(job: Export, path: StrPath) -> None:
-    """Groups ``frames`` (one dataset a column), ``touches``, ``truth`` and ``events``.
+    """Groups ``frames`` (one dataset a column), ``touches``, ``deformations``, ``truth`` and
+    ``events``.
 
     ``drive`` and ``measure`` (n_meas, 2) beside them; the skin file, device and settings are
     attributes.
@@ -190,6 +209,8 @@ def write_hdf5(job: Export, path: StrPath) -> None:
         for block in all_blocks(session, job.advance):
             _append(group, block)
         file["touches"] = _touches(session)
+        rows = list(deformation_rows(session_deformations(session)))
+        file["deformations"] = np.array([_encoded(row) for row in rows], dtype=_DEFORMATION)
         text = h5py.string_dtype()
         for name, items in (("truth", session.truth()), ("events", session.events())):
             lines = [_json(item) for item in items]
@@ -219,6 +240,10 @@ def _touches(session: SessionReader) -> Any:
         for r in [t.detection]
     ]  # fmt: skip
     return np.array(table, dtype=_TOUCH)
+
+
+def _encoded(row: tuple[Any, ...]) -> tuple[Any, ...]:
+    return tuple(value.encode() if isinstance(value, str) else value for value in row)
 
 
 def _json(item: Any) -> str:

@@ -12,6 +12,19 @@ from tomoskin.files.messages.contacts import (
     touch_row as touch_row,
     without_frame as without_frame,
 )
+from tomoskin.files.messages.deformation import (
+    DEFORMATION_COLUMNS as DEFORMATION_COLUMNS,
+    DEFORMATION_KINDS as DEFORMATION_KINDS,
+    DEFORMATION_UNITS as DEFORMATION_UNITS,
+    DeformationSpan as DeformationSpan,
+    DeformedFrame as DeformedFrame,
+    deformation_content as deformation_content,
+    deformation_numbers as deformation_numbers,
+    deformation_of as deformation_of,
+    deformation_rows as deformation_rows,
+    deformation_spans as deformation_spans,
+    deformation_state as deformation_state,
+)
 from tomoskin.files.messages.foxglove_records import (
     TEXT_COLOUR as TEXT_COLOUR,
     TEXT_HEIGHT as TEXT_HEIGHT,

@@ -15,11 +15,13 @@ from typing import Any, Self
 import numpy as np
 
 from tomoskin.core import MEASURANDS, Detection, Event, FloatArray, Image, Touch
+from tomoskin.files.messages.deformation import deformation_content
 from tomoskin.files.messages.place import LinkPose
 from tomoskin.files.messages.stream import Stream
 from tomoskin.learning import FORCE
 from tomoskin.model.mesh import Surface, quaternion
 from tomoskin.pipeline import FrameResult
+from tomoskin.sensing.fit import Deformation
 from tomoskin.sensing.track import TouchEvent
 
 NO_REFERENCE = "the reference has not been taken yet: do not touch the skin for a moment"
@@ -217,6 +219,8 @@ class Contacts:
         Whether it is time to say how the skin is.
     weighs
         Whether forces are calibrated.
+    deformation
+        How the sheet is deformed as a whole; None where it is not. Touches stay what they are.
     """
 
     stream: Stream = field(repr=False)
@@ -236,6 +240,7 @@ class Contacts:
     is_due: bool = True
     reports: bool = True
     weighs: bool = False
+    deformation: Deformation | None = None
     change: FloatArray | None = field(default=None, repr=False)
     noise: FloatArray | None = field(default=None, repr=False)
 
@@ -259,6 +264,7 @@ class Contacts:
             scanned=result.scanned,
             scan_time=result.scan_time,
             weighs=FORCE.name in result.calibrated,
+            deformation=result.deformation,
             change=_change(result) if result.ready else None,
             noise=result.baseline.deviation if result.ready and result.baseline else None,
             measured=(math.nan if stream.replayed else when) if measured is None else measured,
@@ -278,8 +284,8 @@ class Contacts:
     def outdated(self, problem: str) -> Self:
         """The same, but no touches, which are not true any more, and why."""
         return replace(
-            self, valid=False, problem=problem, tracked=(), happened=(), voltages=None,
-            reference=None, change=None, image=None,
+            self, valid=False, problem=problem, tracked=(), happened=(), deformation=None,
+            voltages=None, reference=None, change=None, image=None,
         )  # fmt: skip
 
     @property
@@ -345,6 +351,7 @@ class Contacts:
             "latency_s": self.latency,
             "valid": self.valid,
             "problem": self.problem,
+            "deformation": deformation_content(self.deformation),
             **(self.link.content() if self.link else {}),
         }
 

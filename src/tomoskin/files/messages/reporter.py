@@ -45,11 +45,11 @@ class Every:
 class Reporter:
     """Makes the contacts of each frame, and says what of them is worth sending.
 
-    A touch that begins or ends is sent at once, and so is whether touches are valid; what they do
-    meanwhile every ``period`` s. Of frames without touches one a second is sent: who listens can
-    tell a skin that nothing touches from one that is silent. Before the first frame it is said
-    that touches are not valid, at once and then once a second. A lost source has one last message
-    of that, and a report once a second.
+    A touch or a deformation that begins or ends is sent at once, and so is whether touches are
+    valid; what they do meanwhile every ``period`` s. Of frames with neither one a second is sent:
+    who listens can tell a skin that nothing touches from one that is silent. Before the first frame
+    it is said that touches are not valid, at once and then once a second. A lost source has one
+    last message of that, and a report once a second.
 
     Parameters
     ----------
@@ -117,8 +117,13 @@ class Reporter:
         if self._is_lost:
             state, period = (whole.problem,), math.inf
         else:
-            state = (whole.valid, *(touch.id for touch in whole.tracked))
-            period = self.period if whole.tracked else HEARTBEAT
+            deformation = whole.deformation
+            state = (
+                whole.valid,
+                deformation and deformation.kind,
+                *(touch.id for touch in whole.tracked),
+            )
+            period = self.period if whole.tracked or deformation else HEARTBEAT
         is_due = state != self._state or not 0 <= whole.host_time - self._sent < period
         if is_due:
             self._state, self._sent = state, whole.host_time

@@ -33,6 +33,7 @@ from tomoskin.files.session.replayed import (
     reconstruct_session as reconstruct_session,
     recorded_calibrations as recorded_calibrations,
     replayed as replayed,
+    session_deformations as session_deformations,
     session_touches as session_touches,
 )
 from tomoskin.files.session.scanned import (

@@ -14,7 +14,14 @@ import numpy as np
 
 from tomoskin.board.source import ClockFit, ClockFitter
 from tomoskin.core import FloatArray, Mark, MarkedFrame, StrPath
-from tomoskin.files.session.scanned import Advance, first_scan, no_report, scanned_touches
+from tomoskin.files.messages import DeformationSpan, deformation_spans
+from tomoskin.files.session.scanned import (
+    Advance,
+    first_scan,
+    no_report,
+    scanned_deformations,
+    scanned_touches,
+)
 from tomoskin.files.session.session_reader import (
     SessionReader,
     indexed_frames,
@@ -94,9 +101,9 @@ class SessionInfo:
     ``frames`` and those of them that were ``held`` or ``skipped``; ``lost`` frames missing in the
     sequence, in ``gaps`` places; ``dropped`` by the device itself; ``rate`` frames/s, NaN below
     two; ``longest_pause`` s between two frames; ``touches`` number of those that were recorded,
-    and ``spans`` these, in s from the first frame; ``presses`` on the twin, each once;
-    ``attached`` names of the files inside beside the skin, as calibrations that were on; ``torn``
-    what is missing at the end, or "".
+    ``spans`` these and ``deformations`` those of the sheet, in s from the first frame; ``presses``
+    on the twin, each once; ``attached`` names of the files inside beside the skin, as calibrations
+    that were on; ``torn`` what is missing at the end, or "".
     """
 
     path: str
@@ -125,6 +132,7 @@ class SessionInfo:
     messages: dict[str, int]
     attached: tuple[str, ...] = ()
     spans: tuple[Span, ...] = ()
+    deformations: tuple[DeformationSpan, ...] = ()
 
 
 def _summary(table: FloatArray, epoch: float) -> dict[str, Any]:
@@ -178,6 +186,7 @@ def session_info(path: StrPath, advance: Advance = no_report) -> SessionInfo:
         begun = first_scan(session)
         touched = ((time - begun, touches) for _, time, touches in scanned_touches(session))
         spans = touch_spans(touched)
+        deformed = [(time - begun, bent) for _, time, bent in scanned_deformations(session)]
         messages = message_counts(session)
         return SessionInfo(
             path=str(path),
@@ -196,5 +205,6 @@ def session_info(path: StrPath, advance: Advance = no_report) -> SessionInfo:
             clock=clock.fit,
             messages=messages,
             spans=spans,
+            deformations=deformation_spans(deformed),
             attached=tuple(name for name in session.attachments() if name not in OWN_FILES),
         )

@@ -23,6 +23,8 @@ from tomoskin.core import (
     MarkedFrame,
     Touch,
 )
+from tomoskin.files.messages import deformation_of
+from tomoskin.sensing.fit import Deformation
 
 _CDR = b"\x00\x01\x00\x00"
 _FRAME = struct.Struct("<4sdQIHHBBxxI")
@@ -123,17 +125,20 @@ class Truth:
 
 @dataclass(frozen=True, slots=True)
 class RecordedTouches:
-    """Touches of the frame ``sequence``; which cells they covered is not in the file."""
+    """Touches of the frame ``sequence``, and how the sheet is deformed in it; which cells they
+    covered is not in the file."""
 
     host_time: float
     sequence: int
     touches: tuple[Touch, ...]
+    deformation: Deformation | None = None
 
 
 def touches_of(content: Mapping[str, Any]) -> RecordedTouches:
     """The touches of a ``tomoskin.Touches``."""
     touches = tuple(map(_touch_of, content["touches"]))
-    return RecordedTouches(content["host_time"], content["sequence"], touches)
+    deformation = deformation_of(content.get("deformation"))
+    return RecordedTouches(content["host_time"], content["sequence"], touches, deformation)
 
 
 def truth_of(content: Mapping[str, Any]) -> Truth:

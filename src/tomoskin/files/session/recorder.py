@@ -103,7 +103,7 @@ class Recorder(Consumer):
         self._session: SessionWriter
         self._made = self._broken = False
         self._image_is_due = Every(IMAGE_PERIOD)
-        self._had_touches = False
+        self._had_some = False
         self._clock, self._next_fit = ClockFitter(), float("-inf")
 
     def admit(self, message: RunMessage) -> list[_Part] | None:
@@ -116,9 +116,10 @@ class Recorder(Consumer):
             return [message]
         parts: list[_Part] = []
         if message.ready:
-            if message.touches or self._had_touches:
-                parts.append(RecordedTouches(message.host_time, message.sequence, message.touches))
-            self._had_touches = bool(message.touches)
+            state = message.touches, message.deformation
+            if any(state) or self._had_some:
+                parts.append(RecordedTouches(message.host_time, message.sequence, *state))
+            self._had_some = any(state)
             if self._pixels is not None and self._image_is_due(message.host_time):
                 parts.append(message)
         parts += map(event_of, message.events)
@@ -139,7 +140,7 @@ class Recorder(Consumer):
                     self._fit_clock(part)
                     session.frame(part.frame, part.mark)
                 case RecordedTouches():
-                    session.touches(part.host_time, part.sequence, part.touches)
+                    session.touches(part.host_time, part.sequence, part.touches, part.deformation)
                 case FrameResult() if self._pixels is not None:
                     session.image(part.host_time, part.image, self._pixels, part.touches)
                 case Event():

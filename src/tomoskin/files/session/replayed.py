@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from threadpoolctl import ThreadpoolController
 
 from tomoskin.core import DataError, Mark, StrPath
+from tomoskin.files.messages import DeformedFrame
 from tomoskin.files.session import scanned
 from tomoskin.files.session.session_reader import (
     SessionReader,
@@ -118,10 +119,28 @@ def session_touches(session: SessionReader) -> Iterator[TouchedFrame]:
     if counts["/touches"] or counts["/image"]:
         yield from scanned.scanned_touches(session)
         return
+    for frame, result in _again(session):
+        if result.touches:
+            yield frame.number, frame.time, result.touches
+
+
+def session_deformations(session: SessionReader) -> Iterator[DeformedFrame]:
+    """(frame, time, deformation) as they were recorded; as a replay tells them where neither
+    touches nor images were."""
+    counts = message_counts(session)
+    if counts["/touches"] or counts["/image"]:
+        yield from scanned.scanned_deformations(session)
+        return
+    for frame, result in _again(session):
+        yield frame.number, frame.time, result.deformation
+
+
+def _again(session: SessionReader) -> Iterator[tuple[scanned.ScannedFrame, FrameResult]]:
+    """Each frame that the pipeline takes, and what it makes of it again."""
     prepared = as_recorded(session)
     for frame, result in gathered(replaying(prepared, session), session, prepared.scan):
-        if result is not None and result.touches:
-            yield frame.number, frame.time, result.touches
+        if result is not None:
+            yield frame, result
 
 
 def reconstruct_session(

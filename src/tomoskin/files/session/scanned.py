@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomoskin.core import DataError, FloatArray, Frame, IntArray, Mark, MarkedFrame, StrPath
+from tomoskin.files.messages import DeformedFrame
+from tomoskin.files.session.layout import RecordedTouches
 from tomoskin.files.session.session_reader import (
     SessionReader,
     indexed_frames,
@@ -73,6 +75,17 @@ def scanned_frames(session: SessionReader, scan: Scan) -> Iterator[ScannedFrame]
 
 def scanned_touches(session: SessionReader) -> Iterator[TouchedFrame]:
     """(frame, time, touches) of the recorded touches; None and host time without their frame."""
+    for number, time, touched in _scanned(session):
+        yield number, time, touched.touches
+
+
+def scanned_deformations(session: SessionReader) -> Iterator[DeformedFrame]:
+    """(frame, time, deformation) as recorded; None where a deformation has ended."""
+    for number, time, touched in _scanned(session):
+        yield number, time, touched.deformation
+
+
+def _scanned(session: SessionReader) -> Iterator[tuple[int | None, float, RecordedTouches]]:
     keys = {(item.host_time, item.sequence) for item in session.touches()}
     numbers: dict[tuple[float, int], tuple[int, float]] = {}
     for number, time, item in scanned_frames(session, _own_scan(session)) if keys else ():
@@ -81,7 +94,7 @@ def scanned_touches(session: SessionReader) -> Iterator[TouchedFrame]:
             numbers.setdefault(key, (number, time))
     for touched in session.touches():
         key = touched.host_time, touched.sequence
-        yield *numbers.get(key, (None, touched.host_time)), touched.touches
+        yield *numbers.get(key, (None, touched.host_time)), touched
 
 
 def first_scan(session: SessionReader) -> float:

@@ -30,13 +30,21 @@ from tomoskin.core import (
     encode_json,
     plain_values,
 )
-from tomoskin.files.messages import Contact, grid_message, log_message, scene_message, touch_row
+from tomoskin.files.messages import (
+    Contact,
+    deformation_content,
+    grid_message,
+    log_message,
+    scene_message,
+    touch_row,
+)
 from tomoskin.files.session import channels
 from tomoskin.files.session.channels import CHANNELS, SCHEMAS, SPAN, robot_channels
 from tomoskin.files.session.container import ContainerWriter
 from tomoskin.files.session.layout import encode_frame, encode_raw
 from tomoskin.model.mesh import Plane
 from tomoskin.model.skin import Skin
+from tomoskin.sensing.fit import Deformation
 
 FORMAT = 1
 """Version of the channels and their layout."""
@@ -150,10 +158,19 @@ class SessionWriter(AbstractContextManager["SessionWriter"]):
         """
         self._log.put(channels.FRAMES, max(frame.host_time, self._start), encode_frame(frame, mark))
 
-    def touches(self, host_time: float, sequence: int, touches: Sequence[Touch]) -> None:
-        """Touches of the frame ``sequence``; none is worth saying when there were some before."""
+    def touches(
+        self,
+        host_time: float,
+        sequence: int,
+        touches: Sequence[Touch],
+        deformation: Deformation | None = None,
+    ) -> None:
+        """Touches of the frame ``sequence``, and how the sheet is deformed in it; none is worth
+        saying when there were some before."""
         rows = [touch_row(touch) for touch in touches]
-        content = {"host_time": host_time, "sequence": sequence, "touches": rows}
+        content: dict[str, Any] = {"host_time": host_time, "sequence": sequence, "touches": rows}
+        if deformation is not None:
+            content["deformation"] = deformation_content(deformation)
         _put(self._log, channels.TOUCHES, host_time, content)
 
     def image(

@@ -7,11 +7,13 @@ from dataclasses import replace
 from functools import partial
 
 from tomoskin.core import Detection, Touch, show
+from tomoskin.model.mesh import Outline
 from tomoskin.sensing.track import merging, policy
 from tomoskin.sensing.track.association import FrameOfTouches, ObservedDetection, associate, follow
 from tomoskin.sensing.track.decision import STEP, TrackDecision
 from tomoskin.sensing.track.identity import IdentityLedger
 from tomoskin.sensing.track.motion import TrackSettings, begin
+from tomoskin.sensing.track.rim import on_sheet
 from tomoskin.sensing.track.sliding import SlideCorrection
 from tomoskin.sensing.track.trace import (
     Alone,
@@ -38,6 +40,8 @@ class Tracker:
         Where touches were, of which something may still show.
     slides
         Moves touches that slide to the finger; what is held still is not moved.
+    outline
+        Of the sheet, beyond which no touch is told; None where it is not known.
     responses
         The touches of the newest frame where the sheet's response is, not moved.
     ledger
@@ -51,6 +55,7 @@ class Tracker:
         self.traces: list[Trace] = []
         self.residuals = ResidualResponses()
         self.slides, self.ledger = SlideCorrection(0.0), IdentityLedger()
+        self.outline: Outline | None = None
         self._clock = TrackClock()
         self._happened: list[TouchEvent] = []
         self._keys = 0
@@ -74,9 +79,13 @@ class Tracker:
         happened, self._happened = self._happened, []
         if not self.settings.still:
             self.slides = self.slides.after(touches, time)
-        finger = self.slides.of_finger
+        finger = self.finger
         self.events = tuple([replace(event, touch=finger(event.touch)) for event in happened])
         return tuple(map(finger, touches))
+
+    def finger(self, touch: Touch) -> Touch:
+        """``touch`` of the newest frame as it is told: where the finger is, and on the sheet."""
+        return on_sheet(self.slides.of_finger(touch), self.outline)
 
     def reset(self) -> None:
         """Release every touch and forget all else; identities go on counting.
