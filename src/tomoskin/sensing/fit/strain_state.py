@@ -17,8 +17,8 @@ from tomoskin.sensing.fit.solver import NuisanceMetric
 from tomoskin.sensing.fit.strain import Strain
 from tomoskin.sensing.fit.strained_sheet import StrainedSheet
 
-_NEAR = 0.3
-"""Squared deviations of a move that is linear enough."""
+_NEAR = 0.1
+"""Squared deviations by which a linear move may be wrong."""
 
 _STRAINED = 0.02
 """Size of a strain from which touches change other voltages than at rest."""
@@ -59,15 +59,14 @@ class StrainState:
     def about(cls, sheet: StrainedSheet, at: Strain, size: float = 0.0) -> StrainState:
         """Linear about a strain, before anything is known."""
         size = max(size, at.size)
-        slopes, otherwise = sheet.slopes(at), sheet.otherwise(at, size)
-        directions = np.hstack([slopes, otherwise])
-        n, k = len(at.numbers), otherwise.shape[1]
+        directions = sheet.directions(at, size)
+        n = len(at.numbers)
+        k = directions.shape[1] - n
         middle = sheet.prior.middle(at.kind)
         if at.kind == "fold":  # all places and axes are as likely
             middle[:2] = at.numbers[:2]
         deviations = np.append(sheet.prior.deviations(at.kind), np.ones(k))
         mean = np.append(middle - at.numbers, np.zeros(k))
-        assert n + k == len(deviations)
         covariance = np.diag(deviations**2)
         return cls(sheet, at, sheet.change(at), directions, mean, covariance, size)
 
@@ -138,16 +137,15 @@ class StrainState:
         sheet = self.sheet
         there = sheet.prior.held(self.at.moved(step), sheet.reach)
         size = max(self.size, there.size)
-        directions = np.hstack([sheet.slopes(there), sheet.otherwise(there, size)])
-        change = sheet.change(there)
+        directions, change = sheet.directions(there, size), sheet.change(there)
         return replace(self, at=there, change=change, directions=directions, size=size)
 
     def linear_again(self, matrix: FloatArray) -> StrainState:
-        """About the most likely strain, where that is far from where it is linear, by whitened
-        data of ``matrix`` (c, n_meas) 1/V."""
-        n = len(self.at.numbers)
-        far = matrix @ (self.directions[:, :n] @ self.mean[:n])
-        if far @ far < _NEAR:
+        """About the most likely strain, where that is so far from where it is linear that whitened
+        data of ``matrix`` (c, n_meas) 1/V show it: a sheet that is held is solved once."""
+        step = self.mean[: len(self.at.numbers)]
+        far = matrix @ (self.directions[:, : len(step)] @ step)
+        if far @ far * self.at.bends(step, self.sheet.breadth) ** 2 < _NEAR:
             return self
         return self._about(self.sheet.prior.held(self.strain, self.sheet.reach))
 
@@ -157,7 +155,7 @@ class StrainState:
         mean = self.mean.copy()
         mean[:n] += self.at.numbers - at.numbers
         size = max(self.size, at.size)
-        directions = np.hstack([self.sheet.slopes(at), self.sheet.otherwise(at, size)])
+        directions = self.sheet.directions(at, size)
         mean[n:] *= self.size / size
         return StrainState(
             self.sheet, at, self.sheet.change(at), directions, mean, self.covariance, size
