@@ -13,6 +13,7 @@ from tomoskin.sensing.fit import Response
 from tomoskin.sensing.fit.deformation import Deformation, StrainLaw
 from tomoskin.sensing.fit.strain import Strain, exponential, profile
 from tomoskin.sensing.fit.strain_fit import likeliest, starts
+from tomoskin.sensing.fit.strain_spread import Spread
 from tomoskin.sensing.fit.strain_state import StrainState
 from tomoskin.sensing.fit.strained_sheet import StrainedSheet
 
@@ -79,7 +80,7 @@ def test_slopes_of_a_faint_strain_are_those_of_the_voltages(
     faint = strain.numbers.copy()
     faint[3 if strain.kind == "fold" else 0 :] *= 0.01
     at = Strain(strain.kind, faint)
-    slopes = sheet.slopes(at)
+    slopes = sheet.directions(at, at.size)[:, : len(faint)]
     for number in range(len(faint)):
         step = np.zeros(len(faint))
         step[number] = 1e-4
@@ -105,7 +106,7 @@ def test_the_likeliest_fold_is_the_one_that_was_made(sheet: StrainedSheet, angle
     found = likeliest(StrainState.about(sheet, begin), data, full, none)
     stretch = likeliest(StrainState.about(sheet, Strain.none()), data, full, none)
     assert found.evidence > stretch.evidence + 100
-    told = found.state.told(full @ (data - found.state.moved), found.state.rows @ full.T, none)
+    told = found.state.told(full @ (data - found.state.moved), found.state.spread.seen(full), none)
     record = Deformation.of(told, StrainLaw())
     assert record.kind == "fold"
     assert record.axis is not None
@@ -122,7 +123,7 @@ def test_a_law_turns_levels_into_strain_and_height_into_an_angle(sheet: Strained
     state = StrainState.about(sheet, Strain("fold", numbers))
     n = len(state.mean)
     state = StrainState(
-        sheet, state.at, state.change, state.directions, np.zeros(n), 1e-8 * np.eye(n), 0.1
+        sheet, state.at, state.change, np.zeros(n), Spread(state.directions, 1e-8 * np.eye(n)), 0.1
     )
     bare = Deformation.of(state, StrainLaw())
     assert (bare.unit, bare.amount and round(bare.amount.value, 3)) == ("relative", -0.106)
@@ -142,7 +143,7 @@ def test_a_level_alone_is_told_as_what_it_may_be(sheet: StrainedSheet) -> None:
     state = StrainState.about(sheet, Strain("stretch", np.array([-0.05, 1e-5, 0.0])))
     n = len(state.mean)
     state = StrainState(
-        sheet, state.at, state.change, state.directions, np.zeros(n), 1e-6 * np.eye(n), 0.1
+        sheet, state.at, state.change, np.zeros(n), Spread(state.directions, 1e-6 * np.eye(n)), 0.1
     )
     told = Deformation.of(state, StrainLaw(10.0, 5.0))
     assert told.kind == "common"

@@ -104,7 +104,9 @@ def told_by(found: Searched) -> StrainState | None:
     state, fit = found.state, found.detected.fit
     if state is None:
         return None
-    d = len(state.mean)
+    d, left = len(state.mean), found.problem.left
+    if not len(fit.spots) and len(fit.unknown) == len(left):
+        return state.told_alone(fit.residual, left).linear_again(found.problem.seen.matrix)
     others = np.vstack([fit.unknown[d:], _free(found)])
     told = state.told(fit.residual, fit.unknown[:d], others)
     return told.linear_again(found.problem.seen.matrix)

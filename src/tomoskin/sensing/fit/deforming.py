@@ -34,6 +34,9 @@ _BEGINS, _MOVES, _CHANGES = 6.0, 2.0, 4.0
 """Logarithms of the odds against a deformation's beginning in a frame, its moving, and its being
 another one than was told."""
 
+_ALONE = 5.0
+"""Logarithm of the odds that a frame must give for it that is looked at as the only one."""
+
 _LEAVES = 30.0
 """Squares beyond noise that an explanation leaves, from which others are asked for."""
 
@@ -82,6 +85,9 @@ class Deforming:
     ----------
     state
         What is known of its strain; None where it is at rest.
+    told
+        How it is deformed, as that is reported; None where it is not. What a deformation has left
+        behind is not.
     """
 
     def __init__(
@@ -92,6 +98,7 @@ class Deforming:
         self._looks = self._follows or policy.pace.joint > 0
         self._rival: Begun | None = None
         self.state: StrainState | None = None
+        self.told: Deformation | None = None
         self._moves, self._quiet, self._asked, self._vain = False, 0, 0.0, 0
         self._age, self._count = 0, 0
         self._made: tuple[Strain, Response] | None = None
@@ -117,20 +124,24 @@ class Deforming:
         best, gain = self._best(frame, search, first, score)
         if self.state is None and self._follows:
             return self._begun(first, best, gain)
-        self._moves = gain > 0 and best.state is not None
-        self._vain = 0 if gain > 0 else self._vain + 1
-        return best if gain > 0 else first
+        wins = gain > (0.0 if self._follows else _ALONE)
+        self._moves = wins and best.state is not None
+        self._vain = 0 if wins else self._vain + 1
+        return best if wins else first
 
     def _best(
         self, frame: FrameData, search: Search, first: Searched, score: float
     ) -> tuple[Searched, float]:
         """The likeliest other explanation of a frame, and the logarithm of the odds for it."""
-        if self.state is None:  # touches of another profile leave as much
-            score += self._policy.left_by(first.detected.fit) ** 2 / 2
+        begins, least = self.state is None, first.detected.fit
+        if begins:  # touches of another profile leave as much
+            score += self._policy.left_by(least) ** 2 / 2
         best, most = first, -math.inf
         for found, odds in self._others(frame, first):
             other = search(found.state)
             own = other.evidence - odds - odds_against(other, frame) - score
+            if begins:  # fewer unknowns are no explanation of what several touches explain
+                own -= max(other.detected.fit.beyond - least.beyond, 0.0) / 2
             if own > most:
                 best, most = other, own
         return best, most
@@ -219,17 +230,6 @@ class Deforming:
         return made[1].changes(sets)
 
     @property
-    def told(self) -> Deformation | None:
-        """How the sheet is deformed, as it is reported; None where it is not.
-
-        What a deformation has left behind is not.
-        """
-        state = self.state
-        if state is None or state.strain.size < _RESIDUAL * state.size:
-            return None
-        return Deformation.of(state, self._law)
-
-    @property
     def moved(self) -> FloatArray | float:
         """(n_meas,) V that the deformation has moved the voltages by."""
         return 0.0 if self.state is None else self.state.moved
@@ -239,14 +239,23 @@ class Deforming:
         state = other.state
         if state is not None:
             self.state = state if other.sheet is self.sheet else state.on(self.sheet)
+        self.told = other.told
 
     def take(self, found: Searched) -> None:
         """Take what a frame was explained with."""
-        state, fit = told_by(found), found.detected.fit
+        self.state = self._remains(told_by(found), found)
+        self.told = None if self.state is None else self._report(self.state)
+
+    def _remains(self, state: StrainState | None, found: Searched) -> StrainState | None:
+        """The state of a frame, or None where the deformation is over."""
         if state is None:
-            self.state = None
-            return
+            return None
         shown = found.problem.seen.matrix @ state.moved
         self._quiet = self._quiet + 1 if shown @ shown < _FAINT else 0
-        over = self._quiet >= _QUIET and not len(fit.spots)
-        self.state = None if over else state
+        over = self._quiet >= _QUIET and not len(found.detected.fit.spots)
+        return None if over else state
+
+    def _report(self, state: StrainState) -> Deformation | None:
+        if state.strain.size < _RESIDUAL * state.size:
+            return None
+        return Deformation.of(state, self._law)

@@ -22,7 +22,6 @@ from tomoskin.sensing.fit.expectation import Expectation, ResidualResponse
 from tomoskin.sensing.fit.hypotheses import (
     CommonModeJump,
     Explained,
-    Jumps,
     Rival,
     challenged,
     weighed,
@@ -52,6 +51,20 @@ and as much is slower than frames. Correlations over 2 s on the twin's seed 4801
 
 _SWELLS = 0.08
 """Standard deviation of the logarithm of a touch's radius from frame to frame."""
+
+
+class Stacked:
+    """Rows over rows. The newest are kept: they stay from frame to frame, as a rule."""
+
+    def __init__(self) -> None:
+        self._newest: tuple[tuple[FloatArray, ...], FloatArray] | None = None
+
+    def __call__(self, *rows: FloatArray) -> FloatArray:
+        """(k, c) of all ``rows``."""
+        newest = self._newest
+        if newest is None or not all(map(is_, rows, newest[0])):
+            newest = self._newest = rows, np.concatenate(rows)
+        return newest[1]
 
 
 class SpotFinder:
@@ -109,7 +122,7 @@ class SpotFinder:
             model, skin, CellDiscs.of(mesh), self._sight, self.watch, self._residual, self.deforming
         )
         self._wander = 0.0
-        self._newest_slow: tuple[tuple[FloatArray, ...], FloatArray] | None = None
+        self._slow, self._beside = Stacked(), Stacked()
 
     def renewing(
         self, noise: FloatArray, gain: float = 1.0
@@ -211,13 +224,14 @@ class SpotFinder:
         sight = self._sight.of(self.watch.excess)
         seen, matched, _, jumps = sight if times == 1.0 else sight.louder(times)
         whitened, rest = seen.whitened(data if state is None else data - state.moved)
-        left = self._slow(self._residual.directions(seen.matrix), jumps)
+        # what stays from frame to frame: residual responses, and how far the common mode has moved
+        left = self._slow(self._residual.directions(seen.matrix), jumps.wandered(self._wander))
         exact = self._model.response.changes
         reduced: Reduced | None = self._model.reduced
         if state is not None:
             if state.shows_in_touches:
                 exact, reduced = partial(self.deforming.touched, state), None
-            left = np.vstack([state.rows @ seen.matrix.T, left])
+            left = self._beside(state.spread.seen(seen.matrix), left)
         problem = Problem(
             exact=exact,
             reduced=reduced,
@@ -234,15 +248,6 @@ class SpotFinder:
         explain = partial(self._explained, matched)
         (detected, rival), jump = self._jump.decided(problem, jumps, self._policy, explain)
         return Searched(detected, rival, jump, matched, problem, state)
-
-    def _slow(self, left: FloatArray, jumps: Jumps) -> FloatArray:
-        """(k, c) what stays from frame to frame and is no touch: residual responses, and how far
-        the common mode has wandered."""
-        now = left, jumps.wandered(self._wander)
-        newest = self._newest_slow
-        if newest is None or not all(map(is_, now, newest[0])):
-            newest = self._newest_slow = now, np.concatenate(now)
-        return newest[1]
 
     def _explained(self, matched: Matched, problem: Problem) -> Explained:
         """Touches of the frame of ``problem``, and one more that frames may speak for."""

@@ -123,6 +123,15 @@ class Strain:
         points = np.concatenate([points, points[:, ::-1]])
         return float(np.abs(self.field(points) - other.field(points)).max())
 
+    def bends(self, step: FloatArray, breadth: float) -> float:
+        """By what part derivatives at the sheet at rest are wrong after a ``step`` (d,), about: by
+        L, and by how far a fold has moved in parts of its width, at the ends of its axis too."""
+        if self.kind == "stretch":
+            return self.size + float(np.abs(step).max())
+        width = math.exp(self.numbers[LOG_WIDTH])
+        turned, beside, wider, *levels = np.abs(step).tolist()
+        return max((turned * breadth / 2 + beside) / width, wider) + self.size + max(levels)
+
     def moved(self, step: FloatArray) -> Strain:
         """With other numbers, by a ``step`` (d,)."""
         return Strain(self.kind, self.numbers + step)

@@ -41,7 +41,7 @@ def likeliest(
     touches too.
     """
     prior = begin.mean + np.append(begin.at.numbers, np.zeros(_others(begin)))
-    linear = _Linear(prior, begin.root, data, full, NuisanceMetric.of(others))
+    linear = _Linear(prior, begin.spread.root, data, full, NuisanceMetric.of(others))
     best, cost = begin, linear.cost(begin)
     damping = 0.0
     for _ in range(_STEPS):

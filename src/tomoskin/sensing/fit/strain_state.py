@@ -15,10 +15,11 @@ import numpy as np
 from tomoskin.core import FloatArray
 from tomoskin.sensing.fit.solver import NuisanceMetric
 from tomoskin.sensing.fit.strain import Strain
+from tomoskin.sensing.fit.strain_spread import Spread
 from tomoskin.sensing.fit.strained_sheet import StrainedSheet
 
-_NEAR = 0.3
-"""Squared deviations of a move that is linear enough."""
+_NEAR = 0.1
+"""Squared deviations by which a linear move may be wrong."""
 
 _STRAINED = 0.02
 """Size of a strain from which touches change other voltages than at rest."""
@@ -39,10 +40,11 @@ class StrainState:
         That is strained.
     at
         The strain about which it is linear.
-    change, directions
-        (n_meas,) V of that, and (n_meas, d + k) V what its numbers, and what is otherwise, do.
-    mean, covariance
-        (d + k,) and (d + k, d + k) of the numbers less those of ``at``, and of what is otherwise.
+    change
+        (n_meas,) V of that.
+    mean, spread
+        Of the numbers less those of ``at``, and of what is otherwise: (d + k,), and how well it is
+        known.
     size
         How large it is or has been; see :meth:`Strain.otherwise`.
     """
@@ -50,26 +52,24 @@ class StrainState:
     sheet: StrainedSheet
     at: Strain
     change: FloatArray
-    directions: FloatArray
     mean: FloatArray
-    covariance: FloatArray
+    spread: Spread
     size: float
 
     @classmethod
     def about(cls, sheet: StrainedSheet, at: Strain, size: float = 0.0) -> StrainState:
         """Linear about a strain, before anything is known."""
         size = max(size, at.size)
-        slopes, otherwise = sheet.slopes(at), sheet.otherwise(at, size)
-        directions = np.hstack([slopes, otherwise])
-        n, k = len(at.numbers), otherwise.shape[1]
+        directions = sheet.directions(at, size)
+        n = len(at.numbers)
+        k = directions.shape[1] - n
         middle = sheet.prior.middle(at.kind)
         if at.kind == "fold":  # all places and axes are as likely
             middle[:2] = at.numbers[:2]
         deviations = np.append(sheet.prior.deviations(at.kind), np.ones(k))
         mean = np.append(middle - at.numbers, np.zeros(k))
-        assert n + k == len(deviations)
-        covariance = np.diag(deviations**2)
-        return cls(sheet, at, sheet.change(at), directions, mean, covariance, size)
+        spread = Spread(directions, np.diag(deviations**2))
+        return cls(sheet, at, sheet.change(at), mean, spread, size)
 
     def on(self, sheet: StrainedSheet) -> StrainState:
         """The same on another sheet."""
@@ -90,64 +90,65 @@ class StrainState:
         """(n_meas,) V by which the most likely strain has moved the voltages."""
         return np.asarray(self.change + self.directions @ self.mean)
 
-    @cached_property
-    def root(self) -> FloatArray:
-        """(d + k, d + k) lower root of the covariance."""
-        scale = np.sqrt(np.diag(self.covariance))
-        even = self.covariance / scale[:, None] / scale
-        even[np.diag_indices_from(even)] += 1e-9
-        return np.asarray(scale[:, None] * np.linalg.cholesky(even))
+    @property
+    def directions(self) -> FloatArray:
+        """(n_meas, d + k) V that its numbers, and what is otherwise, do."""
+        return self.spread.directions
 
-    @cached_property
-    def rows(self) -> FloatArray:
-        """(d + k, n_meas) V: what is not known of it, a deviation each."""
-        return np.asarray((self.directions @ self.root).T)
+    @property
+    def covariance(self) -> FloatArray:
+        """(d + k, d + k) of the mean."""
+        return self.spread.covariance
 
     def after(self, *, moves: bool) -> StrainState:
         """As it is expected in the next frame."""
-        angle, offset, *others, otherwise = _MOVES if moves else _HELD
         n, k = len(self.at.numbers), len(self.mean) - len(self.at.numbers)
-        level, deviator = others[1:]
+        angle, offset, width, level, deviator, otherwise = _MOVES if moves else _HELD
         own = [level, deviator, deviator]
         if self.at.kind == "fold":
-            own = [angle, offset * self.sheet.breadth, *others]
+            own = [angle, offset * self.sheet.breadth, width, level, deviator]
         wander = np.append(own[:n], np.full(k, otherwise))
-        covariance = self.covariance + np.diag(wander**2)
-        most = self.sheet.prior.deviations(self.at.kind)
-        scale = np.minimum(1.0, np.append(most, np.ones(k)) / np.sqrt(np.diag(covariance)))
-        return replace(self, covariance=covariance * scale[:, None] * scale)
+        most = np.append(self.sheet.prior.deviations(self.at.kind), np.ones(k))
+        step = self.spread.wider if moves else self.spread.held
+        return replace(self, spread=step(wander, most))
 
     def told(self, residual: FloatArray, rows: FloatArray, others: FloatArray) -> StrainState:
         """What a frame says: it leaves ``residual`` (c,) whitened beside touches and the mean.
 
-        ``rows`` (d + k, c) are :attr:`rows` whitened, ``others`` (q, c) directions of what else is
-        not known, a deviation each.
+        ``rows`` (d + k, c) are those of :attr:`spread` whitened, ``others`` (q, c) directions of
+        what else is not known, a deviation each.
         """
         square = NuisanceMetric.of(others).products(np.vstack([rows, residual]))
         information = square[:-1, :-1] + np.eye(len(rows))
-        found = np.linalg.inv(information)
-        mean = self.mean + self.root @ (found @ square[:-1, -1])
-        n = len(self.at.numbers)
+        step = self.spread.root @ np.linalg.solve(information, square[:-1, -1])
+        return self._moved(step, self.spread.narrower(information))
+
+    def told_alone(self, residual: FloatArray, left: FloatArray) -> StrainState:
+        """The same of a frame without touches: see :meth:`Spread.learnt`."""
+        gain, spread = self.spread.learnt(left)
+        return self._moved(gain @ residual, spread)
+
+    def _moved(self, step: FloatArray, spread: Spread) -> StrainState:
+        mean, n = self.mean + step, len(self.at.numbers)
         held = self.sheet.prior.held(self.at.moved(mean[:n]), self.sheet.reach)
         mean[:n] = held.numbers - self.at.numbers
-        covariance = self.root @ found @ self.root.T
-        return replace(self, mean=mean, covariance=(covariance + covariance.T) / 2)
+        return replace(self, mean=mean, spread=spread)
 
     def linear_at(self, step: FloatArray) -> StrainState:
         """Linear about a strain that is a ``step`` (d,) away; its mean is left as it was."""
         sheet = self.sheet
         there = sheet.prior.held(self.at.moved(step), sheet.reach)
         size = max(self.size, there.size)
-        directions = np.hstack([sheet.slopes(there), sheet.otherwise(there, size)])
-        change = sheet.change(there)
-        return replace(self, at=there, change=change, directions=directions, size=size)
+        directions, change = sheet.directions(there, size), sheet.change(there)
+        spread = Spread(directions, self.covariance)
+        return replace(self, at=there, change=change, spread=spread, size=size)
 
     def linear_again(self, matrix: FloatArray) -> StrainState:
-        """About the most likely strain, where that is far from where it is linear, by whitened
-        data of ``matrix`` (c, n_meas) 1/V."""
-        n = len(self.at.numbers)
-        far = matrix @ (self.directions[:, :n] @ self.mean[:n])
-        if far @ far < _NEAR:
+        """About the most likely strain, where that is so far from where it is linear that whitened
+        data of ``matrix`` (c, n_meas) 1/V show it: a sheet that is held is solved once."""
+        step = self.mean[: len(self.at.numbers)]
+        far = matrix @ (self.directions[:, : len(step)] @ step)
+        if far @ far * self.at.bends(step, self.sheet.breadth) ** 2 < _NEAR:
             return self
         return self._about(self.sheet.prior.held(self.strain, self.sheet.reach))
 
@@ -157,8 +158,7 @@ class StrainState:
         mean = self.mean.copy()
         mean[:n] += self.at.numbers - at.numbers
         size = max(self.size, at.size)
-        directions = np.hstack([self.sheet.slopes(at), self.sheet.otherwise(at, size)])
+        directions = self.sheet.directions(at, size)
         mean[n:] *= self.size / size
-        return StrainState(
-            self.sheet, at, self.sheet.change(at), directions, mean, self.covariance, size
-        )
+        spread = Spread(directions, self.covariance)
+        return StrainState(self.sheet, at, self.sheet.change(at), mean, spread, size)

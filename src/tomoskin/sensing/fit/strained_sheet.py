@@ -107,13 +107,12 @@ class StrainedSheet:
         own = ForwardModel(mesh, model.pattern, model.contact_impedance, model.current)
         return Response(own.at(self._state.conductivity * np.exp(mean)), self._profile)
 
-    def slopes(self, strain: Strain) -> FloatArray:
-        """(n_meas, d) V: derivatives of the change by the numbers, as about the sheet at rest."""
-        return self._linear(strain.slopes(self._patches))
-
-    def otherwise(self, strain: Strain, size: float) -> FloatArray:
-        """(n_meas, k) V: what may be otherwise; see :meth:`Strain.otherwise`."""
-        return self._linear(strain.otherwise(self._patches, self.breadth, size))
+    def directions(self, strain: Strain, size: float) -> FloatArray:
+        """(n_meas, d + k) V: derivatives of the change by the numbers, as about the sheet at rest,
+        and what may be otherwise; see :meth:`Strain.otherwise`."""
+        middles = self._patches
+        otherwise = strain.otherwise(middles, self.breadth, size)
+        return self._linear(np.concatenate([strain.slopes(middles), otherwise], axis=2))
 
     def _linear(self, fields: FloatArray) -> FloatArray:
         """(n_meas, k) V of fields (patches, 3, k)."""
