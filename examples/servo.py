@@ -21,7 +21,7 @@ import pyarrow.parquet as pq
 
 from tomoskin.core import FloatArray
 from tomoskin.extras.lerobot import FIELDS, SLOTS, PolicyForms, PolicyView, write_lerobot
-from tomoskin.extras.lerobot.dataset import PREFIX, TIME
+from tomoskin.extras.lerobot.dataset import PREFIX, TIME, utc_of
 from tomoskin.files.exports import Export
 from tomoskin.files.session import SessionReader, SessionWriter
 from tomoskin.model.skin import Skin
@@ -182,7 +182,7 @@ def examples(dataset: Path) -> tuple[FloatArray, FloatArray]:
     table = pq.read_table(dataset / "data/chunk-000/file-000.parquet", columns=[*names, TIME])
     touches, voltages = (np.array(table[name].to_pylist()) for name in names)
     with np.load(dataset / "actions.npz") as held:
-        moments = np.array(table[TIME]) / 1e9 + 1e-9
+        moments = utc_of(np.array(table[TIME].to_pylist())) + 1e-6
         action = held["actions"][held["times"].searchsorted(moments, side="right") - 1]
     rows = [
         features_of(slots.reshape(SLOTS, len(FIELDS)), change)

@@ -140,6 +140,48 @@ def test_what_stands_in_another_order_is_named(tmp_path: Path, name: str) -> Non
     assert said(write(tmp_path, voltages(SAME, -SAME % N))), "measured pairs counted back"
 
 
+def turned(after: int) -> IntArray:
+    """(256,) the row of a full scan that stands at each place, each drive's rows from its own."""
+    drive = np.arange(N)[:, None]
+    return np.asarray((N * drive + (drive + after + np.arange(N)) % N).ravel())
+
+
+@pytest.mark.parametrize("sizes", [False, True])
+@pytest.mark.parametrize("free", [False, True])
+@pytest.mark.parametrize(("after", "words"), [(2, "at the drive"), (5, "5 electrodes after the")])
+def test_rows_that_begin_at_each_drive_are_named(tmp_path, sizes, free, after, words):
+    """As pyEIT's rotate_meas and most boards of 16 electrodes have them."""
+    whole, order = voltages(SAME, SAME), turned(after)
+    values = whole[order]
+    if free:
+        values = values[FREE[order]]
+    drive, measure = (table[FREE] if free else table for table in SCAN)
+    values = abs(values) if sizes else values
+    path = npz(tmp_path, voltages=values[None], drive=drive, measure=measure)
+    fault = order_fault(read_recording(path), resistance())
+    assert fault is not None
+    assert f"the rows of each drive begin {words}" in fault
+    path = npz(tmp_path, voltages=whole[None], drive=SCAN[0], measure=SCAN[1])
+    assert order_fault(read_recording(path), resistance()) is None
+
+
+def test_tables_that_begin_at_each_drive_with_values_that_do_not_are_named(tmp_path):
+    order = turned(2)
+    order = order[FREE[order]]
+    path = npz(
+        tmp_path,
+        voltages=voltages(SAME, SAME)[FREE][None],
+        drive=SCAN[0][order],
+        measure=SCAN[1][order],
+    )
+    fault = order_fault(read_recording(path), resistance())
+    assert fault is not None
+    assert "begin at E1" in fault
+    table = {"drive": SCAN[0][order], "measure": SCAN[1][order]}
+    right = npz(tmp_path, voltages=voltages(SAME, SAME)[order][None], **table)
+    assert order_fault(read_recording(right), resistance()) is None
+
+
 @pytest.mark.parametrize("name", FORMATS)
 def test_a_skin_is_guessed_for_every_format(tmp_path: Path, name: str) -> None:
     path = FORMATS[name](tmp_path, voltages(SAME, SAME))

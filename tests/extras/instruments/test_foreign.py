@@ -172,6 +172,14 @@ def test_matlab_7_3_and_pickles_are_refused(tmp_path):
         read_recording(pickled)
 
 
+@pytest.mark.parametrize("before", [b"", b"\x33\0\0\0\x90\x01\0\0\0\0\0\0"])
+def test_a_file_of_draeger_is_named(tmp_path, before):
+    path = tmp_path / "patient.eit"
+    path.write_bytes(before + b"---Draeger EIT-Software---\r\nFramerate [Hz]: 50\r\n" + bytes(5000))
+    with pytest.raises(DataError, match=r"patient\.eit: is a file of Dräger's.*eidors_readdata"):
+        read_recording(path)
+
+
 # The Kuopio challenge.
 
 

@@ -14,7 +14,7 @@ from extras.robot.test_joint_states import ROBOT, URDF, write_bag
 from prose import ROOT
 from tomoskin.core import DataError
 from tomoskin.extras.lerobot import FIELDS, SLOTS, Like, write_lerobot
-from tomoskin.extras.lerobot.dataset import TIME
+from tomoskin.extras.lerobot.dataset import TIME, TIME_PARTS, Episode, Rows, _counted, utc_of
 from tomoskin.files.exports import Export
 from tomoskin.files.session import (
     SessionReader,
@@ -95,7 +95,7 @@ def nothing(*_):
 def table_of(folder):
     table = pq.read_table(folder / "data/chunk-000/file-000.parquet").to_pydict()
     arrays = {name: np.array(values) for name, values in table.items()}
-    return arrays | {"time": arrays[TIME] / 1e9}
+    return arrays | {"time": utc_of(arrays[TIME])}
 
 
 def slots_of(table, name=TOUCHES):
@@ -310,7 +310,7 @@ def test_it_says_what_it_holds(dataset):
     assert info["features"].keys() == set(rows.column_names)
     for name, feature in info["features"].items():
         held = np.array(rows[name].to_pylist())
-        assert tuple(feature["shape"]) == held.shape[1:] or (1,)
+        assert tuple(feature["shape"]) == (held.shape[1:] or (1,))
         assert feature["shape"] == [1] or len(feature["names"]) == feature["shape"][0]
         assert len(feature["shape"]) == 1  # LeRobot's tools fail on more
     assert info["features"][TIME]["dtype"] == "int64"  # as a float it would lose minutes
@@ -320,6 +320,35 @@ def test_it_says_what_it_holds(dataset):
     found = statistics[WINDOW]
     assert found["mean"] == pytest.approx(column.mean(axis=0), rel=1e-4, abs=1e-9)
     assert found["q99"] == pytest.approx(np.quantile(column, 0.99, axis=0), rel=1e-4, abs=1e-9)
+
+
+def test_times_survive_statistics_that_square_them():
+    """As LeRobot computes them again: E[x²] − E[x]², the squares perhaps of whole numbers."""
+    epoch = 1_790_000_000.25
+    rows = Rows(30, (Episode(3.0, 90), Episode(7.0, 20)))
+    parts = _counted(rows, epoch)[TIME]
+    assert parts.dtype == np.int64
+    assert utc_of(parts) == pytest.approx(rows.moments + epoch, abs=1e-6)
+    assert parts[0].tolist() == [20717, 51203, 250_000_000]
+    for column, name in zip(parts.T, TIME_PARTS, strict=True):
+        for values in (column, column.astype(float)):
+            variance = np.mean(values**2) - np.mean(values) ** 2
+            assert np.sqrt(max(variance, 0)) == pytest.approx(column.std(), rel=1e-3, abs=1e-3), (
+                name
+            )
+
+
+def test_a_window_of_one_frame_is_a_number(session):
+    """LeRobot reads a feature of the shape (1,) as a number, and no list of one."""
+    folder = exported(session, session.with_name("fast.lerobot"), rate=50)
+    info = json.loads((folder / "meta/info.json").read_text())
+    schema = pq.read_schema(folder / "data" / "chunk-000" / "file-000.parquet")
+    assert info["features"][AGES]["shape"] == [1]
+    for name, feature in info["features"].items():
+        assert (feature["shape"] == [1]) == (not pa.types.is_nested(schema.field(name).type)), name
+    ages = np.array(pq.read_table(folder / "data")[AGES].to_pylist())
+    assert ages.ndim == 1
+    assert 0 <= ages.min() <= ages.max() < 0.2
 
 
 def test_what_cannot_be_written(tomoskin, dataset, session):
@@ -396,7 +425,7 @@ def test_lerobot_joins_it_to_a_robots_dataset_and_merges_those(session, lerobot,
     assert row["action"].tolist() == [4, 0]
     assert np.array_equal(row[WINDOW], skin[4][WINDOW])
     assert np.array_equal(row[TOUCHES], skin[4][TOUCHES])
-    assert row[TIME] == skin[4][TIME]
+    assert np.array_equal(row[TIME], skin[4][TIME])
     assert row["task"] == "pick"
     assert merged.meta.stats[TOUCHES]["mean"].shape == (SLOTS * len(FIELDS),)
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from tomoskin.extras.instruments import matlab, matrices, sciospec, sixteen, text_logs
+from tomoskin.extras.instruments import draeger, matlab, matrices, sciospec, sixteen, text_logs
 from tomoskin.files.imports import Format
 
 MATLAB = Format("a MATLAB file", "file", matlab.is_matlab, matlab.read_matlab)
+DRAEGER = Format("a file of Dräger", "file", draeger.is_draeger, draeger.read_draeger)
 SIXTEEN = Format("a tank of EIDORS", "arrays", sixteen.detects, sixteen.parse)
 SOFT_SKINS = Format("a set of soft skins", "arrays", matrices.is_eskin, matrices.read_eskin)
 KTC = Format("a tank of Kuopio", "arrays", matrices.is_ktc, matrices.read_ktc)

@@ -175,6 +175,9 @@ _FITS = 0.45
 _ALL_PAIRS, _NEAR = 16, 3
 """Of more electrodes than the first, only those so near are tried in exchange."""
 
+_AT_DRIVE = 2
+"""Electrodes after the first driven one at which the first free pair begins."""
+
 _TIE = 0.05
 """Orders of another kind that are as good up to this leave open which it is."""
 
@@ -205,11 +208,14 @@ def order_fault(recording: Recording, resistance: FloatArray) -> str | None:
     if (measured[kept] >= 0.0).all():  # perhaps sizes, whose signs are not known
         model, sizes = np.abs(model), True
     orders = []
-    for kind, name, expected, shift in _orders(resistance, currents, readers, model):
-        some = kept & np.roll(kept, shift)
-        ratio, rest = _compared(measured, model, np.abs(expected) if sizes else expected, some)
+    for kind, name, expected in _wirings(resistance, currents, readers):
+        ratio, rest = _compared(measured, model, np.abs(expected) if sizes else expected, kept)
         if rest <= _FITS:
-            orders.append((ratio, abs(shift), kind, name))
+            orders.append((ratio, 0, kind, name))
+    for kind, name, of, far in (*_shifts(len(model), n), *_turns(recording, n)):
+        ratio, rest = _compared(measured, model, model[of], kept & kept[of])
+        if rest <= _FITS:
+            orders.append((ratio, far, kind, name))
     if not orders or min(orders)[0] > _BETTER:
         return None
     return _sentence(orders)
@@ -230,10 +236,10 @@ def _voltages(resistance: FloatArray, currents: FloatArray, readers: FloatArray)
     return np.asarray(np.einsum("re,re->r", currents @ resistance, readers))
 
 
-def _orders(
-    resistance: FloatArray, currents: FloatArray, readers: FloatArray, model: FloatArray
-) -> Iterator[tuple[str, str, FloatArray, int]]:
-    """Kind, words, voltages (n_rows,) and shift of the rows of other orders."""
+def _wirings(
+    resistance: FloatArray, currents: FloatArray, readers: FloatArray
+) -> Iterator[tuple[str, str, FloatArray]]:
+    """Kind, words and voltages (n_rows,) of other orders of the electrodes."""
     n = len(resistance)
     for pair in combinations(range(n), 2):
         if n > _ALL_PAIRS and min(pair[1] - pair[0], n - pair[1] + pair[0]) > _NEAR:
@@ -241,17 +247,48 @@ def _orders(
         turned = np.arange(n)
         turned[list(pair)] = pair[::-1]
         name = f"E{pair[0] + 1} and E{pair[1] + 1} are exchanged"
-        yield name, name, _voltages(resistance, currents[:, turned], readers[:, turned]), 0
+        yield name, name, _voltages(resistance, currents[:, turned], readers[:, turned])
     for way, kind in ((1, "shifted against"), (-1, "counted the other way round than")):
         for by in range(n):
             turned = (way * np.arange(n) + by + (way > 0)) % n
             if (turned != np.arange(n)).any():
                 expected = _voltages(resistance, currents, readers[:, turned])
-                yield kind, f"the measuring electrodes are {kind} the driven ones", expected, 0
+                yield kind, f"the measuring electrodes are {kind} the driven ones", expected
+
+
+def _shifts(n_rows: int, n: int) -> Iterator[tuple[str, str, IntArray, int]]:
+    """Kind, words, the row (n_rows,) that each value would be of, and how far that is."""
     for shift in range(-n, n + 1):
         if shift:
             name = f"the values are shifted by {abs(shift)} rows of the tables"
-            yield "values", name, np.roll(model, shift), shift
+            yield "values", name, np.roll(np.arange(n_rows), shift), abs(shift)
+
+
+def _turns(recording: Recording, n: int) -> Iterator[tuple[str, str, IntArray, int]]:
+    """The same for rows of each drive that begin elsewhere: at the drive, where the tables begin at
+    E1, as pyEIT's ``rotate_meas`` and most boards of 16 electrodes have it; and for the reverse."""
+    if recording.spread:
+        return
+    begin = _first_of(recording.drive, n)
+    place = _first_of(recording.measure, n)
+    starts = (recording.drive[1:] != recording.drive[:-1]).any(axis=1)
+    group = np.cumsum(np.append(False, starts))
+    tried = {tuple(range(len(group)))}
+    for after in range(n):
+        where = "at the drive" if after <= _AT_DRIVE else f"{after} electrodes after the drive"
+        of = np.lexsort(((place - begin - after) % n, group))
+        if tuple(of.tolist()) not in tried:
+            tried.add(tuple(of.tolist()))
+            yield "turned", f"the rows of each drive begin {where}", of, after
+    of = np.lexsort((place, group))
+    if tuple(of.tolist()) not in tried:
+        yield "from E1", "the rows of each drive begin at E1, not where the tables do", of, 0
+
+
+def _first_of(pairs: IntArray, n: int) -> IntArray:
+    """(n,) the electrode of each pair from which the other one is less than half a round ahead."""
+    ahead = (pairs[:, 1] - pairs[:, 0]) % n
+    return np.where(2 * ahead <= n, pairs[:, 0], pairs[:, 1])
 
 
 def _compared(

@@ -51,9 +51,11 @@ VOLTAGES, TOUCHES, VALID, WINDOW, AGES = "voltages", "touches", "valid", "window
 LINK = "link"
 """Names of a skin's features, after the prefix and, of several skins, the skin's name."""
 
-TIME = "tactile.time_ns"
-"""Name of the feature of absolute times, ns since 1970: not an observation, so that no policy takes
-it, and whole, since LeRobot makes float32 of all other numbers."""
+TIME, TIME_PARTS = "tactile.time", ("day", "second", "nanosecond")
+"""Feature of absolute times, days since 1970 and what follows: not an observation, so that no
+policy takes it, and whole, since LeRobot makes float32 of all other numbers. It is in parts, since
+LeRobot's statistics square what they are given: of ns since 1970 no digit of their scatter is left,
+and int64 overflows above 3e9."""
 
 _FILE = "chunk-000/file-000.parquet"
 _COUNTERS = ("frame_index", "episode_index", "index", "task_index")
@@ -88,7 +90,7 @@ def write_lerobot(job: Export, path: StrPath) -> None:
     tracks = [_Track.of(one) for one in job.each()]
     begin, end = (max(track.times[k] for track in tracks) for k in (0, -1))  # all have a reference
     rows = given or rows_of(sessions, rate, begin, end)
-    columns, names = _counted(rows, job.session.epoch), dict[str, list[str]]()
+    columns, names = _counted(rows, job.session.epoch), {TIME: [*TIME_PARTS]}
     for track in tracks:
         count = track.frames_of_window(rows)
         columns |= track.columns(rows, count)
@@ -213,8 +215,15 @@ def _counted(rows: Rows, epoch: float) -> Columns:
     numbers = (rows.frame_index, rows.episode_index, np.arange(len(rows.moments)), rows.task_index)
     counters = zip(_COUNTERS, (column.astype(np.int64) for column in numbers), strict=True)
     timestamp = (rows.frame_index / rows.rate).astype(np.float32)
-    times = np.round(1e9 * (rows.moments + epoch)).astype(np.int64)
-    return {TIME: times, "timestamp": timestamp, **dict(counters)}
+    begun, rest = np.divmod(rows.moments + epoch, 1.0)
+    nanoseconds = np.minimum(np.round(1e9 * rest), 999_999_999).astype(np.int64)
+    parts = np.column_stack([*np.divmod(begun.astype(np.int64), 86_400), nanoseconds])
+    return {TIME: parts, "timestamp": timestamp, **dict(counters)}
+
+
+def utc_of(parts: IntArray) -> FloatArray:
+    """(n,) s since 1970 of the feature :data:`TIME` (n, 3)."""
+    return np.asarray(parts @ np.array([86_400.0, 1.0, 1e-9]))
 
 
 def _features(columns: Columns, names: Mapping[str, list[str]]) -> dict[str, Any]:
@@ -241,10 +250,11 @@ def _statistics_of(values: Any) -> dict[str, Any]:
 
 
 def _arrays(pa: Any, columns: Columns) -> Columns:
+    """Lists of one number are numbers: so LeRobot reads a feature of the shape (1,)."""
     return {
         name: pa.FixedSizeListArray.from_arrays(pa.array(values.ravel()), values.shape[1])
-        if values.ndim > 1
-        else pa.array(values)
+        if values.ndim > 1 and values.shape[1] > 1
+        else pa.array(values.ravel())
         for name, values in columns.items()
     }
 
