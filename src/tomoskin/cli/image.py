@@ -15,7 +15,14 @@ import typer
 from tomoskin.cli import options
 from tomoskin.cli.choices import quantity, skin_for_file, with_recorded_calibrations
 from tomoskin.cli.named_files import TABLE, Added, ForceFlag, Writes
-from tomoskin.cli.named_parts import Recorded, first_time, reconstructed, say_notes, span_lines
+from tomoskin.cli.named_parts import (
+    Recorded,
+    first_time,
+    reconstructed,
+    say_notes,
+    say_scale,
+    span_lines,
+)
 from tomoskin.cli.output import Bar, JsonFlag, remark, tell
 from tomoskin.core import MEASURANDS, DataError, no_such
 
@@ -173,6 +180,7 @@ def image(
         else:
             prepared = with_recorded_calibrations(prepared, recording)
     given = Recorded(recording, data, prepared.skin, reference, prepared.pattern)
+    say_scale(given, prepared.calibrations.values())
     for doubt in chain.from_iterable(one.doubts(data, prepared) for one in added):
         remark(doubt)
     say_notes(given.data)
