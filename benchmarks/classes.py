@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from report import Floats, Report, recordings, table
 from tomoskin import Skin
 from tomoskin.extras.classes import Classifier, against_rest
+from tomoskin.extras.labelled import COMMON_PRESSES, SetPlan, make_shard
 from tomoskin.learning import ChannelMapping, ring_of, solve_channel_mapping
 from tomoskin.model.pattern import match_rows
-from tomoskin.twin import COMMON_PRESSES, SetPlan, make_shard
 
 TEN = 10
 DRAWS = 5

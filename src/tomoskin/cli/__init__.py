@@ -35,7 +35,11 @@ if TYPE_CHECKING:
         calibration_command as calibration_command,
     )
     from tomoskin.cli.live import Served as Served, hub_of as hub_of
-    from tomoskin.cli.named_parts import Recorded as Recorded, found_touches as found_touches
+    from tomoskin.cli.named_parts import (
+        Recorded as Recorded,
+        found_touches as found_touches,
+        say_scale as say_scale,
+    )
     from tomoskin.cli.options import (
         DEFAULT_SKIN as DEFAULT_SKIN,
         ImageOptions as ImageOptions,

@@ -101,7 +101,7 @@ def _newest(locator: Locator, frames: IntArray, dv: FloatArray, xy: FloatArray) 
 Unit = StrEnum("Unit", {"N": "N", "G": "g", "KG": "kg"})
 """Units in which labels of force are given."""
 
-Length = StrEnum("Length", {"UM": "um", "MM": "mm", "CM": "cm", "M": "m"})
+Length = StrEnum("Length", {"UM": "um", "MM": "mm", "CM": "cm", "IN": "in", "M": "m"})
 """Units in which labels of depth are given."""
 
 
@@ -161,10 +161,18 @@ def depth(
 def _amount(
     labelled: Recorded, name: str, given: list[str] | None, unit: str | None, advice: str
 ) -> LearningOutcome:
-    from tomoskin.learning import MEASURED, AmountModel, calibration_kinds, report_of
+    from tomoskin.learning import (
+        MEASURED,
+        AmountModel,
+        calibration_kinds,
+        label_unit_doubt,
+        report_of,
+    )
 
     skin, path, of = labelled.drawn, labelled.path, MEASURED[name]
     amount = labels.amounts(path, len(labelled.recording), given, unit, of)
+    if (doubt := label_unit_doubt(of, amount)) is not None:
+        remark(f"{path}: {doubt}")
     result = found_touches(labelled)
     presses = labels.labelled_presses(path, result, amount, labelled.data.time, of)
     with Bar("learning"):

@@ -21,6 +21,7 @@ from tomoskin.cli.named_parts import (
     first_time,
     reconstructed,
     say_notes,
+    say_scale,
     span_lines,
 )
 from tomoskin.cli.output import Bar, JsonFlag, remark, tell
@@ -190,6 +191,7 @@ def image(
         else:
             prepared = with_recorded_calibrations(prepared, recording)
     given = Recorded(recording, data, prepared.skin, reference, prepared.pattern)
+    say_scale(given, prepared.calibrations.values())
     for doubt in chain.from_iterable(one.doubts(data, prepared) for one in added):
         remark(doubt)
     say_notes(given.data)

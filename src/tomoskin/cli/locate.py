@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tomoskin.cli.named_files import ForceFlag, Reads
-from tomoskin.cli.named_parts import Recorded, reconstructed
+from tomoskin.cli.named_parts import Recorded, reconstructed, say_scale
 from tomoskin.cli.options import RecordingArgument, ReferenceOption, SameSkinOption, TouchesOut
 from tomoskin.cli.output import Bar, JsonFlag, remark, tell
 
@@ -51,6 +51,7 @@ def locate(
         loaded = TOUCH.read(calibration, bar)
     given = Recorded.of(recording, skin, reference).onto(loaded)
     data = given.data
+    say_scale(given, [loaded])
     if given.skin is not None and is_session(recording) and not several:
         frames, located = _in_flow(given, given.skin, loaded)
     else:

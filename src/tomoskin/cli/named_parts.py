@@ -264,6 +264,21 @@ def say_notes(recording: Recording) -> None:
         remark(f"{recording.source}: {note}")
 
 
+def say_scale(given: Recorded, calibrations: Iterable[Calibration[Any]]) -> None:
+    """Say on stderr which of them were learnt from frames in another unit than those ``given``."""
+    import numpy as np
+
+    from tomoskin.learning import scale_doubt
+
+    known = list(calibrations)
+    if not known or isinstance(given.idle, str) or np.iscomplexobj(given.data.voltages):
+        return
+    untouched = None if given.idle is None else given.idle.mean(axis=0)
+    for one in known:
+        if (doubt := scale_doubt(one, given.dv, untouched)) is not None:
+            remark(f"{given.path}: {doubt}")
+
+
 def span_lines(spans: Sequence[Span], unit: str = "") -> Iterator[str]:
     """Each touch in a line: when, where and how strong; the first of them."""
     for span in spans[:_SHOWN]:

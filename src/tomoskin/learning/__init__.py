@@ -38,6 +38,10 @@ from tomoskin.learning.mapping.solve import (
     MappingAnswer as MappingAnswer,
     solve_channel_mapping as solve_channel_mapping,
 )
+from tomoskin.learning.scale import (
+    label_unit_doubt as label_unit_doubt,
+    scale_doubt as scale_doubt,
+)
 from tomoskin.learning.touch.calibration_health import (
     CalibrationHealth as CalibrationHealth,
     LeftOut as LeftOut,

@@ -21,6 +21,10 @@ ALONG_Y = 90.0
 """Direction of a bend's axis from x, degrees, unless one is given."""
 
 
+MOST_ANGLE = 2 * math.pi
+"""rad: a joint that turns farther has gone round."""
+
+
 def body_examples(
     path: Path, data: Recording, rest: FloatArray, given: list[str] | None, table: Path | None
 ) -> BodyExamples:
@@ -64,6 +68,13 @@ def _tabled(table: Path, n: int) -> tuple[list[int], dict[str, Any]]:
             f"{frames[wrong[0]]:g} in row {wrong[0] + 1}",
             where=str(table),
         )
+    for name in (k for k in names if k.startswith("angle") and not _in_degrees(k)):
+        if (most := float(np.nanmax(np.abs(columns[name]), initial=0.0))) > MOST_ANGLE:
+            raise DataError(
+                f"expected {name} in rad, up to {MOST_ANGLE:.2f}, got {most:.3g}",
+                where=str(table),
+                hint=f"if it is in degrees, name the column {name}_deg",
+            )
     state = np.column_stack([columns[k] * (math.pi / 180 if _in_degrees(k) else 1) for k in names])
     if not np.isfinite(state).all():
         row = int(np.argmin(np.isfinite(state).all(axis=1)))

@@ -19,6 +19,7 @@ from tomoskin.cli import (
     ReferenceOption,
     SameSkinOption,
     Writes,
+    say_scale,
     tell,
 )
 from tomoskin.core import write_rows
@@ -60,6 +61,7 @@ def classify(
     classifier = loaded.model
     given = Recorded.of(recording, skin, reference).onto(loaded)
     data, dv = given.data, given.dv
+    say_scale(given, [loaded])
     with Bar("classifying"):
         answers = classifier.predict(dv)
     count = min(ask, len(dv))  # evenly: the least sure ones would show one class too often

@@ -145,8 +145,8 @@ class AmountModel:
         if not (depth[rows] > 0).all():
             row = int(rows[np.argmin(depth[rows])])
             raise DataError(
-                f"touch {row}, with {of.text(presses.amount[row])}, increases the conductivity "
-                "of the sheet",
+                f"press {presses.press[row]}, with {of.text(presses.amount[row])}, increases the "
+                "conductivity of the sheet",
                 where=of.where,
                 hint="calibrate with frames in which the press is found as a touch",
             )

@@ -12,7 +12,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tomoskin.core import DIMENSIONS, MEASURANDS, DataError, Detection, FloatArray, IntArray
+from tomoskin.core import MEASURANDS, DataError, Detection, FloatArray, IntArray
 
 _PROBABLE = {"N": "g", "g": "kg"}
 _HEAVY, _LIGHT = 15.0, 0.02
@@ -92,7 +92,7 @@ _FORCE = Measurand(
 _DEPTH = Measurand(
     name="depth",
     plural="depths",
-    units=MappingProxyType(DIMENSIONS["length"]),
+    units=MappingProxyType({"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "in": 0.0254, "m": 1.0}),
     shown="mm",
     least=1e-5,
     most=0.1,
