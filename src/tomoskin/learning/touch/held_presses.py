@@ -83,8 +83,8 @@ def _rest(
 def _mean(dv: FloatArray) -> FloatArray:
     """(n_meas,) mean of the frames (m, n_meas) that show the whole press; NaN where no frame has a
     value."""
-    size = np.sqrt(np.nanmean(np.where(np.isfinite(dv).any(axis=1)[:, None], dv, 0.0) ** 2, axis=1))
-    pressed: NDArray[np.bool_] = np.asarray(size >= _PRESSED * np.median(size))
+    size = np.sqrt(np.nanmean(np.where(np.isfinite(dv).any(axis=1, keepdims=True), dv, 0.0) ** 2, axis=1))
+    pressed = np.flatnonzero(size >= _PRESSED * np.median(size))
     values = dv[pressed]
     count = np.isfinite(values).sum(axis=0)
     total = np.where(np.isfinite(values), values, 0.0).sum(axis=0)
