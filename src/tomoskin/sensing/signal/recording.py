@@ -100,8 +100,8 @@ class Recording:
             return ""
         return (
             f"the labels of {fast.sum()} rows lie farther from those of the row before than a "
-            f"finger gets ({_FASTEST:g} m/s): these are single presses, but rows with time_s are "
-            "followed as one finger, which cannot leap, so that touches are missed or shown twice. "
+            f"finger gets ({_FASTEST:g} m/s), so these are single presses. Rows with time_s are "
+            "followed as one finger, which cannot leap: touches are missed or shown twice. "
             "Leave out time_s, or put untouched rows between the presses"
         )
 
