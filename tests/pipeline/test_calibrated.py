@@ -9,7 +9,7 @@ import pytest
 
 from tomoskin.core import FloatArray, Voltages
 from tomoskin.learning import FORCE, TOUCH, AmountModel, LabelledPresses, Locator
-from tomoskin.learning.touch.located_touch import _together
+from tomoskin.learning.touch.fit_trial import together
 from tomoskin.model.skin import Skin
 from tomoskin.pipeline import Pipeline, Prepared, prepare
 from tomoskin.pipeline.frame_result import FrameResult
@@ -139,7 +139,7 @@ def test_where_labels_were_found_both_may_be_wrong() -> None:
     sure = 1e-6 * np.eye(2)
     fitted, learnt = (np.array([x, 0.0]) for x in (0.01, 0.03))
     (known, within), (found, wide) = (
-        _together((fitted, sure), (learnt, sure), doubtful=doubtful) for doubtful in (False, True)
+        together((fitted, sure), (learnt, sure), doubtful=doubtful) for doubtful in (False, True)
     )
     assert known == pytest.approx(learnt, abs=1e-3)
     assert found == pytest.approx((fitted + learnt) / 2, abs=1e-3)

@@ -24,7 +24,7 @@ from tomoskin.core import DataError, FloatArray, write_text
 
 if TYPE_CHECKING:
     from tomoskin.core import IntArray
-    from tomoskin.learning import Calibration, Locator
+    from tomoskin.learning import Calibration, FitTrial, Locator
 
 app = group("calibrate")
 
@@ -55,14 +55,15 @@ def touch(
     old = TOUCH.read(onto) if onto else None
     given, older = labelled.onto(old), None
     aligned = next(filter(None, (one.aligned(given, old) for one in added)), None)
+    trial = None
     if aligned is not None:
         calibration, dv, xy = aligned, given.dv, given.labels
         frames = np.arange(len(dv))
     else:
-        frames = labelled_frames(given.xy)
-        dv, xy = given.dv[frames], given.xy[frames]
+        dv, xy, frames = _presses(given)
         calibration = _learnt(given, old, dv, xy)
         older = None if old is None else old.model
+        trial = _trial(given, calibration.model)
     newest = _newest(calibration.model, frames, dv, xy)
     facts = reports.touch_facts(calibration.model, newest, older)
     if given.skin is not None and (doubts := label_doubts(calibration.model, given.skin)):
@@ -73,7 +74,38 @@ def touch(
             f"error of {facts['mean_mm']:.0f} mm, and of {facts['guessed_mm']:.0f} mm if the "
             "answer is always their middle. Check --reference and the labels, or press harder"
         )
-    return LearningOutcome(calibration.write, facts, reports.touch_lines(facts))
+    if trial is not None and trial.text:
+        facts["with_calibration_mm"] = 1e3 * trial.together
+        facts["fit_alone_mm"], facts["is_used"] = 1e3 * trial.alone, trial.helps
+    lines = [*reports.touch_lines(facts), *([trial.text] if trial and trial.text else ())]
+    return LearningOutcome(calibration.write, facts, lines)
+
+
+def _presses(given: Recorded) -> tuple[FloatArray, FloatArray, IntArray]:
+    """(n, n_meas) V, (n, 2) m and first frame of each labelled press. Frames of a course in time
+    that follow each other with the same label are one press."""
+    from tomoskin.learning import HeldPresses
+
+    if given.data.timed:
+        held = HeldPresses.of(given.dv, given.xy)
+        return held.dv, held.xy, held.frames
+    frames = labelled_frames(given.xy)
+    return given.dv[frames], given.xy[frames], frames
+
+
+def _trial(given: Recorded, locator: Locator) -> FitTrial | None:
+    """The calibration beside the fit of touches, where the file tells how the skin reads untouched;
+    None where nothing is fitted."""
+    from tomoskin.learning import FitTrial
+    from tomoskin.pipeline import fit_conditions, prepare
+
+    if given.skin is None or given.rest is None:
+        return None
+    with Bar("preparing"):
+        prepared = prepare(given.skin)
+    if prepared.pattern.identity != given.pattern.identity:
+        return None
+    return FitTrial.of(locator, fit_conditions(prepared, given.rest))
 
 
 def _learnt(

@@ -259,8 +259,8 @@ def first_time(recording: Recording) -> float:
 
 
 def say_notes(recording: Recording) -> None:
-    """What of the file was left out, on stderr."""
-    for note in recording.notes:
+    """What of the file was left out, and what its times do not fit with, on stderr."""
+    for note in (*recording.notes, *filter(None, [recording.leaps])):
         remark(f"{recording.source}: {note}")
 
 

@@ -49,6 +49,7 @@ from tomoskin.learning.touch.calibration_health import (
     label_doubts as label_doubts,
     worse as worse,
 )
+from tomoskin.learning.touch.fit_trial import FitTrial as FitTrial
 from tomoskin.learning.touch.gaussian_process import (
     Basis as Basis,
     Likeness as Likeness,
@@ -58,6 +59,7 @@ from tomoskin.learning.touch.gaussian_process import (
     squared_distances as squared_distances,
     telling as telling,
 )
+from tomoskin.learning.touch.held_presses import HeldPresses as HeldPresses
 from tomoskin.learning.touch.located_touch import TOUCH as TOUCH
 from tomoskin.learning.touch.locator import Locator as Locator, detection_at as detection_at
 from tomoskin.learning.touch.model_fit import compared as compared

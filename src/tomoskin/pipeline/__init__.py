@@ -2,6 +2,7 @@
 
 from tomoskin.pipeline.drives import DriveResult as DriveResult
 from tomoskin.pipeline.finding import (
+    fit_conditions as fit_conditions,
     located_alone as located_alone,
     voltage_covariance as voltage_covariance,
 )

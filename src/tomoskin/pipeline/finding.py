@@ -260,6 +260,15 @@ class FitConditions:
         return TouchFit(model.response, gain, lambda view, _: finder.push(view))
 
 
+def fit_conditions(prepared: Prepared, reference: Reference | None) -> FitConditions:
+    """Conditions of a skin that reads as ``reference`` while nothing touches it."""
+    method = prepared.skin.touch.method == "fit" and prepared.spots is not None
+    if reference is None or not method:
+        return FitConditions(prepared, reference, fitted=False)
+    agreement = ModelAgreement.of(reference.mean, prepared.operator.reference)
+    return FitConditions(prepared, reference, fitted=agreement.doubt(volts=True) is None)
+
+
 def voltage_covariance(prepared: Prepared, reference: Reference | None) -> FloatArray:
     """(n_meas, n_meas) V² of one frame less the reference."""
     return finished(_voltage_covariance(prepared, reference, 1.0))

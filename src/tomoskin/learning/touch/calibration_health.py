@@ -8,6 +8,7 @@ from itertools import compress, product
 from typing import Self
 
 import numpy as np
+from scipy.stats import mannwhitneyu
 
 from tomoskin.core import Detection, FloatArray
 from tomoskin.learning.touch.locator import SHARED, Locator
@@ -55,12 +56,15 @@ class CalibrationHealth:
         Measurements that have jumped since, in words; they are left out.
     alone
         Whether it locates the strongest region of the image, without a fit.
+    unused
+        Why it does not locate touches, but the fit alone does; "" where it does.
     """
 
     presses: int
     strangeness: float
     excluded: tuple[str, ...] = ()
     alone: bool = False
+    unused: str = ""
 
     @property
     def known(self) -> bool:
@@ -70,16 +74,22 @@ class CalibrationHealth:
     @property
     def well(self) -> bool:
         """Whether nothing speaks against the calibration."""
-        return not self.excluded and not (self.known and self.strangeness > STRANGE)
+        return not (self.unused or self.excluded) and not (
+            self.known and self.strangeness > STRANGE
+        )
 
     @property
     def broken(self) -> bool:
         """Whether the calibration is so strange that someone must act."""
-        return len(self.excluded) > _FEW or (self.known and self.strangeness > BROKEN)
+        return not self.unused and (
+            len(self.excluded) > _FEW or (self.known and self.strangeness > BROKEN)
+        )
 
     @property
     def findings(self) -> tuple[str, ...]:
         """What differs and what would mend it, in words; else that nothing does."""
+        if self.unused:
+            return (self.unused,)
         return (*self._fits(), ALONE) if self.alone else self._fits()
 
     def _fits(self) -> tuple[str, ...]:
@@ -122,7 +132,8 @@ class LeftOut:
     is_guess
         Whether the locator misses them about as far: noise alone gives such errors.
     drift
-        How many times as far as usual the last eighth of the presses is missed (medians).
+        How many times as far as the others the last eighth of the presses is missed (medians); 1
+        where that may be chance.
     one_force
         Whether all presses were about equally hard. Errors and covariances then hold for such
         presses alone, and softer or harder ones are missed by more.
@@ -140,13 +151,28 @@ class LeftOut:
         away = np.linalg.norm(presses.xy - presses.xy.mean(axis=0), axis=1)
         guessed = float(away.mean() * len(away) / max(len(away) - 1, 1))
         limit = _GUESS - _GUESS_OF_FEW / len(away)
-        newest = errors[-max(len(errors) // 8, 5) :]
+        count = max(len(errors) // 8, _NEWEST)
         return cls(
             guessed=guessed,
             is_guess=bool(errors.mean() > limit * guessed),
-            drift=float(np.median(newest) / np.median(errors)),
+            drift=_drift(errors[:-count], errors[-count:]),
             one_force=equally_hard(presses, locator.region.scaled(presses.xy)),
         )
+
+
+_NEWEST = 5
+"""Presses, at least, that count as the last eighth."""
+
+_CHANCE = 5e-3
+"""How often presses may be said to be missed by more where only noise makes them so."""
+
+
+def _drift(before: FloatArray, newest: FloatArray) -> float:
+    """How many times as far the ``newest`` presses (m,) m are missed as those ``before`` (n,) m; 1
+    where as many ranks are as high by chance (Mann & Whitney 1947)."""
+    if not len(before) or mannwhitneyu(newest, before, alternative="greater").pvalue > _CHANCE:
+        return 1.0
+    return float(np.median(newest) / max(np.median(before), np.finfo(float).tiny))
 
 
 _ENOUGH_OLDER = 12

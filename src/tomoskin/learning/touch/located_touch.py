@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from tomoskin.core import Detection, FloatArray, IntArray
 from tomoskin.learning.kind import Applied, Calibration, Conditions, FrameView, Kind, Progress
-from tomoskin.learning.touch.calibration_health import CalibrationHealth, FitCorrection
+from tomoskin.learning.touch.calibration_health import CalibrationHealth
+from tomoskin.learning.touch.fit_trial import FitTrial, together
 from tomoskin.learning.touch.locator import Locator
 from tomoskin.learning.touch.presses import Presses
 from tomoskin.learning.touch.watch import LIVE, Watch
@@ -84,9 +85,6 @@ _ALL = 0.999
 _EVERY = 8
 """Of the frames in which a touch stands so many are one from which something is concluded."""
 
-_TRIED = 60
-"""Presses that a fit is tried on: each takes a millisecond."""
-
 _SAME_SHAPE = 1e-4
 """Outlines within so many metres of each other are one."""
 
@@ -97,14 +95,13 @@ class LocatedTouch(Applied):
     Of several fitted touches, each is located in the frame without what the others change. Regions
     of an image tell nothing of that: then the strongest is located, as if it were the only one.
     Fitted touches stay where they are if presses were labelled by the same model, from a rub.
+    They also do where the calibration does not help beside the fit.
     Measurements that have jumped since the presses are left out where frames do not fit with them.
     A mean of frames in which a touch stands is located, unless frames are ``unrelated``.
     """
 
-    def __init__(
-        self, locator: Locator, correction: FitCorrection | None, *, unrelated: bool
-    ) -> None:
-        self._correction, self.slide_lag = correction, locator.presses.slide_lag or 0.0
+    def __init__(self, locator: Locator, trial: FitTrial | None, *, unrelated: bool) -> None:
+        self._trial, self.slide_lag = trial, locator.presses.slide_lag or 0.0
         self._modelled = locator.presses.modelled
         self._rubbed = locator.presses.spread is not None
         self._watch = Watch(locator, LIVE)
@@ -123,17 +120,17 @@ class LocatedTouch(Applied):
         if not np.isfinite(dv).any():
             return []
         mean = dv if self._unrelated else self._standing.push(dv)
-        correct = self._correction
-        if view.others is None or correct is None:
+        trial = self._trial
+        if view.others is None or trial is None:
             (position,), (covariance,) = self._watch(mean, settled=self._settled())
             return [_at(detections[0], position, covariance)]
         settled = len(detections) == 1 and self._settled()
         answers = zip(*self._watch(mean - view.others, settled=settled), strict=True)
-        if self._modelled:
+        if self._modelled or not trial.helps:
             return detections
         doubtful = self._rubbed or len(detections) > 1
         return [
-            _at(detection, *_together(correct(detection), answer, doubtful=doubtful))
+            _at(detection, *together(trial.correction(detection), answer, doubtful=doubtful))
             for detection, answer in zip(detections, answers, strict=True)
         ]
 
@@ -148,25 +145,9 @@ class LocatedTouch(Applied):
     ) -> CalibrationHealth:
         """How the last touches fit the presses."""
         del view, detections, touched
-        return replace(self._watch.health, alone=self._correction is None)
-
-
-def _together(
-    fitted: tuple[FloatArray, FloatArray], learnt: tuple[FloatArray, FloatArray], *, doubtful: bool
-) -> tuple[FloatArray, FloatArray]:
-    """What a fit and the presses, each a position (2,) m and a covariance (2, 2) m², say together.
-
-    What they differ by beyond their covariances widens them (the moment estimator of DerSimonian
-    and Laird 1986). It is the fit's error: the presses were tried on labels. Of ``doubtful`` ones
-    it is both's: of several touches they see what the fit has left of the others, and after a rub
-    their labels were found by the skin's model.
-    """
-    (here, own), (there, covariance) = fitted, learnt
-    away = here - there
-    beyond = max(float(away @ away - np.trace(own + covariance)) / 2, 0.0) * np.eye(2)
-    wider = covariance + beyond if doubtful else covariance
-    gain = wider @ np.linalg.inv(wider + own + beyond)
-    return there + gain @ away, wider - gain @ wider
+        trial = self._trial
+        unused = "" if trial is None or trial.helps else trial.text
+        return replace(self._watch.health, alone=trial is None, unused=unused)
 
 
 def _at(detection: Detection, position: FloatArray, covariance: FloatArray) -> Detection:
@@ -197,23 +178,8 @@ def _exclude(_locator: Locator, _measurements: IntArray) -> None:
 
 
 def _apply(locator: Locator, conditions: Conditions) -> Applied:
-    correction = _correction(locator, conditions)
-    return LocatedTouch(locator, correction, unrelated=conditions.unrelated)
-
-
-def _correction(locator: Locator, conditions: Conditions) -> FitCorrection | None:
-    """Of the fit, by some of the presses; None where none is fitted."""
-    presses = locator.presses
-    some = np.unique(np.linspace(0, len(presses) - 1, _TRIED).round().astype(int))
-    fitted = conditions.fitted_presses(presses.dv[some])
-    if fitted is None:
-        return None
-    positions, variances = np.full((len(some), 2), np.nan), np.full(len(some), np.nan)
-    for k, detection in enumerate(fitted):
-        if detection is not None:
-            positions[k] = detection.x, detection.y
-            variances[k] = (detection.sd_x**2 + detection.sd_y**2) / 2
-    return FitCorrection.of(positions, variances, presses.xy[some])
+    trial = FitTrial.of(locator, conditions)
+    return LocatedTouch(locator, trial, unrelated=conditions.unrelated)
 
 
 def _excluded(nuisance: FloatArray) -> NDArray[np.bool_]:

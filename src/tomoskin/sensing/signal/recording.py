@@ -29,6 +29,18 @@ _LISTED = 5
 """Frames that a note names."""
 
 
+_MOVES = 2e-3
+"""m; a label that differs by less is of the same position."""
+
+_FASTEST = 0.5
+"""m/s; fingers that slide on a skin are slower: 0.03 to 0.15 where they slide, at most 0.3 in a
+rub."""
+
+_AGAIN, _MOSTLY = 5, 0.5
+"""So many moves that are faster, and so large a part of all, are no finger's: once or twice one is
+lifted and put down elsewhere between two rows."""
+
+
 @dataclass(frozen=True, eq=False)
 class Recording:
     """Frames with the drive and measurement of each row, in the file's own order.
@@ -73,6 +85,25 @@ class Recording:
     idle: int = 1
     timed: bool = True
     board_known: bool = True
+
+    @property
+    def leaps(self) -> str:
+        """What speaks for single presses instead of the course of a finger, in a sentence: labels
+        that leap from row to row, again and again; "" where none do, or nothing has a time."""
+        if self.labels is None or not self.timed:
+            return ""
+        way = np.linalg.norm(np.diff(self.labels, axis=0), axis=1)
+        passed = np.diff(self.time)
+        moves = (way > _MOVES) & (passed > 0)  # not where a label is missing
+        fast = way[moves] > _FASTEST * passed[moves]
+        if fast.sum() < _AGAIN or fast.mean() < _MOSTLY:
+            return ""
+        return (
+            f"the labels of {fast.sum()} rows lie farther from those of the row before than a "
+            f"finger gets ({_FASTEST:g} m/s), so these are single presses. Rows with time_s are "
+            "followed as one finger, which cannot leap: touches are missed or shown twice. "
+            "Leave out time_s, or put untouched rows between the presses"
+        )
 
     def __post_init__(self) -> None:
         """Check that the shapes belong together and that there is a frame."""
