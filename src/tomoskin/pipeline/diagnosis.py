@@ -77,9 +77,8 @@ def of_deformation(deformation: Deformation | None) -> Diagnosis | None:
     level = "" if amount is None else f" by {100 * amount.value:+.2g} %"
     return Diagnosis(
         Cause.SUPPLY,
-        f"the whole sheet conducts otherwise{level}: likely gain or supply, else warmth, or a "
-        "stretch that is the same in all directions; check current, supply and cables, or take a "
-        "new reference",
+        f"the whole sheet conducts otherwise{level}: likely gain or supply, else warmth or an even "
+        "stretch; check current, supply and cables, or take a new reference",
     )
 
 
