@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum, auto
 
 from tomoskin.sensing.fit import Deformation
@@ -72,7 +72,9 @@ def of_deformation(deformation: Deformation | None) -> Diagnosis | None:
     if deformation is None:
         return None
     if deformation.kind != "common":
-        return Diagnosis(Cause.DEFORMATION, f"{deformation.text}; {_NEXT[deformation.kind]}")
+        plain = replace(deformation, confused=None).text  # a page shows the first words
+        also = f"; it may as well be {deformation.confused}" if deformation.confused else ""
+        return Diagnosis(Cause.DEFORMATION, f"{plain}; {_NEXT[deformation.kind]}{also}")
     amount = deformation.amount
     level = "" if amount is None else f" by {100 * amount.value:+.2g} %"
     return Diagnosis(
