@@ -104,7 +104,7 @@ def followed(run: Run) -> list[Shown]:
         result = pipeline.push(frame)
         spent = 1e3 * (time.process_time() - begun)
         if part and result is not None and result.ready:
-            said = result.touches, result.deformation, result.unexplained
+            said = result.touches, result.deformation, result.problem
             out.append(Shown(run, part, follows, *said, spent))
     return out
 

@@ -32,7 +32,7 @@ INKED = """([x, y]) => {
 
 @pytest.fixture(scope="module")
 def site(prepared):
-    runner = Runner(prepared, lambda: open_source("twin:preset=ideal,seed=1", prepared.skin))
+    runner = Runner(prepared, lambda: open_source("twin:seed=1", prepared.skin))
     runner.start()
     site = Site(runner, take=TwinHandlers)
     yield site

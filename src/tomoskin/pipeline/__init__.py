@@ -1,5 +1,6 @@
 """The one frame flow, pure: a reference is collected, then frames are followed to touches."""
 
+from tomoskin.pipeline.diagnosis import Cause as Cause, Diagnosis as Diagnosis
 from tomoskin.pipeline.drives import DriveResult as DriveResult
 from tomoskin.pipeline.finding import (
     fit_conditions as fit_conditions,

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from tomoskin.core import FloatArray, IntArray, Voltages
 from tomoskin.learning import Differences
 from tomoskin.model.pattern import Scan
+from tomoskin.pipeline.diagnosis import Cause, Diagnosis
 from tomoskin.pipeline.frame_subspace import JUMP, Drift, Nuisance
 from tomoskin.pipeline.prepare import Prepared
 from tomoskin.sensing import signal
@@ -42,13 +43,13 @@ class Conditioned:
     health
         Of the electrodes; None where there are no voltages to tell it from.
     problem
-        What is wrong with the voltages as a whole, in a sentence, or None.
+        What is wrong with the voltages as a whole, or None.
     """
 
     differences: Differences | None
     n_excluded: int
     health: signal.Health | None = None
-    problem: str | None = None
+    problem: Diagnosis | None = None
 
 
 class Learnt(NamedTuple):
@@ -195,11 +196,13 @@ class BaselineDifferences:
         if self._levels.mean is not mean or self._levels.excluded is not self._excluded:
             self._levels = _Levels.of(mean, self._excluded)
         times = self._levels.gain(values)
-        problem = None if times is None else _gain_text(times)
+        text = "" if times is None else _gain_text(times)
+        problem = Diagnosis(Cause.SUPPLY, text) if text else None
         self._has_gain = times is not None
         if times is not None:
             if self.prepared.skin.signal.common_modes != "projected":
-                return Conditioned(None, n_excluded, health, f"{problem}; no image is shown")
+                problem = Diagnosis(Cause.SUPPLY, f"{text}; no image is shown")
+                return Conditioned(None, n_excluded, health, problem)
             values = values / times  # touches and noise are then as large as they were learnt
         whole = signal.difference(values, mean, self.prepared.operator.difference)
         differences = Differences(

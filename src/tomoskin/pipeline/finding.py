@@ -11,6 +11,7 @@ import numpy as np
 
 from tomoskin.core import Detection, FloatArray, finished
 from tomoskin.learning import FrameView, TouchFit
+from tomoskin.pipeline.diagnosis import Cause, Diagnosis, likeliest
 from tomoskin.pipeline.frame_result import ModelAgreement
 from tomoskin.pipeline.frame_subspace import JUMP
 from tomoskin.pipeline.prepare import Prepared
@@ -37,7 +38,7 @@ class RegionFinder:
     deformation: Deformation | None = None
     moved: FloatArray | None = None
     others: FloatArray | None = None
-    problem: str | None = None
+    problem: Diagnosis | None = None
 
     def __init__(self, prepared: Prepared) -> None:
         self._segmenter = prepared.segmenter
@@ -75,14 +76,14 @@ class FitFinder:
     rises
         Whether the newest frames show a change of the sign that touches do not have.
     problem
-        What is wrong with the newest frame, in a sentence, or None.
+        What is likely wrong with the newest frame, or None.
     """
 
     def __init__(
         self, model: SpotModel, spots: SpotFinder, volts: float, pace: Pace, interval: float
     ) -> None:
         self.model, self.like_touch, self.rises = model, False, False
-        self.problem: str | None = None
+        self.problem: Diagnosis | None = None
         self.spots, self.volts, self._pace, self._interval = spots, volts, pace, interval
 
     @classmethod
@@ -140,7 +141,12 @@ class FitFinder:
         )
         jump = spots.jump
         self.like_touch, self.rises = watch.like_touch or jump is not None, watch.rises
-        self.problem = watch.problem or (None if jump is None else _jump_text(JUMP * jump))
+        texts = {
+            Cause.STEP: None if jump is None else _jump_text(JUMP * jump),
+            Cause.REFERENCE: watch.lifted_problem,
+            Cause.NOISE: watch.noise_problem,
+        }
+        self.problem = likeliest(Diagnosis(cause, text) for cause, text in texts.items() if text)
         return detections
 
     def learn(self, *, touched: bool) -> bool:

@@ -32,6 +32,7 @@ from tomoskin.pipeline.conditioning import (
     Conditioning,
     GivenDifferences,
 )
+from tomoskin.pipeline.diagnosis import Cause, Diagnosis
 from tomoskin.pipeline.drives import DriveResult, DriveWatch
 from tomoskin.pipeline.frame_result import FrameResult
 from tomoskin.pipeline.imaging import Filtered, SingleFrame
@@ -187,7 +188,8 @@ class Following:
         try:
             view, detections = self._detected(measured.time, conditioned.differences)
         except ModelError as error:  # the next frame may be well
-            problem = f"no touch can be found in this frame: {error}"
+            text = f"no touch can be found in this frame: {error}"
+            problem = Diagnosis(Cause.NO_IMAGE, text)
             failed = replace(conditioned, differences=None, problem=problem)
             return self._without_touches(measured, failed)
         reach("tracking")
@@ -375,7 +377,8 @@ class Following:
     ) -> FrameResult:
         shows = conditioned.differences is not None
         deformed = None if self._taught or not shows else self._finder.deformation
-        doubt = self._doubt(readings) or (deformed and deformed.text)
+        own = self._finder.problem if shows else None
+        doubts = self._doubts(readings), conditioned.problem, own
         return FrameResult(
             sequence=measured.sequence,
             host_time=measured.host_time,
@@ -391,17 +394,18 @@ class Following:
             baseline=self.conditioning.state,
             readings=readings,
             calibrated=self._calibrated,
-            unexplained=doubt or conditioned.problem or (shows and self._finder.problem) or None,
+            diagnoses=tuple(filter(None, doubts)),
             deformation=deformed,
             scanned=measured.scanned,
             scan_time=measured.scan_time,
         )
 
     @staticmethod
-    def _doubt(readings: dict[str, Any]) -> str | None:
-        """What is wrong with what calibrations have read, in a sentence."""
+    def _doubts(readings: dict[str, Any]) -> Diagnosis | None:
+        """What is wrong with what calibrations have read."""
         said = (one.problem for one in readings.values() if isinstance(one, Reading))
-        return next(filter(None, said), None)
+        text = next(filter(None, said), None)
+        return None if text is None else Diagnosis(Cause.TAUGHT, text)
 
 
 def _imaging(

@@ -11,6 +11,13 @@ import numpy as np
 
 from tomoskin.core import FloatArray, Image, Touch, Voltages
 from tomoskin.learning import TOUCH, CalibrationHealth, Reading
+from tomoskin.pipeline.diagnosis import (
+    Cause,
+    Diagnosis,
+    likeliest,
+    of_deformation,
+    of_measurements,
+)
 from tomoskin.sensing.fit import Deformation
 from tomoskin.sensing.signal import BaselineState, Health
 from tomoskin.sensing.track import TouchEvent
@@ -98,8 +105,8 @@ class FrameResult:
         that stands.
     readings
         What the skin's calibrations read in it, by the name of their kind.
-    unexplained
-        What it shows that is neither touch nor noise, in a sentence, or None.
+    diagnoses
+        What may be the matter beside electrodes, a deformation and a stale reference.
     calibrated
         Names of the kinds of calibrations in use.
     deformation
@@ -119,7 +126,7 @@ class FrameResult:
     health: Health | None = None
     baseline: BaselineState | None = None
     readings: Mapping[str, Any] = field(default_factory=dict)
-    unexplained: str | None = None
+    diagnoses: tuple[Diagnosis, ...] = ()
     calibrated: frozenset[str] = frozenset()
     deformation: Deformation | None = None
     scanned: float = math.nan
@@ -161,27 +168,25 @@ class FrameResult:
         return self.readings.get(TOUCH.name)
 
     @property
-    def problem(self) -> str | None:
-        """What is wrong with the picture, in a sentence, or None."""
-        if self.health is not None and self.health.sick:
-            if not self.has_image:
-                return (
-                    f"{self.health.text}; too few rows are left for an image: check the electrodes"
-                )
-            return f"{self.health.text}; the image is made without {self.left_out} rows"
-        if not self.left_out:
-            stale = self.baseline.stale if self.baseline else None
-            return self.unexplained or stale
-        rows = f"{self.left_out} of {len(self.voltages)} rows"
-        if not self.has_image:
-            return (
-                f"{rows} are at a rail of the converter or without a reference, so no image is "
-                "shown: check the electrodes and the gain"
+    def diagnosis(self) -> Diagnosis | None:
+        """What is likely the matter, or None."""
+        stale = self.baseline.stale if self.baseline else None
+        return likeliest(
+            (
+                of_measurements(
+                    self.health, self.left_out, len(self.voltages), has_image=self.has_image
+                ),
+                *self.diagnoses,
+                of_deformation(self.deformation),
+                None if stale is None else Diagnosis(Cause.STALE, stale),
             )
-        return (
-            f"{rows} are at a rail of the converter or without a reference: the image is made "
-            "without them"
         )
+
+    @property
+    def problem(self) -> str | None:
+        """What is likely the matter, in a sentence that says what to do next, or None."""
+        diagnosis = self.diagnosis
+        return None if diagnosis is None else diagnosis.text
 
 
 @dataclass(frozen=True, slots=True)

@@ -67,7 +67,7 @@ class Reconstruction:
     deformations
         How the sheet is deformed in each frame; None where it is not.
     problems
-        What was wrong with frames, in a sentence each, and with which of them.
+        What was likely the matter with frames, in a sentence each, and with which of them.
     """
 
     frames: IntArray
@@ -93,14 +93,14 @@ class Reconstruction:
         """What ``pipeline`` made of some ``frames``, which are asked for one by one."""
         kept: list[tuple[Any, ...]] = []
         left_out: list[int] = []
-        problems: dict[str, list[int]] = {}
+        problems: dict[str, list[tuple[str, int]]] = {}
         for number, time, result in frames:
             contents = result.touches, result.readings, result.deformation
             kept.append((number, time, result.left_out, result.image, *contents))
             if not result.has_image:
                 left_out.append(number)
-            if result.problem is not None:
-                problems.setdefault(result.problem, []).append(number)
+            if (found := result.diagnosis) is not None:
+                problems.setdefault(found.key, []).append((found.text, number))
         numbers, times, missing, shown, touches, readings, deformations = (
             zip(*kept, strict=True) if kept else 7 * ((),)
         )
@@ -117,7 +117,10 @@ class Reconstruction:
             rows_left_out=np.zeros(0, dtype=np.int64),
             readings={k: tuple(r.get(k) for r in readings) for k in prepared.calibrations},
             deformations=deformations,
-            problems={text: tuple(some) for text, some in problems.items()},
+            problems={
+                some[len(some) // 2][0]: tuple(number for _, number in some)
+                for some in problems.values()
+            },
         )
 
     @property

@@ -176,9 +176,8 @@ def _touches(touches: Sequence[Touch], now: float, own: Container[int]) -> bytes
 
 
 def _readings(result: FrameResult) -> bytes:
-    shown: dict[str, Any] = {
-        reading.key: reading.shown for reading in result.shown_readings.values()
-    }
+    readings = result.shown_readings.values()
+    shown: dict[str, Any] = {reading.key: reading.shown for reading in readings}
     if result.deformation is not None:
         shown[DEFORMATION] = deformation_content(result.deformation)
     return encode_json(shown) if shown else b""

@@ -22,6 +22,7 @@ from tomoskin.extras.ros2.ros_types import TYPES, encode_cdr, type_hash
 from tomoskin.extras.ros2.ros_view import IMAGE, ODOMETRY, POSE, TEXT, TOPICS, ros_messages
 from tomoskin.files.messages import Contact, Naming, Place, Reporter
 from tomoskin.model.mesh import Cylinder, Pose
+from tomoskin.pipeline import Cause, Diagnosis
 from tomoskin.sensing.track import TouchEvent
 
 
@@ -283,7 +284,7 @@ def test_points_lie_on_the_surface(stream):
 
 def test_a_report_says_whether_touches_are_valid(stream):
     reporter = Reporter(stream)
-    lost = {"has_image": False, "unexplained": "E4 is dead"}
+    lost = {"has_image": False, "diagnoses": (Diagnosis(Cause.NO_IMAGE, "E4 is dead"),)}
     results = result_at(0.0), result_at(0.1, **lost), result_at(0.9, **lost), result_at(1.0)
     reports = [messages_of(stream, reporter.of(r)).get("/diagnostics") for r in results]
     levels = [(r["status"][0]["level"], r["status"][0]["message"]) for r in reports if r]

@@ -57,7 +57,8 @@ def test_a_jump_is_no_touch_and_its_size_is_told(deviations: float) -> None:
         assert sum(counts(ours, part * MEAN + noise(16, 20, 10 + seed))) <= small
         if abs(deviations) > 10:
             assert ours.jump == pytest.approx(part / 0.02, rel=0.2)
-        assert ours.watch.problem is None
+        assert ours.watch.lifted_problem is None
+        assert ours.watch.noise_problem is None
         assert sum(counts(ours, noise(16, 5, 20 + seed))) == 0
         assert ours.jump is None
 

@@ -7,7 +7,7 @@ import pytest
 
 from tomoskin.core import Detection, Touch
 from tomoskin.model.mesh import Disc, Outline, Polygon, Rectangle
-from tomoskin.sensing.track import Tracker, on_sheet
+from tomoskin.sensing.track import TouchEvent, Tracker, on_sheet
 
 BOOMERANG = Polygon(np.array([[0.0, 0.0], [0.1, 0.05], [0.0, 0.02], [-0.1, 0.05]]))
 
@@ -47,7 +47,8 @@ def test_a_position_off_the_sheet_moves_to_the_nearest_of_its_rim(
 def test_a_tracker_tells_touches_and_events_on_the_sheet_and_follows_them_where_they_are() -> None:
     tracker = Tracker()
     tracker.outline = Disc(0.1)
-    touches, events = [], []
+    touches: list[Touch] = []
+    events: list[TouchEvent] = []
     for number in range(12):
         found = [touch_at(0.104, 0.0).detection] if number < 6 else []
         touches += tracker.update(found, 0.05 * number, 0.05 * number)

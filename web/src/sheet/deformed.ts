@@ -116,7 +116,7 @@ interface Ground {
 }
 
 /** From the middle of the sheet's top or bottom to words, px. */
-const INSET = 36;
+const INSET = 56;
 
 function above({ view, outline }: Ground, lines: number): Place {
   const { left, right: end, bottom, top } = boxOf(outline);

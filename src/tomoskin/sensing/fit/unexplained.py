@@ -124,14 +124,19 @@ class FrameWatch:
             self.like_touch = decisions.is_like_touch(self._policy, fit, ratio.max())
 
     @property
-    def problem(self) -> str | None:
-        """What of the newest frame no touch explains, in a sentence, or None."""
-        if self._lifted is not None:
-            x, y = 1e3 * self._lifted
-            return (
-                f"the conductivity has risen near {x:.0f}, {y:.0f} mm: if a press was on the skin "
-                "when the reference was taken, take a new one while nothing touches"
-            )
+    def lifted_problem(self) -> str | None:
+        """That a press seems to have been on the skin when the reference was taken, or None."""
+        if self._lifted is None:
+            return None
+        x, y = 1e3 * self._lifted
+        return (
+            f"the conductivity has risen near {x:.0f}, {y:.0f} mm: if a press was on the skin "
+            "when the reference was taken, take a new one while nothing touches"
+        )
+
+    @property
+    def noise_problem(self) -> str | None:
+        """What of the newest frame is more than the noise of the idle skin, or None."""
         if len(self._before):  # what they do not explain is their model's as a rule
             return None
         return self.excess.text(self.channels, self._usual, self._times)
