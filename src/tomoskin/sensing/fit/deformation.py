@@ -109,6 +109,11 @@ class Deformation:
         """As a ``state`` of the fit says."""
         return _fold(state, law) if state.at.kind == "fold" else _stretch(state, law)
 
+    @classmethod
+    def unknown(cls) -> Deformation:
+        """One of which no number is known."""
+        return cls("unknown", None, "relative")
+
     @property
     def text(self) -> str:
         """What it is, in a sentence for people."""
