@@ -87,7 +87,7 @@ def test_a_fold_that_is_held_is_no_touch_and_is_seldom_solved(
     assert told.kind == "fold"
     assert told.axis is not None
     assert told.axis.value == pytest.approx(0.4, abs=0.1)
-    assert most <= 1  # a review looks at one other deformation in a frame
+    assert most <= 2  # a review holds one other deformation against it in a frame
     assert counts["solved"] - 9 * counts["fitted"] < 15  # beside reviews, of 40 frames
 
 

@@ -43,10 +43,10 @@ _LEAVES = 30.0
 _FAINT = 4.0
 """Squared deviations by which a deformation must show, or it is over."""
 
-_STRANGE, _USUAL = 40.0, 25.0
+_STRANGE, _USUAL = 60.0, 40.0
 """Squared deviations of what a deformation has otherwise than its numbers say, from which it is no
-fold and no stretch, and below which it is one again. It is ten deviations as a rule; electrodes
-that a sheet slides under make 28, two folds 65 to 150."""
+fold and no stretch, and below which it is one again. It is ten as a rule; folds whose electrodes
+slide, or that 16 electrodes see, make up to 40, two folds 65 to 150."""
 
 _WRONG, _TIMES = 5.0, 3
 """Times as many squares as noise has, and frames in a row that leave so much: then no model of a
@@ -223,13 +223,18 @@ class Deforming:
         if not self._review:
             return first
         strain, alone = self._review.pop()
-        seen = frame.alone if alone else frame
-        other = search(seen.fitted(StrainState.about(self.sheet, strain, self.state.size)).state)
-        gain = self._score(other, frame) - _CHANGES - self._score(first, frame)
-        if gain < 0:
+        # both as if nothing had been known before: what is told has had many frames to fit
+        usual = self._anew(frame, search, self.state.strain)
+        other = self._anew(frame.alone if alone else frame, search, strain)
+        if self._score(other, frame) - _CHANGES < self._score(usual, frame):
             return first
         self._review = []
         return other
+
+    def _anew(self, frame: FrameData, search: Search, strain: Strain) -> Searched:
+        """A frame with a strain that is sought from there on."""
+        size = self.state.size if self.state else 0.0
+        return search(frame.fitted(StrainState.about(self.sheet, strain, size)).state)
 
     def _folds(self, frame: FrameData) -> list[tuple[Strain, bool]]:
         """Folds that a review looks at, the likeliest last, and whether without the touches."""
