@@ -22,6 +22,9 @@ law's, seeds 1 to 20, 8 and 16 electrodes."""
 _BOX = math.sqrt(12.0)
 """Breadth of a strip that is bent evenly, in its profile's standard deviations."""
 
+_CURVED = 0.1
+"""Part of L by which a strain may be otherwise than a power law says: its deviation."""
+
 _CLEAR = 4.0
 """Deviations by which one number must differ from another for the two to be told apart."""
 
@@ -109,6 +112,11 @@ class Deformation:
         """As a ``state`` of the fit says."""
         return _fold(state, law) if state.at.kind == "fold" else _stretch(state, law)
 
+    @classmethod
+    def unknown(cls) -> Deformation:
+        """One of which no number is known."""
+        return cls("unknown", None, "relative")
+
     @property
     def text(self) -> str:
         """What it is, in a sentence for people."""
@@ -192,9 +200,11 @@ def _stretch(state: StrainState, law: StrainLaw) -> Deformation:
     turn = float(np.hypot(xx * sd[2], xy * sd[1])) / deviator**2 / 2
     size = float(np.hypot(xx * sd[1], xy * sd[2])) / deviator
     if law.gauge and law.gauge_across:
+        # resistance goes with a power of the length, as far as dimensions make it
         mean, half = -level / law.gauge, deviator / abs(law.gauge_across)
         spread = math.hypot(sd[0] / law.gauge, size / law.gauge_across)
-        amounts, unit = (mean + half, mean - half), "strain"
+        amounts, unit = (math.expm1(mean + half), math.expm1(mean - half)), "strain"
+        spread = math.hypot(spread, _CURVED * state.strain.size * max(map(abs, amounts)))
     else:
         spread = math.hypot(sd[0], size)
         amounts = (math.expm1(level + sign * deviator), math.expm1(level - sign * deviator))

@@ -43,6 +43,15 @@ _LEAVES = 30.0
 _FAINT = 4.0
 """Squared deviations by which a deformation must show, or it is over."""
 
+_STRANGE, _USUAL = 60.0, 40.0
+"""Squared deviations of what a deformation has otherwise than its numbers say, from which it is no
+fold and no stretch, and below which it is one again. It is ten as a rule; folds whose electrodes
+slide, or that 16 electrodes see, make up to 40, two folds 65 to 150."""
+
+_WRONG, _TIMES = 5.0, 3
+"""Times as many squares as noise has, and frames in a row that leave so much: then no model of a
+deformation holds."""
+
 _QUIET = 5
 """Frames in which it does not show, after which it is over."""
 
@@ -54,6 +63,9 @@ _RESIDUAL = 0.15
 
 _OTHER = 0.2
 """By which part of itself a strain may differ from one that touches are fitted on."""
+
+_STEPS = 3
+"""Frames of a deformation that moves, after which it is asked whether it still does."""
 
 _STARTS = 2
 """Folds that are looked at, the best of the table."""
@@ -99,8 +111,10 @@ class Deforming:
         self._rival: Begun | None = None
         self.state: StrainState | None = None
         self.told: Deformation | None = None
+        self._wrong = self._strange = 0
         self._moves, self._quiet, self._asked, self._vain = False, 0, 0.0, 0
-        self._age, self._count = 0, 0
+        self._age, self._count, self._steps = 0, 0, 0
+        self._review: list[tuple[Strain, bool]] = []
         self._made: tuple[Strain, Response] | None = None
 
     def decided(self, frame: FrameData, search: Search) -> Searched:
@@ -116,11 +130,11 @@ class Deforming:
             if quick is not None:
                 return quick
         first = search(now)
-        asks = self._rival or self._asks(first, frame) or self._reviews(frame)
+        asks = self._rival or self._asks(first, frame)
         if not asks:
             self._moves = False
-            return first
-        score = first.evidence - odds_against(first, frame)
+            return self._reviewed(frame, search, first)
+        score = self._score(first, frame)
         best, gain = self._best(frame, search, first, score)
         if self.state is None and self._follows:
             return self._begun(first, best, gain)
@@ -139,7 +153,7 @@ class Deforming:
         best, most = first, -math.inf
         for found, odds in self._others(frame, first):
             other = search(found.state)
-            own = other.evidence - odds - odds_against(other, frame) - score
+            own = self._score(other, frame) - odds - score
             if begins:  # fewer unknowns are no explanation of what several touches explain
                 own -= max(other.detected.fit.beyond - least.beyond, 0.0) / 2
             if own > most:
@@ -165,16 +179,27 @@ class Deforming:
         return first
 
     def _moved(self, frame: FrameData, search: Search, state: StrainState) -> Searched | None:
-        """The explanation by a deformation that moves on, where that is enough."""
+        """The explanation by a deformation that moves on, where that is enough.
+
+        Now and then one that stands is tried too: it may have come to rest.
+        """
         found = frame.fitted(state.after(moves=True))
         moved = search(found.state)
-        asks = self._asks(moved, frame, quick=True) or self._reviews(frame)
-        return None if asks else moved
+        if self._asks(moved, frame, quick=True):
+            return None
+        self._steps += 1
+        if self._steps % _STEPS == 0:
+            stands = search(state.after(moves=False))
+            if not self._asks(stands, frame):
+                self._moves, moved = False, stands
+        return self._reviewed(frame, search, moved)
 
     def _asks(self, found: Searched, frame: FrameData, *, quick: bool = False) -> bool:
         """Whether other explanations than one are asked for: touches begin, or much is left."""
         fit = found.detected.fit
         left = fit.beyond
+        if self._strange:  # ever later: much is left in each frame
+            return self._strange.bit_count() == 1
         if len(fit.spots) > frame.count:
             return True
         if left < max(_LEAVES, fit.degrees):
@@ -182,14 +207,48 @@ class Deforming:
             return False
         return quick or decisions.looks_again(self._vain) or left > 2.0 * self._asked
 
-    def _reviews(self, frame: FrameData) -> bool:
-        """Whether it is time to ask whether the sheet is deformed otherwise than was told: ever
-        later after that, or the number of touches, has changed."""
+    def _reviewed(self, frame: FrameData, search: Search, first: Searched) -> Searched:
+        """The explanation of a frame that is as the last one, or a likelier one.
+
+        It is asked whether the sheet is deformed otherwise than was told: ever later after that,
+        or the number of touches, has changed; in each frame of one other deformation.
+        """
         if self.state is None or frame.count != self._count:
-            self._age, self._count = 0, frame.count
-            return False
+            self._age, self._count, self._review = 0, frame.count, []
+            return first
         self._age += 1
-        return self._age > 1 and self._age.bit_count() == 1
+        if self._age > 1 and self._age.bit_count() == 1 and not self._review:
+            self._review = [(Strain.none("stretch"), False), *self._folds(frame)]
+            return first
+        if not self._review:
+            return first
+        strain, alone = self._review.pop()
+        # both as if nothing had been known before: what is told has had many frames to fit
+        usual = self._anew(frame, search, self.state.strain)
+        other = self._anew(frame.alone if alone else frame, search, strain)
+        if self._score(other, frame) - _CHANGES < self._score(usual, frame):
+            return first
+        self._review = []
+        return other
+
+    def _anew(self, frame: FrameData, search: Search, strain: Strain) -> Searched:
+        """A frame with a strain that is sought from there on."""
+        size = self.state.size if self.state else 0.0
+        return search(frame.fitted(StrainState.about(self.sheet, strain, size)).state)
+
+    def _folds(self, frame: FrameData) -> list[tuple[Strain, bool]]:
+        """Folds that a review looks at, the likeliest last, and whether without the touches."""
+        with_touches = starts(self.sheet, frame.untouched, frame.seen.full, frame.others, _STARTS)
+        folds = [(strain, False) for strain in reversed(with_touches)]
+        if frame.count:
+            seen = frame.alone
+            first = starts(self.sheet, seen.untouched, seen.seen.full, seen.others, 1)
+            folds = [(first[0], True), *folds]
+        return folds
+
+    @staticmethod
+    def _score(found: Searched, frame: FrameData) -> float:
+        return found.evidence - odds_against(found, frame)
 
     def _others(self, frame: FrameData, first: Searched) -> list[tuple[Explained, float]]:
         """Deformations that may explain a frame beside the touches of the last, or without these;
@@ -244,18 +303,29 @@ class Deforming:
     def take(self, found: Searched) -> None:
         """Take what a frame was explained with."""
         self.state = self._remains(told_by(found), found)
-        self.told = None if self.state is None else self._report(self.state)
+        self.told = None if self.state is None else self._report(self.state, found)
 
     def _remains(self, state: StrainState | None, found: Searched) -> StrainState | None:
         """The state of a frame, or None where the deformation is over."""
         if state is None:
+            self._strange = 0
             return None
         shown = found.problem.seen.matrix @ state.moved
         self._quiet = self._quiet + 1 if shown @ shown < _FAINT else 0
         over = self._quiet >= _QUIET and not len(found.detected.fit.spots)
         return None if over else state
 
-    def _report(self, state: StrainState) -> Deformation | None:
+    def _report(self, state: StrainState, found: Searched) -> Deformation | None:
         if state.strain.size < _RESIDUAL * state.size:
             return None
-        return Deformation.of(state, self._law)
+        otherwise, fit = state.mean[len(state.at.numbers) :], found.detected.fit
+        self._wrong = self._wrong + 1 if fit.beyond > _WRONG * fit.degrees else 0
+        most = _USUAL if self._strange else _STRANGE
+        strange = otherwise @ otherwise > most or self._wrong >= _TIMES or state.strain.is_beyond
+        self._strange = self._strange + 1 if strange else 0
+        return Deformation.of(state, self._law) if not self._strange else Deformation.unknown()
+
+    @property
+    def hides_touches(self) -> bool:
+        """Whether what seems to touch may be what no model of a deformation holds."""
+        return self.told is not None and self.told.kind == "unknown"

@@ -305,6 +305,9 @@ class SpotFinder:
         self._shown = spots = detected.fit.spots
         if not len(spots):
             return []
+        if self.deforming.hides_touches:
+            self._shown = spots[:0]
+            return []
         shown = np.flatnonzero(~self._policy.is_wrong(spots[:, CONTENT]))
         found = [self._detection(detected, k, spots[k].tolist()) for k in shown.tolist()]
         order = sorted(range(len(found)), key=lambda k: -abs(found[k].peak))

@@ -35,6 +35,10 @@ _LEAST, _MOST = 0.03, 0.2
 _INSIDE = 0.85
 """A fold runs across the sheet: no farther from its origin than this part of its reach."""
 
+_LARGEST = 1.2
+"""Largest L of mean strain and of deviator that a model holds: a third of the conductance is left.
+"""
+
 _DEVIATIONS = (0.9, 0.3, 0.6, 0.15, 0.1)
 """Of the five numbers, before the data speak: the axis is as even as a standard deviation can say,
 and the offset is in parts of the breadth."""
@@ -83,9 +87,11 @@ class StrainPrior:
 
     def held(self, strain: Strain, reach: float) -> Strain:
         """The same within what a sheet of that ``reach`` m from its origin can show."""
-        if strain.kind == "stretch":
-            return strain
         numbers = strain.numbers.copy()
+        levels = slice(LEVEL if strain.kind == "fold" else 0, None)
+        numbers[levels] = np.clip(numbers[levels], -_LARGEST, _LARGEST)
+        if strain.kind == "stretch":
+            return Strain("stretch", numbers)
         numbers[LOG_WIDTH] = np.clip(numbers[LOG_WIDTH], *self.log_widths)
         numbers[OFFSET] = np.clip(numbers[OFFSET], -_INSIDE * reach, _INSIDE * reach)
         return Strain("fold", numbers)
@@ -115,6 +121,11 @@ class Strain:
         """How large L is."""
         return math.hypot(*self.levels)
 
+    @property
+    def is_beyond(self) -> bool:
+        """Whether it is as large as a model holds, or would be larger."""
+        return self.size >= _LARGEST
+
     def away(self, other: Strain) -> float:
         """How large the largest difference of L to an ``other`` strain is, about."""
         if self.kind != other.kind:
@@ -130,7 +141,8 @@ class Strain:
             return self.size + float(np.abs(step).max())
         width = math.exp(self.numbers[LOG_WIDTH])
         turned, beside, wider, *levels = np.abs(step).tolist()
-        return max((turned * breadth / 2 + beside) / width, wider) + self.size + max(levels)
+        farther: float = max((turned * breadth / 2 + beside) / width, wider)
+        return farther + self.size + float(max(levels))
 
     def moved(self, step: FloatArray) -> Strain:
         """With other numbers, by a ``step`` (d,)."""

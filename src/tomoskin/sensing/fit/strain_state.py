@@ -18,7 +18,7 @@ from tomoskin.sensing.fit.strain import Strain
 from tomoskin.sensing.fit.strain_spread import Spread
 from tomoskin.sensing.fit.strained_sheet import StrainedSheet
 
-_NEAR = 0.1
+_NEAR = 0.5
 """Squared deviations by which a linear move may be wrong."""
 
 _STRAINED = 0.02
