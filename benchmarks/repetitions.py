@@ -91,7 +91,7 @@ def _subject(seed: int, varies: float) -> tuple[Set, Set]:
             places, sizes = rng.uniform(-0.075, 0.075, (6, 2)), rng.normal(size=6)
             near = ((mesh.centroids - places[:, None]) ** 2).sum(axis=2)
             row[:] = jacobian @ (sizes @ np.exp(-near / (2 * 0.03**2)))
-        return out / np.sqrt((out**2).mean(axis=1, keepdims=True))
+        return np.asarray(out / np.sqrt((out**2).mean(axis=1, keepdims=True)))
 
     gestures, ways = changes(CLASSES), changes(8) / np.sqrt(8)
     trials = []
