@@ -124,5 +124,7 @@ def test_a_file_that_is_compressed_as_a_whole(tmp_path):
 
 def test_what_is_packed_in_another_way_is_said(tmp_path):
     path = write(tmp_path / "arm.mcap", STATES, lambda data: b"\x04\x22\x4d\x18" + data)
-    with pytest.raises(DataError, match=r"message 0 is no .*begin with 04 22 4d 18 \(ros2 bag"):
+    with pytest.raises(
+        DataError, match=r"message 0: expected a .*begin with 04 22 4d 18 \(ros2 bag"
+    ):
         joint_states(path)

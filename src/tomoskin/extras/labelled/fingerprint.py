@@ -6,9 +6,11 @@ library alone.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import importlib
 import importlib.metadata
+import sys
 from pathlib import Path
 
 ROOMS = (
@@ -25,19 +27,20 @@ _KINDS = (".py", ".toml", ".json")
 
 def fingerprint() -> dict[str, str]:
     """The versions of :data:`PACKAGES`, "none" where one is missing, and ``code``, a hash."""
-    found = {name: _version(name) for name in PACKAGES}
-    try:
-        package = importlib.import_module("tomoskin")
-    except ImportError:
-        return found | {"tomoskin": "none", "code": "none"}
-    found["tomoskin"] = str(getattr(package, "__version__", found["tomoskin"]))
+    versions = {name: _version(name) for name in PACKAGES}
+    with contextlib.suppress(ImportError):
+        importlib.import_module("tomoskin.core")
+    package = sys.modules.get("tomoskin")
+    if package is None:
+        return versions | {"tomoskin": "none", "code": "none"}
+    versions["tomoskin"] = str(getattr(package, "__version__", versions["tomoskin"]))
     root = Path(str(package.__file__)).parent
     digest = hashlib.sha256()
     for file in sorted(file for room in ROOMS for file in (root / room).rglob("*")):
         if file.suffix in _KINDS:
             digest.update(file.relative_to(root).as_posix().encode())
             digest.update(file.read_bytes())
-    return found | {"code": digest.hexdigest()[:12]}
+    return versions | {"code": digest.hexdigest()[:12]}
 
 
 def _version(name: str) -> str:
@@ -47,12 +50,12 @@ def _version(name: str) -> str:
         return "none"
 
 
-def differences(expected: dict[str, str], found: dict[str, str]) -> str:
+def differences(expected: dict[str, str], theirs: dict[str, str]) -> str:
     """What of them is not the same, in words; "" where all is."""
     return ", ".join(
-        f"{name} {found.get(name, 'none')} instead of {value}"
+        f"{name} {theirs.get(name, 'none')} instead of {value}"
         for name, value in expected.items()
-        if found.get(name, "none") != value
+        if theirs.get(name, "none") != value
     )
 
 

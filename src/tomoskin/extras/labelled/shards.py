@@ -175,10 +175,14 @@ def on_cluster(address: str) -> Workers:
     return run
 
 
-def _check_workers(found: Mapping[str, dict[str, str]], ours: dict[str, str], address: str) -> None:
+def _check_workers(
+    fingerprints: Mapping[str, dict[str, str]], ours: dict[str, str], address: str
+) -> None:
     """Raise SourceError that names the workers on which others would compute."""
-    told = {worker: fingerprint.differences(ours, theirs) for worker, theirs in found.items()}
-    others = [f"{worker} has {said}" for worker, said in told.items() if said]
+    unlike = {
+        worker: fingerprint.differences(ours, theirs) for worker, theirs in fingerprints.items()
+    }
+    others = [f"{worker} has {said}" for worker, said in unlike.items() if said]
     if others:
         raise SourceError(
             f"expected workers with the tomoskin of this computer, got {len(others)} others: "

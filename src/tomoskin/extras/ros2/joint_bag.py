@@ -104,8 +104,8 @@ def _decoded(messages: Iterable[tuple[float, bytes]], where: str) -> Iterator[St
             yield sent, struct.deserialize(_plain(data))
         except Exception as error:  # of any kind, for damaged bytes
             raise DataError(
-                f"message {number} is no {JOINT_STATE}: {error}",
-                where=where,
+                f"expected a {JOINT_STATE}, got what cannot be decoded: {error}",
+                where=f"{where}, message {number}",
                 hint="ros2 bag convert writes a bag without compression",
             ) from error
 

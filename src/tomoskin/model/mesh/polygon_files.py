@@ -159,8 +159,8 @@ def read_ply(file: Path) -> Facets:
 def _ply_header(stream: Any) -> tuple[str, list[_Element]]:
     order: str | None = None
     elements: list[_Element] = []
-    if stream.readline().strip() != b"ply":
-        raise ValueError('expected "ply" in the first line')
+    if (first := stream.readline(80).strip()) != b"ply":
+        raise ValueError(f'expected "ply" in the first line, got {first!r}')
     for raw in stream:
         match raw.decode("ascii", "replace").split():
             case ["end_header"]:
@@ -176,9 +176,9 @@ def _ply_header(stream: Any) -> tuple[str, list[_Element]]:
             case _:
                 pass  # comments
     else:
-        raise ValueError('expected "end_header" after the header')
+        raise ValueError(f'expected "end_header" after {len(elements)} elements, got the end')
     if order is None:
-        raise ValueError(f"expected a format among {', '.join(_PLY_ORDERS)}")
+        raise ValueError(f"expected a format among {', '.join(_PLY_ORDERS)}, got another")
     return order, elements
 
 
