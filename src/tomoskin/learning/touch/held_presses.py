@@ -83,7 +83,8 @@ def _rest(
 def _mean(dv: FloatArray) -> FloatArray:
     """(n_meas,) mean of the frames (m, n_meas) that show the whole press; NaN where no frame has a
     value."""
-    size = np.sqrt(np.nanmean(np.where(np.isfinite(dv).any(axis=1, keepdims=True), dv, 0.0) ** 2, axis=1))
+    has_values = np.isfinite(dv).any(axis=1, keepdims=True)
+    size = np.sqrt(np.nanmean(np.where(has_values, dv, 0.0) ** 2, axis=1))
     pressed = np.flatnonzero(size >= _PRESSED * np.median(size))
     values = dv[pressed]
     count = np.isfinite(values).sum(axis=0)
