@@ -30,8 +30,9 @@ INKED = """([x, y]) => {
 """Whether anything is drawn over the image at a place of the sheet, m."""
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def site(prepared):
+    """Of each test its own: a sheet that was stretched keeps some of it for a while."""
     runner = Runner(prepared, lambda: open_source("twin:seed=1", prepared.skin))
     runner.start()
     site = Site(runner, take=TwinHandlers)

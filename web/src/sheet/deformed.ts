@@ -116,7 +116,8 @@ interface Ground {
 }
 
 /** From the middle of the sheet's top or bottom to words, px. */
-const INSET = 56;
+const INSET = 36;
+const LINE = 20;
 
 function above({ view, outline }: Ground, lines: number): Place {
   const { left, right: end, bottom, top } = boxOf(outline);
@@ -141,7 +142,11 @@ export function drawDeformation(ground: Ground, deformation: DeformationNow): vo
       }
     }
   });
-  written(pen, theme, deformationInWords(deformation), above(ground, 1), theme.accent);
+  // Two lines, which fit between the electrodes of a disc.
+  const [x, y] = above(ground, 1);
+  deformationInWords(deformation)
+    .split(", ")
+    .forEach((line, k) => written(pen, theme, line, [x, y + k * LINE], theme.accent));
 }
 
 export interface TrueDeformation {
