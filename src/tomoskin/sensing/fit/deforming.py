@@ -43,10 +43,10 @@ _LEAVES = 30.0
 _FAINT = 4.0
 """Squared deviations by which a deformation must show, or it is over."""
 
-_STRANGE, _USUAL = 60.0, 40.0
-"""Squared deviations of what a deformation has otherwise than its numbers say, from which it is no
-fold and no stretch, and below which it is one again. It is ten as a rule; folds whose electrodes
-slide, or that 16 electrodes see, make up to 40, two folds 65 to 150."""
+_STRANGE, _USUAL = 9.5, 6.5
+"""Squared deviations of what a deformation has otherwise than its numbers say, over the root of the
+number of measurements: from the first it is no fold and no stretch, below the second it is one
+again. One fold makes up to 5 in these units, two make 10 to 20: the benchmark's quick seeds."""
 
 _WRONG, _TIMES = 5.0, 3
 """Times as many squares as noise has, and frames in a row that leave so much: then no model of a
@@ -321,6 +321,7 @@ class Deforming:
         otherwise, fit = state.mean[len(state.at.numbers) :], found.detected.fit
         self._wrong = self._wrong + 1 if fit.beyond > _WRONG * fit.degrees else 0
         most = _USUAL if self._strange else _STRANGE
+        most *= math.sqrt(len(state.change))
         strange = otherwise @ otherwise > most or self._wrong >= _TIMES or state.strain.is_beyond
         self._strange = self._strange + 1 if strange else 0
         return Deformation.of(state, self._law) if not self._strange else Deformation.unknown()
