@@ -16,12 +16,13 @@ from msgspec import inspect
 
 from tomoskin.learning import ShownReading
 from tomoskin.run import StrictRequest
-from tomoskin.server import frames, page_messages, requests, settings_messages
+from tomoskin.server import frames, page_messages, requests, robot_messages, settings_messages
 
 TYPES = Path(__file__).resolve().parent.parent / "web" / "src" / "wire.ts"
 _HEAD = """\
 /** What goes between the page and its server. Made by scripts/page_types.py from page_messages.py,
- * settings_messages.py, requests.py and frames.py of src/tomoskin/server: change those. */
+ * robot_messages.py, settings_messages.py, requests.py and frames.py of src/tomoskin/server:
+ * change those. */
 """
 _GETTERS = {"u1": "Uint8", "u2": "Uint16", "u4": "Uint32", "f4": "Float32", "f8": "Float64"}
 _UNNAMED = ("magic",)
@@ -33,12 +34,12 @@ def types() -> str:
     to_skin = (*page_messages.PAGE_MESSAGES, *settings_messages.SETTINGS_MESSAGES)
     unions = {
         "ServerMessage": to_skin,
-        "RobotMessage": page_messages.ROBOT_MESSAGES,
+        "RobotMessage": robot_messages.ROBOT_MESSAGES,
         "PageRequest": sent,
     }
-    roots = [*to_skin, *page_messages.ROBOT_MESSAGES, *sent]
+    roots = [*to_skin, *robot_messages.ROBOT_MESSAGES, *sent]
     made: dict[str, str] = {}
-    others = page_messages.RobotTouches, ShownReading, page_messages.DeformationNow
+    others = robot_messages.RobotTouches, ShownReading, page_messages.DeformationNow
     for info in inspect.multi_type_info([*roots, *others]):
         _type(info, made)
     parts = [*made.values()]

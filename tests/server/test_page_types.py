@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tomoskin.server import frames, page_messages, settings_messages
+from tomoskin.server import frames, page_messages, robot_messages, settings_messages
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -37,7 +37,7 @@ def test_they_hold_every_message_and_request(script):
 
 def test_what_is_not_finite_goes_out_as_null():
     stage = page_messages.StageNow(name="wire", p50_ms=float("nan"), p99_ms=float("inf"))
-    skins = page_messages.RobotState(skins={}, recording=None)
+    skins = robot_messages.RobotState(skins={}, recording=None)
     assert json.loads(skins.json) == {"type": "robot-state", "skins": {}, "recording": None}
     assert json.loads(page_messages.encode_json(stage))["p50_ms"] is None
 

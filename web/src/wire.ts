@@ -1,5 +1,6 @@
 /** What goes between the page and its server. Made by scripts/page_types.py from page_messages.py,
- * settings_messages.py, requests.py and frames.py of src/tomoskin/server: change those. */
+ * robot_messages.py, settings_messages.py, requests.py and frames.py of src/tomoskin/server:
+ * change those. */
 
 /** A value as a skin file writes it. */
 export type Value = string | number | readonly (string | number | readonly (string | number | readonly (string | number)[])[])[];

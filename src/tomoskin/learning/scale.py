@@ -49,15 +49,15 @@ def scale_doubt(
     if untouched is None:
         most = float(np.nanmax(_size(change)))
         factor, apart = most / own if own > 0 else 1.0, _APART
-        beside = "the largest change of these frames"
+        compared = "the largest change of these frames"
     else:
         part = own / float(_size(np.abs(untouched)[None])[0])
         factor = 1.0 if LEAST_CHANGE <= part <= MOST_CHANGE else 1 / part
-        apart, beside = 1.0, "the untouched voltages of these frames"
+        apart, compared = 1.0, "the untouched voltages of these frames"
     if not factor > 0 or 1 / apart <= factor <= apart:
         return None
     return (
-        f"{beside} are {factor:.2g} times what presses of the calibration of "
+        f"{compared} are {factor:.2g} times what presses of the calibration of "
         f"{calibration.kind.subject} have changed: one of them is in another unit, such as mV "
         "instead of V, and what is read means nothing"
     )

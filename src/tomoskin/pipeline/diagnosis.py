@@ -58,9 +58,9 @@ class Diagnosis:
         return self.cause.name if self.cause is Cause.DEFORMATION else self.text
 
 
-def likeliest(found: Iterable[Diagnosis | None]) -> Diagnosis | None:
+def likeliest(diagnoses: Iterable[Diagnosis | None]) -> Diagnosis | None:
     """The one to be told."""
-    return min((one for one in found if one is not None), key=_rank, default=None)
+    return min((one for one in diagnoses if one is not None), key=_rank, default=None)
 
 
 def _rank(diagnosis: Diagnosis) -> Cause:

@@ -99,8 +99,8 @@ class Reconstruction:
             kept.append((number, time, result.left_out, result.image, *contents))
             if not result.has_image:
                 left_out.append(number)
-            if (found := result.diagnosis) is not None:
-                problems.setdefault(found.key, []).append((found.text, number))
+            if (diagnosis := result.diagnosis) is not None:
+                problems.setdefault(diagnosis.key, []).append((diagnosis.text, number))
         numbers, times, missing, shown, touches, readings, deformations = (
             zip(*kept, strict=True) if kept else 7 * ((),)
         )

@@ -1,6 +1,6 @@
 """The page's server: what a page may ask, and what it is sent."""
 
-from tomoskin.server import page_messages as page_messages
+from tomoskin.server import page_messages as page_messages, robot_messages as robot_messages
 from tomoskin.server.access import (
     AccessPolicy as AccessPolicy,
     is_loopback as is_loopback,

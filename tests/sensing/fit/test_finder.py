@@ -180,7 +180,7 @@ def test_a_rise_beside_a_press_is_no_touch(first: int) -> None:
     for k in range(first, first + 6):
         (detection,) = ours.push(data(risen) + n[k], NOTHING)
         assert place(detection) == pytest.approx([-0.04, 0.02], abs=4e-3)
-        assert "near 4" in (ours.watch.problem or "")
+        assert "near 4" in (ours.watch.lifted_problem or "")
     assert ours.watch.rises
     assert len(ours.push(data(pressed) + n[0], NOTHING)) == 1
     assert not ours.watch.rises

@@ -146,7 +146,7 @@ def test_a_short_slide_that_one_frame_cannot_tell_from_noise_is_held_and_told(
     for seed in range(5, 10):
         shown = standing(rate, 6.0, NOISE, seed=seed, way=way)[round(3 * rate) :]
         inside += [_in_ellipse(d, way) for d in shown]
-        late.append(np.mean([d.x for d in shown[-rate:]]))
+        late.append(np.mean([d.x for d in shown[-round(rate) :]]))
     assert np.mean(inside) > 0.84
     assert np.median(late) == pytest.approx(way, abs=1.2e-3), "it stands where it has come to"
 

@@ -31,7 +31,7 @@ from tomoskin.server import (
     Tasks,
     application_of_several,
     during,
-    page_messages as to_page,
+    robot_messages as to_page,
 )
 
 PERIOD = 1 / 20

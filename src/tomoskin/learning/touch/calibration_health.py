@@ -8,7 +8,6 @@ from itertools import compress, product
 from typing import Self
 
 import numpy as np
-from scipy.stats import mannwhitneyu
 
 from tomoskin.core import Detection, FloatArray
 from tomoskin.learning.touch.locator import SHARED, Locator
@@ -170,6 +169,8 @@ _CHANCE = 5e-3
 def _drift(before: FloatArray, newest: FloatArray) -> float:
     """How many times as far the ``newest`` presses (m,) m are missed as those ``before`` (n,) m; 1
     where as many ranks are as high by chance (Mann & Whitney 1947)."""
+    from scipy.stats import mannwhitneyu  # noqa: PLC0415 - loads slowly
+
     if not len(before) or mannwhitneyu(newest, before, alternative="greater").pvalue > _CHANCE:
         return 1.0
     return float(np.median(newest) / max(np.median(before), np.finfo(float).tiny))

@@ -53,26 +53,26 @@ class FitTrial:
         if fitted is None:
             return None
         positions, variances = np.full((len(some), 2), np.nan), np.full(len(some), np.nan)
-        for k, found in enumerate(fitted):
-            if found is not None:
-                positions[k] = found.x, found.y
-                variances[k] = (found.sd_x**2 + found.sd_y**2) / 2
+        for k, detection in enumerate(fitted):
+            if detection is not None:
+                positions[k] = detection.x, detection.y
+                variances[k] = (detection.sd_x**2 + detection.sd_y**2) / 2
         labels = presses.xy[some]
         correction = FitCorrection.of(positions, variances, labels)
-        seen = [k for k, found in enumerate(fitted) if found is not None]
-        if len(seen) < max(_FEWEST, len(some) // 2) or presses.spread is not None:
+        fitted_numbers = [k for k, detection in enumerate(fitted) if detection is not None]
+        if len(fitted_numbers) < max(_FEWEST, len(some) // 2) or presses.spread is not None:
             return cls(correction)
         left_out = locator.region.metres(locator.stacking.left_out[some])
         spread = locator.calibrated(locator.estimates.left_out_spread[some])
         answers = zip(left_out, locator.region.unit**2 * spread, fitted, strict=True)
         both = [
-            together(correction(found), (place, covariance), doubtful=False)[0]
-            for place, covariance, found in answers
-            if found is not None
+            together(correction(detection), (place, covariance), doubtful=False)[0]
+            for place, covariance, detection in answers
+            if detection is not None
         ]
         alone, joint = (
-            np.linalg.norm(np.asarray(said) - labels[seen], axis=1)
-            for said in (positions[seen], both)
+            np.linalg.norm(np.asarray(said) - labels[fitted_numbers], axis=1)
+            for said in (positions[fitted_numbers], both)
         )
         less = alone - joint
         helps = bool(less.mean() > _SURELY * less.std() / np.sqrt(len(less)))

@@ -66,23 +66,23 @@ def _windings(ahead: FloatArray, normal: FloatArray) -> FloatArray:
 
 def _clipped(points: FloatArray, polygon: IntArray) -> IntArray:
     """Ears that are cut off one by one, the best shaped first (Meisters, 1975)."""
-    left = [c for c, before in zip(polygon, np.roll(polygon, 1), strict=True) if c != before]
-    flat = _in_plane(points[left])
-    kept, triangles = list(range(len(left))), []
+    ring = [c for c, before in zip(polygon, np.roll(polygon, 1), strict=True) if c != before]
+    flat = _in_plane(points[ring])
+    kept, triangles = list(range(len(ring))), []
     crossing = _crosses(flat)
     while len(kept) > 3:
         at = None if crossing else _ear(flat[kept])
         if at is None:
-            corners = ", ".join(map(str, polygon[:8].tolist()))
+            listed = ", ".join(map(str, polygon[:8].tolist()))
             raise GeometryError(
-                f"expected polygons whose sides do not cross, got one of the points {corners}",
+                f"expected polygons whose sides do not cross, got one of the points {listed}",
                 hint="cut it into triangles before saving",
             )
         triangles.append([kept[at - 1], kept[at], kept[(at + 1) % len(kept)]])
         del kept[at]
     if len(kept) == 3:
         triangles.append(kept)
-    return np.array(left, dtype=np.int64)[np.array(triangles, dtype=np.int64).reshape(-1, 3)]
+    return np.array(ring, dtype=np.int64)[np.array(triangles, dtype=np.int64).reshape(-1, 3)]
 
 
 def _crosses(flat: FloatArray) -> bool:

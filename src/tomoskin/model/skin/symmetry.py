@@ -179,13 +179,13 @@ class Ambiguity:
     def elsewhere(self, x: float, y: float) -> tuple[tuple[float, float], ...]:
         """The other places, m, whose press gives the voltages of one at (``x``, ``y``) m."""
         here = np.array([[x, y]])
-        found: list[FloatArray] = []
+        places: list[FloatArray] = []
         for one in self.symmetries:
             place = one.moved(here)[0]
-            apart = [np.linalg.norm(place - other) for other in (here[0], *found)]
+            apart = [np.linalg.norm(place - other) for other in (here[0], *places)]
             if min(apart) > self.least:
-                found.append(place)
-        return tuple((float(u), float(v)) for u, v in found)
+                places.append(place)
+        return tuple((float(u), float(v)) for u, v in places)
 
 
 _NOTHING = 0.01
