@@ -82,7 +82,7 @@ def _alone(given: Recorded, loaded: Calibration[Locator], *, several: bool) -> L
     """By the calibration alone: each frame is one press, or two, of a skin that may be unknown."""
     import numpy as np
 
-    from tomoskin.sensing.track import on_sheet
+    from tomoskin.sensing.track import Rim
 
     dv = given.dv
     frames = np.flatnonzero(np.isfinite(dv[:, loaded.model.features.rows]).any(axis=1))
@@ -91,9 +91,11 @@ def _alone(given: Recorded, loaded: Calibration[Locator], *, several: bool) -> L
             f"{given.path}: {len(dv) - len(frames)} frames hold no finite value and were left out"
         )
     _say_health(_strangeness(loaded.model, dv[frames]))
-    outline = None if given.skin is None else given.skin.outline
-    located = (_several if several else _single)(loaded, dv[frames])
-    return frames.tolist(), [tuple(on_sheet(one, outline) for one in some) for some in located]
+    located = list((_several if several else _single)(loaded, dv[frames]))
+    if given.skin is not None:
+        on_sheet = Rim.of(given.skin.outline).on_sheet
+        located = [tuple(map(on_sheet, touches)) for touches in located]
+    return frames.tolist(), located
 
 
 def _strangeness(locator: Locator, dv: FloatArray) -> CalibrationHealth:

@@ -40,7 +40,7 @@ from tomoskin.pipeline.prepare import Prepared
 from tomoskin.pipeline.rest import BodySheets, Rest, Steps, tune, tuned_sheet
 from tomoskin.sensing.fit import LIVE, Pace
 from tomoskin.sensing.signal import Reference
-from tomoskin.sensing.track import SlideCorrection, Tracker
+from tomoskin.sensing.track import Rim, SlideCorrection, Tracker
 
 _STEP = 5e-3
 """Seconds between two frames that allow one step of what is prepared anew. A step is a millisecond
@@ -133,7 +133,7 @@ class Following:
         self._calibrated = frozenset(self._applied)
         if (lag := prepared.skin.touch.slide_lag) is None:
             lag = sum(applied.slide_lag for applied in self._applied.values())
-        tracker.slides, tracker.outline = SlideCorrection(lag), prepared.skin.outline
+        tracker.slides, tracker.rim = SlideCorrection(lag), Rim.of(prepared.skin.outline)
         self._tuning = None if reference is None else tune(prepared, reference, excluded)
         self._sheets: BodySheets | None = None
         poses = [applied.poses for applied in self._applied.values() if len(applied.poses)]

@@ -221,7 +221,7 @@ def test_a_table_that_holds_no_states_is_refused(bare, recorded, tomoskin, text)
 def test_degrees_that_would_be_taken_for_rad_are_refused(bare, recorded, tomoskin):
     table = recorded / "degrees.csv"
     table.write_text("frame,angle\n" + "\n".join(f"{k},{2 * k}" for k in range(40)) + "\n")
-    given = ("--skin", "textile-disc-8", "--states", table, "--out", recorded / "d.npz")
+    given = ("--skin", "textile-disc-8", "--states", table, "--out", recorded / "rad.npz")
     code, _, err = tomoskin("calibrate", "body", bare, *given)
     assert code == 1
     assert "expected angle in rad, up to 6.28, got 78" in err

@@ -33,7 +33,7 @@ def model(sign: str = "decrease") -> SpotModel:
 def finder(**touch: object) -> SpotFinder:
     """One that has seen nothing yet; what it prepares is copied."""
     own = copy(_prepared(**touch))
-    own.deforming = copy(own.deforming)
+    own.deforming, own.watch = copy(own.deforming), copy(own.watch)
     return own
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from tomoskin.core import Detection, Touch
 from tomoskin.model.mesh import Disc, Outline, Polygon, Rectangle
-from tomoskin.sensing.track import TouchEvent, Tracker, on_sheet
+from tomoskin.sensing.track import Rim, TouchEvent, Tracker
 
 BOOMERANG = Polygon(np.array([[0.0, 0.0], [0.1, 0.05], [0.0, 0.02], [-0.1, 0.05]]))
 
@@ -25,20 +25,18 @@ def touch_at(x: float, y: float) -> Touch:
         (Rectangle(0.2, 0.1), (0.15, 0.02), (0.1, 0.02)),
         (Rectangle(0.2, 0.1), (-0.2, 0.3), (-0.1, 0.05)),
         (BOOMERANG, (0.0, 0.04), None),  # between its arms: on the nearer of their edges
-        (None, (9.0, 9.0), (9.0, 9.0)),
     ],
     ids=str,
 )
 def test_a_position_off_the_sheet_moves_to_the_nearest_of_its_rim(
-    outline: Outline | None, place: tuple[float, float], expected: tuple[float, float] | None
+    outline: Outline, place: tuple[float, float], expected: tuple[float, float] | None
 ) -> None:
     touch = touch_at(*place)
-    moved = on_sheet(touch, outline).detection
+    moved = Rim.of(outline).on_sheet(touch).detection
     assert (moved.sd_x, moved.sd_y, moved.cov_xy) == (2e-3, 1e-3, 1e-6)
     if expected is not None:
         assert (moved.x, moved.y) == pytest.approx(expected, abs=1e-9)
         return
-    assert outline is not None
     rim = outline.polyline(1e-4)
     nearest = np.linalg.norm(rim - place, axis=1).min()
     assert np.hypot(moved.x - place[0], moved.y - place[1]) == pytest.approx(nearest, abs=1e-6)
@@ -46,7 +44,7 @@ def test_a_position_off_the_sheet_moves_to_the_nearest_of_its_rim(
 
 def test_a_tracker_tells_touches_and_events_on_the_sheet_and_follows_them_where_they_are() -> None:
     tracker = Tracker()
-    tracker.outline = Disc(0.1)
+    tracker.rim = Rim.of(Disc(0.1))
     touches: list[Touch] = []
     events: list[TouchEvent] = []
     for number in range(12):

@@ -130,7 +130,7 @@ const TEACHING: Readonly<Record<Exclude<Step, "board">, readonly Teaching[]>> = 
   touch: [
     {
       kind: "touch",
-      text: "This teaches the skin where a touch is. Press where the dot is, softly and hard in turn, ten times or more. Positions then come from these presses, each with its uncertainty.",
+      text: "Press where the dot is, softly and hard in turn, ten times or more. Positions then come from them, with their uncertainty.",
       begin: "Begin",
     },
     {

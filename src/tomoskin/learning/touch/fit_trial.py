@@ -89,10 +89,7 @@ class FitTrial:
                 f"presses left out are missed by {both:.1f} mm with the calibration, and by "
                 f"{fit:.1f} mm by the fit alone"
             )
-        return (
-            "the calibration is not used, since it does not surely improve on the fit: presses "
-            f"left out are missed by {both:.1f} mm with it, and by {fit:.1f} mm by the fit alone"
-        )
+        return f"the calibration is not used: {both:.1f} mm off, the fit alone {fit:.1f} mm"
 
 
 def together(

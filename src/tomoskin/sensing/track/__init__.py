@@ -2,7 +2,7 @@
 
 from tomoskin.sensing.track.motion import TrackSettings as TrackSettings, motion_step as motion_step
 from tomoskin.sensing.track.policy import GATE as GATE, HELD as HELD, RESIDUAL as RESIDUAL
-from tomoskin.sensing.track.rim import on_sheet as on_sheet
+from tomoskin.sensing.track.rim import Rim as Rim
 from tomoskin.sensing.track.sliding import (
     SlideCorrection as SlideCorrection,
     likeliest_lag as likeliest_lag,

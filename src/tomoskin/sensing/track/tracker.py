@@ -7,13 +7,12 @@ from dataclasses import replace
 from functools import partial
 
 from tomoskin.core import Detection, Touch, show
-from tomoskin.model.mesh import Outline
 from tomoskin.sensing.track import merging, policy
 from tomoskin.sensing.track.association import FrameOfTouches, ObservedDetection, associate, follow
 from tomoskin.sensing.track.decision import STEP, TrackDecision
 from tomoskin.sensing.track.identity import IdentityLedger
 from tomoskin.sensing.track.motion import TrackSettings, begin
-from tomoskin.sensing.track.rim import on_sheet
+from tomoskin.sensing.track.rim import Rim
 from tomoskin.sensing.track.sliding import SlideCorrection
 from tomoskin.sensing.track.trace import (
     Alone,
@@ -40,7 +39,7 @@ class Tracker:
         Where touches were, of which something may still show.
     slides
         Moves touches that slide to the finger; what is held still is not moved.
-    outline
+    rim
         Of the sheet, beyond which no touch is told; None where it is not known.
     responses
         The touches of the newest frame where the sheet's response is, not moved.
@@ -55,7 +54,7 @@ class Tracker:
         self.traces: list[Trace] = []
         self.residuals = ResidualResponses()
         self.slides, self.ledger = SlideCorrection(0.0), IdentityLedger()
-        self.outline: Outline | None = None
+        self.rim: Rim | None = None
         self._clock = TrackClock()
         self._happened: list[TouchEvent] = []
         self._keys = 0
@@ -85,7 +84,8 @@ class Tracker:
 
     def finger(self, touch: Touch) -> Touch:
         """``touch`` of the newest frame as it is told: where the finger is, and on the sheet."""
-        return on_sheet(self.slides.of_finger(touch), self.outline)
+        moved = self.slides.of_finger(touch)
+        return moved if self.rim is None else self.rim.on_sheet(moved)
 
     def reset(self) -> None:
         """Release every touch and forget all else; identities go on counting.
