@@ -269,6 +269,9 @@ def _schur(matrices: FloatArray, n_inside: int) -> FloatArray:
     """(…, r, r) what is left of ``matrices`` (…, n, n) without their first ``n_inside`` rows."""
     if not n_inside:
         return matrices
+    inside = np.arange(n_inside)  # an empty group has zeros at its first node
+    held = matrices[..., inside, inside]
+    matrices[..., inside, inside] = np.where(held == 0.0, 1.0, held)
     rim = np.arange(n_inside, matrices.shape[-1])
     more = float(matrices[..., rim, rim].max(initial=0.0))
     matrices[..., rim, rim] += more
